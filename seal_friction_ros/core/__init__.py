@@ -1,0 +1,1 @@
+"""Friction physics and the estimator: no ROS, no files, no clock."""

@@ -1,0 +1,170 @@
+"""Pressure -> Coulomb friction: of one seal, and of an actuator with any number of seals."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+from seal_friction_ros.core.friction_coefficient import FrictionCoefficientLaw
+from seal_friction_ros.core.monotone import MonotoneTable
+from seal_friction_ros.core.normal_force import NormalForceLaw
+from seal_friction_ros.core.seal import SealGeometry, contact_length, projected_area
+from seal_friction_ros.core.validated import check, parameter
+
+
+class CoulombLaw(Protocol):
+    """A law of the Coulomb friction of one seal."""
+
+    def coulomb_friction(self, pressure: float) -> float:
+        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]."""
+        ...
+
+
+@dataclass(frozen=True)
+class PhysicsBased:
+    """Coulomb friction from geometry, normal force and coefficient of friction: f_c = mu(F_n) F_n.
+
+    Source: thesis, chapter 7.
+    """
+
+    geometry: SealGeometry
+    normal_force_law: NormalForceLaw
+    friction_coefficient_law: FrictionCoefficientLaw
+    projected_area: float = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'projected_area', projected_area(self.geometry))
+
+    def coulomb_friction(self, pressure: float) -> float:
+        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]."""
+        normal_force = self.normal_force_law.normal_force(pressure, self.projected_area)
+        return self.friction_coefficient_law.coefficient_of_friction(normal_force) * normal_force
+
+
+@dataclass(frozen=True)
+class PriorArtChart:
+    """Coulomb friction read from charts: F = f_c L_r + f_h(P) A_r.
+
+    Source: thesis, chapter 2 (Tables 1 to 3); monotone interpolation between the chart readings is our choice.
+
+    Raises:
+        ValueError: A chart value is out of bounds, or friction falls with pressure.
+    """
+
+    geometry: SealGeometry
+    squeeze_friction: float = parameter(unit='N/m', lower=0.0, upper=1e6, description='f_c, friction per contact length.')
+    pressures: tuple[float, ...] = parameter(unit='Pa', description='Gauge pressures of the chart, increasing.')
+    pressure_frictions: tuple[float, ...] = parameter(unit='Pa', description='f_h, friction per projected area.')
+    table: MonotoneTable = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        check(self)
+        if any(b < a for a, b in zip(self.pressure_frictions, self.pressure_frictions[1:], strict=False)):
+            raise ValueError(f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa falls with pressure')
+        if any(friction < 0.0 for friction in self.pressure_frictions):
+            raise ValueError(f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa is below 0 Pa')
+        table = MonotoneTable(self.pressures, self.pressure_frictions, 'PriorArtChart')
+        object.__setattr__(self, 'table', table)
+
+    def coulomb_friction(self, pressure: float) -> float:
+        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]; constant above the chart."""
+        squeeze_part = self.squeeze_friction * contact_length(self.geometry)
+        return squeeze_part + self.table(pressure) * projected_area(self.geometry)
+
+
+@dataclass(frozen=True)
+class Seal:
+    """One seal: its Coulomb law, what comes on top at breakaway, how sure we are, and where that holds.
+
+    Raises:
+        ValueError: A value is out of bounds, or friction falls with pressure inside the identified range.
+    """
+
+    name: str
+    coulomb_law: CoulombLaw
+    stiction: float = parameter(0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway force above Coulomb friction.')
+    relative_std: float = parameter(
+        unit='1', lower=0.0, upper=10.0, description='Standard deviation of a new reading, share of the friction.'
+    )
+    absolute_std: float = parameter(
+        0.0, unit='N', lower=0.0, upper=1e6, description='Standard deviation of a new reading that does not scale.'
+    )
+    pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
+    pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.pressure_max <= self.pressure_min:
+            raise ValueError(f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa')
+        self._check_monotone()
+
+    def _check_monotone(self) -> None:
+        # 200 intervals over twice the identified range: a table of points can hide a fall between two of them.
+        pressures = [self.pressure_max * i / 100.0 for i in range(201)]
+        frictions = [self.coulomb_law.coulomb_friction(p) for p in pressures]
+        for p, low, high in zip(pressures[1:], frictions, frictions[1:], strict=False):
+            if not (math.isfinite(high) and high >= low * (1.0 - 1e-12)):
+                raise ValueError(f'Seal {self.name}: Coulomb friction falls from {low:.6g} N to {high:.6g} N at {p:.6g} Pa')
+
+
+def coulomb_friction(seal: Seal, pressure: float) -> float:
+    """Magnitude of the sliding friction of one seal [N] at ``pressure`` [Pa, gauge].
+
+    A chamber below ambient pressure presses the seal no less than no pressure does, so negative gauge pressure counts
+    as zero (our choice).
+    """
+    return seal.coulomb_law.coulomb_friction(max(pressure, 0.0))
+
+
+@dataclass(frozen=True)
+class MountedSeal:
+    """A seal and the chamber whose pressure it sees.
+
+    Raises:
+        ValueError: The chamber is neither ``a`` nor ``b``.
+    """
+
+    seal: Seal
+    chamber: str
+
+    def __post_init__(self) -> None:
+        if self.chamber not in ('a', 'b'):
+            raise ValueError(f'chamber = {self.chamber!r} of seal {self.seal.name} is neither a nor b')
+
+
+class ActuatorFriction(NamedTuple):
+    """Friction of all seals of an actuator together."""
+
+    coulomb_friction: float
+    """[N]"""
+    coulomb_friction_std: float
+    """[N]"""
+    stiction: float
+    """[N]"""
+    in_identified_range: bool
+
+
+def actuator_friction(seals: tuple[MountedSeal, ...], pressure_a: float, pressure_b: float) -> ActuatorFriction:
+    """Sum over the seals of an actuator.
+
+    Standard deviations add up linearly, since the seals of an actuator are of one kind, age and temperature and are
+    wrong together (our choice; independent seals would be surer than this). A seal is inside its identified range up
+    to 1 % of the range beyond its ends, so that sensor noise at zero pressure does not count as extrapolation (our
+    choice).
+
+    Args:
+        seals: Seals and their chambers.
+        pressure_a: Pressure of chamber a [Pa, gauge].
+        pressure_b: Pressure of chamber b [Pa, gauge].
+    """
+    total = std = stiction = 0.0
+    inside = True
+    for mounted in seals:
+        seal = mounted.seal
+        pressure = pressure_a if mounted.chamber == 'a' else pressure_b
+        friction = coulomb_friction(seal, pressure)
+        total += friction
+        std += math.sqrt((seal.relative_std * friction) ** 2 + seal.absolute_std**2)
+        stiction += seal.stiction
+        margin = 0.01 * (seal.pressure_max - seal.pressure_min)
+        inside = inside and seal.pressure_min - margin <= pressure <= seal.pressure_max + margin
+    return ActuatorFriction(total, std, stiction, inside)

@@ -1,0 +1,85 @@
+"""Pressure -> normal force of one seal on the wall it slides on."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from seal_friction_ros.core.monotone import MonotoneTable
+from seal_friction_ros.core.validated import check, parameter
+
+
+class NormalForceLaw(Protocol):
+    """A law of the normal force."""
+
+    def normal_force(self, pressure: float, projected_area: float) -> float:
+        """Normal force [N] at ``pressure`` [Pa, gauge, >= 0] on ``projected_area`` [m^2]."""
+        ...
+
+
+@dataclass(frozen=True)
+class AreaDeformationGain:
+    """Normal force linear in the axial force: F_n = G F_ax + F_rad with F_ax = P A_r.
+
+    Source: thesis, chapters 6.2 and 7.
+
+    Raises:
+        ValueError: A parameter is out of bounds.
+    """
+
+    area_deformation_gain: float = parameter(unit='1', lower=0.0, upper=100.0, description='G, slope of F_n over F_ax.')
+    radial_force: float = parameter(unit='N', lower=1e-6, upper=1e6, description='F_rad, normal force at no pressure.')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def normal_force(self, pressure: float, projected_area: float) -> float:
+        """Normal force [N] at ``pressure`` [Pa, gauge, >= 0] on ``projected_area`` [m^2]."""
+        return self.area_deformation_gain * (pressure * projected_area) + self.radial_force
+
+
+@dataclass(frozen=True)
+class NormalForceTable:
+    """Normal force by monotone interpolation of computed or measured values over pressure.
+
+    Above the last pressure it goes on with the slope it has there (our choice: rubber under pressure is as good as a
+    fluid, so the normal force keeps rising).
+
+    Raises:
+        ValueError: Fewer than two points, or pressures or forces that do not increase, or a force that is not positive.
+    """
+
+    pressures: tuple[float, ...] = parameter(unit='Pa', description='Gauge pressures, increasing.')
+    normal_forces: tuple[float, ...] = parameter(unit='N', description='Normal force at each pressure, not decreasing.')
+    table: MonotoneTable = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if any(b < a for a, b in zip(self.normal_forces, self.normal_forces[1:], strict=False)):
+            raise ValueError(f'NormalForceTable.normal_forces = {list(self.normal_forces)} N falls with pressure')
+        if any(force <= 0.0 for force in self.normal_forces):
+            raise ValueError(f'NormalForceTable.normal_forces = {list(self.normal_forces)} N is not above 0 N everywhere')
+        table = MonotoneTable(self.pressures, self.normal_forces, 'NormalForceTable')
+        object.__setattr__(self, 'table', table)  # frozen: the only way to keep what was built from the fields
+
+    def normal_force(self, pressure: float, projected_area: float) -> float:
+        """Normal force [N] at ``pressure`` [Pa, gauge, >= 0]; ``projected_area`` is in the table already."""
+        del projected_area
+        beyond = max(pressure - self.pressures[-1], 0.0)
+        return self.table(pressure) + self.table.end_slope * beyond
+
+
+def area_deformation_gain_from_points(
+    axial_forces: tuple[float, ...], normal_forces: tuple[float, ...]
+) -> AreaDeformationGain:
+    """Least-squares line F_n = G F_ax + F_rad through computed points, both in [N], shape (n,), n >= 2.
+
+    Source: thesis, section 6.2 and Figure 19.
+
+    Raises:
+        ValueError: The line makes no sense as a law (see `AreaDeformationGain`).
+    """
+    n = len(axial_forces)
+    mean_x, mean_y = math.fsum(axial_forces) / n, math.fsum(normal_forces) / n
+    slope = math.fsum((x - mean_x) * (y - mean_y) for x, y in zip(axial_forces, normal_forces, strict=True)) / math.fsum(
+        (x - mean_x) ** 2 for x in axial_forces
+    )
+    return AreaDeformationGain(slope, mean_y - slope * mean_x)

@@ -1,0 +1,105 @@
+"""The document of a seal file (a mapping, as YAML or JSON give it) -> `Seal`. Laws are chosen by name.
+
+A seal file looks like this; every law and every field is in docs/seal_files.md::
+
+    name: ms28775_114
+    source: where the numbers are from
+    geometry: {section_diameter: 2.69e-3, ...}
+    coulomb_law: physics_based          # or prior_art_chart
+    normal_force: {law: area_deformation_gain, area_deformation_gain: 0.39, radial_force: 9.3}
+    friction_coefficient: {law: power_law, coefficient: 2.1, exponent: 0.56}
+    stiction: 2.5
+    uncertainty: {relative_std: 0.08, absolute_std: 0.3}
+    identified_pressure: [0.0, 6.9e+6]
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from seal_friction_ros.core.coulomb import CoulombLaw, MountedSeal, PhysicsBased, PriorArtChart, Seal
+from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.seal import SealGeometry
+from seal_friction_ros.core.validated import from_mapping
+
+NORMAL_FORCE_LAWS: dict[str, type] = {'area_deformation_gain': AreaDeformationGain, 'monotone_table': NormalForceTable}
+FRICTION_COEFFICIENT_LAWS: dict[str, type] = {'power_law': PowerLaw, 'monotone_table': CoefficientTable}
+COULOMB_LAWS = ('physics_based', 'prior_art_chart')
+
+_COMMON = {'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'uncertainty', 'identified_pressure'}
+_PARTS = {'physics_based': {'normal_force', 'friction_coefficient'}, 'prior_art_chart': {'chart'}}
+
+
+def parse_seal(document: Any) -> Seal:
+    """Make a seal from the document of a seal file.
+
+    Raises:
+        ValueError: The document makes no sense; the message names the seal, the field, its value and its bound.
+    """
+    if not isinstance(document, Mapping):
+        raise ValueError(f'a seal file is a mapping of names to values, not {type(document).__name__}')
+    name = document.get('name')
+    if not isinstance(name, str) or not name:
+        raise ValueError(f'seal file: name = {name!r} is not a text')
+    where = f'seal {name}'
+    law_name = _choice(document, 'coulomb_law', COULOMB_LAWS, where)
+    unknown = sorted(str(key) for key in document if key not in _COMMON | _PARTS[law_name])
+    if unknown:
+        allowed = ', '.join(sorted(_COMMON | _PARTS[law_name]))
+        raise ValueError(f'{where}: {law_name} has no {", ".join(unknown)}: it has {allowed}')
+    geometry = from_mapping(SealGeometry, _part(document, 'geometry', where), f'{where}: geometry')
+    law: CoulombLaw
+    if law_name == 'physics_based':
+        law = PhysicsBased(
+            geometry,
+            _law(document, 'normal_force', NORMAL_FORCE_LAWS, where),
+            _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where),
+        )
+    else:
+        law = from_mapping(PriorArtChart, {**_part(document, 'chart', where), 'geometry': geometry}, f'{where}: chart')
+    pressure_min, pressure_max = _range(document, where)
+    rest = {
+        'stiction': document.get('stiction', 0.0),
+        'pressure_min': pressure_min,
+        'pressure_max': pressure_max,
+        **_part(document, 'uncertainty', where),
+    }
+    return from_mapping(Seal, {'name': name, 'coulomb_law': law, **rest}, where)
+
+
+def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:
+    """Seals of an actuator from their documents and the chamber (``a`` or ``b``) of each.
+
+    Raises:
+        ValueError: There are not as many chambers as seals, or a document or chamber makes no sense.
+    """
+    if len(documents) != len(chambers):
+        raise ValueError(f'seals has {len(documents)} entries but seal_chambers has {len(chambers)}: give one chamber a seal')
+    return tuple(MountedSeal(parse_seal(d), chamber) for d, chamber in zip(documents, chambers, strict=True))
+
+
+def _part(document: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+    part = document.get(key)
+    if not isinstance(part, Mapping):
+        raise ValueError(f'{where}: {key} = {part!r} is not a mapping of names to values')
+    return part
+
+
+def _choice(document: Mapping[str, Any], key: str, choices: Any, where: str) -> str:
+    value = document.get(key)
+    if value not in tuple(choices):
+        raise ValueError(f'{where}: {key} = {value!r} is not one of {", ".join(choices)}')
+    return str(value)
+
+
+def _law(document: Mapping[str, Any], key: str, laws: dict[str, type], where: str) -> Any:
+    part = _part(document, key, where)
+    name = _choice(part, 'law', laws, f'{where}: {key}')
+    return from_mapping(laws[name], {k: v for k, v in part.items() if k != 'law'}, f'{where}: {key}')
+
+
+def _range(document: Mapping[str, Any], where: str) -> tuple[Any, Any]:
+    value = document.get('identified_pressure')
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise ValueError(f'{where}: identified_pressure = {value!r} is not a list of two pressures [Pa]')
+    return value[0], value[1]

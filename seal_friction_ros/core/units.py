@@ -1,0 +1,45 @@
+"""Units that data are read in and plots are labelled with; everything else is SI (REP-103)."""
+
+INCH = 0.0254  # [m]
+LBF = 4.4482216152605  # [N]
+PSI = LBF / INCH**2  # [Pa]
+BAR = 1.0e5  # [Pa]
+
+UNITS: dict[str, float] = {
+    '1': 1.0,
+    's': 1.0,
+    'ms': 1e-3,
+    'us': 1e-6,
+    'ns': 1e-9,
+    'm': 1.0,
+    'mm': 1e-3,
+    'um': 1e-6,
+    'in': INCH,
+    'm/s': 1.0,
+    'mm/s': 1e-3,
+    'in/s': INCH,
+    'Pa': 1.0,
+    'kPa': 1e3,
+    'MPa': 1e6,
+    'bar': BAR,
+    'psi': PSI,
+    'N': 1.0,
+    'kN': 1e3,
+    'lbf': LBF,
+    'm2': 1.0,
+    'mm2': 1e-6,
+    'in2': INCH**2,
+}
+"""Name of a unit -> its size in SI."""
+
+
+def unit_size(name: str) -> float:
+    """Size in SI of the unit called ``name``, for example 6894.757 [Pa] for ``psi``.
+
+    Raises:
+        ValueError: There is no such unit.
+    """
+    try:
+        return UNITS[name]
+    except KeyError:
+        raise ValueError(f'unknown unit {name!r}: use one of {", ".join(UNITS)}') from None

@@ -1,0 +1,109 @@
+"""Parameters that cannot exist wrong: frozen dataclasses whose fields carry unit, bounds and meaning.
+
+From this one place follow the check at construction, the check of a YAML file, the ROS parameter declaration
+(``nodes/parameters.py``) and the tables in the docs.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+Record = TypeVar('Record')
+
+
+@dataclasses.dataclass(frozen=True)
+class Meaning:
+    """What a field is: unit, bounds (both included), description, and whether it may change while the node is active."""
+
+    unit: str
+    description: str
+    lower: float | None = None
+    upper: float | None = None
+    live: bool = True
+
+    def bounds_text(self) -> str:
+        """Bounds for a reader, for example ``0.0 to 1.0``; empty if there are none."""
+        if self.lower is None and self.upper is None:
+            return ''
+        return f'{"" if self.lower is None else self.lower} to {"" if self.upper is None else self.upper}'.strip()
+
+
+def parameter(
+    default: Any = dataclasses.MISSING,
+    *,
+    unit: str,
+    description: str,
+    lower: float | None = None,
+    upper: float | None = None,
+    live: bool = True,
+) -> Any:
+    """Dataclass field with its unit, bounds (both included) and meaning."""
+    meaning = Meaning(unit, description, lower, upper, live)
+    return dataclasses.field(default=default, metadata={'meaning': meaning})
+
+
+def meanings(record: Any) -> dict[str, Meaning]:
+    """Meaning of each described field of a dataclass or of an instance of it, in order of declaration."""
+    return {f.name: f.metadata['meaning'] for f in dataclasses.fields(record) if 'meaning' in f.metadata}
+
+
+def check(record: Any) -> None:
+    """Check the described fields of a dataclass instance against their bounds.
+
+    Raises:
+        ValueError: A number is not finite or out of bounds; the message names field, value, unit and bound.
+    """
+    for name, meaning in meanings(record).items():
+        value = getattr(record, name)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            continue
+        where = f'{type(record).__name__}.{name} = {value} {meaning.unit}'
+        if not math.isfinite(value):
+            raise ValueError(f'{where} is not finite')
+        if meaning.lower is not None and value < meaning.lower:
+            raise ValueError(f'{where} is below its lower bound {meaning.lower} {meaning.unit}')
+        if meaning.upper is not None and value > meaning.upper:
+            raise ValueError(f'{where} is above its upper bound {meaning.upper} {meaning.unit}')
+
+
+def from_mapping(record_type: type[Record], values: Mapping[str, Any], where: str) -> Record:
+    """Make a dataclass from a mapping that came from outside.
+
+    Integers are taken for floats, lists for tuples; nothing else is converted.
+
+    Args:
+        record_type: Dataclass whose fields are bool, int, float, str or tuples of str or float.
+        values: Field name to value; fields with a default may be left out.
+        where: What the mapping is, for the error message.
+
+    Raises:
+        ValueError: A field is unknown, missing, of the wrong type or out of bounds.
+    """
+    if not isinstance(values, Mapping):
+        raise ValueError(f'{where} is not a mapping of names to values but {values!r}')
+    fields = {f.name: f for f in dataclasses.fields(record_type) if f.init}  # type: ignore[arg-type]
+    unknown = sorted(str(name) for name in values if name not in fields)
+    if unknown:
+        raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(fields)}')
+    missing = [n for n, f in fields.items() if n not in values and f.default is dataclasses.MISSING]
+    if missing:
+        raise ValueError(f'{where} lacks {", ".join(missing)}')
+    converted = {name: _as_declared(value, fields[name].type, f'{where}.{name}') for name, value in values.items()}
+    try:
+        return record_type(**converted)
+    except ValueError as error:
+        raise ValueError(f'{where}: {error}') from None
+
+
+def _as_declared(value: Any, declared: Any, where: str) -> Any:
+    if declared in (float, int, bool, str):
+        if declared is float and type(value) is int:
+            return float(value)
+        if type(value) is not declared:
+            raise ValueError(f'{where} = {value!r} is not a {declared.__name__}')
+        return value
+    if not isinstance(value, list | tuple):
+        raise ValueError(f'{where} = {value!r} is not a list')
+    item = declared.__args__[0]
+    return tuple(_as_declared(v, item, f'{where}[{i}]') for i, v in enumerate(value))

@@ -1,0 +1,102 @@
+"""The door through which YAML comes in, used by nodes and tools alike: seal files, parameter files, what is installed."""
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from seal_friction_ros.core.configuration import Configuration, SealSelection
+from seal_friction_ros.core.estimator import EstimatorSettings
+from seal_friction_ros.core.validated import from_mapping, meanings
+
+_LARGEST_YAML = 1 << 20  # [bytes] a seal or parameter file has a few thousand
+
+
+class _PlainLoader(yaml.CSafeLoader):
+    """Safe loader that takes no aliases (a few lines of them can unfold to gigabytes) and no duplicate keys."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError('aliases (*name) are not allowed')
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+        keys = [key.value for key, _ in node.value]
+        doubled = sorted({str(key) for key in keys if keys.count(key) > 1})
+        if doubled:
+            raise yaml.YAMLError(f'{", ".join(doubled)} stands twice in one mapping')
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: Path) -> Any:
+    """Document of a YAML file, plain data only.
+
+    Raises:
+        ValueError: The file is missing, not readable, too large or not plain YAML; one line that names it.
+    """
+    try:
+        if path.stat().st_size > _LARGEST_YAML:
+            raise ValueError(f'{path}: larger than {_LARGEST_YAML} bytes, not a file of this kind')
+        return yaml.load(path.read_text(encoding='utf-8'), Loader=_PlainLoader)  # a safe loader, restricted further
+    except OSError as error:
+        raise ValueError(f'{path}: {error.strerror}') from None
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        raise ValueError(f'{path}: not plain YAML: {" ".join(str(error).split())}') from None
+
+
+def share_directory(package: str, module_file: str) -> Path:
+    """Folder that holds what a package installs besides code.
+
+    Looked for beside and above the code: ``share/<package>`` of an install prefix, or the source tree itself.
+
+    Raises:
+        FileNotFoundError: There is none.
+    """
+    for parent in Path(module_file).resolve().parents:
+        for candidate in (parent / 'share' / package, parent):
+            if (candidate / 'package.xml').is_file():
+                return candidate
+    raise FileNotFoundError(f'no share folder of {package} above {module_file}')
+
+
+def config_path(kind: str, name: str) -> Path:
+    """Path of a configuration file given by name: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``."""
+    if '/' in name or name.endswith('.yaml'):
+        return Path(name).expanduser()
+    return share_directory('seal_friction_ros', __file__) / 'config' / kind / f'{name}.yaml'
+
+
+def load_configuration(selection: SealSelection, settings: EstimatorSettings) -> Configuration:
+    """Configuration with the seal files that ``selection`` names.
+
+    Raises:
+        ValueError: A seal file cannot be read or makes no sense; one line that names file, field, value and bound.
+    """
+    paths = [config_path('seals', name) for name in selection.seals]
+    configuration = Configuration(selection, tuple(read_yaml(path) for path in paths), settings)
+    try:
+        configuration.parameters()
+    except ValueError as error:
+        raise ValueError(f'{", ".join(sorted({str(p) for p in paths}))}: {error}') from None
+    return configuration
+
+
+def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
+    """Selection and settings from a ROS parameter file (``/**: ros__parameters: ...``), of any node name.
+
+    Parameters of the node that are not the estimator's (recording, QoS) are passed over.
+
+    Raises:
+        ValueError: The file is no parameter file, or a value makes no sense.
+    """
+    document = read_yaml(path)
+    values: dict[str, Any] = {}
+    try:
+        for node in document.values():
+            values.update(node['ros__parameters'])
+    except (AttributeError, KeyError, TypeError):
+        raise ValueError(f'{path}: not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)') from None
+    return tuple(  # type: ignore[return-value]
+        from_mapping(kind, {k: v for k, v in values.items() if k in meanings(kind)}, str(path))
+        for kind in (SealSelection, EstimatorSettings)
+    )

@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# Set up .venv, once: `tools/setup.sh run` for what the package needs, `tools/setup.sh dev` for the tests as well.
+# Without ROS the ROS 2 wheels of requirements/run.txt make .venv an ament underlay of its own; with ROS_DISTRO set
+# (a sourced installation, Jazzy or newer) that ROS is used and only the other packages are installed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+profile=${1:-run}
+log=build/setup.log
+
+say() { printf 'setup: %s\n' "$1" >&2; }
+fail() { say "$1"; exit 2; }
+
+wanted='import sys, sysconfig, venv, ensurepip, pathlib
+assert (3, 11) <= sys.version_info < (3, 14)
+assert pathlib.Path(sysconfig.get_path("include"), "Python.h").exists()'
+
+find_python() {
+    local candidate
+    for candidate in ${PYTHON:-python3 python3.13 python3.12 python3.11 /usr/bin/python3}; do
+        if "$candidate" -c "$wanted" >/dev/null 2>&1; then
+            "$candidate" -c 'import sys; print(sys.executable)'
+            return
+        fi
+    done
+    fail "no Python 3.11, 3.12 or 3.13 with venv and headers among: ${PYTHON:-python3, python3.13, python3.12, python3.11} (Debian: apt-get install python3-venv python3-dev; or set PYTHON=/path/to/python)"
+}
+
+# What the environment was made from; when none of it changed there is nothing to do.
+fingerprint() {
+    { cat requirements/run.txt tools/setup.sh tools/patch_wheels.py setup.py setup.cfg msg_defs/CMakeLists.txt msg_defs/package.xml msg_defs/msg/*.msg
+      [ "$1" = dev ] && cat requirements/dev.txt
+      printf '%s\n' "$PWD" "${PYTHON:-}" "${ROS_DISTRO:-wheels}"; } | sha256sum | cut -d' ' -f1
+}
+
+done_already() { [ -x .venv/bin/seal_friction ] && [ "$(cat ".venv/.setup-$1" 2>/dev/null)" = "$(fingerprint "$1")" ]; }
+
+run_logged() { "$@" >>"$log" 2>&1 || fail "'$1 ${2:-} ${3:-}' failed; the last lines of $log: $(tail -n 3 "$log" | tr '\n' ' ')"; }
+
+install_requirements() {
+    # With a distribution the ROS packages come from there, so the ros-* and build-tool wheels are left out.
+    if [ -n "${ROS_DISTRO:-}" ]; then
+        grep -v -E '^(ros-|colcon|cmake==|setuptools==|empy==|catkin-pkg==|lark-parser==)' "$1" >build/requirements.txt
+    else
+        cp "$1" build/requirements.txt
+    fi
+    run_logged .venv/bin/python -m pip install --disable-pip-version-check -r build/requirements.txt
+}
+
+build_messages() {
+    local colcon=.venv/bin/colcon prefix=$PWD/.venv
+    if [ -n "${ROS_DISTRO:-}" ]; then
+        colcon=colcon prefix=${CMAKE_PREFIX_PATH:-$AMENT_PREFIX_PATH}
+    else
+        run_logged .venv/bin/python tools/patch_wheels.py
+    fi
+    run_logged env PATH="$PWD/.venv/bin:$PATH" AMENT_PREFIX_PATH="${AMENT_PREFIX_PATH:-$prefix}" CMAKE_PREFIX_PATH="$prefix" \
+        "$colcon" --log-base build/log build --base-paths msg_defs --build-base build/messages \
+        --install-base .venv --merge-install \
+        --cmake-args -DPython3_EXECUTABLE="$PWD/.venv/bin/python" -DBUILD_TESTING=OFF
+}
+
+make_environment() {
+    local python
+    command -v "${CC:-cc}" >/dev/null || fail "no C compiler (${CC:-cc}): on Debian or Ubuntu, apt-get install build-essential"
+    command -v "${CXX:-c++}" >/dev/null || fail "no C++ compiler (${CXX:-c++}): on Debian or Ubuntu, apt-get install build-essential"
+    python=$(find_python) || exit 2
+    rm -rf .venv build/messages
+    mkdir -p build && touch build/COLCON_IGNORE && : >"$log"
+    say "making .venv with $("$python" --version), ROS 2 from ${ROS_DISTRO:-wheels}: a minute or two, once"
+    if [ -n "${ROS_DISTRO:-}" ]; then
+        command -v colcon >/dev/null || fail "ROS_DISTRO is $ROS_DISTRO but there is no colcon: apt-get install python3-colcon-common-extensions"
+        [ -n "${AMENT_PREFIX_PATH:-}" ] || fail "ROS_DISTRO is $ROS_DISTRO but AMENT_PREFIX_PATH is not set: source /opt/ros/$ROS_DISTRO/setup.bash"
+        run_logged "$python" -m venv --system-site-packages .venv
+    else
+        run_logged "$python" -m venv .venv
+    fi
+    touch .venv/COLCON_IGNORE
+    install_requirements requirements/run.txt
+    build_messages
+    run_logged .venv/bin/python -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable .
+    fingerprint run >.venv/.setup-run
+}
+
+done_already run || make_environment
+if [ "$profile" = dev ] && ! done_already dev; then
+    say "adding the packages the tests need"
+    install_requirements requirements/dev.txt
+    fingerprint dev >.venv/.setup-dev
+fi
