@@ -1,10 +1,16 @@
-"""Build of the ament_python package: `colcon build --base-paths . msg_defs`, or `make setup` on a machine without ROS."""
+"""Build of the ament_python package: `colcon build --base-paths . msg_defs`, or `make setup` without ROS."""
 
-from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = 'seal_friction_ros'
+
+
+def shared(folder: str, pattern: str) -> tuple[str, list[str]]:
+    """Where files of a folder of the source tree are installed."""
+    return f'share/{NAME}/{folder}', sorted(str(path) for path in Path(folder).glob(pattern))
+
 
 setup(
     name=NAME,
@@ -13,9 +19,10 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
-        ('share/' + NAME + '/config', glob('config/*.yaml')),
-        ('share/' + NAME + '/config/seals', glob('config/seals/*.yaml')),
-        ('share/' + NAME + '/config/rigs', glob('config/rigs/*.yaml')),
+        shared('config', '*.yaml'),
+        shared('config/seals', '*.yaml'),
+        shared('config/rigs', '*.yaml'),
+        shared('data/thesis', '*.csv'),
     ],
     package_data={NAME: ['py.typed']},
     python_requires='>=3.11',

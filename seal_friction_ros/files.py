@@ -1,4 +1,4 @@
-"""The door through which YAML comes in, used by nodes and tools alike: seal files, parameter files, what is installed."""
+"""The door through which YAML comes in, for nodes and tools alike: seal files and parameter files."""
 
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from seal_friction_ros.core.validated import from_mapping, meanings
 _LARGEST_YAML = 1 << 20  # [bytes] a seal or parameter file has a few thousand
 
 
-class _PlainLoader(yaml.CSafeLoader):
+class _PlainLoader(yaml.SafeLoader):
     """Safe loader that takes no aliases (a few lines of them can unfold to gigabytes) and no duplicate keys."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
@@ -37,7 +37,7 @@ def read_yaml(path: Path) -> Any:
     try:
         if path.stat().st_size > _LARGEST_YAML:
             raise ValueError(f'{path}: larger than {_LARGEST_YAML} bytes, not a file of this kind')
-        return yaml.load(path.read_text(encoding='utf-8'), Loader=_PlainLoader)  # a safe loader, restricted further
+        return _PlainLoader(path.read_text(encoding='utf-8')).get_single_data()
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
@@ -60,7 +60,7 @@ def share_directory(package: str, module_file: str) -> Path:
 
 
 def config_path(kind: str, name: str) -> Path:
-    """Path of a configuration file given by name: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``."""
+    """Path of a configuration file: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``."""
     if '/' in name or name.endswith('.yaml'):
         return Path(name).expanduser()
     return share_directory('seal_friction_ros', __file__) / 'config' / kind / f'{name}.yaml'

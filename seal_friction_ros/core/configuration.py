@@ -43,7 +43,9 @@ class SealSelection:
             )
         wrong = [chamber for chamber in self.seal_chambers if chamber not in ('a', 'b')]
         if wrong:
-            raise ValueError(f'SealSelection.seal_chambers = {list(self.seal_chambers)}: {wrong[0]!r} is neither a nor b')
+            raise ValueError(
+                f'SealSelection.seal_chambers = {list(self.seal_chambers)}: {wrong[0]!r} is neither a nor b'
+            )
 
 
 @dataclass(frozen=True)

@@ -51,15 +51,19 @@ class PriorArtChart:
     """
 
     geometry: SealGeometry
-    squeeze_friction: float = parameter(unit='N/m', lower=0.0, upper=1e6, description='f_c, friction per contact length.')
+    squeeze_friction: float = parameter(
+        unit='N/m', lower=0.0, upper=1e6, description='f_c, friction per contact length.'
+    )
     pressures: tuple[float, ...] = parameter(unit='Pa', description='Gauge pressures of the chart, increasing.')
     pressure_frictions: tuple[float, ...] = parameter(unit='Pa', description='f_h, friction per projected area.')
     table: MonotoneTable = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         check(self)
-        if any(b < a for a, b in zip(self.pressure_frictions, self.pressure_frictions[1:], strict=False)):
-            raise ValueError(f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa falls with pressure')
+        if list(self.pressure_frictions) != sorted(self.pressure_frictions):
+            raise ValueError(
+                f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa falls with pressure'
+            )
         if any(friction < 0.0 for friction in self.pressure_frictions):
             raise ValueError(f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa is below 0 Pa')
         table = MonotoneTable(self.pressures, self.pressure_frictions, 'PriorArtChart')
@@ -72,6 +76,27 @@ class PriorArtChart:
 
 
 @dataclass(frozen=True)
+class Uncertainty:
+    """How far a new reading of the Coulomb friction of one seal may be off: std^2 = (relative f_c)^2 + absolute^2.
+
+    Raises:
+        ValueError: A value is out of bounds.
+    """
+
+    relative_std: float = parameter(
+        unit='1', lower=0.0, upper=10.0, description='Part that is a share of the friction.'
+    )
+    absolute_std: float = parameter(0.0, unit='N', lower=0.0, upper=1e6, description='Part that does not scale.')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def std(self, friction: float) -> float:
+        """Standard deviation [N] at a Coulomb friction of ``friction`` [N]."""
+        return math.sqrt((self.relative_std * friction) ** 2 + self.absolute_std**2)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Seal:
     """One seal: its Coulomb law, what comes on top at breakaway, how sure we are, and where that holds.
 
@@ -81,12 +106,9 @@ class Seal:
 
     name: str
     coulomb_law: CoulombLaw
-    stiction: float = parameter(0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway force above Coulomb friction.')
-    relative_std: float = parameter(
-        unit='1', lower=0.0, upper=10.0, description='Standard deviation of a new reading, share of the friction.'
-    )
-    absolute_std: float = parameter(
-        0.0, unit='N', lower=0.0, upper=1e6, description='Standard deviation of a new reading that does not scale.'
+    uncertainty: Uncertainty
+    stiction: float = parameter(
+        0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway force above Coulomb friction.'
     )
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
@@ -94,7 +116,9 @@ class Seal:
     def __post_init__(self) -> None:
         check(self)
         if self.pressure_max <= self.pressure_min:
-            raise ValueError(f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa')
+            raise ValueError(
+                f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa'
+            )
         self._check_monotone()
 
     def _check_monotone(self) -> None:
@@ -103,7 +127,9 @@ class Seal:
         frictions = [self.coulomb_law.coulomb_friction(p) for p in pressures]
         for p, low, high in zip(pressures[1:], frictions, frictions[1:], strict=False):
             if not (math.isfinite(high) and high >= low * (1.0 - 1e-12)):
-                raise ValueError(f'Seal {self.name}: Coulomb friction falls from {low:.6g} N to {high:.6g} N at {p:.6g} Pa')
+                raise ValueError(
+                    f'Seal {self.name}: Coulomb friction falls from {low:.6g} N to {high:.6g} N at {p:.6g} Pa'
+                )
 
 
 def coulomb_friction(seal: Seal, pressure: float) -> float:
@@ -163,7 +189,7 @@ def actuator_friction(seals: tuple[MountedSeal, ...], pressure_a: float, pressur
         pressure = pressure_a if mounted.chamber == 'a' else pressure_b
         friction = coulomb_friction(seal, pressure)
         total += friction
-        std += math.sqrt((seal.relative_std * friction) ** 2 + seal.absolute_std**2)
+        std += seal.uncertainty.std(friction)
         stiction += seal.stiction
         margin = 0.01 * (seal.pressure_max - seal.pressure_min)
         inside = inside and seal.pressure_min - margin <= pressure <= seal.pressure_max + margin

@@ -1,4 +1,6 @@
-"""The one estimator, online and offline: ``state = init(parameters)``; ``state, estimate = step(parameters, state, sample)``.
+"""The one estimator, online and offline.
+
+``state = init(parameters)``, then ``state, estimate = step(parameters, state, sample)`` at every velocity sample.
 
 Nothing here knows of ROS, files or a clock: time is the stamp of the samples, so the same samples give the same
 estimates, live or replayed.
@@ -26,10 +28,10 @@ class EstimatorSettings:
         1e-3, unit='m/s', lower=0.0, upper=1.0, description='A sliding rod is at rest at this speed and below.'
     )
     slip_velocity: float = parameter(
-        2e-3, unit='m/s', lower=0.0, upper=1.0, description='A rod at rest slides above this speed; not below stick_velocity.'
+        2e-3, unit='m/s', lower=0.0, upper=1.0, description='A rod at rest slides above this speed.'
     )
     use_stiction: bool = parameter(
-        True, unit='', description='Breakaway force above Coulomb friction by the stiction of the seals; else equal to it.'
+        True, unit='', description='Breakaway force above Coulomb friction by the stiction of the seals.'
     )
     pressure_timeout: float = parameter(
         0.1, unit='s', lower=1e-4, upper=60.0, description='Largest distance in time between velocity and pressure.'

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from statistics import linear_regression
 from typing import Protocol
 
 from seal_friction_ros.core.monotone import MonotoneTable
@@ -79,8 +80,5 @@ def power_law_from_points(normal_forces: Sequence[float], frictions: Sequence[fl
     """
     x = [math.log(force) for force in normal_forces]
     y = [math.log(friction) for friction in frictions]
-    mean_x, mean_y = math.fsum(x) / len(x), math.fsum(y) / len(y)
-    slope = math.fsum((a - mean_x) * (b - mean_y) for a, b in zip(x, y, strict=True)) / math.fsum(
-        (a - mean_x) ** 2 for a in x
-    )
-    return PowerLaw(math.exp(mean_y - slope * mean_x), 1.0 - slope)
+    slope, intercept = linear_regression(x, y)
+    return PowerLaw(math.exp(intercept), 1.0 - slope)

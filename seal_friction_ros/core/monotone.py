@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -27,7 +28,7 @@ class MonotoneTable:
             raise ValueError(f'{name}: needs at least two points with as many ordinates, got {len(x)} and {len(y)}')
         if not (np.isfinite(x).all() and np.isfinite(y).all()):
             raise ValueError(f'{name}: not every point is finite')
-        if any(b <= a for a, b in zip(x, x[1:], strict=False)):
+        if any(b <= a for a, b in pairwise(x)):
             raise ValueError(f'{name}: abscissae do not increase: {list(x)}')
         spline = PchipInterpolator(x, y)
         self._knots = [float(v) for v in spline.x]

@@ -1,7 +1,8 @@
 """Pressure -> normal force of one seal on the wall it slides on."""
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from statistics import linear_regression
 from typing import Protocol
 
 from seal_friction_ros.core.monotone import MonotoneTable
@@ -53,10 +54,12 @@ class NormalForceTable:
     table: MonotoneTable = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if any(b < a for a, b in zip(self.normal_forces, self.normal_forces[1:], strict=False)):
+        if list(self.normal_forces) != sorted(self.normal_forces):
             raise ValueError(f'NormalForceTable.normal_forces = {list(self.normal_forces)} N falls with pressure')
         if any(force <= 0.0 for force in self.normal_forces):
-            raise ValueError(f'NormalForceTable.normal_forces = {list(self.normal_forces)} N is not above 0 N everywhere')
+            raise ValueError(
+                f'NormalForceTable.normal_forces = {list(self.normal_forces)} N is not above 0 N everywhere'
+            )
         table = MonotoneTable(self.pressures, self.normal_forces, 'NormalForceTable')
         object.__setattr__(self, 'table', table)  # frozen: the only way to keep what was built from the fields
 
@@ -68,7 +71,7 @@ class NormalForceTable:
 
 
 def area_deformation_gain_from_points(
-    axial_forces: tuple[float, ...], normal_forces: tuple[float, ...]
+    axial_forces: Sequence[float], normal_forces: Sequence[float]
 ) -> AreaDeformationGain:
     """Least-squares line F_n = G F_ax + F_rad through computed points, both in [N], shape (n,), n >= 2.
 
@@ -77,9 +80,5 @@ def area_deformation_gain_from_points(
     Raises:
         ValueError: The line makes no sense as a law (see `AreaDeformationGain`).
     """
-    n = len(axial_forces)
-    mean_x, mean_y = math.fsum(axial_forces) / n, math.fsum(normal_forces) / n
-    slope = math.fsum((x - mean_x) * (y - mean_y) for x, y in zip(axial_forces, normal_forces, strict=True)) / math.fsum(
-        (x - mean_x) ** 2 for x in axial_forces
-    )
-    return AreaDeformationGain(slope, mean_y - slope * mean_x)
+    slope, intercept = linear_regression(axial_forces, normal_forces)
+    return AreaDeformationGain(slope, intercept)

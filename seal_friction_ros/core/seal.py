@@ -10,7 +10,7 @@ from seal_friction_ros.core.validated import check, parameter
 class SealGeometry:
     """An O-ring and the ring-shaped space it is squeezed into.
 
-    The space lies between an inner wall (the rod, or the groove of a piston) and an outer wall (the gland, or the bore).
+    The space lies between an inner wall (rod, or groove of a piston) and an outer wall (gland, or bore).
 
     Raises:
         ValueError: A dimension is out of bounds, the walls do not fit, or the ring is not squeezed.
@@ -21,7 +21,9 @@ class SealGeometry:
     rod_diameter: float = parameter(unit='m', lower=1e-4, upper=10.0, description='Inner wall: rod, or piston groove.')
     gland_diameter: float = parameter(unit='m', lower=1e-4, upper=10.0, description='Outer wall: gland, or bore.')
     sliding_wall: str = parameter('rod', unit='', description='Wall the ring slides on: rod, or bore.')
-    elastic_modulus: float = parameter(5.5e6, unit='Pa', lower=1e4, upper=1e10, description='Young modulus at small strain, E.')
+    elastic_modulus: float = parameter(
+        5.5e6, unit='Pa', lower=1e4, upper=1e10, description='Young modulus at small strain, E.'
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -29,7 +31,8 @@ class SealGeometry:
             raise ValueError(f'SealGeometry.sliding_wall = {self.sliding_wall!r} is neither rod nor bore')
         if self.gland_diameter <= self.rod_diameter:
             raise ValueError(
-                f'SealGeometry.gland_diameter = {self.gland_diameter} m is not above rod_diameter = {self.rod_diameter} m'
+                f'SealGeometry.gland_diameter = {self.gland_diameter} m is not above '
+                f'rod_diameter = {self.rod_diameter} m'
             )
         if not 0.0 < squeeze(self) < 0.5:
             raise ValueError(

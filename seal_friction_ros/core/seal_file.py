@@ -16,7 +16,7 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
 from collections.abc import Mapping
 from typing import Any
 
-from seal_friction_ros.core.coulomb import CoulombLaw, MountedSeal, PhysicsBased, PriorArtChart, Seal
+from seal_friction_ros.core.coulomb import CoulombLaw, MountedSeal, PhysicsBased, PriorArtChart, Seal, Uncertainty
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
@@ -47,7 +47,7 @@ def parse_seal(document: Any) -> Seal:
     if unknown:
         allowed = ', '.join(sorted(_COMMON | _PARTS[law_name]))
         raise ValueError(f'{where}: {law_name} has no {", ".join(unknown)}: it has {allowed}')
-    geometry = from_mapping(SealGeometry, _part(document, 'geometry', where), f'{where}: geometry')
+    geometry = from_mapping(SealGeometry, document.get('geometry'), f'{where}: geometry')
     law: CoulombLaw
     if law_name == 'physics_based':
         law = PhysicsBased(
@@ -56,15 +56,11 @@ def parse_seal(document: Any) -> Seal:
             _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where),
         )
     else:
-        law = from_mapping(PriorArtChart, {**_part(document, 'chart', where), 'geometry': geometry}, f'{where}: chart')
+        law = from_mapping(PriorArtChart, document.get('chart'), f'{where}: chart', geometry=geometry)
+    uncertainty = from_mapping(Uncertainty, document.get('uncertainty'), f'{where}: uncertainty')
     pressure_min, pressure_max = _range(document, where)
-    rest = {
-        'stiction': document.get('stiction', 0.0),
-        'pressure_min': pressure_min,
-        'pressure_max': pressure_max,
-        **_part(document, 'uncertainty', where),
-    }
-    return from_mapping(Seal, {'name': name, 'coulomb_law': law, **rest}, where)
+    numbers = {'pressure_min': pressure_min, 'pressure_max': pressure_max, 'stiction': document.get('stiction', 0.0)}
+    return from_mapping(Seal, numbers, where, name=name, coulomb_law=law, uncertainty=uncertainty)
 
 
 def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:
@@ -74,15 +70,10 @@ def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[
         ValueError: There are not as many chambers as seals, or a document or chamber makes no sense.
     """
     if len(documents) != len(chambers):
-        raise ValueError(f'seals has {len(documents)} entries but seal_chambers has {len(chambers)}: give one chamber a seal')
+        raise ValueError(
+            f'seals has {len(documents)} entries but seal_chambers has {len(chambers)}: give one chamber a seal'
+        )
     return tuple(MountedSeal(parse_seal(d), chamber) for d, chamber in zip(documents, chambers, strict=True))
-
-
-def _part(document: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
-    part = document.get(key)
-    if not isinstance(part, Mapping):
-        raise ValueError(f'{where}: {key} = {part!r} is not a mapping of names to values')
-    return part
 
 
 def _choice(document: Mapping[str, Any], key: str, choices: Any, where: str) -> str:
@@ -93,7 +84,9 @@ def _choice(document: Mapping[str, Any], key: str, choices: Any, where: str) -> 
 
 
 def _law(document: Mapping[str, Any], key: str, laws: dict[str, type], where: str) -> Any:
-    part = _part(document, key, where)
+    part = document.get(key)
+    if not isinstance(part, Mapping):
+        raise ValueError(f'{where}: {key} = {part!r} is not a mapping of names to values')
     name = _choice(part, 'law', laws, f'{where}: {key}')
     return from_mapping(laws[name], {k: v for k, v in part.items() if k != 'law'}, f'{where}: {key}')
 

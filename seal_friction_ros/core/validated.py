@@ -14,7 +14,7 @@ Record = TypeVar('Record')
 
 @dataclasses.dataclass(frozen=True)
 class Meaning:
-    """What a field is: unit, bounds (both included), description, and whether it may change while the node is active."""
+    """What a field is: unit, bounds (both included), meaning, and whether it may change while the node is active."""
 
     unit: str
     description: str
@@ -67,7 +67,7 @@ def check(record: Any) -> None:
             raise ValueError(f'{where} is above its upper bound {meaning.upper} {meaning.unit}')
 
 
-def from_mapping(record_type: type[Record], values: Mapping[str, Any], where: str) -> Record:
+def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any) -> Record:
     """Make a dataclass from a mapping that came from outside.
 
     Integers are taken for floats, lists for tuples; nothing else is converted.
@@ -76,13 +76,14 @@ def from_mapping(record_type: type[Record], values: Mapping[str, Any], where: st
         record_type: Dataclass whose fields are bool, int, float, str or tuples of str or float.
         values: Field name to value; fields with a default may be left out.
         where: What the mapping is, for the error message.
+        made: Fields that were made already, and that the mapping may not give.
 
     Raises:
         ValueError: A field is unknown, missing, of the wrong type or out of bounds.
     """
     if not isinstance(values, Mapping):
         raise ValueError(f'{where} is not a mapping of names to values but {values!r}')
-    fields = {f.name: f for f in dataclasses.fields(record_type) if f.init}  # type: ignore[arg-type]
+    fields = {f.name: f for f in _fields(record_type) if f.init and f.name not in made}
     unknown = sorted(str(name) for name in values if name not in fields)
     if unknown:
         raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(fields)}')
@@ -91,9 +92,13 @@ def from_mapping(record_type: type[Record], values: Mapping[str, Any], where: st
         raise ValueError(f'{where} lacks {", ".join(missing)}')
     converted = {name: _as_declared(value, fields[name].type, f'{where}.{name}') for name, value in values.items()}
     try:
-        return record_type(**converted)
+        return record_type(**made, **converted)
     except ValueError as error:
         raise ValueError(f'{where}: {error}') from None
+
+
+def _fields(record_type: Any) -> tuple[dataclasses.Field[Any], ...]:
+    return dataclasses.fields(record_type)
 
 
 def _as_declared(value: Any, declared: Any, where: str) -> Any:
