@@ -19,7 +19,7 @@ PRESSURE_TYPE = f'{PACKAGE}/msg/CylinderPressure'
 VELOCITY_TYPE = f'{PACKAGE}/msg/RodVelocity'
 FORCE_TYPE = f'{PACKAGE}/msg/ForceSum'
 ESTIMATE_TYPE = f'{PACKAGE}/msg/FrictionEstimate'
-CONFIGURATION_TYPE = 'std_msgs/msg/String'
+CONFIGURATION_TYPE = f'{PACKAGE}/msg/EstimatorConfiguration'
 
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little endian, no options
 _FIRST_HEADER_PART = struct.Struct('<4siII')
@@ -124,13 +124,13 @@ def decode_estimate(data: bytes) -> FrictionEstimate:
 
 
 def encode_text(text: str) -> bytes:
-    """std_msgs/String as bytes."""
+    """EstimatorConfiguration (one text) as bytes."""
     data = text.encode() + b'\x00'
     return struct.pack(f'<4sI{len(data)}s', _ENCAPSULATION, len(data), data)
 
 
 def decode_text(data: bytes) -> str:
-    """std_msgs/String from bytes."""
+    """EstimatorConfiguration from bytes."""
     if len(data) < 9 or data[:2] != b'\x00\x01':
         raise ValueError(f'{len(data)} bytes are not a text in little-endian CDR')
     (length,) = struct.unpack_from('<I', data, 4)

@@ -7,6 +7,7 @@ inside. What is read may be any rosbag2 bag (MCAP or SQLite) or a bare MCAP file
 import shutil
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -223,19 +224,30 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
     Raises:
         BagError: There is no bag, or it is damaged (found out when the damage is reached).
     """
-    try:
+    with _as_bag_errors(path):
         yield from _read_folder(path) if path.is_dir() else _read_file(path)
+
+
+@contextmanager
+def _as_bag_errors(path: Path) -> Iterator[None]:
+    """Turn whatever a reader says of a damaged bag into one line."""
+    try:
+        yield
     except BagError:
         raise
-    except (ReaderError, McapError, OSError, ValueError, KeyError, EOFError, struct.error, AssertionError) as error:
+    except (ReaderError, McapError, OSError, ValueError, LookupError, EOFError, struct.error, AssertionError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise BagError(f'{path}: not a readable bag: {reason}') from None
 
 
-def _read_folder(path: Path) -> Iterator[BagMessage]:
+def _open_folder(path: Path) -> Reader:
     if not (path / 'metadata.yaml').is_file():
         raise BagError(f'{path}: no metadata.yaml in it, so not a rosbag2 bag')
-    with Reader(path) as reader:
+    return Reader(path)
+
+
+def _read_folder(path: Path) -> Iterator[BagMessage]:
+    with _open_folder(path) as reader:
         for connection, log_time, data in reader.messages():
             yield BagMessage(connection.topic, connection.msgtype, log_time, bytes(data))
 
@@ -245,3 +257,31 @@ def _read_file(path: Path) -> Iterator[BagMessage]:
         for schema, channel, message in make_reader(file).iter_messages(log_time_order=True):
             name = schema.name if schema else ''
             yield BagMessage(channel.topic, name, message.log_time, message.data)
+
+
+class TopicInfo(NamedTuple):
+    """What a bag says of one of its topics."""
+
+    type_name: str
+    message_count: int
+
+
+def bag_topics(path: Path) -> dict[str, TopicInfo]:
+    """Topics of a bag with their type and number of messages, from its index.
+
+    Raises:
+        BagError: There is no bag, or it is damaged.
+    """
+    with _as_bag_errors(path):
+        if path.is_dir():
+            with _open_folder(path) as reader:
+                return {c.topic: TopicInfo(c.msgtype, c.msgcount) for c in reader.connections}
+        with path.open('rb') as file:
+            summary = make_reader(file).get_summary()
+        if summary is None or summary.statistics is None:
+            raise BagError(f'{path}: no summary at its end: truncated')
+        counts = summary.statistics.channel_message_counts
+        return {
+            channel.topic: TopicInfo(summary.schemas[channel.schema_id].name, counts.get(number, 0))
+            for number, channel in summary.channels.items()
+        }
