@@ -24,9 +24,7 @@ class Meaning:
 
     def bounds_text(self) -> str:
         """Bounds for a reader, for example ``0.0 to 1.0``; empty if there are none."""
-        if self.lower is None and self.upper is None:
-            return ''
-        return f'{"" if self.lower is None else self.lower} to {"" if self.upper is None else self.upper}'.strip()
+        return '' if self.lower is None and self.upper is None else f'{self.lower} to {self.upper}'
 
 
 def parameter(

@@ -5,6 +5,7 @@ and waits until it is there.
 """
 
 import argparse
+import json
 import sys
 import time
 from pathlib import Path
@@ -17,6 +18,7 @@ from seal_friction_msgs.msg import CylinderPressure, ForceSum, FrictionEstimate,
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.live_statistics import latency_values
 from seal_friction_ros.offline.bag import BagError, BagMessage, read_messages
 
 _TOPICS = {
@@ -38,13 +40,15 @@ class BagPlayer(Node):
             for type_name, (message_type, topic) in _TOPICS.items()
         }
         self._connected = False
-        self.answered = 0
+        self.sent: list[int] = []
+        self.round_trips: list[int] = []
         self.create_subscription(FrictionEstimate, 'friction_estimate', self._on_estimate, qos.STREAM, raw=True)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
 
     def _on_estimate(self, data: bytes) -> None:
         del data
-        self.answered += 1
+        if self.answered < len(self.sent):
+            self.round_trips.append(time.perf_counter_ns() - self.sent[self.answered])
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -52,8 +56,15 @@ class BagPlayer(Node):
             if counts and all(int(count) > 0 for count in counts):
                 self._connected = True
 
+    @property
+    def answered(self) -> int:
+        """Velocity samples that an estimate has come for; they come in order."""
+        return len(self.round_trips)
+
     def publish(self, message: BagMessage) -> None:
         """Publish one message, byte for byte."""
+        if message.type_name == wire.VELOCITY_TYPE:
+            self.sent.append(time.perf_counter_ns())
         self._publishers_of[message.type_name].publish(message.data)
 
     def wait_for_estimator(self, timeout: float) -> bool:
@@ -82,8 +93,8 @@ class BagPlayer(Node):
         return True
 
 
-def play(player: BagPlayer, bag: Path, rate: float) -> int:
-    """Play a bag; return the number of velocity samples that were answered by an estimate.
+def play(player: BagPlayer, bag: Path, rate: float) -> dict[str, str]:
+    """Play a bag; return the number of velocity samples, all answered, and the round trip from each to its estimate.
 
     Args:
         player: The node.
@@ -95,7 +106,6 @@ def play(player: BagPlayer, bag: Path, rate: float) -> int:
     """
     start = time.monotonic()
     first: int | None = None
-    velocities = 0
     for message in read_messages(bag):
         if message.type_name not in _TOPICS:
             continue
@@ -104,17 +114,18 @@ def play(player: BagPlayer, bag: Path, rate: float) -> int:
         while (wait := due - time.monotonic()) > 0.0:
             rclpy.spin_once(player, timeout_sec=wait)
         player.publish(message)
-        if message.type_name == wire.VELOCITY_TYPE:
-            velocities += 1
-            if not player.wait_for_answers(velocities - _UNANSWERED):
-                raise BagError(f'{bag}: the estimator answered {player.answered} of {velocities} velocity samples')
-    if not player.wait_for_answers(velocities):
-        raise BagError(f'{bag}: the estimator answered {player.answered} of {velocities} velocity samples')
-    return velocities
+        _await(player, bag, _UNANSWERED)
+    _await(player, bag, 0)
+    return {'velocity samples': str(len(player.sent)), **latency_values(player.round_trips, 'round trip')}
+
+
+def _await(player: BagPlayer, bag: Path, unanswered: int) -> None:
+    if not player.wait_for_answers(len(player.sent) - unanswered):
+        raise BagError(f'{bag}: the estimator answered {player.answered} of {len(player.sent)} velocity samples')
 
 
 def main() -> int:
-    """Run ``bag_player BAG [--rate R] [--wait S]``."""
+    """Run ``bag_player BAG [--rate R] [--wait S]``; figures of the run as JSON on stdout."""
     parser = argparse.ArgumentParser(prog='bag_player', description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('bag', type=Path, help='bag to play; only pressure, velocity and force sum are')
     parser.add_argument('--rate', type=float, default=1.0, help='times the pace of the bag; 0: as fast as answered')
@@ -125,8 +136,7 @@ def main() -> int:
     try:
         if not player.wait_for_estimator(arguments.wait):
             raise BagError(f'no estimator subscribed to the inputs within {arguments.wait} s')
-        count = play(player, arguments.bag, arguments.rate)
-        print(f'{count} velocity samples played, each answered by an estimate', file=sys.stderr)
+        print(json.dumps(play(player, arguments.bag, arguments.rate)))
     except BagError as error:
         print(f'bag_player: {error}', file=sys.stderr)
         return 2

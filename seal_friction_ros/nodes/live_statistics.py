@@ -67,7 +67,7 @@ class LiveStatistics:
         for bit in Status:
             values[f'estimates {bit.name}'] = str(sum(n for status, n in self._by_status.items() if status & bit))
         values['input age [s]'] = f'{self._input_age:.4f}'
-        values |= _latency_values(self._latencies)
+        values |= latency_values(self._latencies)
         status = DiagnosticStatus(level=DiagnosticStatus.OK, message='estimating')
         if not active:
             status.message = 'inactive'
@@ -80,12 +80,12 @@ class LiveStatistics:
         return status
 
 
-def _latency_values(latencies: list[int]) -> dict[str, str]:
-    """Median and 99th percentile [us] of latencies [ns], from taking the velocity sample to the estimate published."""
+def latency_values(latencies: list[int], what: str = 'latency') -> dict[str, str]:
+    """Median and 99th percentile [us] of latencies [ns], by the names they have in diagnostics."""
     if not latencies:
-        return {'latency p50 [us]': 'none', 'latency p99 [us]': 'none'}
+        return {f'{what} p50 [us]': 'none', f'{what} p99 [us]': 'none'}
     ordered = sorted(latencies)
     return {
-        f'latency p{percent} [us]': f'{ordered[min(len(ordered) * percent // 100, len(ordered) - 1)] / 1e3:.1f}'
+        f'{what} p{percent} [us]': f'{ordered[min(len(ordered) * percent // 100, len(ordered) - 1)] / 1e3:.1f}'
         for percent in (50, 99)
     }

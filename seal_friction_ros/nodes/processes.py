@@ -1,5 +1,6 @@
 """Nodes of this package as processes of their own, for the demo, the tests and the benchmarks."""
 
+import json
 import os
 import signal
 import subprocess
@@ -47,7 +48,9 @@ def running(
                 process.wait()
 
 
-def play_live(bag: Path, out: Path, domain: int, rate: float, parameters: Mapping[str, object] | None = None) -> None:
+def play_live(
+    bag: Path, out: Path, domain: int, rate: float, parameters: Mapping[str, object] | None = None
+) -> dict[str, str]:
     """Play the inputs of a bag into a live estimator, in separate processes, which records to ``out``.
 
     Args:
@@ -56,6 +59,9 @@ def play_live(bag: Path, out: Path, domain: int, rate: float, parameters: Mappin
         domain: ROS domain.
         rate: Times the pace of the bag; 0 for as fast as the estimator answers.
         parameters: ROS parameters of the estimator besides those of the recording.
+
+    Returns:
+        Number of velocity samples, all answered, and percentiles of the round trip to the estimate.
 
     Raises:
         RuntimeError: A sample was not answered, or there is no recording; with what the processes said.
@@ -68,6 +74,7 @@ def play_live(bag: Path, out: Path, domain: int, rate: float, parameters: Mappin
         played = subprocess.run(player, env=graph_environment(domain), capture_output=True, text=True, check=False)
     if played.returncode or not (out / 'metadata.yaml').is_file():
         raise RuntimeError(f'{played.stderr.strip()}; {log}: {log.read_text().strip()}')
+    return dict(json.loads(played.stdout))
 
 
 def _yaml(value: object) -> str:

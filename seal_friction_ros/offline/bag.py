@@ -128,6 +128,10 @@ class BagWriter:
         self._file.close()
         self._write_metadata()
 
+    def abandon(self) -> None:
+        """Let go of the file as it is, after a failure."""
+        self._file.close()
+
     def __enter__(self) -> Self:
         return self
 
@@ -137,7 +141,7 @@ class BagWriter:
         if kind is None:
             self.close()
         else:
-            self._file.close()
+            self.abandon()
             shutil.rmtree(self.path)
 
     def _add_channel(self, topic: str, type_name: str) -> None:

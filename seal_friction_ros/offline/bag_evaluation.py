@@ -10,6 +10,7 @@ import math
 from array import array
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from itertools import chain, pairwise
 from pathlib import Path
 from statistics import fmean
@@ -39,8 +40,9 @@ STEADY_SHARE = 0.5  # of what is left must slide steadily; a stroke that only ac
 MIN_STEADY_SAMPLES = 10
 MIN_REST = 0.1  # [s] a shorter stop, as at a reversal, is no rest to break away from
 MAX_GAP = 0.5  # [s] a longer gap in time (or of 20 sample periods) ends a stroke or a rest
-LEVEL_GAP = 0.02  # of the highest pressure: a larger step between sorted pressures separates two levels
-LEVEL_GAP_MIN = 5e3  # [Pa] sensor noise near zero pressure makes no levels
+LEVEL_GAP = 0.05  # of the pressure: a larger step between sorted pressures separates two levels; a pressure regulator
+#                   holds a few per cent more in one direction than in the other, and both belong together
+LEVEL_GAP_MIN = 1e4  # [Pa] sensor noise near zero pressure makes no levels
 LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp, and is cut into equal parts
 BAND_95 = 1.96  # standard deviations on each side that hold 95 % of a normal distribution
 
@@ -93,7 +95,7 @@ class RecordedRun:
     input_age: FloatArray
     """[s]"""
 
-    @property
+    @cached_property
     def pressure(self) -> FloatArray:
         """Mean of the pressures that the seals see [Pa, gauge]."""
         share_a = self.chambers.count('a') / len(self.chambers)
@@ -440,11 +442,14 @@ def _levels(events: Sequence[Event]) -> tuple[PressureLevel, ...]:
 def pressure_labels(pressures: FloatArray) -> IntArray:
     """Number of the pressure level that each of some increasing pressures [Pa] belongs to.
 
-    A new level begins at every step above `LEVEL_GAP` of the highest pressure (`LEVEL_GAP_MIN` at least). A level
-    wider than `LEVEL_WIDTH` of it is a ramp, and is cut into equal parts that are not.
+    A new level begins at every step above `LEVEL_GAP` of the pressure (`LEVEL_GAP_MIN` at least). A level wider than
+    `LEVEL_WIDTH` of the highest pressure is a ramp, and is cut into equal parts that are not.
     """
     highest = float(np.abs(pressures).max())
-    gap, width = max(LEVEL_GAP * highest, LEVEL_GAP_MIN), max(LEVEL_WIDTH * highest, 2.0 * LEVEL_GAP_MIN)
+    gap, width = (
+        np.maximum(LEVEL_GAP * np.abs(pressures[1:]), LEVEL_GAP_MIN),
+        max(LEVEL_WIDTH * highest, 2.0 * LEVEL_GAP_MIN),
+    )
     labels = np.zeros(len(pressures), dtype=np.int64)
     clusters = np.split(np.arange(len(pressures)), np.flatnonzero(np.diff(pressures) > gap) + 1)
     used = 0

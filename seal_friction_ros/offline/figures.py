@@ -103,16 +103,17 @@ def new_figure(title: str, height: float, **layout: Any) -> tuple[Figure, Any]:
     return figure, figure.subplots(**layout)
 
 
-def legend_above(ax: Axes, columns: int = 6) -> None:
+def legend_above(ax: Axes, **choice: Any) -> None:
     """Legend in a row above the axes, out of the way of the data."""
     ax.legend(
         loc='lower right',
         bbox_to_anchor=(1.0, 1.0),
-        ncols=columns,
+        ncols=6,
         borderaxespad=0.2,
         columnspacing=1.2,
         handlelength=1.6,
         handletextpad=0.5,
+        **choice,
     )
 
 
@@ -171,12 +172,12 @@ def verdict(levels: Sequence[PressureLevel]) -> str:
     level = worst(levels)
     if level is None:
         return 'No steady sliding to compare the estimate with'
+    size = f'{abs(level.deviation_percent or 0.0):.1f} %'
     where = f'at {level.pressure / BAR:.1f} bar'
     if len(levels) == 1:
-        return f'Estimated sliding friction is {level.deviation_percent:+.1f} % off the measured one {where}'
-    return (
-        f'Estimated sliding friction is at most {abs(level.deviation_percent or 0.0):.1f} % off the measured ({where})'
-    )
+        side = 'above' if level.deviation > 0.0 else 'below'
+        return f'Estimated sliding friction is {size} {side} the measured one {where}'
+    return f'Estimated sliding friction is at most {size} off the measured one ({where})'
 
 
 # -- over time --------------------------------------------------------------------------------------------------------
@@ -197,11 +198,12 @@ def live_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
     part = slice(first, last + 1)
     _friction_over_time(axes[2], run, part, level)
     _state_strip(axes[3], run, part)
-    at = '' if level is None else f' at {level.pressure / BAR:.1f} bar'
-    axes[2].set_title(f'Shaded part{at}')
-    axes[3].set_xlabel('time since the first estimate [s]')
+    axes[2].set_title('Shaded part' if level is None else f'Shaded part, at {level.pressure / BAR:.1f} bar')
+    _state_legend(axes[3], run)
+    axes[3].set_xlabel('time since the first estimate [s]', loc='left')
     if level is not None and _offset_matters(level):
-        legend_above(axes[2])
+        handles, labels = axes[2].get_legend_handles_labels()
+        legend_above(axes[2], handles=handles[1:3], labels=labels[1:3])  # the others stand above the first plot
     return Plot(
         'live_estimate',
         figure,
@@ -241,7 +243,7 @@ def _nearest(pairs: Sequence[tuple[Event, Event]]) -> tuple[Event, Event]:
 
 
 def _offset_matters(level: PressureLevel) -> bool:
-    return level.offset is not None and abs(level.offset) > 0.02 * abs(level.measured)
+    return level.offset is not None and abs(level.offset) > 0.1 * abs(level.measured)
 
 
 def _friction_over_time(ax: Axes, run: RecordedRun, part: slice, level: PressureLevel | None) -> None:
@@ -291,7 +293,10 @@ def _state_strip(ax: Axes, run: RecordedRun, part: slice) -> None:
     ax.set_yticks([])
     ax.grid(visible=False)
     ax.set_ylabel('state', rotation=0, ha='right', va='center')
-    present = [state for state in FrictionState if (run.state[part] == state).any()]
+
+
+def _state_legend(ax: Axes, run: RecordedRun) -> None:
+    present = [state for state in FrictionState if (run.state == state).any()]
     patches = [Patch(color=STATE_COLOURS[state], label=state.name.lower()) for state in present]
     ax.legend(
         handles=patches, loc='upper right', bbox_to_anchor=(1.0, -1.4), ncols=4, borderaxespad=0.0, handlelength=1.0
@@ -385,6 +390,8 @@ def pressure_figure(sliding: Sequence[PressureLevel], breakaway: Sequence[Pressu
         measured = [level.measured / size for level in levels]
         ax.plot(pressure, measured, ls='', marker=marker, ms=6.5, color=dot, mec='white', label=f'{name}, measured')
     ax.set_ylim(bottom=0.0)
+    highest = max(level.pressure for level in chain(sliding, breakaway)) / BAR
+    ax.set_xlim(-0.03 * highest, 1.05 * highest if highest > 0.0 else 1.0)
     ax.set_xlabel('pressure at the seals [bar, gauge]')
     ax.set_ylabel(f'friction of all seals [{unit}]')
     ax.legend(loc='upper left')
@@ -435,12 +442,12 @@ def deviation_figure(levels: Sequence[PressureLevel]) -> Plot:
     shown = [level for level in levels if level.deviation_percent is not None]
     place = np.arange(len(shown))
     band = np.array([100.0 * BAND_95 * level.estimated_std / level.measured for level in shown])
-    deviation = np.array([level.deviation_percent or 0.0 for level in shown])
+    deviation = np.round([level.deviation_percent or 0.0 for level in shown], 1)
     ax.bar(place, 2.0 * band, 0.86, bottom=-band, color=SKY, alpha=0.3, lw=0, label='95 % band of one reading')
     ax.bar(place, deviation, 0.5, color=BLUE, label='estimated less measured')
     for x, value in zip(place, deviation, strict=True):
         ax.annotate(
-            f'{value:+.1f}',
+            f'{value + 0.0:+.1f}'.replace('-', '\N{MINUS SIGN}'),
             (x, value),
             (0, 3 if value >= 0.0 else -3),
             textcoords='offset points',
@@ -454,7 +461,8 @@ def deviation_figure(levels: Sequence[PressureLevel]) -> Plot:
     ax.grid(visible=False, axis='x')
     ax.set_xlabel('pressure at the seals [bar, gauge]')
     ax.set_ylabel('deviation [%]')
-    ax.margins(y=0.12)
+    largest = 1.2 * max(float(np.abs(deviation).max()), float(band.max()), 1.0) if shown else 1.0
+    ax.set_ylim(-largest, largest)
     legend_above(ax)
     return Plot(
         'deviation',
@@ -484,6 +492,7 @@ def velocity_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
     figure, axes = new_figure(_velocity_title(levels), 4.2, ncols=2, sharex=True, sharey=True)
     good = np.flatnonzero(np.isfinite(run.velocity) & np.isfinite(run.force_sum) & np.isfinite(run.pressure))
     good = good[:: len(good) // _DOTS + 1]
+    good = good[np.argsort(-run.pressure[good], kind='stable')]  # low pressures, which reach less far, on top
     for ax, values, name in (
         (axes[0], run.force_sum, 'measured: force sum'),
         (axes[1], run.friction_force, 'estimated'),

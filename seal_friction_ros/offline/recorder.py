@@ -70,6 +70,7 @@ class Recorder:
             self.dropped += len(self._queue)
             self._queue.clear()
             self.error = f'{self.path}: recording stopped: {error}'
+            self._writer.abandon()
 
     def _drain(self) -> None:
         while self._queue:
