@@ -55,7 +55,7 @@ def test_core_knows_neither_ros_nor_files_nor_clock_nor_chance():
 
 def test_core_stands_on_the_standard_library_and_numerics_alone():
     def outside(name: str) -> bool:
-        top = name.split('.')[0]
+        top, _, _ = name.partition('.')
         return top not in sys.stdlib_module_names | THIRD_PARTY_OF_CORE and not is_below(name, f'{PACKAGE}.core')
 
     assert not offenders('core', outside)

@@ -99,12 +99,15 @@ def _fields(record_type: Any) -> tuple[dataclasses.Field[Any], ...]:
     return dataclasses.fields(record_type)
 
 
+_WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text'}
+
+
 def _as_declared(value: Any, declared: Any, where: str) -> Any:
     if declared in (float, int, bool, str):
         if declared is float and type(value) is int:
             return float(value)
         if type(value) is not declared:
-            raise ValueError(f'{where} = {value!r} is not a {declared.__name__}')
+            raise ValueError(f'{where} = {value!r} is not {_WORDS[declared]}')
         return value
     if not isinstance(value, list | tuple):
         raise ValueError(f'{where} = {value!r} is not a list')

@@ -38,6 +38,8 @@ def run(make_node: Callable[[], Node], stop: Callable[[Node], None], args: list[
     try:
         node = make_node()
     except ValueError as error:
+        if not rclpy.ok():  # stopped by a signal while it started
+            return 0
         rclpy.logging.get_logger('seal_friction_ros').fatal(str(error))
         rclpy.try_shutdown()
         return 2

@@ -47,6 +47,7 @@ LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp, and is cu
 BAND_95 = 1.96  # standard deviations on each side that hold 95 % of a normal distribution
 
 _MAX_PENDING = 10_000  # velocity samples that may wait for their estimate; more were never answered
+_ABSURD = 1e15  # [SI] no pressure, force or speed is as large; NaN and infinity are no smaller than it either
 _COLUMNS = ('velocity', 'pressure_a', 'pressure_b', 'force_sum', *FrictionEstimate._fields[1:])
 _INTEGERS = {'state', 'direction', 'status'}
 _HARMLESS = int(Status.OUTSIDE_IDENTIFIED_RANGE)  # the inputs are good, only the law is stretched
@@ -356,7 +357,7 @@ def friction_by_pressure(run: RecordedRun) -> FrictionByPressure:
     columns = (run.velocity, run.pressure, run.force_sum, run.coulomb_friction, run.coulomb_friction_std)
     usable = run.status & ~_HARMLESS == 0
     for column in (*columns, run.breakaway_force):
-        usable &= np.isfinite(column)
+        usable &= np.abs(column) < _ABSURD
     runs = _runs(run)
     strokes = [event for first_last in runs if (event := _steady_stroke(run, usable, *first_last))]
     starts = [event for rest, motion in pairwise(runs) if (event := _start(run, usable, rest, motion))]

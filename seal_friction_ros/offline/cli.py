@@ -174,6 +174,8 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         print(f'seal_friction: {error}', file=sys.stderr)
         return UNUSABLE
+    except BrokenPipeError:
+        raise
     except OSError as error:
         print(f'seal_friction: {error.filename}: {error.strerror}', file=sys.stderr)
         return UNUSABLE

@@ -88,12 +88,26 @@ def house_style() -> Iterator[None]:
 
 def render(figure: Figure) -> dict[str, bytes]:
     """A figure as ``svg`` and ``png``; equal figures give equal bytes."""
+    _settle(figure)
     rendered = {}
     for kind, metadata in (('svg', {'Date': None, 'Creator': None}), ('png', {'Software': None})):
         buffer = io.BytesIO()
         figure.savefig(buffer, format=kind, metadata=metadata)
         rendered[kind] = buffer.getvalue()
     return rendered
+
+
+def _settle(figure: Figure) -> None:
+    """Lay the figure out once and for all.
+
+    The solver behind the layout takes its constraints in the order of their addresses in memory, so the last bits of
+    the positions differ from run to run, and with them the names of the clip paths in an SVG: rounding removes that.
+    """
+    figure.draw_without_rendering()
+    figure.set_layout_engine('none')
+    for ax in figure.axes:
+        left, bottom, width, height = (round(value, 5) for value in ax.get_position(original=True).bounds)
+        ax.set_position((left, bottom, width, height))
 
 
 def new_figure(title: str, height: float, **layout: Any) -> tuple[Figure, Any]:
@@ -306,7 +320,7 @@ def _state_legend(ax: Axes, run: RecordedRun) -> None:
 def inputs_figure(run: RecordedRun) -> Plot:
     """What the estimator was given, over time."""
     low, high = _pressure_range(run)
-    title = f'Inputs: {low:.1f} to {high:.1f} bar, {run.time[-1] - run.time[0]:.0f} s'
+    title = f'Inputs: {low:.1f} to {high:.1f} bar, {run.time.max() - run.time.min():.0f} s'
     figure, axes = new_figure(title, 5.4, nrows=3, sharex=True)
     same = np.array_equal(run.pressure_a, run.pressure_b, equal_nan=True)
     name = 'chambers a and b' if same else 'chamber a'
@@ -322,7 +336,7 @@ def inputs_figure(run: RecordedRun) -> Plot:
     _line(axes[2], run.time, run.force_sum / size, color=BLACK, lw=1.0)
     axes[2].set_ylabel(f'force sum\n[{name}]')
     axes[2].set_xlabel('time since the first estimate [s]')
-    axes[2].set_xlim(run.time[0], max(run.time[-1], run.time[0] + 1e-3))
+    axes[2].set_xlim(run.time.min(), max(run.time.max(), run.time.min() + 1e-3))
     return Plot(
         'inputs',
         figure,
@@ -341,7 +355,7 @@ def status_figure(run: RecordedRun) -> Plot:
     bits = [bit for bit in Status if (run.status & int(bit)).any()]
     share = 100.0 * np.count_nonzero(run.status) / len(run.status)
     figure, ax = new_figure(f'{share:.3g} % of the estimates carry a status bit', 1.6 + 0.34 * len(bits))
-    grid = np.linspace(run.time[0], max(run.time[-1], run.time[0] + 1e-3), _COLUMNS + 1)
+    grid = np.linspace(run.time.min(), max(run.time.max(), run.time.min() + 1e-3), _COLUMNS + 1)
     column = np.clip(np.searchsorted(grid, run.time, side='right') - 1, 0, _COLUMNS - 1)
     for row, bit in enumerate(bits):
         hit = np.zeros(_COLUMNS, dtype=np.bool_)

@@ -40,12 +40,12 @@ class NotFinite:
         return 1.0 if pressure < 1e6 else math.nan
 
 
-def seal(law=None, relative_std=0.1, absolute_std=0.0, stiction=2.0, pressure_min=0.0, pressure_max=1e7) -> Seal:
+def seal(law=None, pressure_min=0.0, pressure_max=1e7) -> Seal:
     return Seal(
         name='test',
         coulomb_law=law or Proportional(),
-        uncertainty=Uncertainty(relative_std, absolute_std),
-        stiction=stiction,
+        uncertainty=Uncertainty(relative_std=0.1),
+        stiction=2.0,
         pressure_min=pressure_min,
         pressure_max=pressure_max,
     )
@@ -92,7 +92,7 @@ def test_friction_never_falls_with_pressure(a, b):
 
 @pytest.mark.parametrize('law', [Falling(), NotFinite()])
 def test_a_seal_whose_friction_falls_with_pressure_or_is_not_finite_cannot_be_made(law):
-    with pytest.raises(ValueError, match='^Seal test: Coulomb friction falls from .* N to .* N at .* Pa'):
+    with pytest.raises(ValueError, match=r'^Seal test: Coulomb friction falls from .* N to .* N at .* Pa'):
         seal(law=law)
 
 

@@ -25,7 +25,7 @@ START = 1_700_000_000_000_000_000  # [ns]
 MS = 1_000_000  # [ns]
 
 
-def sample(stamp=START, velocity=0.01, pressure=3e6, force=30.0, pressure_age=0, force_age=0) -> RodSample:
+def sample(stamp=START, velocity=0.01, pressure=3e6, force=30.0, *, pressure_age=0, force_age=0) -> RodSample:
     """A good sample but for what is given; ages in [ms]; a pressure may be one for both chambers, a pair, or None."""
     if pressure is not None:
         a, b = pressure if isinstance(pressure, tuple) else (pressure, pressure)
@@ -298,7 +298,7 @@ def test_the_last_usable_pressure_grows_old_and_is_then_stale():
 
 def test_a_stale_pressure_keeps_state_and_friction_but_says_so():
     fresh, stale = only(sample()), only(sample(pressure_age=5000))
-    assert stale[:8] == fresh[:7] + (Status.PRESSURE_STALE,)
+    assert stale[:8] == (*fresh[:7], Status.PRESSURE_STALE)
 
 
 # --- unknown ---
@@ -383,5 +383,5 @@ def test_settings_that_make_no_sense_are_refused_with_field_value_and_bound(chan
 
 
 def test_an_actuator_without_seals_is_refused():
-    with pytest.raises(ValueError, match='^EstimatorParameters.seals is empty'):
+    with pytest.raises(ValueError, match=r'^EstimatorParameters.seals is empty'):
         EstimatorParameters(EstimatorSettings(), ())

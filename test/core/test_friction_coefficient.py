@@ -58,7 +58,7 @@ def test_friction_that_is_not_positive_makes_no_power_law(frictions):
 
 
 def test_friction_that_falls_with_normal_force_makes_no_power_law():
-    with pytest.raises(ValueError, match='exponent = .* is above its upper bound 0.99'):
+    with pytest.raises(ValueError, match=r'exponent = .* is above its upper bound 0.99'):
         power_law_from_points([1.0, 2.0], [2.0, 1.0])
 
 

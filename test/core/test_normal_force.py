@@ -78,5 +78,5 @@ def test_a_table_that_makes_no_sense_is_refused(pressures_, forces, complaint):
 
 
 def test_a_seal_that_does_not_press_is_refused():
-    with pytest.raises(ValueError, match='radial_force = 0.0 N is below its lower bound 1e-06 N'):
+    with pytest.raises(ValueError, match=r'radial_force = 0.0 N is below its lower bound 1e-06 N'):
         AreaDeformationGain(0.4, 0.0)

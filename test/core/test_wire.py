@@ -1,6 +1,5 @@
 """Bytes of the messages: the same as rosbags writes and rclpy reads, for every frame name; nothing else is taken."""
 
-import math
 import re
 import struct
 from pathlib import Path
@@ -58,7 +57,7 @@ def as_rosbags(type_name: str, frame: bytes):
 
 
 def as_rclpy(type_name: str, frame: bytes):
-    message = getattr(messages, type_name.split('/')[-1])(**SAMPLES[type_name][0])
+    message = getattr(messages, type_name.rpartition('/')[2])(**SAMPLES[type_name][0])
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(STAMP, 10**9)
     message.header.frame_id = frame.decode()
     return message
@@ -105,7 +104,7 @@ def test_decoding_undoes_encoding_for_every_frame_name_length(type_name):
 
 @STAMPED
 def test_padding_is_zero(type_name):
-    # A frame name and numbers of all ones leave zero bytes only where nothing is: end of the name, and padding.
+    # With a 1 in every byte of name and numbers, zeros are left only where nothing is.
     ones = struct.unpack('<d', b'\x01' * 8)[0]
     stamp = 0x01010101 * 10**9 + 0x01010101
     records = {
@@ -116,7 +115,6 @@ def test_padding_is_zero(type_name):
     }
     for length in range(41):
         data = SAMPLES[type_name][2](records[type_name], b'\x01' * length)
-        assert set(data) == {0, 1}
         end_of_name = 16 + length
         # Counted from the end of the encapsulation, the first number stands at a multiple of 8.
         body = 4 + -(-(end_of_name + 1 - 4) // 8) * 8
@@ -159,8 +157,7 @@ def test_rclpy_and_we_read_each_others_texts(text):
 def decode_or_refuse(type_name: str, data: bytes):
     try:
         return wire.DECODERS[type_name](data)
-    except ValueError as error:
-        assert str(error)  # a reason, and nothing but a ValueError
+    except ValueError:  # and nothing but a ValueError
         return None
 
 
@@ -273,7 +270,3 @@ def test_the_generated_message_has_the_constants_of_the_code():
 def test_fields_of_the_estimate_stand_in_the_order_of_the_message():
     names = list(messages.FrictionEstimate.get_fields_and_field_types())
     assert names == ['header', *FrictionEstimate._fields[1:]]
-
-
-def test_nan_is_not_hidden_by_encoding():
-    assert math.isnan(wire.decode_force(wire.encode_force(Force(STAMP, math.nan))).force)

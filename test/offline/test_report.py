@@ -17,7 +17,7 @@ from seal_friction_ros.core.estimator import EstimatorSettings, init
 from seal_friction_ros.core.held_inputs import HeldInputs
 from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.files import load_configuration
-from seal_friction_ros.offline.bag import BagError, BagWriter
+from seal_friction_ros.offline.bag import BagError, BagWriter, read_messages
 from seal_friction_ros.offline.bag_evaluation import evaluate, read_run
 from seal_friction_ros.offline.figures import house_style, render, run_figures, thinned
 from seal_friction_ros.offline.replay import replay
@@ -27,7 +27,7 @@ RATE = 100  # [Hz]
 CONFIGURATION = load_configuration(SealSelection(), EstimatorSettings())
 
 
-def make_bag(folder, name='bag', frame=b'rod', topic='/rod_velocity', pressures=(1e6, 4e6), configuration=None):
+def make_bag(folder, *, name='bag', frame=b'rod', topic='/rod_velocity', pressures=(1e6, 4e6), configuration=None):
     """Two strokes at each pressure, with a lost velocity so that there is something to say."""
     snapshot = Snapshot(CONFIGURATION, init(CONFIGURATION.parameters()), HeldInputs())
     seals = CONFIGURATION.parameters().seals
@@ -124,11 +124,15 @@ def test_what_comes_from_a_bag_is_escaped(tmp_path):
     assert '<b>bag' not in page
 
 
-def test_a_configuration_of_another_version_is_shown_as_text(tmp_path):
-    bag = make_bag(tmp_path, name='plain', configuration='')
-    run = read_run(bag)
-    assert run.configurations == ()
+def test_a_configuration_that_is_missing_or_not_understood_is_said_or_shown_as_text(tmp_path):
+    bag = make_bag(tmp_path, configuration='')
     assert 'holds no configuration' in write_report(bag, tmp_path / 'none.html').page.read_text()
+    with BagWriter(tmp_path / 'other') as writer:
+        writer.write('/configuration', wire.CONFIGURATION_TYPE, 0, wire.encode_text('<b>{"version": 99}'))
+        for message in read_messages(bag):
+            writer.write(*message)
+    page = write_report(tmp_path / 'other', tmp_path / 'other.html').page.read_text()
+    assert '<pre>&lt;b&gt;{&quot;version&quot;: 99}</pre>' in page
 
 
 def test_a_report_that_is_there_is_replaced(tmp_path):
