@@ -47,7 +47,7 @@ LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp, and is cu
 BAND_95 = 1.96  # standard deviations on each side that hold 95 % of a normal distribution
 
 _MAX_PENDING = 10_000  # velocity samples that may wait for their estimate; more were never answered
-_ABSURD = 1e15  # [SI] no pressure, force or speed is as large; NaN and infinity are no smaller than it either
+_ABSURD = 1e15  # [SI] no pressure, force or speed is as large; a comparison with it drops NaN and infinity too
 _COLUMNS = ('velocity', 'pressure_a', 'pressure_b', 'force_sum', *FrictionEstimate._fields[1:])
 _INTEGERS = {'state', 'direction', 'status'}
 _HARMLESS = int(Status.OUTSIDE_IDENTIFIED_RANGE)  # the inputs are good, only the law is stretched

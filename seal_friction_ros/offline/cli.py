@@ -72,7 +72,9 @@ def _info(arguments: argparse.Namespace) -> int:
 def _report(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.report import write_report
 
-    return _tell(arguments, write_report(arguments.bag, arguments.out), f'{arguments.out}: written')
+    return _tell(
+        arguments, write_report(arguments.bag, arguments.out, arguments.namespace), f'{arguments.out}: written'
+    )
 
 
 def _charts(arguments: argparse.Namespace) -> int:
@@ -152,6 +154,7 @@ def make_parser() -> argparse.ArgumentParser:
 
     report = _add(commands, 'report', _report, 'a page with figures and numbers, PNG and SVG beside it')
     report.add_argument('bag', type=Path)
+    report.add_argument('--namespace', default='', help='look only at topics below it')
     charts = _add(commands, 'charts', _charts, 'a page with the curves of a seal file, PNG and SVG beside it')
     charts.add_argument('seal', help='seal file: a path, or the name of one in config/seals')
     for page in (report, charts):

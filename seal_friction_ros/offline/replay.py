@@ -7,12 +7,27 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import Configuration, SealSelection, parse_snapshot
+from seal_friction_ros.core.configuration import Configuration, SealSelection, Snapshot, parse_snapshot, snapshot_text
 from seal_friction_ros.core.estimator import EstimatorSettings, init, step
 from seal_friction_ros.core.held_inputs import HeldInputs
-from seal_friction_ros.core.wire import decode_force, decode_pressure, decode_text, decode_velocity, encode_estimate
+from seal_friction_ros.core.wire import (
+    decode_force,
+    decode_pressure,
+    decode_text,
+    decode_velocity,
+    encode_estimate,
+    encode_text,
+)
 from seal_friction_ros.files import load_configuration, load_parameter_file
-from seal_friction_ros.offline.bag import ESTIMATE_TOPIC, BagError, BagMessage, BagWriter, bag_topics, read_messages
+from seal_friction_ros.offline.bag import (
+    CONFIGURATION_TOPIC,
+    ESTIMATE_TOPIC,
+    BagError,
+    BagMessage,
+    BagWriter,
+    bag_topics,
+    read_messages,
+)
 from seal_friction_ros.offline.progress import progress
 
 
@@ -71,13 +86,19 @@ def estimates(
 ) -> Iterator[tuple[BagMessage, bytes]]:
     """Each message in order, with the serialised estimate it triggers; empty where it triggers none.
 
-    The configuration is the newest one in the bag, or ``override``, or the default while there is neither.
+    The configuration is the newest one in the bag, or ``override``, or the default where there is neither. Configuration
+    messages come out as what was used: with ``override`` in place of the recorded one, and one at the start if the bag
+    has none.
 
     Raises:
         BagError: A message is not what its type says.
     """
-    parameters = (override or load_configuration(SealSelection(), EstimatorSettings())).parameters()
+    configuration = override or load_configuration(SealSelection(), EstimatorSettings())
+    parameters = configuration.parameters()
     state, held = init(parameters), HeldInputs()
+    if not topics.configuration:
+        data = encode_text(snapshot_text(Snapshot(configuration, state, held)))
+        yield BagMessage(CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, 0, data), b''
     for message in messages:
         estimate_bytes = b''
         try:
@@ -91,7 +112,11 @@ def estimates(
                 held = held._replace(force=decode_force(message.data))
             elif message.topic == topics.configuration:
                 configuration, state, held = parse_snapshot(decode_text(message.data))
-                parameters = parameters if override else configuration.parameters()
+                if override:
+                    data = encode_text(snapshot_text(Snapshot(override, state, held)))
+                    message = message._replace(data=data)  # noqa: PLW2901
+                else:
+                    parameters = configuration.parameters()
         except ValueError as error:
             raise BagError(f'message on {message.topic} at {message.log_time} ns: {error}') from None
         yield message, estimate_bytes
@@ -140,7 +165,8 @@ def _written(
     pairs: Iterable[tuple[BagMessage, bytes]], topics: Topics, writer: BagWriter
 ) -> Iterator[tuple[BagMessage, bytes]]:
     for message, estimate in pairs:
-        if message.topic in topics and message.topic != topics.estimate:
+        used = message.topic in topics or message.type_name == wire.CONFIGURATION_TYPE
+        if used and message.topic != topics.estimate:
             log_time = writer.write(*message)
             if estimate:
                 writer.write(topics.estimate or ESTIMATE_TOPIC, wire.ESTIMATE_TYPE, log_time, estimate)

@@ -77,11 +77,11 @@ def test_a_falling_table_falls_everywhere(a, b):
 @pytest.mark.parametrize(
     ('normal', 'coefficients', 'complaint'),
     [
-        ((1.0, 2.0), (0.3, 0.0), 'is not above 0 everywhere'),
-        ((1.0, 2.0), (0.3, -0.1), 'is not above 0 everywhere'),
+        ((1.0, 2.0), (0.3, 0.0), '(is not above 0 everywhere|lower bound)'),
+        ((1.0, 2.0), (0.3, -0.1), '(is not above 0 everywhere|lower bound)'),
         ((2.0, 1.0), (0.3, 0.2), 'do not increase'),
         ((1.0, 2.0), (0.3,), 'as many ordinates'),
-        ((1.0, math.nan), (0.3, 0.2), 'not every point is finite'),
+        ((1.0, math.nan), (0.3, 0.2), '(not every point is|is not) finite'),
     ],
 )
 def test_a_table_that_makes_no_sense_is_refused(normal, coefficients, complaint):

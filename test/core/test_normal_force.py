@@ -65,8 +65,8 @@ def test_normal_force_never_falls_with_pressure(law, a, b):
     ('pressures_', 'forces', 'complaint'),
     [
         ((0.0, 1.0), (2.0, 1.0), 'falls with pressure'),
-        ((0.0, 1.0), (0.0, 1.0), 'is not above 0 N everywhere'),
-        ((0.0, 1.0), (-1.0, 1.0), 'is not above 0 N everywhere'),
+        ((0.0, 1.0), (0.0, 1.0), '(is not above 0 N everywhere|lower bound)'),
+        ((0.0, 1.0), (-1.0, 1.0), '(is not above 0 N everywhere|lower bound)'),
         ((1.0, 0.0), (1.0, 2.0), 'do not increase'),
         ((0.0,), (1.0,), 'at least two points'),
         ((0.0, 1.0), (1.0, 2.0, 3.0), 'as many ordinates'),

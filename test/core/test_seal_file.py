@@ -2,6 +2,7 @@
 
 import copy
 import math
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -129,12 +130,16 @@ def test_a_wrong_list_is_refused_in_one_line(document, path, value):
     assert document['name'] in text
 
 
-@pytest.mark.parametrize('document', [POWER, TABLE, CHART], ids=ids)
-@pytest.mark.parametrize('part', ['geometry', 'uncertainty', 'normal_force', 'friction_coefficient', 'chart'])
+@pytest.mark.parametrize(
+    ('document', 'part'),
+    [
+        *[(POWER, part) for part in ('geometry', 'uncertainty', 'normal_force', 'friction_coefficient')],
+        *[(CHART, part) for part in ('geometry', 'uncertainty', 'chart')],
+    ],
+    ids=ids,
+)
 @pytest.mark.parametrize('value', [REMOVED, None, 5, 'text', [], {}], ids=['removed', 'None', '5', 'text', '[]', '{}'])
 def test_a_missing_or_empty_part_is_refused_by_name(document, part, value):
-    if part not in document:
-        pytest.skip('no part of this law')
     text = complaint(changed(document, part, value))
     assert part in text
     assert document['name'] in text
@@ -260,7 +265,7 @@ def test_a_source_that_is_no_text_is_refused(source):
 
 
 @pytest.mark.xfail(strict=True, raises=(TypeError, ValueError), reason='seal_file.py: source is not checked')
-@pytest.mark.parametrize('source', [__import__('datetime').date(2008, 5, 1), math.nan, b'thesis'], ids=repr)
+@pytest.mark.parametrize('source', [date(2008, 5, 1), math.nan, b'thesis'], ids=repr)
 def test_what_makes_a_seal_can_also_be_recorded(source):
     try:
         document = changed(POWER, 'source', source)

@@ -146,3 +146,20 @@ def test_a_parameter_file_of_the_node_replaces_the_settings_of_the_bag(tmp_path:
     file.write_text('/**:\n  ros__parameters:\n    slip_velocity: -1.0\n')
     with pytest.raises(ValueError, match=r'slip_velocity = -1.0 m/s is below its lower bound 0.0'):
         chosen_configuration(file, None)
+
+
+def test_a_replay_with_another_seal_verifies_with_that_seal(recorded: Path, tmp_path: Path):
+    seal = Path(__file__).parents[2] / 'config' / 'seals' / 'ms28775_114_table.yaml'
+    for source in (recorded, write_inputs(tmp_path / 'bare')):
+        out = tmp_path / f'{source.name}_out'
+        replay(source, chosen_configuration(None, seal), out)
+        texts = [wire.decode_text(m.data) for m in read_messages(out) if m.type_name == wire.CONFIGURATION_TYPE]
+        assert len(texts) == 1
+        assert 'ms28775_114_table' in texts[0]
+        assert replay(out).identical
+
+
+def test_a_replayed_bag_of_inputs_says_what_it_was_replayed_with(tmp_path: Path):
+    replay(write_inputs(tmp_path / 'inputs'), out=tmp_path / 'out')
+    assert next(read_messages(tmp_path / 'out')).type_name == wire.CONFIGURATION_TYPE
+    assert replay(tmp_path / 'out').identical
