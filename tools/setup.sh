@@ -40,9 +40,9 @@ stage() {
 run_logged() { "$@" >>"$log" 2>&1 || fail "'$1 ${2:-} ${3:-}' failed; the last lines of $log: $(tail -n 3 "$log" | tr '\n' ' ')"; }
 
 install_requirements() {
-    # With a distribution the ROS packages come from there, so the ros-* and build-tool wheels are left out.
+    # With a distribution ROS, its build tools and the numpy that its messages were built against come from there.
     if [ -n "${ROS_DISTRO:-}" ]; then
-        grep -v -E '^(ros-|colcon|cmake==|setuptools==|empy==|catkin-pkg==|lark-parser==)' "$1" >build/requirements.txt
+        grep -v -E '^(ros-|colcon|cmake==|empy==|catkin-pkg==|lark-parser==|numpy==)' "$1" >build/requirements.txt
     else
         cp "$1" build/requirements.txt
     fi

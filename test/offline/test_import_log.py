@@ -293,7 +293,7 @@ def test_garbage_in_the_log_gives_one_line(tmp_path, log, pattern):
         (changed(time={'column': 0}), 'rig.yaml: time lacks unit'),
         (changed(time={'unit': 's'}), 'rig.yaml: time: Term.column = -1'),
         (changed(time={'column': 0, 'column_name': 't', 'unit': 's'}), 'give one of them'),
-        (changed(time={'column': 'a', 'unit': 's'}), "rig.yaml: time.column = 'a' is not a int"),
+        (changed(time={'column': 'a', 'unit': 's'}), "rig.yaml: time.column = 'a' is not a whole number"),
         (changed(time={'column': 99999, 'unit': 's'}), 'above its upper bound 9999'),
         (changed(time={'column_name': 't', 'unit': 's'}), 'but header = none'),
         (changed(chamber_a={}), 'rig.yaml: chamber_a has neither terms nor a constant'),
