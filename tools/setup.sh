@@ -83,7 +83,7 @@ make_environment() {
 install_package() { run_logged .venv/bin/python -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable .; }
 
 mkdir -p build && touch build/COLCON_IGNORE && : >"$log"
-stage environment requirements/run.txt tools/patch_wheels.py -- make_environment
+stage environment requirements/run.txt tools/setup.sh tools/patch_wheels.py -- make_environment
 stage messages msg_defs/CMakeLists.txt msg_defs/package.xml msg_defs/msg/*.msg -- build_messages
 stage package setup.py setup.cfg -- install_package
 [ "$profile" = run ] || stage tests requirements/dev.txt -- install_requirements requirements/dev.txt

@@ -86,9 +86,9 @@ def estimates(
 ) -> Iterator[tuple[BagMessage, bytes]]:
     """Each message in order, with the serialised estimate it triggers; empty where it triggers none.
 
-    The configuration is the newest one in the bag, or ``override``, or the default where there is neither. What was used
-    comes out: configuration messages hold ``override`` where it is given, and there is one at the start if the bag has
-    none.
+    The configuration is the newest one in the bag, or ``override``, or the default where there is neither. What was
+    used comes out: configuration messages hold ``override`` where it is given, and there is one at the start if the
+    bag has none.
 
     Raises:
         BagError: A message is not what its type says.
