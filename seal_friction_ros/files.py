@@ -1,5 +1,6 @@
 """The door through which YAML comes in, for nodes and tools alike: seal files and parameter files."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from seal_friction_ros.core.configuration import Configuration, SealSelection
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.validated import from_mapping, meanings
 
+_CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # what PyYAML lets out for '!!int foo'
 _LARGEST_YAML = 1 << 20  # [bytes] a seal or parameter file has a few thousand
 
 
@@ -21,8 +23,8 @@ class _PlainLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-        keys = [key.value for key, _ in node.value]
-        doubled = sorted({str(key) for key in keys if keys.count(key) > 1})
+        keys = Counter(str(key.value) for key, _ in node.value)
+        doubled = sorted(key for key, count in keys.items() if count > 1)
         if doubled:
             raise yaml.YAMLError(f'{", ".join(doubled)} stands twice in one mapping')
         return super().construct_mapping(node, deep)
@@ -35,12 +37,17 @@ def read_yaml(path: Path) -> Any:
         ValueError: The file is missing, not readable, too large or not plain YAML; one line that names it.
     """
     try:
-        if path.stat().st_size > _LARGEST_YAML:
-            raise ValueError(f'{path}: larger than {_LARGEST_YAML} bytes, not a file of this kind')
-        return _PlainLoader(path.read_text(encoding='utf-8')).get_single_data()
+        size = path.stat().st_size
+        text = path.read_text(encoding='utf-8') if size <= _LARGEST_YAML else ''
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+    except ValueError as error:
+        raise ValueError(f'{path}: not plain YAML: {error}') from None
+    if size > _LARGEST_YAML:
+        raise ValueError(f'{path}: larger than {_LARGEST_YAML} bytes, not a file of this kind')
+    try:
+        return _PlainLoader(text).get_single_data()
+    except (yaml.YAMLError, RecursionError, *_CONSTRUCTOR_ERRORS) as error:
         raise ValueError(f'{path}: not plain YAML: {" ".join(str(error).split())}') from None
 
 
@@ -62,7 +69,10 @@ def share_directory(package: str, module_file: str) -> Path:
 def config_path(kind: str, name: str) -> Path:
     """Path of a configuration file: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``."""
     if '/' in name or name.endswith('.yaml'):
-        return Path(name).expanduser()
+        try:
+            return Path(name).expanduser()
+        except RuntimeError as error:
+            raise ValueError(f'{name}: {error}') from None
     return share_directory('seal_friction_ros', __file__) / 'config' / kind / f'{name}.yaml'
 
 
@@ -93,7 +103,7 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
     values: dict[str, Any] = {}
     try:
         for node in document.values():
-            values.update(node['ros__parameters'])
+            values.update(node['ros__parameters'].items())
     except (AttributeError, KeyError, TypeError):
         raise ValueError(f'{path}: not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)') from None
     return tuple(  # type: ignore[return-value]

@@ -5,6 +5,7 @@ So a bag carries what is needed to replay it, also when parameters changed on th
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -99,8 +100,8 @@ def parse_snapshot(text: str) -> Snapshot:
     Raises:
         ValueError: The text is not the JSON of a snapshot, or a value in it makes no sense.
     """
-    document = json.loads(text)
     try:
+        document = json.loads(text)
         configuration = Configuration(
             from_mapping(SealSelection, document['selection'], 'configuration: selection'),
             tuple(document['seal_documents']),
@@ -109,9 +110,11 @@ def parse_snapshot(text: str) -> Snapshot:
         state, held = document['state'], document['held']
         stamp = None if state['stamp'] is None else int(state['stamp'])
         usable = _parse_pressure(state['pressure']), _parse_force(state['force'])
+        if not all(math.isfinite(x) for sample in usable if sample is not None for x in sample[1:]):
+            raise ValueError('configuration: a pressure or force sum in use is not finite')
         newest = _parse_pressure(held['pressure']), _parse_force(held['force'])
         return Snapshot(configuration, EstimatorState(stamp, bool(state['at_rest']), *usable), HeldInputs(*newest))
-    except (TypeError, LookupError) as error:
+    except (TypeError, LookupError, OverflowError, RecursionError) as error:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
 

@@ -61,7 +61,7 @@ def _decode(data: bytes, body: str) -> tuple[int, bytes, tuple[Any, ...]]:
     encapsulation, seconds, nanoseconds, length = _FIRST_HEADER_PART.unpack_from(data)
     if encapsulation[:2] != b'\x00\x01':
         raise ValueError(f'encapsulation {encapsulation.hex()} is not little-endian CDR')
-    if not 1 <= length <= _LONGEST_FRAME or not 0 <= nanoseconds < _SECOND:
+    if not 0 <= length <= _LONGEST_FRAME or not 0 <= nanoseconds < _SECOND:
         raise ValueError(f'header with {nanoseconds} ns and a frame name of {length} bytes makes no sense')
     layout = _body(length, body)
     if not layout.size <= len(data) <= layout.size + 3:  # some writers pad the whole to a multiple of 4

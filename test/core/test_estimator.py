@@ -342,10 +342,6 @@ def test_all_forces_are_zero_while_there_was_no_pressure():
     assert only(sample(pressure=None))[1:5] == (0.0, 0.0, 0.0, 0.0)
 
 
-# --- known gap ---
-
-
-@pytest.mark.xfail(strict=True, reason='estimator.py: a velocity fault makes the rod count as moving')
 @pytest.mark.parametrize('bad', [math.nan, 11.0])
 def test_one_unusable_velocity_does_not_make_a_resting_rod_slide(bad):
     speeds = [0.0, 1.5e-3, bad, 1.5e-3]

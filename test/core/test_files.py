@@ -195,10 +195,6 @@ def test_a_parameter_that_makes_no_sense_is_refused_with_file_field_and_bound(wr
     assert expected in complaint(load_parameter_file, written(f'/**:\n  ros__parameters: {parameters}\n'))
 
 
-# --- known gaps ---
-
-
-@pytest.mark.xfail(strict=True, reason='files.py: errors of YAML constructors that are no YAMLError')
 @pytest.mark.parametrize(
     'content',
     [
@@ -211,14 +207,12 @@ def test_a_value_that_does_not_fit_its_tag_is_refused_with_the_file(written, con
     complaint(read_yaml, written(content))
 
 
-@pytest.mark.xfail(strict=True, raises=RuntimeError, reason='files.py: config_path')
 @pytest.mark.parametrize('name', ['~no_such_user_here/x.yaml'])
 def test_a_path_that_cannot_be_is_refused_by_name(name):
     with pytest.raises(ValueError, match='no_such_user_here'):
         load_configuration(SealSelection((name,), ('a',)), EstimatorSettings())
 
 
-@pytest.mark.xfail(strict=True, reason='files.py: load_parameter_file')
 @pytest.mark.parametrize('parameters', ['ab', '[[stick_velocity, 0.0]]', '{stick_velocity: 1' + '0' * 400 + '}'])
 def test_parameters_that_are_no_mapping_or_too_large_are_refused_with_the_file(written, parameters):
     complaint(load_parameter_file, written(f'/**: {{ros__parameters: {parameters}}}'))

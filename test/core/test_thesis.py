@@ -287,7 +287,11 @@ def recomputed(name: str) -> dict:
         }
     charts = [(0.5 * 0.625 * math.pi + row['f_h_lbf_per_in2'] * projected_area(GEOMETRY) / INCH**2) * 2.0
               for row in PRIOR_ART]  # fmt: skip
-    excess = [chart / MEAN[p] - 1.0 for chart, p in zip(charts, PRESSURES, strict=True)]
+    excess = [
+        reading / chart - 1.0
+        for chart, p in zip(charts, PRESSURES, strict=True)
+        for reading in readings('dynamic', pressure_psig=p)
+    ]
     return common | {
         'chart': {
             'squeeze_friction': 0.5 * LBF / INCH,
