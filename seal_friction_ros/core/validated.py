@@ -6,6 +6,7 @@ From this one place follow the check at construction, the check of a YAML file, 
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -117,6 +118,13 @@ def _fields(record_type: Any) -> tuple[dataclasses.Field[Any], ...]:
 _WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text'}
 
 
+def _hint(value: Any, declared: Any) -> str:
+    """YAML 1.1 takes a number with an exponent but without point or sign, such as 15e-3 or 1.0e5, for a text."""
+    if declared is float and isinstance(value, str) and re.fullmatch(r'[-+]?[\d.]+[eE][-+]?\d+', value):
+        return ': write it with a point and a signed exponent, as in 1.0e+5'
+    return ''
+
+
 def _as_declared(value: Any, declared: Any, where: str) -> Any:
     if declared in (float, int, bool, str):
         if declared is float and type(value) is int:
@@ -125,7 +133,7 @@ def _as_declared(value: Any, declared: Any, where: str) -> Any:
             except OverflowError:
                 raise ValueError(f'{where} is a whole number too large to be a number in use') from None
         if type(value) is not declared:
-            raise ValueError(f'{where} = {value!r} is not {_WORDS[declared]}')
+            raise ValueError(f'{where} = {value!r} is not {_WORDS[declared]}{_hint(value, declared)}')
         return value
     if not isinstance(value, list | tuple):
         raise ValueError(f'{where} = {value!r} is not a list')

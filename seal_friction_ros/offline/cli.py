@@ -103,6 +103,8 @@ def _plain(value: Any) -> Any:
     """What JSON can hold: records as mappings, paths as text, numbers that are not finite as null."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return _plain(dataclasses.asdict(value))
+    if hasattr(value, '_asdict'):
+        return _plain(value._asdict())
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

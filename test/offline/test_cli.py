@@ -101,9 +101,10 @@ def test_unusable_bags_are_exit_code_2_one_line_and_nothing_written(command: str
     ('old', 'new', 'words'),
     [
         ('exponent: 0.562321', 'exponent: 1.7', ['exponent', '1.7', '0.99']),
-        ('gland_diameter: 20.8534e-3', 'gland_diameter: 15e-3', ['gland_diameter', '0.015', 'rod_diameter']),
+        ('gland_diameter: 20.8534e-3', 'gland_diameter: 0.015', ['gland_diameter', '0.015', 'rod_diameter']),
         ('law: power_law', 'law: magic', ['friction_coefficient', 'magic', 'power_law']),
         ('stiction: 2.47685', 'stiction: lots', ['stiction', 'lots']),
+        ('stiction: 2.47685', 'stiction: 2e-1', ['stiction', '2e-1', 'signed exponent']),
     ],
 )
 def test_a_seal_that_makes_no_sense_is_exit_code_2_with_field_value_and_bound(
