@@ -12,6 +12,7 @@ from statistics import median
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.configuration import SealSelection
@@ -59,7 +60,7 @@ def main() -> int:
         return 0
     table = Table(title=f'One sample, median of {BATCHES} batches of {CALLS}')
     for heading in ('stage', 'time [us]', 'bare calls'):
-        table.add_column(heading, justify='left' if heading == 'stage' else 'right')
+        table.add_column(Text(heading), justify='left' if heading == 'stage' else 'right')
     for name, time in figures.items():
         table.add_row(name, f'{time:.2f}', f'{time / figures["bare call"]:.0f}')
     Console().print(table)

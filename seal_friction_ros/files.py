@@ -11,6 +11,7 @@ from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.validated import from_mapping, meanings
 
 _CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # what PyYAML lets out for '!!int foo'
+_OF_THE_NODE = ('autostart', 'record', 'record_directory', 'record_name', 'use_sim_time', 'qos_overrides')
 _LARGEST_YAML = 1 << 20  # [bytes] a seal or parameter file has a few thousand
 
 
@@ -37,16 +38,16 @@ def read_yaml(path: Path) -> Any:
         ValueError: The file is missing, not readable, too large or not plain YAML; one line that names it.
     """
     try:
-        size = path.stat().st_size
-        text = path.read_text(encoding='utf-8') if size <= _LARGEST_YAML else ''
+        if path.exists() and not path.is_file():  # a pipe or a device never ends
+            raise ValueError(f'{path}: not a file')
+        with path.open('rb') as file:
+            data = file.read(_LARGEST_YAML + 1)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
-    except ValueError as error:
-        raise ValueError(f'{path}: not plain YAML: {error}') from None
-    if size > _LARGEST_YAML:
+    if len(data) > _LARGEST_YAML:
         raise ValueError(f'{path}: larger than {_LARGEST_YAML} bytes, not a file of this kind')
     try:
-        return _PlainLoader(text).get_single_data()
+        return _PlainLoader(data.decode('utf-8')).get_single_data()
     except (yaml.YAMLError, RecursionError, *_CONSTRUCTOR_ERRORS) as error:
         raise ValueError(f'{path}: not plain YAML: {" ".join(str(error).split())}') from None
 
@@ -59,9 +60,11 @@ def share_directory(package: str, module_file: str) -> Path:
     Raises:
         FileNotFoundError: There is none.
     """
-    for parent in Path(module_file).resolve().parents:
+    paths = (Path(module_file), Path(module_file).resolve())  # a colcon --symlink-install has links into the source
+    for parent in (parent for path in paths for parent in path.parents):
         for candidate in (parent / 'share' / package, parent):
-            if (candidate / 'package.xml').is_file():
+            manifest = candidate / 'package.xml'
+            if manifest.is_file() and f'<name>{package}</name>' in manifest.read_text(encoding='utf-8'):
                 return candidate
     raise FileNotFoundError(f'no share folder of {package} above {module_file}')
 
@@ -92,7 +95,7 @@ def load_configuration(selection: SealSelection, settings: EstimatorSettings) ->
 
 
 def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
-    """Selection and settings from a ROS parameter file (``/**: ros__parameters: ...``), of any node name.
+    """Selection and settings from the parts of a ROS parameter file that are for ``friction_estimator`` or every node.
 
     Parameters of the node that are not the estimator's (recording, QoS) are passed over.
 
@@ -102,10 +105,15 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
     document = read_yaml(path)
     values: dict[str, Any] = {}
     try:
-        for node in document.values():
-            values.update(node['ros__parameters'].items())
+        for node, content in document.items():
+            if str(node).rsplit('/', maxsplit=1)[-1] in ('friction_estimator', '*', '**'):
+                values.update(content['ros__parameters'].items())
     except (AttributeError, KeyError, TypeError):
         raise ValueError(f'{path}: not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)') from None
+    known = {*meanings(SealSelection), *meanings(EstimatorSettings), *_OF_THE_NODE}
+    unknown = sorted(str(name) for name in values if name not in known)
+    if unknown:
+        raise ValueError(f'{path}: friction_estimator has no parameter {", ".join(unknown)}')
     return tuple(  # type: ignore[return-value]
         from_mapping(kind, {k: v for k, v in values.items() if k in meanings(kind)}, str(path))
         for kind in (SealSelection, EstimatorSettings)

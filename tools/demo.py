@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.files import config_path
@@ -66,7 +67,7 @@ def friction_table(runs: list[Run]) -> Table:
     """Measured and estimated Coulomb friction at every pressure of every run."""
     table = Table(title='Coulomb friction, measured and estimated live')
     for heading in ('run', 'pressure [bar]', 'measured [N]', 'estimated [N]', 'std [N]', 'deviation [%]'):
-        table.add_column(heading, justify='left' if heading == 'run' else 'right')
+        table.add_column(Text(heading), justify='left' if heading == 'run' else 'right')
     for run in runs:
         for level in evaluate(read_run(run.bag)).friction.sliding:
             deviation = 'none' if level.deviation_percent is None else f'{level.deviation_percent:+.1f}'
@@ -79,7 +80,7 @@ def run_table(runs: list[Run]) -> Table:
     """How long an estimate took, and whether the replay gave the same bytes."""
     table = Table(title='Live runs: velocity sample out, estimate back')
     for heading in ('run', 'samples', 'p50 [us]', 'p99 [us]', 'replay', 'bag', 'report'):
-        table.add_column(heading, justify='right' if heading.startswith(('p', 's')) else 'left', overflow='fold')
+        table.add_column(Text(heading), justify='right' if heading.startswith(('p', 's')) else 'left', overflow='fold')
     for run in runs:
         f = run.figures
         verdict = 'identical' if run.identical else 'DIFFERENT'

@@ -14,7 +14,8 @@ class Recording:
 
     def __init__(self) -> None:
         self._recorder: Recorder | None = None
-        self._failure = ''
+        self.failure = ''
+        """Why the last bag could not be made or finished; empty if it could."""
 
     def start(self, directory: str, name: str) -> Path:
         """Start a bag called ``name``, or after the time if that is empty; return its folder.
@@ -22,17 +23,16 @@ class Recording:
         Raises:
             BagError: It cannot be made, or another one is being recorded.
         """
-        if self._recorder is not None:
+        if self._recorder is not None and not self._recorder.error:
             raise BagError(f'recording to {self._recorder.path} already: stop that first')
-        folder = Path(directory).expanduser()
-        path = folder / (name or f'friction_{datetime.now(UTC):%Y%m%d_%H%M%S_%f}')
-        self._failure = ''
+        self.stop()
         try:
-            self._recorder = Recorder(path)
-        except BagError as error:
-            self._failure = str(error)
-            raise
-        return path
+            folder = Path(directory).expanduser()
+            self._recorder = Recorder(folder / (name or f'friction_{datetime.now(UTC):%Y%m%d_%H%M%S_%f}'))
+        except (ValueError, RuntimeError) as error:
+            self.failure = str(error)
+            raise BagError(f'record_directory = {directory!r}, record_name = {name!r}: {error}') from None
+        return self._recorder.path
 
     def record(self, topic: str, type_name: str, log_time: int, data: bytes) -> None:
         """Record one message, if a bag is being recorded."""
@@ -42,10 +42,11 @@ class Recording:
     def stop(self) -> str:
         """Finish the bag; return what became of it in words, empty if none was being recorded."""
         recorder, self._recorder = self._recorder, None
+        self.failure = ''
         if recorder is None:
             return ''
         recorder.close()
-        self._failure = recorder.error
+        self.failure = recorder.error
         return recorder.error or f'{recorder.path}: {recorder.written} messages, {recorder.dropped} dropped'
 
     def report(self) -> DiagnosticStatus:
@@ -63,7 +64,7 @@ class Recording:
             }
             if recorder.dropped:
                 status.level, status.message = DiagnosticStatus.WARN, f'{recorder.dropped} messages dropped'
-        failure = recorder.error if recorder is not None and recorder.error else self._failure
+        failure = recorder.error if recorder is not None and recorder.error else self.failure
         if failure:
             status.level, status.message = DiagnosticStatus.ERROR, failure
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]

@@ -86,22 +86,28 @@ class BagWriter:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            path.mkdir(parents=True)
-            self._file: BinaryIO = (path / f'{path.name}_0.mcap').open('xb')
-        except FileExistsError:
-            raise BagError(f'{path} exists already: not overwriting') from None
-        except OSError as error:
-            raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
-        self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE)
-        self._writer.start(profile='ros2', library='seal_friction_ros')
+        for type_name in wire.DECODERS:
+            message_definition(type_name)  # now, where it can be said, and not when the first message comes
         self._channels: dict[str, int] = {}
         self._types: dict[str, str] = {}
         self._counts: dict[str, int] = {}
         self._first_time = 0
         self._last_time = -1
         self._custom_data: dict[str, str] = {}
-        self._write_metadata()
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            raise BagError(f'{path} exists already: not overwriting') from None
+        except OSError as error:
+            raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
+        try:
+            self._file: BinaryIO = (path / f'{path.name}_0.mcap').open('xb')
+            self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE)
+            self._writer.start(profile='ros2', library='seal_friction_ros')
+            self._write_metadata()
+        except OSError as error:
+            shutil.rmtree(path, ignore_errors=True)  # made just now, by us
+            raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
 
     def write(self, topic: str, type_name: str, log_time: int, data: bytes) -> int:
         """Append one serialised message; returns the log time [ns] it got: the one given, or 1 ns after the last."""
@@ -241,7 +247,7 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
         raise
     except (ReaderError, McapError, OSError, ValueError, LookupError, EOFError, struct.error, AssertionError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
-        raise BagError(f'{path}: not a readable bag: {reason}') from None
+        raise BagError(f'{path}: not a readable bag (truncated, not finished, or no bag): {reason}') from None
 
 
 def _open_folder(path: Path) -> Reader:

@@ -9,7 +9,7 @@ import time
 from collections import deque
 from pathlib import Path
 
-from seal_friction_ros.offline.bag import BagError, BagMessage, BagWriter
+from seal_friction_ros.offline.bag import BagMessage, BagWriter
 
 QUEUE_LENGTH = 50_000  # [messages] ten seconds of five topics at 1 kHz
 _PERIOD = 0.01  # [s] between two looks at the queue: waking the thread for each message would slow the estimator
@@ -66,7 +66,7 @@ class Recorder:
                 time.sleep(_PERIOD)
             self._drain()
             self._writer.close({'dropped_messages': str(self.dropped)})
-        except (OSError, BagError) as error:
+        except Exception as error:  # noqa: BLE001  whatever it is, the thread must not end without a word
             self.dropped += len(self._queue)
             self._queue.clear()
             self.error = f'{self.path}: recording stopped: {error}'

@@ -55,7 +55,8 @@ def find_topics(bag: Path, namespace: str = '') -> Topics:
         BagError: There is no velocity, or a type has several topics.
     """
     names = []
-    topics = {topic: info for topic, info in bag_topics(bag).items() if topic.startswith(namespace)}
+    below = f'/{namespace.strip("/")}/'.replace('//', '/')
+    topics = {topic: info for topic, info in bag_topics(bag).items() if topic.startswith(below)}
     for wanted in _TYPES:
         found = sorted(topic for topic, info in topics.items() if info.type_name == wanted and info.message_count)
         if len(found) > 1:
