@@ -38,7 +38,7 @@ def read_yaml(path: Path) -> Any:
         ValueError: The file is missing, not readable, too large or not plain YAML; one line that names it.
     """
     try:
-        if path.exists() and not path.is_file():  # a pipe or a device never ends
+        if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe or a device never ends
             raise ValueError(f'{path}: not a file')
         with path.open('rb') as file:
             data = file.read(_LARGEST_YAML + 1)
@@ -97,7 +97,8 @@ def load_configuration(selection: SealSelection, settings: EstimatorSettings) ->
 def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
     """Selection and settings from the parts of a ROS parameter file that are for ``friction_estimator`` or every node.
 
-    Parameters of the node that are not the estimator's (recording, QoS) are passed over.
+    A file with one node only is for that node, whatever its name. Parameters of the node that are not the estimator's
+    (recording, QoS) are passed over.
 
     Raises:
         ValueError: The file is no parameter file, or a value makes no sense.
@@ -106,7 +107,7 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
     values: dict[str, Any] = {}
     try:
         for node, content in document.items():
-            if str(node).rsplit('/', maxsplit=1)[-1] in ('friction_estimator', '*', '**'):
+            if len(document) == 1 or str(node).rsplit('/', maxsplit=1)[-1] in ('friction_estimator', '*', '**'):
                 values.update(content['ros__parameters'].items())
     except (AttributeError, KeyError, TypeError):
         raise ValueError(f'{path}: not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)') from None

@@ -1,7 +1,5 @@
 """A graph of one test: the node under test and a probe that publishes inputs and collects what comes out."""
 
-import itertools
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,13 +21,7 @@ from seal_friction_msgs.msg import (
 )
 
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
-
-_domains = itertools.count(os.getpid() % 100)
-
-
-def next_domain() -> int:
-    """A ROS domain for one test: 1 to 100, so that runs side by side hardly ever meet."""
-    return 1 + next(_domains) % 100
+from seal_friction_ros.nodes.processes import free_domain
 
 
 class Probe(Node):
@@ -145,7 +137,7 @@ def graph(
 ) -> Iterator[Graph]:
     """Estimator with ``parameters`` and command-line ``arguments`` (remapping), and a probe below ``namespace``."""
     context = Context()
-    rclpy.init(context=context, domain_id=next_domain())
+    rclpy.init(context=context, domain_id=free_domain())
     overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
     estimator = FrictionEstimator(
         context=context, parameter_overrides=overrides, cli_args=['--ros-args', *arguments] if arguments else None

@@ -8,9 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from live_graph import next_domain
 
-from seal_friction_ros.nodes.processes import graph_environment
+from seal_friction_ros.nodes.processes import free_domain, graph_environment
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / 'tools'))
@@ -45,7 +44,7 @@ def run(command: str, folder: Path, timeout: float = 120.0) -> subprocess.Comple
     return subprocess.run(
         ['bash', '-c', command],
         cwd=folder,
-        env=graph_environment(next_domain()),
+        env=graph_environment(free_domain()),
         capture_output=True,
         text=True,
         timeout=timeout,
@@ -63,7 +62,7 @@ def test_every_command_of_the_readme_runs(checkout: Path):
 
 def test_the_node_runs_as_the_readme_says_and_records(checkout: Path):
     *settings, command = commands(' live')
-    environment = graph_environment(next_domain())
+    environment = graph_environment(free_domain())
     environment |= dict(setting.removeprefix('export ').split('=') for setting in settings)
     command = command.replace('.venv/bin', str(ROOT / '.venv' / 'bin'))
     process = subprocess.Popen(command.split(), cwd=checkout, env=environment, stderr=subprocess.PIPE, text=True)
@@ -117,3 +116,10 @@ def test_every_figure_is_made_by_a_command():
     source = (ROOT / 'tools' / 'make_figures.py').read_text()
     for figure in (ROOT / 'docs' / 'figures').iterdir():
         assert f"'{figure.name}'" in source
+
+
+def test_the_units_are_in_the_table_of_the_demo():
+    import demo  # noqa: PLC0415
+
+    headings = [str(column.header) for column in (*demo.friction_table([]).columns, *demo.run_table([]).columns)]
+    assert {'pressure [bar]', 'measured [N]', 'p99 [us]'} <= set(headings)

@@ -17,7 +17,7 @@ from rich.text import Text
 
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.files import config_path
-from seal_friction_ros.nodes.processes import play_live
+from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.offline.bag_evaluation import evaluate, read_run
 from seal_friction_ros.offline.import_log import import_log
 from seal_friction_ros.offline.import_thesis import import_thesis
@@ -29,7 +29,6 @@ OUT = ROOT / 'build' / 'demo'
 RIG_LOGS = ROOT.parent / 'shared' / 'data' / 'delft'
 PULL_TEST_RATE = 10.0  # [times the pace of the data] 100 Hz of readings become the 1 kHz of a servo controller
 RIG_RATE = 25.0  # [times the pace of the data] the runs last minutes
-DOMAIN = 85
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ def inputs(folder: Path) -> Iterator[tuple[Path, float, dict[str, object]]]:
 def run_live(bag: Path, rate: float, parameters: dict[str, object]) -> Run:
     """Play one bag live, verify what was recorded, report it."""
     recorded = OUT / bag.name
-    figures = play_live(bag, recorded, DOMAIN, rate, parameters)
+    figures = play_live(bag, recorded, free_domain(), rate, parameters)
     identical = replay(recorded).identical
     report = OUT / f'{bag.name}.html'
     write_report(recorded, report)

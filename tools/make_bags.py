@@ -17,7 +17,7 @@ import yaml
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.core.wire import Velocity
-from seal_friction_ros.nodes.processes import play_live
+from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.offline.bag import (
     FORCE_TOPIC,
     PRESSURE_TOPIC,
@@ -73,12 +73,12 @@ def main() -> int:
         ),
         'faults': (faults, 'Made up: sine waves with one fault after another.'),
     }
-    for number, (name, (make, origin)) in enumerate(sources.items()):
+    for name, (make, origin) in sources.items():
         with tempfile.TemporaryDirectory() as folder:
             with BagWriter(Path(folder) / 'inputs') as writer:
                 for message in make(Path(folder)):
                     writer.write(*message)
-            play_live(Path(folder) / 'inputs', Path(folder) / name, 90 + number, 1.0)
+            play_live(Path(folder) / 'inputs', Path(folder) / name, free_domain(), 1.0)
             shutil.rmtree(BAGS / name, ignore_errors=True)
             shutil.copytree(Path(folder) / name, BAGS / name)
         digest = hashlib.sha256((BAGS / name / f'{name}_0.mcap').read_bytes()).hexdigest()

@@ -67,11 +67,13 @@ make_environment() {
     command -v "${CC:-cc}" >/dev/null || fail "no C compiler (${CC:-cc}): on Debian or Ubuntu, apt-get install build-essential"
     command -v "${CXX:-c++}" >/dev/null || fail "no C++ compiler (${CXX:-c++}): on Debian or Ubuntu, apt-get install build-essential"
     python=$(find_python) || exit 2
-    rm -rf .venv build/messages
-    say "making .venv with $("$python" --version), ROS 2 from ${ROS_DISTRO:-wheels}: a minute or two, once"
     if [ -n "${ROS_DISTRO:-}" ]; then
         command -v colcon >/dev/null || fail "ROS_DISTRO is $ROS_DISTRO but there is no colcon: apt-get install python3-colcon-common-extensions"
         [ -n "${AMENT_PREFIX_PATH:-}" ] || fail "ROS_DISTRO is $ROS_DISTRO but AMENT_PREFIX_PATH is not set: source /opt/ros/$ROS_DISTRO/setup.bash"
+    fi
+    rm -rf .venv build/messages
+    say "making .venv with $("$python" --version), ROS 2 from ${ROS_DISTRO:-wheels}: a minute or two, once"
+    if [ -n "${ROS_DISTRO:-}" ]; then
         run_logged "$python" -m venv --system-site-packages .venv
     else
         run_logged "$python" -m venv .venv

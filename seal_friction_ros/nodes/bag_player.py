@@ -131,6 +131,8 @@ def main() -> int:
     parser.add_argument('--rate', type=float, default=1.0, help='times the pace of the bag; 0: as fast as answered')
     parser.add_argument('--wait', type=float, default=10.0, help='how long to wait for an estimator [s]')
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    if not 0.0 <= arguments.rate < float('inf'):
+        parser.error(f'--rate {arguments.rate}: not a rate')
     rclpy.init()
     player = BagPlayer()
     try:

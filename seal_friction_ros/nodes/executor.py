@@ -1,6 +1,8 @@
 """How the nodes of this package are spun and how they stop."""
 
+import sys
 from collections.abc import Callable
+from typing import TypeVar
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -12,6 +14,7 @@ try:
 except ImportError:  # ROS 2 Jazzy
     EventsExecutor = None
 
+AnyNode = TypeVar('AnyNode', bound=Node)
 _LONG = 86400.0  # [s] a wait without end overflows the clock of the events executor and dispatches nothing
 
 
@@ -23,27 +26,36 @@ def spin(node: Node) -> None:
         executor.spin_until_future_complete(Future(), timeout_sec=_LONG)
 
 
-def run(make_node: Callable[[], Node], stop: Callable[[Node], None], args: list[str] | None = None) -> int:
-    """Make a node, spin it, and on SIGINT or SIGTERM stop it in order.
+def run(
+    make_node: Callable[[], AnyNode],
+    start: Callable[[AnyNode], bool],
+    stop: Callable[[AnyNode], None],
+    args: list[str] | None = None,
+) -> int:
+    """Make a node, start it, spin it, and on SIGINT or SIGTERM stop it in order.
 
     Args:
         make_node: Makes the node; a ValueError it raises ends the process with one line.
-        stop: Called with the node when spinning has ended.
+        start: Called with the node before spinning; False for a node that could not start, and has said why.
+        stop: Called with the node at the end, whatever happened.
         args: Command line with ``--ros-args``.
 
     Returns:
         Exit code: 0, or 2 for a node that could not start.
     """
-    rclpy.init(args=args)
     try:
+        rclpy.init(args=args)
         node = make_node()
-    except ValueError as error:
-        if not rclpy.ok():  # stopped by a signal while it started
-            return 0
-        rclpy.logging.get_logger('seal_friction_ros').fatal(str(error))
+    except (ValueError, RuntimeError) as error:  # RCLError, of a parameter file for example, is a RuntimeError
+        print(f'not started: {" ".join(str(error).split())}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
+    except KeyboardInterrupt:
+        rclpy.try_shutdown()
+        return 0
     try:
+        if not start(node):
+            return 2 if rclpy.ok() else 0  # not ok: stopped by a signal while it started
         spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

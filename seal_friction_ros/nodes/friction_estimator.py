@@ -5,7 +5,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
@@ -53,11 +53,12 @@ class FrictionEstimator(LifecycleNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('friction_estimator', **kwargs)
-        self._configuration: Configuration | None = None
         self._active = False
+        self._failure_said = ''
         self._recording = Recording()
         self._inputs: dict[str, Any] = {}
         self._topics: dict[str, str] = {}
+        self._forget()
         try:
             for record_type in _RECORDS:
                 declare(self, record_type)
@@ -67,6 +68,13 @@ class FrictionEstimator(LifecycleNode):
         self.add_post_set_parameters_callback(self._on_parameters_set)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
+
+    def _forget(self) -> None:
+        self._configuration: Configuration | None = None
+        self._diagnostics_timer: Any = None
+        self._estimate_publisher: Any = None
+        self._configuration_publisher: Any = None
+        self._diagnostics_publisher: Any = None
 
     def autostart(self) -> bool:
         """Configure and activate, if the parameters say so; False if that failed, which is logged."""
@@ -89,10 +97,15 @@ class FrictionEstimator(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the seal files; make publishers and subscriptions."""
         try:
-            self._configuration = load_configuration(read(self, SealSelection), read(self, EstimatorSettings))
-        except ValueError as error:
+            self._make()
+        except Exception as error:  # noqa: BLE001  rclpy swallows what a transition raises, so it is said here
             self.get_logger().error(str(error))
+            self._release()
             return TransitionCallbackReturn.FAILURE
+        return super().on_configure(state)
+
+    def _make(self) -> None:
+        configuration = load_configuration(read(self, SealSelection), read(self, EstimatorSettings))
         self._statistics = LiveStatistics()
         self._estimate_publisher = self.create_lifecycle_publisher(
             FrictionEstimate, 'friction_estimate', qos.STREAM, qos_overriding_options=qos.overridable()
@@ -106,7 +119,7 @@ class FrictionEstimator(LifecycleNode):
             self._subscribe(name, qos.STREAM)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # diagnostics go on while simulated time stands still
         self._diagnostics_timer = self.create_timer(_DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
-        return super().on_configure(state)
+        self._configuration = configuration
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start estimating, from a state in which nothing is known, and recording if asked to."""
@@ -140,15 +153,15 @@ class FrictionEstimator(LifecycleNode):
         return super().on_shutdown(state)
 
     def _release(self) -> None:
-        if self._configuration is None:
-            return
-        self.destroy_timer(self._diagnostics_timer)
+        if self._diagnostics_timer is not None:
+            self.destroy_timer(self._diagnostics_timer)
         for subscription in self._inputs.values():
             self.destroy_subscription(subscription)
         for publisher in (self._estimate_publisher, self._configuration_publisher, self._diagnostics_publisher):
-            self.destroy_publisher(publisher)
+            if publisher is not None:
+                self.destroy_publisher(publisher)
         self._inputs.clear()
-        self._configuration = None
+        self._forget()
 
     def _subscribe(self, name: str, profile: QoSProfile) -> None:
         if name in self._inputs:
@@ -264,7 +277,8 @@ class FrictionEstimator(LifecycleNode):
     def _on_stop_recording(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         del request
         outcome = self._recording.stop()
-        response.success, response.message = bool(outcome), outcome or 'not recording'
+        response.success = bool(outcome) and not self._recording.failure
+        response.message = outcome or 'not recording'
         return response
 
     # --- diagnostics ---
@@ -273,6 +287,9 @@ class FrictionEstimator(LifecycleNode):
         publishers = {name: self._publisher_count(name) for name in INPUTS}
         statuses = [self._statistics.report(self._active, publishers), self._recording.report()]
         message = DiagnosticArray(status=statuses)
+        if statuses[1].level == DiagnosticStatus.ERROR and statuses[1].message != self._failure_said:
+            self._failure_said = statuses[1].message
+            self.get_logger().error(self._failure_said)
         for status, part in zip(message.status, ('estimate', 'recorder'), strict=True):
             status.name = f'{self.get_fully_qualified_name()}: {part}'
         message.header.stamp = self.get_clock().now().to_msg()
@@ -297,21 +314,9 @@ class FrictionEstimator(LifecycleNode):
                 return
 
 
-def make_node() -> FrictionEstimator:
-    """Make the node, started if its parameters say so.
-
-    Raises:
-        ValueError: It cannot start.
-    """
-    node = FrictionEstimator()
-    if not node.autostart():
-        raise ValueError('friction_estimator: not started')
-    return node
-
-
 def main() -> int:
     """Run the node: ``friction_estimator --ros-args -p seals:=[...] --params-file FILE``."""
-    return run(make_node, FrictionEstimator.finish)
+    return run(FrictionEstimator, FrictionEstimator.autostart, FrictionEstimator.finish)
 
 
 if __name__ == '__main__':

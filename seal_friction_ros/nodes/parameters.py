@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
 
 from seal_friction_ros.core.validated import Meaning, meanings, parameter
@@ -13,7 +14,11 @@ Record = TypeVar('Record')
 
 @dataclasses.dataclass(frozen=True)
 class NodeOptions:
-    """What the estimator node does besides estimating, one field per ROS parameter."""
+    """What the estimator node does besides estimating, one field per ROS parameter.
+
+    Raises:
+        ValueError: The name of the bag is not a plain name: it could lead out of the folder.
+    """
 
     autostart: bool = parameter(True, unit='', live=False, description='Configure and activate by itself at start.')
     record: bool = parameter(False, unit='', live=False, description='Record from activation on.')
@@ -21,6 +26,10 @@ class NodeOptions:
     record_name: str = parameter(
         '', unit='', description='Name of the bag; never overwritten. Empty: friction_ and the time of its start.'
     )
+
+    def __post_init__(self) -> None:
+        if '/' in self.record_name or not self.record_name.isprintable() or self.record_name in ('.', '..'):
+            raise ValueError(f'NodeOptions.record_name = {self.record_name!r} is not a plain name of a folder')
 
 
 def declare(node: Node, record_type: type) -> None:
@@ -42,7 +51,10 @@ def read(node: Node, record_type: type[Record], **changed: Any) -> Record:
     Raises:
         ValueError: The values make no sense; one line that names field, value and bound.
     """
-    values = {name: changed.get(name, node.get_parameter(name).value) for name in meanings(record_type)}
+    try:
+        values = {name: changed.get(name, node.get_parameter(name).value) for name in meanings(record_type)}
+    except ParameterUninitializedException as error:  # an empty list has no type, so it counts as none
+        raise ValueError(f'{record_type.__name__}: a list is empty: {error}') from None
     return record_type(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
 
 

@@ -274,6 +274,10 @@ class _Collector:
         columns = np.frombuffer(self._rows, dtype=np.float64).reshape(len(stamps), len(_COLUMNS)).T.copy()
         values: dict[str, Any] = dict(zip(_COLUMNS, columns, strict=True))
         values.update({name: values[name].astype(np.int64) for name in _INTEGERS})
+        for column in ('velocity', 'pressure_a', 'pressure_b', 'force_sum'):
+            values[column][~(np.abs(values[column]) < _ABSURD)] = math.nan  # a fault: nothing to evaluate or to draw
+        refused = (values['status'] & int(Status.VELOCITY_OUT_OF_RANGE)) != 0
+        values['velocity'][refused] = math.nan
         start = int(stamps[0])
         # A configuration has no stamp of its own: it counts from when it was recorded.
         changes = tuple((round((t - start) * 1e-9, 6), text) for t, text in self._configurations)

@@ -1,5 +1,6 @@
 """The door through which YAML comes in: plain data, or one line that names the file."""
 
+import os
 from itertools import pairwise
 from pathlib import Path
 
@@ -110,7 +111,7 @@ def test_the_share_folder_of_an_install_is_found_above_the_code(tmp_path):
     share = tmp_path / 'share' / 'some_package'
     code = tmp_path / 'lib' / 'python3' / 'site-packages' / 'some_package' / 'code.py'
     share.mkdir(parents=True)
-    (share / 'package.xml').touch()
+    (share / 'package.xml').write_text('<package><name>some_package</name></package>')
     assert share_directory('some_package', str(code)) == share
     with pytest.raises(FileNotFoundError, match='no share folder of other_package above'):
         share_directory('other_package', str(code))
@@ -170,8 +171,35 @@ def test_parameters_of_the_node_that_are_not_the_estimators_are_passed_over(writ
 
 
 def test_later_nodes_of_a_parameter_file_overrule_earlier_ones(written):
-    path = written('/**:\n  ros__parameters: {force_max: 5.0}\nx:\n  ros__parameters: {force_max: 7.0}\n')
-    assert load_parameter_file(path)[1].force_max == 7.0
+    nodes = (
+        '/**:\n  ros__parameters: {force_max: 5.0}\n/left/friction_estimator:\n  ros__parameters: {force_max: 7.0}\n'
+    )
+    assert load_parameter_file(written(nodes))[1].force_max == 7.0
+
+
+def test_what_a_parameter_file_says_of_other_nodes_is_passed_over(written):
+    nodes = '/**:\n  ros__parameters: {force_max: 5.0}\nother:\n  ros__parameters: {force_max: 7.0, gain: 1}\n'
+    assert load_parameter_file(written(nodes))[1].force_max == 5.0
+
+
+def test_a_misspelt_parameter_is_refused_by_name(written):
+    with pytest.raises(ValueError, match='no parameter stick_velocty'):
+        load_parameter_file(written('/**:\n  ros__parameters: {stick_velocty: 0.5}\n'))
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / 'pipe')
+    assert complaint(read_yaml, tmp_path / 'pipe').endswith('not a file')
+
+
+def test_a_link_into_the_source_tree_finds_the_share_folder_of_the_install(tmp_path):
+    for prefix, package in (('source', 'outer'), ('install/share/inner', 'inner')):
+        (tmp_path / prefix).mkdir(parents=True)
+        (tmp_path / prefix / 'package.xml').write_text(f'<name>{package}</name>')
+    (tmp_path / 'source' / 'inner.py').touch()
+    (tmp_path / 'install' / 'lib').mkdir()
+    (tmp_path / 'install' / 'lib' / 'inner.py').symlink_to(tmp_path / 'source' / 'inner.py')
+    assert share_directory('inner', str(tmp_path / 'install' / 'lib' / 'inner.py')) == tmp_path / 'install/share/inner'
 
 
 @pytest.mark.parametrize('content', ['', '5', '[1]', 'a: 5', 'a: {b: 1}', 'a: {ros__parameters: }', 'a: [1]'])

@@ -16,12 +16,11 @@ from pathlib import Path
 import pytest
 
 from seal_friction_ros.core import wire
-from seal_friction_ros.nodes.processes import play_live
+from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.offline.bag import read_messages
 from seal_friction_ros.offline.replay import chosen_configuration, replay
 
 BAGS = sorted(path.parent for path in (Path(__file__).parents[2] / 'bags').glob('*/metadata.yaml'))
-DOMAINS = iter(range(101, 200))  # above those of test/nodes; each run has its own
 
 
 def live_and_offline(bag: Path, rate: float, folder: Path) -> tuple[list[bytes], list[bytes], bool]:
@@ -29,7 +28,7 @@ def live_and_offline(bag: Path, rate: float, folder: Path) -> tuple[list[bytes],
 
     The live node runs with its default parameters, so the offline replay does too, whatever the bag says.
     """
-    play_live(bag, folder / 'live', next(DOMAINS), rate)
+    play_live(bag, folder / 'live', free_domain(), rate)
     default = folder / 'default.yaml'
     default.write_text('/**:\n  ros__parameters: {}\n')
     replay(bag, chosen_configuration(default, None), folder / 'offline')
@@ -53,7 +52,7 @@ def test_what_comes_out_live_is_the_offline_replay_byte_for_byte(bag: Path, rate
 def test_twenty_recordings_in_a_row_verify(tmp_path: Path):
     verified = []
     for run in range(20):
-        play_live(BAGS[0], tmp_path / str(run), next(DOMAINS), 0.0)
+        play_live(BAGS[0], tmp_path / str(run), free_domain(), 0.0)
         verified.append(replay(tmp_path / str(run)).identical)
     assert verified == [True] * 20
 
