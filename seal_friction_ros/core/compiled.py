@@ -1,7 +1,7 @@
 """Compile a numeric function where numba is installed; leave it as it is where not.
 
-The function is written once, in plain Python on floats and tuples, and is the readable reference of itself: with numba it
-runs some twenty times faster, without it gives the same numbers (test/core/test_servo_compiled.py). Set
+The function is written once, in plain Python on floats and tuples, and is the readable reference of itself: with numba
+it runs some twenty times faster, without it gives the same numbers (test/core/test_servo_compiled.py). Set
 ``NUMBA_DISABLE_JIT=1`` to have it as Python although numba is there.
 """
 

@@ -5,12 +5,13 @@ r"""Estimate and reference velocity -> the force that cancels the seal friction 
 .. math::
     F = \tanh(v / w)\,[s_C f_c + s_S (f_b - f_c)\, e^{-|v / v_S|^\delta}] + s_V \sigma v
 
-with v the reference velocity, seen ``lead_time`` ahead. It comes from the reference and not from the rod, so it closes no loop:
-too large a force makes an error, but no limit cycle. Scales below 1 leave some friction to the controller, which a wrong
-model needs. tanh is smooth through zero here, where it shapes a command; the friction itself is never smoothed.
+with v the reference velocity, seen ``lead_time`` ahead. It comes from the reference and not from the rod, so it closes
+no loop: too large a force makes an error, but no limit cycle. Scales below 1 leave some friction to the controller,
+which a wrong model needs. tanh is smooth through zero here, where it shapes a command; the friction itself
+is never smoothed.
 
-Source: [Armstrong1994]_ section 4.2 (feed-forward from the desired velocity) and eq. (5) (Stribeck); fade, slew and clamp are
-our choice.
+Source: [Armstrong1994]_ section 4.2 (feed-forward from the desired velocity) and eq. (5) (Stribeck); fade, slew and
+clamp are our choice.
 """
 
 import math
@@ -20,6 +21,8 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.records import FrictionEstimate, FrictionState, Status
 from seal_friction_ros.core.validated import check, parameter
+
+FASTEST = 100.0  # [m/s] no rod is faster
 
 
 class Limited(IntFlag):
@@ -64,14 +67,16 @@ class FeedForwardSettings:
         0.001, unit='m/s', lower=1e-6, upper=1.0, description='w, speed at which 76 % of the Coulomb term is there.'
     )
     lead_time: float = parameter(
-        0.003, unit='s', lower=0.0, upper=0.5, description='How far ahead the velocity is seen; the delay of the force loop.'
+        0.003,
+        unit='s',
+        lower=0.0,
+        upper=0.5,
+        description='How far ahead the velocity is seen; the delay of the force loop.',
     )
     use_measured_velocity: bool = parameter(
         False, unit='', description='From the rod instead of the reference; closes a loop, so it can limit-cycle.'
     )
-    slew_limit: float = parameter(
-        5e4, unit='N/s', lower=1e-3, upper=1e9, description='Largest rate of the force.'
-    )
+    slew_limit: float = parameter(5e4, unit='N/s', lower=1e-3, upper=1e9, description='Largest rate of the force.')
     force_limit: float = parameter(150.0, unit='N', lower=0.0, upper=1e6, description='Largest force.')
     estimate_timeout: float = parameter(
         0.1, unit='s', lower=1e-4, upper=60.0, description='An estimate older than this is not used.'
@@ -130,7 +135,7 @@ def init(settings: FeedForwardSettings) -> FeedForwardState:
 def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
     """Whether the Coulomb friction of an estimate stands on a good pressure.
 
-    The state of the rod counts only with ``use_measured_velocity``: the feed-forward takes the direction from the reference.
+    The state of the rod counts only with ``use_measured_velocity``; else the direction comes from the reference.
     """
     if estimate.status & UNUSABLE:
         return False
@@ -155,8 +160,8 @@ def step(
 ) -> tuple[FeedForwardState, FeedForward]:
     """Feed-forward at one moment.
 
-    Without a usable estimate the last usable one is faded out over ``fade_time``; with one, the force fades in again. Fade,
-    then clamp, then slew: so the rate is bounded whatever happens.
+    Without a usable estimate the last usable one is faded out over ``fade_time``; with one, the force fades in again.
+    Fade, then clamp, then slew: so the rate is bounded whatever happens.
 
     Args:
         settings: Settings.
@@ -166,11 +171,10 @@ def step(
         motion: Reference and measured motion. What is not finite counts as standing still.
     """
     elapsed = 0.0 if state.stamp is None else max((stamp - state.stamp) * 1e-9, 0.0)
+    good, valid = state.estimate, False
     if estimate is not None and usable(settings, estimate):
         good = estimate
         valid = abs(stamp - estimate.stamp) * 1e-9 <= settings.estimate_timeout
-    else:
-        good, valid = state.estimate, False
     change = elapsed / settings.fade_time
     first = valid and state.estimate is None and state.stamp is None
     fade = 1.0 if first else min(max(state.fade + (change if valid else -change), 0.0), 1.0)
@@ -184,9 +188,7 @@ def step(
     force = min(max(clamped, state.force - most), state.force + most)
     if force != clamped:
         limited |= int(Limited.SLEW)
-    return FeedForwardState(stamp, force, fade, good), FeedForward(
-        stamp, force, settings.coulomb_scale * fade, limited
-    )
+    return FeedForwardState(stamp, force, fade, good), FeedForward(stamp, force, settings.coulomb_scale * fade, limited)
 
 
 def _velocity(settings: FeedForwardSettings, motion: Motion) -> float:
@@ -194,4 +196,4 @@ def _velocity(settings: FeedForwardSettings, motion: Motion) -> float:
         velocity = motion.measured_velocity
     else:
         velocity = motion.reference_velocity + settings.lead_time * motion.reference_acceleration
-    return velocity if math.isfinite(velocity) else 0.0
+    return min(max(velocity, -FASTEST), FASTEST) if math.isfinite(velocity) else 0.0

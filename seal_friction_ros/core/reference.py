@@ -1,7 +1,7 @@
 """Reference programs: waves of position over time, and the friction tests of the thesis and of the spool-valve paper.
 
-A wave is a frozen dataclass, ``at(time)`` its position, velocity and acceleration: a pure function, so that any sample can be
-asked for in any order. Before time 0 a wave stands where it starts.
+A wave is a frozen dataclass, ``at(time)`` its position, velocity and acceleration: a pure function, so that any sample
+can be asked for in any order. Before time 0 a wave stands where it starts.
 """
 
 import math
@@ -78,10 +78,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """There and back with a rest at both ends, ``cycles`` times: position over time is a trapezoid with rounded corners.
+    """There and back with a rest at both ends, ``cycles`` times: a trapezoid of position with rounded corners.
 
-    A cycle is: move by ``distance``, rest, move back, rest; both rests fill the period. A move runs at ``speed``, reached and
-    left with ``acceleration``; it takes distance / speed + speed / acceleration.
+    A cycle is: move by ``distance``, rest, move back, rest; both rests fill the period. A move runs at ``speed``,
+    reached and left with ``acceleration``; it takes distance / speed + speed / acceleration.
 
     Raises:
         ValueError: A value is out of bounds, the speed is not reached, or the moves do not fit into the period.
@@ -91,7 +91,11 @@ class Trapezoid:
     speed: float = parameter(0.034, unit='m/s', lower=1e-6, upper=10.0, description='Speed between the ends.')
     frequency: float = parameter(3.0, unit='Hz', lower=1e-4, upper=1e3, description='Cycles per second.')
     acceleration: float = parameter(
-        5.0, unit='m/s2', lower=1e-3, upper=1e4, description='Acceleration at the corners (sharp as it goes to infinity).'
+        5.0,
+        unit='m/s2',
+        lower=1e-3,
+        upper=1e4,
+        description='Acceleration at the corners (sharp as it goes to infinity).',
     )
     cycles: int = parameter(0, unit='1', lower=0, upper=1000000, description='Number of cycles; 0 is without end.')
     offset: float = parameter(0.0, unit='m', lower=-10.0, upper=10.0, description='Position of the first end.')
@@ -173,13 +177,13 @@ class Chirp:
         mean = 0.5 * (self.start_frequency + self.end_frequency)
         full = mean * self.duration if time >= self.duration else 0.0
         frequency = self.end_frequency if time >= self.duration else self.start_frequency + sweep * inside
-        turns = full + self.end_frequency * (time - inside) if full else (self.start_frequency + frequency) / 2.0 * inside
+        turns = (
+            full + self.end_frequency * (time - inside) if full else (self.start_frequency + frequency) / 2.0 * inside
+        )
         rate = 2.0 * math.pi * frequency
         sine, cosine = math.sin(2.0 * math.pi * turns), math.cos(2.0 * math.pi * turns)
         bend = 2.0 * math.pi * sweep * cosine - rate * rate * sine
-        return Reference(
-            self.offset + self.amplitude * sine, self.amplitude * rate * cosine, self.amplitude * bend
-        )
+        return Reference(self.offset + self.amplitude * sine, self.amplitude * rate * cosine, self.amplitude * bend)
 
 
 def spool_cycles(distance: float) -> Trapezoid:
@@ -211,23 +215,24 @@ class PullTest:
     """The thesis's friction test: rest, push until it moves and on, pull back likewise; pressure by pressure, repeated.
 
     The spring scale is drawn by a carriage at constant speed, so its force rises until the rod breaks away (static
-    reading) and then stays at the running friction (dynamic reading). Plan: 0 to 1000 psi in steps of 100 psi, 30 s rest,
-    three times over.
+    reading) and then stays, in the mean, at the running friction (dynamic reading). Plan: 0 to 1000 psi in steps of
+    100 psi, 30 s rest, three times over.
 
     Raises:
         ValueError: A value is out of bounds.
 
-    Source: thesis, Appendix A. There the cylinder moves and a hand pulls: carriage, its speed and its way are our choice.
+    Source: thesis, Appendix A. There the cylinder moves and a hand pulls; carriage, its speed and the stiffness
+    of the scale are our choice.
     """
 
     pressure_max: float = parameter(1000.0 * PSI, unit='Pa', lower=0.0, upper=1e8, description='Last pressure.')
     intervals: int = parameter(10, unit='1', lower=1, upper=1000, description='Pressure steps from 0 to the last.')
     repetitions: int = parameter(3, unit='1', lower=1, upper=100, description='How often the plan is run.')
     rest_time: float = parameter(30.0, unit='s', lower=0.0, upper=1e5, description='Rest before each push.')
-    pull_time: float = parameter(6.0, unit='s', lower=1e-3, upper=1e4, description='Time of one push or pull.')
-    carriage_speed: float = parameter(0.01, unit='m/s', lower=1e-6, upper=1.0, description='Speed of the carriage.')
+    pull_time: float = parameter(5.0, unit='s', lower=1e-3, upper=1e4, description='Time of one push or pull.')
+    carriage_speed: float = parameter(0.004, unit='m/s', lower=1e-6, upper=1.0, description='Speed of the carriage.')
     scale_stiffness: float = parameter(
-        2200.0, unit='N/m', lower=1.0, upper=1e9, description='Spring scale: 50 lbf over some 100 mm.'
+        1e4, unit='N/m', lower=1.0, upper=1e9, description='Spring scale: 50 lbf over some 20 mm.'
     )
 
     def __post_init__(self) -> None:

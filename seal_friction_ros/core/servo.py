@@ -1,7 +1,8 @@
-"""A position servo with seals that rub: ``state = init(parameters)``, then ``state, outputs = step(parameters, state, reference)``.
+"""A position servo with seals that rub.
 
-One step is one sample of the controller; valve, cylinder and load advance through it in inner steps. `control` and `advance`
-are its two halves, for who wants sensors (noise, delay) between them, or a rig without a controller.
+``state = init(parameters)``, then ``state, outputs = step(parameters, state, reference, feedforward)``: one sample of
+the controller, through which valve, cylinder and load advance in inner steps. `control` and `advance` are its
+halves, for who wants sensors (noise, delay) between them, or a rig without a controller.
 """
 
 from collections.abc import Iterable
@@ -11,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seal_friction_ros.core.compiled import compiled
+from seal_friction_ros.core.compiled import COMPILED, compiled
 from seal_friction_ros.core.coulomb import MountedSeal
 from seal_friction_ros.core.friction_state import state_friction
 from seal_friction_ros.core.records import FrictionState
@@ -54,10 +55,10 @@ class ServoParameters:
             part of the plant, or the closed loop is unstable.
     """
 
-    valve: ServoValve = ServoValve()
-    cylinder: Cylinder = Cylinder()
-    load: Load = Load()
-    controller: ServoController = ServoController()
+    valve: ServoValve = field(default_factory=ServoValve)
+    cylinder: Cylinder = field(default_factory=Cylinder)
+    load: Load = field(default_factory=Load)
+    controller: ServoController = field(default_factory=ServoController)
     seals: tuple[MountedSeal, ...]
     control_period: float = parameter(
         5e-4, unit='s', lower=1e-6, upper=0.1, description='Sample time of the controller, and of one step.'
@@ -273,11 +274,10 @@ def _simulate(
     inner_steps: int,
     rows: Any,
 ) -> ServoState:
-    for i in range(inputs.shape[0]):
-        wanted = Reference(inputs[i, 0], inputs[i, 1], inputs[i, 2])
-        state, command, forces = _step(
-            c, g, state, wanted, inputs[i, 3], inputs[i, 4], inner_step_time, inner_steps
-        )
+    for i in range(len(inputs)):
+        row = inputs[i]
+        wanted = Reference(row[0], row[1], row[2])
+        state, command, forces = _step(c, g, state, wanted, row[3], row[4], inner_step_time, inner_steps)
         measured = measure(c, state.plant)
         rows[i, 0], rows[i, 1] = measured.position, measured.velocity
         rows[i, 2], rows[i, 3] = measured.pressure_a, measured.pressure_b
@@ -308,5 +308,6 @@ def simulate(
     inputs[:, :3], inputs[:, 3], inputs[:, 4] = wanted, feedforward, load_force
     rows = np.empty((len(wanted), len(Trajectory._fields)))
     c, g = parameters.constants, parameters.gains
-    state = _simulate(c, g, state, inputs, parameters.inner_step, parameters.inner_steps, rows)
+    samples: Any = inputs if COMPILED else inputs.tolist()  # Python is twice as fast on its own floats
+    state = _simulate(c, g, state, samples, parameters.inner_step, parameters.inner_steps, rows)
     return state, Trajectory(*rows.T)

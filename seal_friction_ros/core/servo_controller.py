@@ -1,16 +1,16 @@
-r"""Position loop over a load-pressure (force) loop, with a friction feed-forward; all in one sample, without hidden state.
+r"""Position loop over a load-pressure (force) loop, with a friction feed-forward.
 
 .. math::
     F &= K_p (x_r - x) + K_d (v_r - v) + K_i \textstyle\int (x_r - x) + m a_r + b v_r + k (x_r - x_k) + F_{ff} \\
     Q &= A (\alpha v + (1 - \alpha) v_r + \tau a_r) + G (F / A - (p_a - p_b)), \qquad G = \omega_F V_t / (4 \beta) \\
     u &= Q / (K \sqrt{(p_s - p_r - \mathrm{sgn}(Q) p_L) / 2})
 
-Inner loop: at standstill load pressure follows F / A with the bandwidth omega_F; alpha takes out the natural velocity feedback
-of a force-controlled cylinder; what it leaves acts on the velocity error, as damping (1 - alpha) A^2 / G. tau is the
-delay of spool and sampling, 2 zeta / omega + T / 2. The last line inverts the orifice.
+Inner loop: at standstill load pressure follows F / A with the bandwidth omega_F; alpha takes out the natural velocity
+feedback of a force-controlled cylinder; what it leaves acts on the velocity error, as damping (1 - alpha) A^2 / G. tau
+is the delay of spool and sampling, 2 zeta / omega + T / 2. The last line inverts the orifice.
 
-Source: [Merritt1967]_ section 6-3 for the orifice and V_t / (4 beta), [Alleyne1999]_ for force loop and velocity feedback;
-their arrangement here is our choice.
+Source: [Merritt1967]_ section 6-3 for the orifice and V_t / (4 beta), [Alleyne1999]_ for force loop and velocity
+feedback; their arrangement here is our choice.
 """
 
 import math
@@ -215,7 +215,7 @@ def control(
 
 
 def closed_loop(g: Gains, c: Constants, held: bool = False) -> NDArray[np.float64]:
-    r"""Sample-to-sample matrix of the closed loop in mid-stroke, at null and without friction; or with the rod ``held``.
+    r"""Sample-to-sample matrix of the closed loop without friction, in mid-stroke and at null; or rod ``held``.
 
     State: x, v, p_L, s, s'/omega, integral. The plant between two samples is exact (matrix exponential).
 
@@ -251,7 +251,7 @@ def closed_loop(g: Gains, c: Constants, held: bool = False) -> NDArray[np.float6
 
 
 def spectral_radius(g: Gains, c: Constants) -> float:
-    """Largest magnitude of an eigenvalue of `closed_loop`, rod free or held (then of the force loop); stable below 1."""
+    """Largest magnitude of an eigenvalue of `closed_loop`, rod free, or held (the force loop alone); stable below 1."""
     free = np.linalg.eigvals(closed_loop(g, c))
     held = np.linalg.eigvals(closed_loop(g, c, held=True)[2:5, 2:5])
     return float(np.abs(np.concatenate([free, held])).max())

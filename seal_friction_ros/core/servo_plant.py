@@ -8,6 +8,7 @@ that a stuck rod has a velocity of exactly 0.0 and a position that does not chan
 Our choices, none of them in the sources:
 
 - Stuck is a state of its own, without Karnopp's velocity band, since here the velocity is known and not measured.
+- A rod that slows down ever more without end, as it can against a leaking chamber, is at rest below 1 nm/s.
 - End stops are rigid and take all of the kinetic energy.
 - A chamber that is emptied faster than it is filled holds a cavity at vapour pressure (see `chamber_pressure`).
 - Below ``transition_pressure`` an orifice is laminar (see `signed_root`).
@@ -25,6 +26,7 @@ from seal_friction_ros.core.validated import check, parameter
 
 AMBIENT = 101325.0  # [Pa, absolute] zero of gauge pressure
 TABLE_INTERVALS = 8192
+CREEP_SPEED = 1e-9  # [m/s] a rod that slides slower than this, and ever slower, is at rest
 MAX_EVENTS = 8  # in one inner step; then the rod is held to its end
 
 
@@ -209,9 +211,10 @@ class PlantState(NamedTuple):
 
 
 def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[MountedSeal, ...]) -> Constants:
-    """Numbers for the equations. The seals' laws become tables up to twice the largest pressure they or the supply know.
+    """Numbers for the equations.
 
-    A table of 8192 intervals, read linearly and on with its last slope, is within 1e-5 of the laws in
+    The seals' laws become tables up to twice the largest pressure that they or the supply know. A
+    table of 8192 intervals, read linearly and on with its last slope, is within 1e-5 of the laws in
     seal_friction_ros/core and keeps them monotone: the price of compiling the equations.
     """
     beta = cylinder.bulk_modulus
@@ -275,9 +278,9 @@ def signed_root(drop: float, transition: float) -> float:
 def chamber_pressure(charge: float, vapour: float) -> float:
     r"""Pressure of a chamber [Pa, gauge]: its charge, but never below vapour pressure.
 
-    The charge is the pressure that the oil would have if it alone had to fill the chamber, p = beta ln(m / (rho_0 V)). Where
-    that is below vapour pressure, oil at vapour pressure fills V exp((charge - vapour) / beta) and a cavity the rest.
-    So volume is conserved through growth and collapse of a cavity, without an event.
+    The charge is the pressure that the oil would have if it alone had to fill the chamber, beta ln(m / (rho_0 V)).
+    Where that is below vapour pressure, oil at vapour pressure fills V exp((charge - vapour) / beta) and a cavity the
+    rest. So volume is conserved through growth and collapse of a cavity, without an event.
     """
     return max(charge, vapour)
 
@@ -336,7 +339,7 @@ def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, lo
     r"""Time derivatives of the first eight numbers of `PlantState`.
 
     .. math::
-        \dot x &= v, \qquad m \dot v = \Sigma F - d f_c(p_a, p_b) \quad (\dot x = \dot v = 0 \text{ while stuck, } d = 0) \\
+        \dot x &= v, \qquad m \dot v = \Sigma F - d f_c(p_a, p_b) \quad (\text{stuck, } d = 0: \dot x = \dot v = 0) \\
         \dot p_a &= \beta / V_a\, (Q_a - C_i (p_a - p_b) - C_e p_a - A v), \quad V_a = V_t/2 + A x \\
         \ddot s &= \omega^2 (u - s) - 2 \zeta \omega \dot s
 
@@ -366,9 +369,8 @@ def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, lo
     acceleration = (active_force(c, y, load_force) - friction) / c.mass if direction != 0 else 0.0
 
     density_a, density_b = math.exp(a / beta), math.exp(b / beta)
-    power_in = (
-        density_a * (supply_a * c.supply_enthalpy + return_a * c.return_enthalpy)
-        + density_b * (supply_b * c.supply_enthalpy + return_b * c.return_enthalpy)
+    power_in = density_a * (supply_a * c.supply_enthalpy + return_a * c.return_enthalpy) + density_b * (
+        supply_b * c.supply_enthalpy + return_b * c.return_enthalpy
     )
     into_chambers = beta * ((density_a - 1.0) * flow_a + (density_b - 1.0) * flow_b)
     rubbing = c.damping * velocity * velocity + friction * velocity
@@ -427,13 +429,11 @@ def margin(c: Constants, y: tuple[float, ...], direction: int, load_force: float
 
 
 @compiled
-def after_event(
-    c: Constants, y: tuple[float, ...], direction: int, load_force: float
-) -> tuple[tuple[float, ...], int]:
+def after_event(c: Constants, y: tuple[float, ...], direction: int, load_force: float) -> tuple[tuple[float, ...], int]:
     """State and direction once the friction state has ended at ``y``.
 
-    A sliding rod comes to rest, at an end stop with the loss of its kinetic energy, and stays there unless the force sum
-    exceeds the breakaway force; a stuck rod slides where the force sum points.
+    A sliding rod comes to rest, at an end stop with the loss of its kinetic energy, and stays there unless the force
+    sum exceeds the breakaway force; a stuck rod slides where the force sum points.
     """
     if direction != 0:
         position, velocity = y[0], y[1]
@@ -468,9 +468,7 @@ def time_of_event(
             break
         middle = early + (late - early) * margin_early / (margin_early - margin_late)
         middle = min(max(middle, early + 4e-10 * h), late - 4e-10 * h)
-        margin_middle = margin(
-            c, smooth_step(c, y, direction, command, load_force, middle), direction, load_force
-        )
+        margin_middle = margin(c, smooth_step(c, y, direction, command, load_force, middle), direction, load_force)
         if margin_middle > 0.0:
             early, margin_early = middle, margin_middle
             if side == 1:
@@ -485,21 +483,35 @@ def time_of_event(
 
 
 @compiled
+def with_motion(y: tuple[float, ...], direction: int, transitions: int) -> PlantState:
+    """Plant state of the eight integrated numbers and the friction state."""
+    return PlantState(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], direction, transitions)
+
+
+@compiled
+def creeps(before: tuple[float, ...], after: tuple[float, ...], direction: int) -> bool:
+    """Whether a sliding rod has become as slow as nothing, and slower: it would come to rest only in infinite time."""
+    return direction != 0 and after[1] * direction < min(CREEP_SPEED, before[1] * direction)
+
+
+@compiled
 def inner_step(c: Constants, state: PlantState, command: float, load_force: float, h: float) -> PlantState:
     """Advance valve, chambers and rod by ``h`` [s] with command [-1 to 1] and load force [N] held.
 
     A rod that starts to slide but does not get anywhere within the step (no stiction, force at the limit) is held for
     the rest of the step, and so is one after eight events: no Zeno.
     """
-    y = state[:8]
+    y: tuple[float, ...] = state[:8]
     direction, transitions = state.direction, state.transitions
     rest = h
     for _ in range(MAX_EVENTS):
         new = smooth_step(c, y, direction, command, load_force, rest)
         margin_end = margin(c, new, direction, load_force)
         if margin_end > 0.0 or (direction == 0 and margin_end == 0.0):
-            return PlantState(*new, direction, transitions)
-        if margin(c, y, direction, load_force) > 0.0:
+            if not creeps(y, new, direction):
+                return with_motion(new, direction, transitions)
+            y, rest = new, 0.0
+        elif margin(c, y, direction, load_force) > 0.0:
             before = time_of_event(c, y, direction, command, load_force, rest, margin_end)
             y = smooth_step(c, y, direction, command, load_force, before)
             rest = rest - before
@@ -508,10 +520,10 @@ def inner_step(c: Constants, state: PlantState, command: float, load_force: floa
         was, (y, direction) = direction, after_event(c, y, direction, load_force)
         transitions += 1 if (was == 0) != (direction == 0) else 0
         if rest <= 0.0:
-            return PlantState(*y, direction, transitions)
+            return with_motion(y, direction, transitions)
     y = (y[0], 0.0, y[2], y[3], y[4], y[5], y[6], y[7])
     transitions += 1 if direction != 0 else 0
-    return PlantState(*smooth_step(c, y, 0, command, load_force, rest), 0, transitions)
+    return with_motion(smooth_step(c, y, 0, command, load_force, rest), 0, transitions)
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -159,8 +160,10 @@ def reference_solution(servo, commands, command_time):
 
     def root(dp):
         r = dp / valve.transition_pressure
-        return math.copysign(math.sqrt(abs(dp)), dp) if abs(r) >= 1 else (
-            math.sqrt(valve.transition_pressure) * r * (5 - r * r) / 4
+        return (
+            math.copysign(math.sqrt(abs(dp)), dp)
+            if abs(r) >= 1
+            else (math.sqrt(valve.transition_pressure) * r * (5 - r * r) / 4)
         )
 
     def force(y):
@@ -193,10 +196,17 @@ def reference_solution(servo, commands, command_time):
     for i, u in enumerate(commands):
         end = (i + 1) * command_time
         while t < end:
-            event = (lambda _, y, *a: y[1]) if direction else (lambda _, y, *a: holding(y) - abs(force(y)))
+            event = (lambda _, y, *_a: y[1]) if direction else (lambda _, y, *_a: holding(y) - abs(force(y)))
             event.terminal, event.direction = True, -direction if direction else -1
             solution = solve_ivp(
-                equations, (t, end), y, 'DOP853', args=(direction, u), events=event, rtol=1e-10, atol=1e-12,
+                equations,
+                (t, end),
+                y,
+                'DOP853',
+                args=(direction, u),
+                events=event,
+                rtol=1e-10,
+                atol=1e-12,
                 max_step=1e-3,
             )
             t, y = solution.t[-1], solution.y[:, -1]
@@ -221,7 +231,7 @@ def test_halving_the_step_halves_the_error_at_least():
         errors.append(float(np.max(np.abs(np.array(state[:6]) - exact) / scale)))
     assert state.transitions >= 6
     assert errors[1] < 1e-4
-    for coarse, fine in zip(errors, errors[1:], strict=False):
+    for coarse, fine in pairwise(errors):
         assert fine < 0.5 * coarse or fine < 1e-8
 
 
@@ -256,7 +266,7 @@ def test_rod_meets_the_stops_and_stays_within():
 
 
 def test_cavitating_chamber_keeps_its_oil():
-    # No flow: the charge depends on the volume alone, p_0 + beta ln(V_0 / V), through growth and collapse of the cavity.
+    # No flow: the charge depends on the volume alone, p_0 + beta ln(V_0 / V), while the cavity grows and collapses.
     shut = ServoParameters(valve=TIGHT_VALVE, cylinder=TIGHT_CYLINDER, load=Load(mass=50.0), seals=())
     state = plant(shut)
     start, middle, area = state.charge_a, shut.constants.mid_volume, shut.constants.area
