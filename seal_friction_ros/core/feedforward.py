@@ -10,7 +10,7 @@ no loop: too large a force makes an error, but no limit cycle. Scales below 1 le
 which a wrong model needs. tanh is smooth through zero here, where it shapes a command; the friction itself
 is never smoothed.
 
-Source: [Armstrong1994]_ section 4.2 (feed-forward from the desired velocity) and eq. (5) (Stribeck); fade, slew and
+Source: [Armstrong1994]_ (feed-forward from the desired velocity) and eq. (5) (Stribeck); fade, slew and
 clamp are our choice.
 """
 

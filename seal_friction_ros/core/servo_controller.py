@@ -9,7 +9,7 @@ Inner loop: at standstill load pressure follows F / A with the bandwidth omega_F
 feedback of a force-controlled cylinder; what it leaves acts on the velocity error, as damping (1 - alpha) A^2 / G. tau
 is the delay of spool and sampling, 2 zeta / omega + T / 2. The last line inverts the orifice.
 
-Source: [Merritt1967]_ section 6-3 for the orifice and V_t / (4 beta), [Alleyne1999]_ for force loop and velocity
+Source: [Merritt1967]_ chapter 6 for the orifice and V_t / (4 beta), [Alleyne1999]_ for force loop and velocity
 feedback; their arrangement here is our choice.
 """
 
@@ -221,7 +221,7 @@ def closed_loop(g: Gains, c: Constants, held: bool = False) -> NDArray[np.float6
 
     .. math:: \dot p_L = \frac{4 \beta}{V_t} (K_q s - A v - K_{c} p_L), \quad K_q = K \sqrt{(p_s - p_r)/2}
 
-    Source: [Merritt1967]_ section 6-1, linearised.
+    Source: [Merritt1967]_ chapter 6, linearised.
     """
     flow_gain = c.orifice_gain * math.sqrt(max(c.supply - c.ret, 2.0 * c.transition) / 2.0)
     leakage = c.internal_leakage + 0.5 * c.external_leakage + c.null_leakage

@@ -2,8 +2,9 @@ r"""Servo valve, cylinder and load with the seals of the estimator: parameters, 
 
 The equations are the field's [Merritt1967]_ (valve: chapter 5, cylinder: chapter 6), the seals those of `coulomb` and
 `friction_state`. Between events the state follows smooth equations, integrated by a Runge-Kutta step of fourth order.
-Events end a step early: the rod comes to rest, breaks away, or meets an end stop. They are located inside the step, so
-that a stuck rod has a velocity of exactly 0.0 and a position that does not change by one bit [Karnopp1985]_.
+Events end a step early: the rod comes to rest, breaks away or meets an end stop, a cavity begins or collapses. They are
+located inside the step, so that a stuck rod has a velocity of exactly 0.0 and a position that does not change by one
+bit [Karnopp1985]_.
 
 Our choices, none of them in the sources:
 
@@ -27,7 +28,7 @@ from seal_friction_ros.core.validated import check, parameter
 AMBIENT = 101325.0  # [Pa, absolute] zero of gauge pressure
 TABLE_INTERVALS = 8192
 CREEP_SPEED = 1e-9  # [m/s] a rod that slides slower than this, and ever slower, is at rest
-MAX_EVENTS = 8  # in one inner step; then the rod is held to its end
+MAX_EVENTS = 16  # in one inner step; then the rod is held to its end
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def natural_frequency(cylinder: Cylinder, mass: float) -> float:
 
     .. math:: \omega_h = \sqrt{4 \beta A^2 / (V_t m)}
 
-    Source: [Merritt1967]_ eq. (6-37).
+    Source: [Merritt1967]_ chapter 6.
     """
     area = piston_area(cylinder)
     return math.sqrt(4.0 * cylinder.bulk_modulus * area**2 / (total_volume(cylinder) * mass))
@@ -280,7 +281,7 @@ def chamber_pressure(charge: float, vapour: float) -> float:
 
     The charge is the pressure that the oil would have if it alone had to fill the chamber, beta ln(m / (rho_0 V)).
     Where that is below vapour pressure, oil at vapour pressure fills V exp((charge - vapour) / beta) and a cavity the
-    rest. So volume is conserved through growth and collapse of a cavity, without an event.
+    rest. So volume is conserved through growth and collapse of a cavity.
     """
     return max(charge, vapour)
 
@@ -328,7 +329,7 @@ def force_sum(c: Constants, y: tuple[float, ...], load_force: float) -> float:
 def port_flow(c: Constants, opening: float, outside: float, pressure: float) -> float:
     """Flow into a chamber through one land [m^3/s]: orifice and null leakage.
 
-    Source: [Merritt1967]_ eq. (5-4) to (5-7).
+    Source: [Merritt1967]_ chapter 5.
     """
     drop = outside - pressure
     return c.orifice_gain * opening * signed_root(drop, c.transition) + c.null_leakage * drop
@@ -347,7 +348,7 @@ def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, lo
     volume at p, and a flow Q carries H Q. What comes through a land came with the enthalpy of its other side; what is
     missing was dissipated there.
 
-    Source: [Merritt1967]_ eq. (6-30), (6-31), (6-33) and section 1-7 (energy: our derivation).
+    Source: [Merritt1967]_ chapters 5 and 6; the energy is our derivation.
     """
     position, velocity, charge_a, charge_b, spool, spool_rate = y[0], y[1], y[2], y[3], y[4], y[5]
     beta = c.bulk_modulus
@@ -447,37 +448,42 @@ def after_event(c: Constants, y: tuple[float, ...], direction: int, load_force: 
 
 
 @compiled
-def time_of_event(
-    c: Constants,
-    y: tuple[float, ...],
-    direction: int,
-    command: float,
-    load_force: float,
-    h: float,
-    margin_end: float,
-) -> float:
-    """Time within ``h`` [s], at or just after the moment the margin reaches zero, by the Illinois method.
+def cavity_margin(c: Constants, before: tuple[float, ...], after: tuple[float, ...]) -> float:
+    """Way of the charges from vapour pressure [Pa], the smaller of both; negative if one crossed since ``before``."""
+    nearest = 1e12
+    for i in (2, 3):
+        side = before[i] - c.vapour
+        if side != 0.0:
+            nearest = min(nearest, math.copysign(1.0, side) * (after[i] - c.vapour))
+    return nearest
 
-    Needs a positive margin at 0 and none at ``h``.
+
+@compiled
+def time_of_event(
+    c: Constants, y: tuple[float, ...], direction: int, command: float, load_force: float, h: float
+) -> float:
+    """Time within ``h`` [s], at or just after the moment the friction state ends or a cavity begins or collapses.
+
+    The smaller of `margin` and `cavity_margin` must be positive at 0 and must not be at ``h``. Illinois method.
     """
-    early, late = 0.0, h
-    margin_early, margin_late = margin(c, y, direction, load_force), margin_end
-    side = 0
+    early, late, side = 0.0, h, 0
+    margin_early = min(margin(c, y, direction, load_force), cavity_margin(c, y, y))
+    new = smooth_step(c, y, direction, command, load_force, h)
+    margin_late = min(margin(c, new, direction, load_force), cavity_margin(c, y, new))
     for _ in range(60):
         if late - early <= 1e-9 * h:
             break
         middle = early + (late - early) * margin_early / (margin_early - margin_late)
         middle = min(max(middle, early + 4e-10 * h), late - 4e-10 * h)
-        margin_middle = margin(c, smooth_step(c, y, direction, command, load_force, middle), direction, load_force)
+        new = smooth_step(c, y, direction, command, load_force, middle)
+        margin_middle = min(margin(c, new, direction, load_force), cavity_margin(c, y, new))
         if margin_middle > 0.0:
             early, margin_early = middle, margin_middle
-            if side == 1:
-                margin_late *= 0.5
+            margin_late *= 0.5 if side == 1 else 1.0
             side = 1
         else:
             late, margin_late = middle, margin_middle
-            if side == -1:
-                margin_early *= 0.5
+            margin_early *= 0.5 if side == -1 else 1.0
             side = -1
     return late
 
@@ -495,26 +501,35 @@ def creeps(before: tuple[float, ...], after: tuple[float, ...], direction: int) 
 
 
 @compiled
+def lasts(margin_now: float, direction: int) -> bool:
+    """Whether a friction state goes on: a stuck rod also at the breakaway force, a sliding one only at a speed."""
+    return margin_now > 0.0 or (direction == 0 and margin_now == 0.0)
+
+
+@compiled
 def inner_step(c: Constants, state: PlantState, command: float, load_force: float, h: float) -> PlantState:
     """Advance valve, chambers and rod by ``h`` [s] with command [-1 to 1] and load force [N] held.
 
     A rod that starts to slide but does not get anywhere within the step (no stiction, force at the limit) is held for
-    the rest of the step, and so is one after eight events: no Zeno.
+    the rest of the step, and so is one after `MAX_EVENTS` events: no Zeno.
     """
     y: tuple[float, ...] = state[:8]
     direction, transitions = state.direction, state.transitions
     rest = h
     for _ in range(MAX_EVENTS):
         new = smooth_step(c, y, direction, command, load_force, rest)
-        margin_end = margin(c, new, direction, load_force)
-        if margin_end > 0.0 or (direction == 0 and margin_end == 0.0):
+        goes_on = lasts(margin(c, new, direction, load_force), direction)
+        starts_inside = margin(c, y, direction, load_force) > 0.0
+        if goes_on and (cavity_margin(c, y, new) > 0.0 or not starts_inside):
             if not creeps(y, new, direction):
                 return with_motion(new, direction, transitions)
             y, rest = new, 0.0
-        elif margin(c, y, direction, load_force) > 0.0:
-            before = time_of_event(c, y, direction, command, load_force, rest, margin_end)
+        elif starts_inside:
+            before = time_of_event(c, y, direction, command, load_force, rest)
             y = smooth_step(c, y, direction, command, load_force, before)
             rest = rest - before
+            if lasts(margin(c, y, direction, load_force), direction):
+                continue  # a cavity began or collapsed, no more
         elif direction != 0:
             break
         was, (y, direction) = direction, after_event(c, y, direction, load_force)
