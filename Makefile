@@ -1,3 +1,35 @@
-.PHONY: setup
+# make demo    set up, then play real friction readings through the live node, verify, report
+# make test    set up, then lint, types and tests
+# make setup   only set up .venv
+# make bench   figures of speed
+# make figures the figures in docs/figures
+
+.PHONY: demo test setup bench figures clean
+.DEFAULT_GOAL := demo
+
+python := .venv/bin/python
+ifdef ROS_DISTRO
+export LD_LIBRARY_PATH := $(CURDIR)/.venv/lib:$(LD_LIBRARY_PATH)
+endif
+
 setup:
 	@tools/setup.sh run
+
+demo: setup
+	@$(python) tools/demo.py
+
+test:
+	@tools/setup.sh dev
+	$(python) -m ruff check .
+	$(python) -m ruff format --check .
+	$(python) -m mypy
+	$(python) -m pytest
+
+bench: setup
+	@$(python) bench/step.py
+
+figures: setup
+	@$(python) tools/make_figures.py
+
+clean:
+	rm -rf .venv build

@@ -33,7 +33,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'seal_friction = seal_friction_ros.offline.cli:main',
+            'seal_friction = seal_friction_ros.offline.cli:run_and_exit',
             'friction_estimator = seal_friction_ros.nodes.friction_estimator:main',
             'bag_player = seal_friction_ros.nodes.bag_player:main',
         ],

@@ -1,5 +1,6 @@
 """The door through which YAML comes in, for nodes and tools alike: seal files and parameter files."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ from seal_friction_ros.core.configuration import Configuration, SealSelection
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.validated import from_mapping, meanings
 
+_CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # what PyYAML lets out for '!!int foo'
+_OF_THE_NODE = ('autostart', 'record', 'record_directory', 'record_name', 'use_sim_time', 'qos_overrides')
 _LARGEST_YAML = 1 << 20  # [bytes] a seal or parameter file has a few thousand
 
 
@@ -21,8 +24,8 @@ class _PlainLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-        keys = [key.value for key, _ in node.value]
-        doubled = sorted({str(key) for key in keys if keys.count(key) > 1})
+        keys = Counter(str(key.value) for key, _ in node.value)
+        doubled = sorted(key for key, count in keys.items() if count > 1)
         if doubled:
             raise yaml.YAMLError(f'{", ".join(doubled)} stands twice in one mapping')
         return super().construct_mapping(node, deep)
@@ -35,12 +38,17 @@ def read_yaml(path: Path) -> Any:
         ValueError: The file is missing, not readable, too large or not plain YAML; one line that names it.
     """
     try:
-        if path.stat().st_size > _LARGEST_YAML:
-            raise ValueError(f'{path}: larger than {_LARGEST_YAML} bytes, not a file of this kind')
-        return _PlainLoader(path.read_text(encoding='utf-8')).get_single_data()
+        if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe or a device never ends
+            raise ValueError(f'{path}: not a file')
+        with path.open('rb') as file:
+            data = file.read(_LARGEST_YAML + 1)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+    if len(data) > _LARGEST_YAML:
+        raise ValueError(f'{path}: larger than {_LARGEST_YAML} bytes, not a file of this kind')
+    try:
+        return _PlainLoader(data.decode('utf-8')).get_single_data()
+    except (yaml.YAMLError, RecursionError, *_CONSTRUCTOR_ERRORS) as error:
         raise ValueError(f'{path}: not plain YAML: {" ".join(str(error).split())}') from None
 
 
@@ -52,9 +60,11 @@ def share_directory(package: str, module_file: str) -> Path:
     Raises:
         FileNotFoundError: There is none.
     """
-    for parent in Path(module_file).resolve().parents:
+    paths = (Path(module_file), Path(module_file).resolve())  # a colcon --symlink-install has links into the source
+    for parent in (parent for path in paths for parent in path.parents):
         for candidate in (parent / 'share' / package, parent):
-            if (candidate / 'package.xml').is_file():
+            manifest = candidate / 'package.xml'
+            if manifest.is_file() and f'<name>{package}</name>' in manifest.read_text(encoding='utf-8'):
                 return candidate
     raise FileNotFoundError(f'no share folder of {package} above {module_file}')
 
@@ -62,7 +72,10 @@ def share_directory(package: str, module_file: str) -> Path:
 def config_path(kind: str, name: str) -> Path:
     """Path of a configuration file: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``."""
     if '/' in name or name.endswith('.yaml'):
-        return Path(name).expanduser()
+        try:
+            return Path(name).expanduser()
+        except RuntimeError as error:
+            raise ValueError(f'{name}: {error}') from None
     return share_directory('seal_friction_ros', __file__) / 'config' / kind / f'{name}.yaml'
 
 
@@ -82,9 +95,10 @@ def load_configuration(selection: SealSelection, settings: EstimatorSettings) ->
 
 
 def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
-    """Selection and settings from a ROS parameter file (``/**: ros__parameters: ...``), of any node name.
+    """Selection and settings from the parts of a ROS parameter file that are for ``friction_estimator`` or every node.
 
-    Parameters of the node that are not the estimator's (recording, QoS) are passed over.
+    A file with one node only is for that node, whatever its name. Parameters of the node that are not the estimator's
+    (recording, QoS) are passed over.
 
     Raises:
         ValueError: The file is no parameter file, or a value makes no sense.
@@ -92,10 +106,15 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
     document = read_yaml(path)
     values: dict[str, Any] = {}
     try:
-        for node in document.values():
-            values.update(node['ros__parameters'])
+        for node, content in document.items():
+            if len(document) == 1 or str(node).rsplit('/', maxsplit=1)[-1] in ('friction_estimator', '*', '**'):
+                values.update(content['ros__parameters'].items())
     except (AttributeError, KeyError, TypeError):
         raise ValueError(f'{path}: not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)') from None
+    known = {*meanings(SealSelection), *meanings(EstimatorSettings), *_OF_THE_NODE}
+    unknown = sorted(str(name) for name in values if name not in known)
+    if unknown:
+        raise ValueError(f'{path}: friction_estimator has no parameter {", ".join(unknown)}')
     return tuple(  # type: ignore[return-value]
         from_mapping(kind, {k: v for k, v in values.items() if k in meanings(kind)}, str(path))
         for kind in (SealSelection, EstimatorSettings)

@@ -25,21 +25,24 @@ find_python() {
     fail "no Python 3.11, 3.12 or 3.13 with venv and headers among: ${PYTHON:-python3, python3.13, python3.12, python3.11} (Debian: apt-get install python3-venv python3-dev; or set PYTHON=/path/to/python)"
 }
 
-# What the environment was made from; when none of it changed there is nothing to do.
-fingerprint() {
-    { cat requirements/run.txt tools/setup.sh tools/patch_wheels.py setup.py setup.cfg msg_defs/CMakeLists.txt msg_defs/package.xml msg_defs/msg/*.msg
-      [ "$1" = dev ] && cat requirements/dev.txt
-      printf '%s\n' "$PWD" "${PYTHON:-}" "${ROS_DISTRO:-wheels}"; } | sha256sum | cut -d' ' -f1
+# A stage is done when what it was made from has not changed since: `stage NAME FILES... -- COMMAND`.
+stage() {
+    local name=$1 files=() sum
+    shift
+    while [ "$1" != -- ]; do files+=("$1"); shift; done
+    shift
+    sum=$({ cat "${files[@]}"; printf '%s\n' "$PWD" "${PYTHON:-}" "${ROS_DISTRO:-wheels}"; } | sha256sum)
+    [ "$(cat ".venv/.done-$name" 2>/dev/null)" = "$sum" ] && return
+    "$@"
+    mkdir -p .venv && printf '%s\n' "$sum" >".venv/.done-$name"
 }
-
-done_already() { [ -x .venv/bin/seal_friction ] && [ "$(cat ".venv/.setup-$1" 2>/dev/null)" = "$(fingerprint "$1")" ]; }
 
 run_logged() { "$@" >>"$log" 2>&1 || fail "'$1 ${2:-} ${3:-}' failed; the last lines of $log: $(tail -n 3 "$log" | tr '\n' ' ')"; }
 
 install_requirements() {
-    # With a distribution the ROS packages come from there, so the ros-* and build-tool wheels are left out.
+    # With a distribution ROS, its build tools and the numpy that its messages were built against come from there.
     if [ -n "${ROS_DISTRO:-}" ]; then
-        grep -v -E '^(ros-|colcon|cmake==|setuptools==|empy==|catkin-pkg==|lark-parser==)' "$1" >build/requirements.txt
+        grep -v -E '^(ros-|colcon|cmake==|empy==|catkin-pkg==|lark-parser==|numpy==)' "$1" >build/requirements.txt
     else
         cp "$1" build/requirements.txt
     fi
@@ -64,26 +67,25 @@ make_environment() {
     command -v "${CC:-cc}" >/dev/null || fail "no C compiler (${CC:-cc}): on Debian or Ubuntu, apt-get install build-essential"
     command -v "${CXX:-c++}" >/dev/null || fail "no C++ compiler (${CXX:-c++}): on Debian or Ubuntu, apt-get install build-essential"
     python=$(find_python) || exit 2
-    rm -rf .venv build/messages
-    mkdir -p build && touch build/COLCON_IGNORE && : >"$log"
-    say "making .venv with $("$python" --version), ROS 2 from ${ROS_DISTRO:-wheels}: a minute or two, once"
     if [ -n "${ROS_DISTRO:-}" ]; then
         command -v colcon >/dev/null || fail "ROS_DISTRO is $ROS_DISTRO but there is no colcon: apt-get install python3-colcon-common-extensions"
         [ -n "${AMENT_PREFIX_PATH:-}" ] || fail "ROS_DISTRO is $ROS_DISTRO but AMENT_PREFIX_PATH is not set: source /opt/ros/$ROS_DISTRO/setup.bash"
+    fi
+    rm -rf .venv build/messages
+    say "making .venv with $("$python" --version), ROS 2 from ${ROS_DISTRO:-wheels}: a minute or two, once"
+    if [ -n "${ROS_DISTRO:-}" ]; then
         run_logged "$python" -m venv --system-site-packages .venv
     else
         run_logged "$python" -m venv .venv
     fi
     touch .venv/COLCON_IGNORE
     install_requirements requirements/run.txt
-    build_messages
-    run_logged .venv/bin/python -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable .
-    fingerprint run >.venv/.setup-run
 }
 
-done_already run || make_environment
-if [ "$profile" = dev ] && ! done_already dev; then
-    say "adding the packages the tests need"
-    install_requirements requirements/dev.txt
-    fingerprint dev >.venv/.setup-dev
-fi
+install_package() { run_logged .venv/bin/python -m pip install --disable-pip-version-check --no-deps --no-build-isolation --editable .; }
+
+mkdir -p build && touch build/COLCON_IGNORE && : >"$log"
+stage environment requirements/run.txt tools/setup.sh tools/patch_wheels.py -- make_environment
+stage messages msg_defs/CMakeLists.txt msg_defs/package.xml msg_defs/msg/*.msg -- build_messages
+stage package setup.py setup.cfg -- install_package
+[ "$profile" = run ] || stage tests requirements/dev.txt -- install_requirements requirements/dev.txt

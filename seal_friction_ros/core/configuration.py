@@ -5,11 +5,14 @@ So a bag carries what is needed to replay it, also when parameters changed on th
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
-from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings
+from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings, EstimatorState
+from seal_friction_ros.core.held_inputs import HeldInputs
+from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.core.seal_file import mount_seals
 from seal_friction_ros.core.validated import check, from_mapping, parameter
 
@@ -65,27 +68,63 @@ class Configuration:
         return EstimatorParameters(self.settings, mount_seals(self.seal_documents, self.selection.seal_chambers))
 
 
-def configuration_text(configuration: Configuration) -> str:
-    """Configuration as JSON; equal configurations give equal text."""
+class Snapshot(NamedTuple):
+    """All that the next estimate depends on besides the inputs to come."""
+
+    configuration: Configuration
+    state: EstimatorState
+    held: HeldInputs
+
+
+def snapshot_text(snapshot: Snapshot) -> str:
+    """Snapshot as JSON; equal ones give equal text. Measured values are hexadecimal, so also NaN and infinity pass."""
+    configuration, state, held = snapshot
     document = {
         'selection': dataclasses.asdict(configuration.selection),
         'seal_documents': configuration.seal_documents,
         'settings': dataclasses.asdict(configuration.settings),
+        'state': {
+            'stamp': state.stamp,
+            'at_rest': state.at_rest,
+            'pressure': _stamped_text(state.pressure),
+            'force': _stamped_text(state.force),
+        },
+        'held': {'pressure': _stamped_text(held.pressure), 'force': _stamped_text(held.force)},
     }
     return json.dumps(document, sort_keys=True, allow_nan=False)
 
 
-def parse_configuration(text: str) -> Configuration:
-    """Configuration from its JSON text.
+def parse_snapshot(text: str) -> Snapshot:
+    """Snapshot from its JSON text.
 
     Raises:
-        ValueError: The text is not the JSON of a configuration, or a value in it makes no sense.
+        ValueError: The text is not the JSON of a snapshot, or a value in it makes no sense.
     """
-    document = json.loads(text)
-    if not isinstance(document, dict) or set(document) != {'selection', 'seal_documents', 'settings'}:
-        raise ValueError('configuration: not the JSON of selection, seal_documents and settings')
-    return Configuration(
-        from_mapping(SealSelection, document['selection'], 'configuration: selection'),
-        tuple(document['seal_documents']),
-        from_mapping(EstimatorSettings, document['settings'], 'configuration: settings'),
-    )
+    try:
+        document = json.loads(text)
+        configuration = Configuration(
+            from_mapping(SealSelection, document['selection'], 'configuration: selection'),
+            tuple(document['seal_documents']),
+            from_mapping(EstimatorSettings, document['settings'], 'configuration: settings'),
+        )
+        state, held = document['state'], document['held']
+        stamp = None if state['stamp'] is None else int(state['stamp'])
+        usable = _parse_pressure(state['pressure']), _parse_force(state['force'])
+        if not all(math.isfinite(x) for sample in usable if sample is not None for x in sample[1:]):
+            raise ValueError('configuration: a pressure or force sum in use is not finite')
+        newest = _parse_pressure(held['pressure']), _parse_force(held['force'])
+        return Snapshot(configuration, EstimatorState(stamp, bool(state['at_rest']), *usable), HeldInputs(*newest))
+    except (TypeError, LookupError, OverflowError, RecursionError) as error:
+        raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
+
+
+def _stamped_text(sample: Pressure | Force | None) -> list[int | str] | None:
+    return None if sample is None else [sample.stamp, *(float(value).hex() for value in sample[1:])]
+
+
+def _parse_pressure(values: Any) -> Pressure | None:
+    return None if values is None else Pressure(int(values[0]), float.fromhex(values[1]), float.fromhex(values[2]))
+
+
+def _parse_force(values: Any) -> Force | None:
+    return None if values is None else Force(int(values[0]), float.fromhex(values[1]))

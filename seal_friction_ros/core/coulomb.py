@@ -54,8 +54,12 @@ class PriorArtChart:
     squeeze_friction: float = parameter(
         unit='N/m', lower=0.0, upper=1e6, description='f_c, friction per contact length.'
     )
-    pressures: tuple[float, ...] = parameter(unit='Pa', description='Gauge pressures of the chart, increasing.')
-    pressure_frictions: tuple[float, ...] = parameter(unit='Pa', description='f_h, friction per projected area.')
+    pressures: tuple[float, ...] = parameter(
+        unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures of the chart, increasing.'
+    )
+    pressure_frictions: tuple[float, ...] = parameter(
+        unit='Pa', lower=0.0, upper=1e9, description='f_h, friction per projected area.'
+    )
     table: MonotoneTable = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -64,8 +68,6 @@ class PriorArtChart:
             raise ValueError(
                 f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa falls with pressure'
             )
-        if any(friction < 0.0 for friction in self.pressure_frictions):
-            raise ValueError(f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa is below 0 Pa')
         table = MonotoneTable(self.pressures, self.pressure_frictions, 'PriorArtChart')
         object.__setattr__(self, 'table', table)
 

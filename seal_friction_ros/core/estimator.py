@@ -157,7 +157,9 @@ def step(
 
     fault = _velocity_fault(settings, sample.velocity)
     status |= fault
-    at_rest = not fault and is_at_rest(sample.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
+    at_rest = state.at_rest
+    if not fault:
+        at_rest = is_at_rest(sample.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
     force_known = force is not None and not status & _FORCE_STALE
     if fault or pressure is None or (at_rest and not force_known):
         acting = (FrictionState.UNKNOWN, 0, 0.0)

@@ -50,13 +50,16 @@ class CoefficientTable:
         ValueError: Fewer than two points, forces that do not increase, or a coefficient that is not positive.
     """
 
-    normal_forces: tuple[float, ...] = parameter(unit='N', description='Normal forces, increasing.')
-    coefficients: tuple[float, ...] = parameter(unit='1', description='Coefficient of friction at each of them.')
+    normal_forces: tuple[float, ...] = parameter(
+        unit='N', lower=0.0, upper=1e9, description='Normal forces, increasing.'
+    )
+    coefficients: tuple[float, ...] = parameter(
+        unit='1', lower=1e-6, upper=100.0, description='Coefficient of friction at each of them.'
+    )
     table: MonotoneTable = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if any(mu <= 0.0 for mu in self.coefficients):
-            raise ValueError(f'CoefficientTable.coefficients = {list(self.coefficients)} is not above 0 everywhere')
+        check(self)
         table = MonotoneTable(self.normal_forces, self.coefficients, 'CoefficientTable')
         object.__setattr__(self, 'table', table)  # frozen: the only way to keep what was built from the fields
 

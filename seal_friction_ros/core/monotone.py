@@ -30,7 +30,10 @@ class MonotoneTable:
             raise ValueError(f'{name}: not every point is finite')
         if any(b <= a for a, b in pairwise(x)):
             raise ValueError(f'{name}: abscissae do not increase: {list(x)}')
-        spline = PchipInterpolator(x, y)
+        with np.errstate(all='ignore'):
+            spline = PchipInterpolator(x, y)
+        if not np.isfinite(spline.c).all():
+            raise ValueError(f'{name}: points too close together or too far apart: {list(x)}')
         self._knots = [float(v) for v in spline.x]
         self._cubics = [tuple(float(c) for c in column) for column in spline.c.T]
         self._last = float(y[-1])

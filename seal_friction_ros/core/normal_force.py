@@ -49,17 +49,18 @@ class NormalForceTable:
         ValueError: Fewer than two points, or pressures or forces that do not increase, or a force that is not positive.
     """
 
-    pressures: tuple[float, ...] = parameter(unit='Pa', description='Gauge pressures, increasing.')
-    normal_forces: tuple[float, ...] = parameter(unit='N', description='Normal force at each pressure, not decreasing.')
+    pressures: tuple[float, ...] = parameter(
+        unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures, increasing.'
+    )
+    normal_forces: tuple[float, ...] = parameter(
+        unit='N', lower=1e-6, upper=1e9, description='Normal force at each pressure, not decreasing.'
+    )
     table: MonotoneTable = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        check(self)
         if list(self.normal_forces) != sorted(self.normal_forces):
             raise ValueError(f'NormalForceTable.normal_forces = {list(self.normal_forces)} N falls with pressure')
-        if any(force <= 0.0 for force in self.normal_forces):
-            raise ValueError(
-                f'NormalForceTable.normal_forces = {list(self.normal_forces)} N is not above 0 N everywhere'
-            )
         table = MonotoneTable(self.pressures, self.normal_forces, 'NormalForceTable')
         object.__setattr__(self, 'table', table)  # frozen: the only way to keep what was built from the fields
 

@@ -20,7 +20,7 @@ from seal_friction_ros.core.coulomb import CoulombLaw, MountedSeal, PhysicsBased
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
-from seal_friction_ros.core.validated import from_mapping
+from seal_friction_ros.core.validated import from_mapping, plain
 
 NORMAL_FORCE_LAWS: dict[str, type] = {'area_deformation_gain': AreaDeformationGain, 'monotone_table': NormalForceTable}
 FRICTION_COEFFICIENT_LAWS: dict[str, type] = {'power_law': PowerLaw, 'monotone_table': CoefficientTable}
@@ -41,12 +41,17 @@ def parse_seal(document: Any) -> Seal:
     name = document.get('name')
     if not isinstance(name, str) or not name:
         raise ValueError(f'seal file: name = {name!r} is not a text')
+    if not name.isprintable():
+        raise ValueError(f'seal file: name = {name!r} is not one line of text')
     where = f'seal {name}'
     law_name = _choice(document, 'coulomb_law', COULOMB_LAWS, where)
-    unknown = sorted(str(key) for key in document if key not in _COMMON | _PARTS[law_name])
+    unknown = sorted(plain(key) for key in document if key not in _COMMON | _PARTS[law_name])
     if unknown:
         allowed = ', '.join(sorted(_COMMON | _PARTS[law_name]))
         raise ValueError(f'{where}: {law_name} has no {", ".join(unknown)}: it has {allowed}')
+    source = document.get('source', '')
+    if not isinstance(source, str):
+        raise ValueError(f'{where}: source = {source!r} is not a text')
     geometry = from_mapping(SealGeometry, document.get('geometry'), f'{where}: geometry')
     law: CoulombLaw
     if law_name == 'physics_based':

@@ -6,6 +6,7 @@ From this one place follow the check at construction, the check of a YAML file, 
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -24,9 +25,7 @@ class Meaning:
 
     def bounds_text(self) -> str:
         """Bounds for a reader, for example ``0.0 to 1.0``; empty if there are none."""
-        if self.lower is None and self.upper is None:
-            return ''
-        return f'{"" if self.lower is None else self.lower} to {"" if self.upper is None else self.upper}'.strip()
+        return '' if self.lower is None and self.upper is None else f'{self.lower} to {self.upper}'
 
 
 def parameter(
@@ -56,15 +55,24 @@ def check(record: Any) -> None:
     """
     for name, meaning in meanings(record).items():
         value = getattr(record, name)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            continue
-        where = f'{type(record).__name__}.{name} = {value} {meaning.unit}'
-        if not math.isfinite(value):
-            raise ValueError(f'{where} is not finite')
-        if meaning.lower is not None and value < meaning.lower:
-            raise ValueError(f'{where} is below its lower bound {meaning.lower} {meaning.unit}')
-        if meaning.upper is not None and value > meaning.upper:
-            raise ValueError(f'{where} is above its upper bound {meaning.upper} {meaning.unit}')
+        where = f'{type(record).__name__}.{name}'
+        if isinstance(value, tuple):
+            for i, item in enumerate(value):
+                _check_number(f'{where}[{i}]', item, meaning)
+        else:
+            _check_number(where, value, meaning)
+
+
+def _check_number(where: str, value: Any, meaning: Meaning) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return
+    what = f'{where} = {value} {meaning.unit}'
+    if not math.isfinite(value):
+        raise ValueError(f'{what} is not finite')
+    if meaning.lower is not None and value < meaning.lower:
+        raise ValueError(f'{what} is below its lower bound {meaning.lower} {meaning.unit}')
+    if meaning.upper is not None and value > meaning.upper:
+        raise ValueError(f'{what} is above its upper bound {meaning.upper} {meaning.unit}')
 
 
 def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any) -> Record:
@@ -84,7 +92,7 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
     if not isinstance(values, Mapping):
         raise ValueError(f'{where} is not a mapping of names to values but {values!r}')
     fields = {f.name: f for f in _fields(record_type) if f.init and f.name not in made}
-    unknown = sorted(str(name) for name in values if name not in fields)
+    unknown = sorted(plain(name) for name in values if name not in fields)
     if unknown:
         raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(fields)}')
     missing = [n for n, f in fields.items() if n not in values and f.default is dataclasses.MISSING]
@@ -97,16 +105,35 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
         raise ValueError(f'{where}: {error}') from None
 
 
+def plain(name: Any) -> str:
+    """A name that came from outside, fit for one line of an error message."""
+    text = str(name)
+    return text if text.isprintable() else repr(text)
+
+
 def _fields(record_type: Any) -> tuple[dataclasses.Field[Any], ...]:
     return dataclasses.fields(record_type)
+
+
+_WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text'}
+
+
+def _hint(value: Any, declared: Any) -> str:
+    """YAML 1.1 takes a number with an exponent but without point or sign, such as 15e-3 or 1.0e5, for a text."""
+    if declared is float and isinstance(value, str) and re.fullmatch(r'[-+]?[\d.]+[eE][-+]?\d+', value):
+        return ': write it with a point and a signed exponent, as in 1.0e+5'
+    return ''
 
 
 def _as_declared(value: Any, declared: Any, where: str) -> Any:
     if declared in (float, int, bool, str):
         if declared is float and type(value) is int:
-            return float(value)
+            try:
+                return float(value)
+            except OverflowError:
+                raise ValueError(f'{where} is a whole number too large to be a number in use') from None
         if type(value) is not declared:
-            raise ValueError(f'{where} = {value!r} is not a {declared.__name__}')
+            raise ValueError(f'{where} = {value!r} is not {_WORDS[declared]}{_hint(value, declared)}')
         return value
     if not isinstance(value, list | tuple):
         raise ValueError(f'{where} = {value!r} is not a list')

@@ -19,7 +19,7 @@ PRESSURE_TYPE = f'{PACKAGE}/msg/CylinderPressure'
 VELOCITY_TYPE = f'{PACKAGE}/msg/RodVelocity'
 FORCE_TYPE = f'{PACKAGE}/msg/ForceSum'
 ESTIMATE_TYPE = f'{PACKAGE}/msg/FrictionEstimate'
-CONFIGURATION_TYPE = 'std_msgs/msg/String'
+CONFIGURATION_TYPE = f'{PACKAGE}/msg/EstimatorConfiguration'
 
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little endian, no options
 _FIRST_HEADER_PART = struct.Struct('<4siII')
@@ -61,7 +61,7 @@ def _decode(data: bytes, body: str) -> tuple[int, bytes, tuple[Any, ...]]:
     encapsulation, seconds, nanoseconds, length = _FIRST_HEADER_PART.unpack_from(data)
     if encapsulation[:2] != b'\x00\x01':
         raise ValueError(f'encapsulation {encapsulation.hex()} is not little-endian CDR')
-    if not 1 <= length <= _LONGEST_FRAME or not 0 <= nanoseconds < _SECOND:
+    if not 0 <= length <= _LONGEST_FRAME or not 0 <= nanoseconds < _SECOND:
         raise ValueError(f'header with {nanoseconds} ns and a frame name of {length} bytes makes no sense')
     layout = _body(length, body)
     if not layout.size <= len(data) <= layout.size + 3:  # some writers pad the whole to a multiple of 4
@@ -124,13 +124,13 @@ def decode_estimate(data: bytes) -> FrictionEstimate:
 
 
 def encode_text(text: str) -> bytes:
-    """std_msgs/String as bytes."""
+    """EstimatorConfiguration (one text) as bytes."""
     data = text.encode() + b'\x00'
     return struct.pack(f'<4sI{len(data)}s', _ENCAPSULATION, len(data), data)
 
 
 def decode_text(data: bytes) -> str:
-    """std_msgs/String from bytes."""
+    """EstimatorConfiguration from bytes."""
     if len(data) < 9 or data[:2] != b'\x00\x01':
         raise ValueError(f'{len(data)} bytes are not a text in little-endian CDR')
     (length,) = struct.unpack_from('<I', data, 4)

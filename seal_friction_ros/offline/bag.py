@@ -7,6 +7,7 @@ inside. What is read may be any rosbag2 bag (MCAP or SQLite) or a bare MCAP file
 import shutil
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -85,22 +86,28 @@ class BagWriter:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            path.mkdir(parents=True)
-            self._file: BinaryIO = (path / f'{path.name}_0.mcap').open('xb')
-        except FileExistsError:
-            raise BagError(f'{path} exists already: not overwriting') from None
-        except OSError as error:
-            raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
-        self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE)
-        self._writer.start(profile='ros2', library='seal_friction_ros')
+        for type_name in wire.DECODERS:
+            message_definition(type_name)  # now, where it can be said, and not when the first message comes
         self._channels: dict[str, int] = {}
         self._types: dict[str, str] = {}
         self._counts: dict[str, int] = {}
         self._first_time = 0
         self._last_time = -1
         self._custom_data: dict[str, str] = {}
-        self._write_metadata()
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            raise BagError(f'{path} exists already: not overwriting') from None
+        except OSError as error:
+            raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
+        try:
+            self._file: BinaryIO = (path / f'{path.name}_0.mcap').open('xb')
+            self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE)
+            self._writer.start(profile='ros2', library='seal_friction_ros')
+            self._write_metadata()
+        except OSError as error:
+            shutil.rmtree(path, ignore_errors=True)  # made just now, by us
+            raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
 
     def write(self, topic: str, type_name: str, log_time: int, data: bytes) -> int:
         """Append one serialised message; returns the log time [ns] it got: the one given, or 1 ns after the last."""
@@ -127,6 +134,10 @@ class BagWriter:
         self._file.close()
         self._write_metadata()
 
+    def abandon(self) -> None:
+        """Let go of the file as it is, after a failure."""
+        self._file.close()
+
     def __enter__(self) -> Self:
         return self
 
@@ -136,7 +147,7 @@ class BagWriter:
         if kind is None:
             self.close()
         else:
-            self._file.close()
+            self.abandon()
             shutil.rmtree(self.path)
 
     def _add_channel(self, topic: str, type_name: str) -> None:
@@ -223,19 +234,30 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
     Raises:
         BagError: There is no bag, or it is damaged (found out when the damage is reached).
     """
-    try:
+    with _as_bag_errors(path):
         yield from _read_folder(path) if path.is_dir() else _read_file(path)
+
+
+@contextmanager
+def _as_bag_errors(path: Path) -> Iterator[None]:
+    """Turn whatever a reader says of a damaged bag into one line."""
+    try:
+        yield
     except BagError:
         raise
-    except (ReaderError, McapError, OSError, ValueError, KeyError, EOFError, struct.error, AssertionError) as error:
+    except (ReaderError, McapError, OSError, ValueError, LookupError, EOFError, struct.error, AssertionError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
-        raise BagError(f'{path}: not a readable bag: {reason}') from None
+        raise BagError(f'{path}: not a readable bag (truncated, not finished, or no bag): {reason}') from None
+
+
+def _open_folder(path: Path) -> Reader:
+    if not (path / 'metadata.yaml').is_file():
+        raise BagError(f'{path}: no metadata.yaml in it, so not a rosbag2 bag')
+    return Reader(path)
 
 
 def _read_folder(path: Path) -> Iterator[BagMessage]:
-    if not (path / 'metadata.yaml').is_file():
-        raise BagError(f'{path}: no metadata.yaml in it, so not a rosbag2 bag')
-    with Reader(path) as reader:
+    with _open_folder(path) as reader:
         for connection, log_time, data in reader.messages():
             yield BagMessage(connection.topic, connection.msgtype, log_time, bytes(data))
 
@@ -245,3 +267,31 @@ def _read_file(path: Path) -> Iterator[BagMessage]:
         for schema, channel, message in make_reader(file).iter_messages(log_time_order=True):
             name = schema.name if schema else ''
             yield BagMessage(channel.topic, name, message.log_time, message.data)
+
+
+class TopicInfo(NamedTuple):
+    """What a bag says of one of its topics."""
+
+    type_name: str
+    message_count: int
+
+
+def bag_topics(path: Path) -> dict[str, TopicInfo]:
+    """Topics of a bag with their type and number of messages, from its index.
+
+    Raises:
+        BagError: There is no bag, or it is damaged.
+    """
+    with _as_bag_errors(path):
+        if path.is_dir():
+            with _open_folder(path) as reader:
+                return {c.topic: TopicInfo(c.msgtype, c.msgcount) for c in reader.connections}
+        with path.open('rb') as file:
+            summary = make_reader(file).get_summary()
+        if summary is None or summary.statistics is None:
+            raise BagError(f'{path}: no summary at its end: truncated')
+        counts = summary.statistics.channel_message_counts
+        return {
+            channel.topic: TopicInfo(summary.schemas[channel.schema_id].name, counts.get(number, 0))
+            for number, channel in summary.channels.items()
+        }

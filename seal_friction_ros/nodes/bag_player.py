@@ -1,0 +1,154 @@
+"""Plays the inputs of a bag onto the graph: at the bag's pace, faster, or as fast as the estimator answers.
+
+``ros2 bag play`` does this too where it is installed; this one also runs from wheels, never overtakes the estimator,
+and waits until it is there.
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+from seal_friction_msgs.msg import CylinderPressure, ForceSum, FrictionEstimate, RodVelocity
+
+from seal_friction_ros.core import wire
+from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.live_statistics import latency_values
+from seal_friction_ros.offline.bag import BagError, BagMessage, read_messages
+
+_TOPICS = {
+    wire.PRESSURE_TYPE: (CylinderPressure, 'cylinder_pressure'),
+    wire.FORCE_TYPE: (ForceSum, 'force_sum'),
+    wire.VELOCITY_TYPE: (RodVelocity, 'rod_velocity'),
+}
+_UNANSWERED = 20  # [samples] so many velocities may be under way: well below the depth of the queues
+_PATIENCE = 5.0  # [s] to wait for the answer to a sample before giving up
+
+
+class BagPlayer(Node):
+    """Publishes messages as they are in a bag and watches the estimates that answer them."""
+
+    def __init__(self) -> None:
+        super().__init__('bag_player')
+        self._publishers_of = {
+            type_name: self.create_publisher(message_type, topic, qos.STREAM)
+            for type_name, (message_type, topic) in _TOPICS.items()
+        }
+        self._connected = False
+        self.sent: list[int] = []
+        self.round_trips: list[int] = []
+        self.create_subscription(FrictionEstimate, 'friction_estimate', self._on_estimate, qos.STREAM, raw=True)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+
+    def _on_estimate(self, data: bytes) -> None:
+        del data
+        if self.answered < len(self.sent):
+            self.round_trips.append(time.perf_counter_ns() - self.sent[self.answered])
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            counts = [value.value for value in status.values if value.key.endswith(' publishers')]
+            if counts and all(int(count) > 0 for count in counts):
+                self._connected = True
+
+    @property
+    def answered(self) -> int:
+        """Velocity samples that an estimate has come for; they come in order."""
+        return len(self.round_trips)
+
+    def publish(self, message: BagMessage) -> None:
+        """Publish one message, byte for byte."""
+        if message.type_name == wire.VELOCITY_TYPE:
+            self.sent.append(time.perf_counter_ns())
+        self._publishers_of[message.type_name].publish(message.data)
+
+    def wait_for_estimator(self, timeout: float) -> bool:
+        """Wait at most ``timeout`` [s] until the estimator is connected to each of our topics, and says so.
+
+        That we see its subscription is not enough: while it does not yet see our publisher, the messages of one topic
+        come later than those of another, and the estimates are not those of the bag.
+        """
+        deadline = time.monotonic() + timeout
+        while time.monotonic() < deadline:
+            subscribed = all(p.get_subscription_count() for p in self._publishers_of.values())
+            if subscribed and self._connected:
+                return True
+            rclpy.spin_once(self, timeout_sec=0.02)
+        return False
+
+    def wait_for_answers(self, wanted: int) -> bool:
+        """Wait until ``wanted`` estimates have come; False if none comes for a while."""
+        before, since = self.answered, time.monotonic()
+        while self.answered < wanted:
+            rclpy.spin_once(self, timeout_sec=0.1)
+            if self.answered != before:
+                before, since = self.answered, time.monotonic()
+            elif time.monotonic() - since > _PATIENCE:
+                return False
+        return True
+
+
+def play(player: BagPlayer, bag: Path, rate: float) -> dict[str, str]:
+    """Play a bag; return the number of velocity samples, all answered, and the round trip from each to its estimate.
+
+    Args:
+        player: The node.
+        bag: The bag.
+        rate: Times the bag's own pace; 0 for as fast as the estimator answers.
+
+    Raises:
+        BagError: The bag cannot be read, or the estimator stopped answering.
+    """
+    start = time.monotonic()
+    first: int | None = None
+    for message in read_messages(bag):
+        if message.type_name not in _TOPICS:
+            continue
+        first = message.log_time if first is None else first
+        due = start + (message.log_time - first) * 1e-9 / rate if rate else 0.0
+        while (wait := due - time.monotonic()) > 0.0:
+            rclpy.spin_once(player, timeout_sec=wait)
+        player.publish(message)
+        _await(player, bag, _UNANSWERED)
+    _await(player, bag, 0)
+    return {'velocity samples': str(len(player.sent)), **latency_values(player.round_trips, 'round trip')}
+
+
+def _await(player: BagPlayer, bag: Path, unanswered: int) -> None:
+    if not player.wait_for_answers(len(player.sent) - unanswered):
+        raise BagError(f'{bag}: the estimator answered {player.answered} of {len(player.sent)} velocity samples')
+
+
+def main() -> int:
+    """Run ``bag_player BAG [--rate R] [--wait S]``; figures of the run as JSON on stdout."""
+    parser = argparse.ArgumentParser(prog='bag_player', description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('bag', type=Path, help='bag to play; only pressure, velocity and force sum are')
+    parser.add_argument('--rate', type=float, default=1.0, help='times the pace of the bag; 0: as fast as answered')
+    parser.add_argument('--wait', type=float, default=10.0, help='how long to wait for an estimator [s]')
+    arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    if not 0.0 <= arguments.rate < float('inf'):
+        parser.error(f'--rate {arguments.rate}: not a rate')
+    rclpy.init()
+    player = BagPlayer()
+    try:
+        if not player.wait_for_estimator(arguments.wait):
+            raise BagError(f'no estimator subscribed to the inputs within {arguments.wait} s')
+        print(json.dumps(play(player, arguments.bag, arguments.rate)))
+    except BagError as error:
+        print(f'bag_player: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    finally:
+        player.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,91 @@
+"""What the estimator counts while it runs, and how it says it on ``/diagnostics``."""
+
+import time
+from collections import Counter
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from seal_friction_ros.core.records import FrictionEstimate, Status
+
+INPUT_NAMES = ('cylinder_pressure', 'rod_velocity', 'force_sum')
+
+
+class LiveStatistics:
+    """Counts since activation, and rates, ages and latencies since the last report."""
+
+    def __init__(self) -> None:
+        self._received: Counter[str] = Counter()
+        self._malformed: Counter[str] = Counter()
+        self._by_status: Counter[int] = Counter()
+        self._input_age = -1.0
+        self._start_interval()
+
+    def _start_interval(self) -> None:
+        self._started = time.monotonic()
+        self._received_before = self._received.copy()
+        self._recent_status = 0
+        self._latencies: list[int] = []
+
+    def on_input(self, name: str) -> None:
+        """Count one message of an input."""
+        self._received[name] += 1
+
+    def on_malformed(self, name: str) -> None:
+        """Count one message of an input whose bytes make no sense."""
+        self._malformed[name] += 1
+
+    def on_estimate(self, estimate: FrictionEstimate, latency: int) -> None:
+        """Count one estimate, ``latency`` [ns] after its velocity sample was taken."""
+        self._by_status[estimate.status] += 1
+        self._recent_status |= estimate.status
+        self._latencies.append(latency)
+        self._input_age = estimate.input_age
+
+    @property
+    def silent_inputs(self) -> list[str]:
+        """Inputs of which nothing has come since activation."""
+        return [name for name in INPUT_NAMES if not self._received[name]]
+
+    def report(self, active: bool, publishers: dict[str, int]) -> DiagnosticStatus:
+        """State of the estimate since the last report; starts the next interval.
+
+        Args:
+            active: Whether the node estimates.
+            publishers: Publishers connected to each input.
+        """
+        seconds = max(time.monotonic() - self._started, 1e-3)
+        values: dict[str, str] = {}
+        for name in INPUT_NAMES:
+            recent = self._received[name] - self._received_before[name]
+            values[f'{name} publishers'] = str(publishers[name])
+            values[f'{name} rate [Hz]'] = f'{recent / seconds:.1f}'
+            values[f'{name} received'] = str(self._received[name])
+            values[f'{name} malformed'] = str(self._malformed[name])
+        values['estimate rate [Hz]'] = f'{len(self._latencies) / seconds:.1f}'
+        values['estimates'] = str(self._by_status.total())
+        values['estimates all good'] = str(self._by_status[0])
+        for bit in Status:
+            values[f'estimates {bit.name}'] = str(sum(n for status, n in self._by_status.items() if status & bit))
+        values['input age [s]'] = f'{self._input_age:.4f}'
+        values |= latency_values(self._latencies)
+        status = DiagnosticStatus(level=DiagnosticStatus.OK, message='estimating')
+        if not active:
+            status.message = 'inactive'
+        elif not self._latencies:
+            status.level, status.message = DiagnosticStatus.STALE, 'no rod_velocity comes in'
+        elif self._recent_status:
+            status.level, status.message = DiagnosticStatus.WARN, str(Status(self._recent_status).name)
+        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+        self._start_interval()
+        return status
+
+
+def latency_values(latencies: list[int], what: str = 'latency') -> dict[str, str]:
+    """Median and 99th percentile [us] of latencies [ns], by the names they have in diagnostics."""
+    if not latencies:
+        return {f'{what} p50 [us]': 'none', f'{what} p99 [us]': 'none'}
+    ordered = sorted(latencies)
+    return {
+        f'{what} p{percent} [us]': f'{ordered[min(len(ordered) * percent // 100, len(ordered) - 1)] / 1e3:.1f}'
+        for percent in (50, 99)
+    }

@@ -1,0 +1,71 @@
+"""Recording as the node sees it: at most one bag at a time, started and stopped while estimates go on."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from seal_friction_ros.offline.bag import BagError
+from seal_friction_ros.offline.recorder import Recorder
+
+
+class Recording:
+    """The bag being recorded, if any, and what became of the last one."""
+
+    def __init__(self) -> None:
+        self._recorder: Recorder | None = None
+        self.failure = ''
+        """Why the last bag could not be made or finished; empty if it could."""
+
+    def start(self, directory: str, name: str) -> Path:
+        """Start a bag called ``name``, or after the time if that is empty; return its folder.
+
+        Raises:
+            BagError: It cannot be made, or another one is being recorded.
+        """
+        if self._recorder is not None and not self._recorder.error:
+            raise BagError(f'recording to {self._recorder.path} already: stop that first')
+        self.stop()
+        try:
+            folder = Path(directory).expanduser()
+            self._recorder = Recorder(folder / (name or f'friction_{datetime.now(UTC):%Y%m%d_%H%M%S_%f}'))
+        except (ValueError, RuntimeError) as error:
+            self.failure = str(error)
+            raise BagError(f'record_directory = {directory!r}, record_name = {name!r}: {error}') from None
+        return self._recorder.path
+
+    def record(self, topic: str, type_name: str, log_time: int, data: bytes) -> None:
+        """Record one message, if a bag is being recorded."""
+        if self._recorder is not None:
+            self._recorder.record(topic, type_name, log_time, data)
+
+    def stop(self) -> str:
+        """Finish the bag; return what became of it in words, empty if none was being recorded."""
+        recorder, self._recorder = self._recorder, None
+        self.failure = ''
+        if recorder is None:
+            return ''
+        recorder.close()
+        self.failure = recorder.error
+        return recorder.error or f'{recorder.path}: {recorder.written} messages, {recorder.dropped} dropped'
+
+    def report(self) -> DiagnosticStatus:
+        """State of the recorder."""
+        status = DiagnosticStatus(level=DiagnosticStatus.OK, message='not recording')
+        values = {}
+        recorder = self._recorder
+        if recorder is not None:
+            status.message = 'recording'
+            values = {
+                'bag': str(recorder.path),
+                'written': str(recorder.written),
+                'waiting': str(recorder.waiting),
+                'dropped': str(recorder.dropped),
+            }
+            if recorder.dropped:
+                status.level, status.message = DiagnosticStatus.WARN, f'{recorder.dropped} messages dropped'
+        failure = recorder.error if recorder is not None and recorder.error else self.failure
+        if failure:
+            status.level, status.message = DiagnosticStatus.ERROR, failure
+        status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+        return status

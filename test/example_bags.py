@@ -1,0 +1,39 @@
+"""Small bags for tests, made by the code under test's own writer."""
+
+import math
+from pathlib import Path
+
+from seal_friction_ros.core import wire
+from seal_friction_ros.core.configuration import Configuration, SealSelection, Snapshot, snapshot_text
+from seal_friction_ros.core.estimator import EstimatorSettings, init
+from seal_friction_ros.core.held_inputs import HeldInputs
+from seal_friction_ros.core.records import Force, Pressure
+from seal_friction_ros.core.wire import Velocity
+from seal_friction_ros.files import load_configuration
+from seal_friction_ros.offline import bag as b
+
+STEP = 10_000_000  # [ns]
+
+
+def write_inputs(path: Path, samples: int = 300, configuration: Configuration | None = None) -> Path:
+    """A rod that goes to and fro at changing pressure, with rests, and a few inputs that are missing or not finite."""
+    with b.BagWriter(path) as writer:
+        if configuration is not None:
+            snapshot = Snapshot(configuration, init(configuration.parameters()), HeldInputs())
+            data = wire.encode_text(snapshot_text(snapshot))
+            writer.write(b.CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, 0, data)
+        for i in range(samples):
+            stamp = 1_000_000_000 + i * STEP
+            velocity = max(abs(math.sin(i / 20)) - 0.3, 0.0) * math.copysign(0.05, math.sin(i / 20))
+            if i % 50 != 7:
+                pressure = Pressure(stamp, 2e6 + 1e6 * math.sin(i / 70), math.nan if i % 61 == 5 else 5e5)
+                writer.write(b.PRESSURE_TOPIC, wire.PRESSURE_TYPE, stamp, wire.encode_pressure(pressure, b'rod'))
+            force = Force(stamp, 60.0 * math.sin(i / 20 + 0.3))
+            writer.write(b.FORCE_TOPIC, wire.FORCE_TYPE, stamp, wire.encode_force(force, b'rod'))
+            data = wire.encode_velocity(Velocity(stamp, velocity, b'rod'))
+            writer.write(b.VELOCITY_TOPIC, wire.VELOCITY_TYPE, stamp, data)
+    return path
+
+
+def default_configuration(**settings: float) -> Configuration:
+    return load_configuration(SealSelection(), EstimatorSettings(**settings))

@@ -1,0 +1,154 @@
+"""A graph of one test: the node under test and a probe that publishes inputs and collects what comes out."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from seal_friction_msgs.msg import (
+    CylinderPressure,
+    EstimatorConfiguration,
+    ForceSum,
+    FrictionEstimate,
+    RodVelocity,
+)
+
+from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.processes import free_domain
+
+
+class Probe(Node):
+    """Stands for the drivers and the controller."""
+
+    def __init__(self, qos: QoSProfile | int = 10, **kwargs: Any) -> None:
+        super().__init__('probe', **kwargs)
+        self.pressure = self.create_publisher(CylinderPressure, 'cylinder_pressure', qos)
+        self.force = self.create_publisher(ForceSum, 'force_sum', qos)
+        self.velocity = self.create_publisher(RodVelocity, 'rod_velocity', qos)
+        self.estimates: list[FrictionEstimate] = []
+        self.diagnostics: list[DiagnosticArray] = []
+        self.configurations: list[EstimatorConfiguration] = []
+        self.create_subscription(FrictionEstimate, 'friction_estimate', self.estimates.append, 100)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self.diagnostics.append, 10)
+        latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.create_subscription(
+            EstimatorConfiguration, 'friction_estimator/configuration', self.configurations.append, latched
+        )
+
+    def send(self, stamp: int, velocity: float, pressure: float = 1e6, force: float = 0.0) -> None:
+        """Publish pressure, force sum and velocity of one moment, ``stamp`` in ns."""
+        self.send_pressure(stamp, pressure)
+        self.send_force(stamp, force)
+        self.send_velocity(stamp, velocity)
+
+    def send_pressure(self, stamp: int, pressure: float) -> None:
+        message = CylinderPressure(chamber_a=pressure, chamber_b=pressure)
+        self.pressure.publish(_stamped(message, stamp))
+
+    def send_force(self, stamp: int, force: float) -> None:
+        self.force.publish(_stamped(ForceSum(force=force), stamp))
+
+    def send_velocity(self, stamp: int, velocity: float) -> None:
+        self.velocity.publish(_stamped(RodVelocity(velocity=velocity), stamp))
+
+    def values(self, part: str) -> dict[str, str]:
+        """Newest diagnostics of ``estimate`` or ``recorder``, by key; level and message among them."""
+        for array in reversed(self.diagnostics):
+            for status in array.status:
+                if status.name.endswith(part):
+                    values = {value.key: value.value for value in status.values}
+                    return {**values, 'level': str(ord(status.level)), 'message': status.message}
+        return {}
+
+
+def _stamped(message: Any, stamp: int) -> Any:
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+    message.header.frame_id = 'rod'
+    return message
+
+
+class Graph:
+    """Estimator and probe on a domain of their own, spun together."""
+
+    def __init__(self, context: Context, probe: Probe, estimator: FrictionEstimator) -> None:
+        self.context, self.probe, self.estimator = context, probe, estimator
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(estimator)
+        self._executor.add_node(probe)
+
+    def spin_until(self, condition: Callable[[], object], timeout: float = 10.0) -> bool:
+        """Spin until ``condition`` holds; False if it does not within ``timeout`` [s]."""
+        deadline = time.monotonic() + timeout
+        while not condition():
+            if time.monotonic() > deadline:
+                return False
+            self._executor.spin_once(timeout_sec=0.02)
+        return True
+
+    def spin(self, seconds: float) -> None:
+        """Spin for a while."""
+        self.spin_until(lambda: False, seconds)
+
+    def connect(self) -> None:
+        """Spin until the estimator hears the probe and the probe the estimator."""
+        publishers = (self.probe.pressure, self.probe.force, self.probe.velocity)
+        assert self.spin_until(
+            lambda: (
+                all(p.get_subscription_count() for p in publishers) and self.probe.count_publishers('friction_estimate')
+            )
+        )
+        self.spin(0.3)
+
+    def estimate(self, stamp: int, velocity: float, pressure: float = 1e6, force: float = 0.0) -> FrictionEstimate:
+        """Send inputs of one moment; the estimate that answers."""
+        before = len(self.probe.estimates)
+        self.probe.send_pressure(stamp, pressure)
+        self.probe.send_force(stamp, force)
+        self.spin(0.03)
+        self.probe.send_velocity(stamp, velocity)
+        assert self.spin_until(lambda: len(self.probe.estimates) > before)
+        return self.probe.estimates[-1]
+
+    def call(self, kind: type, name: str, request: Any) -> Any:
+        """Call a service of the estimator."""
+        client = self.probe.create_client(kind, name)
+        assert self.spin_until(client.service_is_ready)
+        future = client.call_async(request)
+        assert self.spin_until(future.done)
+        self.probe.destroy_client(client)
+        return future.result()
+
+
+@contextmanager
+def graph(
+    parameters: dict[str, Any] | None = None,
+    *,
+    autostart: bool = True,
+    qos: QoSProfile | int = 10,
+    arguments: tuple[str, ...] = (),
+    namespace: str = '',
+) -> Iterator[Graph]:
+    """Estimator with ``parameters`` and command-line ``arguments`` (remapping), and a probe below ``namespace``."""
+    context = Context()
+    rclpy.init(context=context, domain_id=free_domain())
+    overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
+    estimator = FrictionEstimator(
+        context=context, parameter_overrides=overrides, cli_args=['--ros-args', *arguments] if arguments else None
+    )
+    probe = Probe(qos, context=context, namespace=namespace)
+    try:
+        if autostart:
+            assert estimator.autostart()
+        yield Graph(context, probe, estimator)
+    finally:
+        estimator.finish()
+        estimator.destroy_node()
+        probe.destroy_node()
+        rclpy.try_shutdown(context=context)

@@ -1,0 +1,275 @@
+"""The live node: what it publishes, refuses, reports and survives, on a real graph."""
+
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from live_graph import graph
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, SetParametersAtomically
+from rclpy.qos import ReliabilityPolicy, qos_profile_sensor_data
+from seal_friction_msgs.msg import FrictionEstimate
+from std_srvs.srv import Trigger
+
+from seal_friction_ros.core.configuration import SealSelection
+from seal_friction_ros.core.coulomb import actuator_friction
+from seal_friction_ros.core.estimator import EstimatorSettings
+from seal_friction_ros.files import load_configuration
+from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.offline.bag import bag_topics
+from seal_friction_ros.offline.replay import replay
+
+SECOND = 10**9  # [ns]
+DOUBLE, STRING_ARRAY = 3, 9  # rcl_interfaces/ParameterType
+
+
+def double(name: str, value: float) -> Parameter:
+    return Parameter(name=name, value=ParameterValue(type=DOUBLE, double_value=value))
+
+
+def transition(number: int) -> ChangeState.Request:
+    return ChangeState.Request(transition=Transition(id=number))
+
+
+def test_each_velocity_sample_is_answered_by_an_estimate_with_its_header():
+    with graph() as g:
+        g.connect()
+        estimate = g.estimate(5 * SECOND + 7, 0.1, pressure=2e6)
+        friction = actuator_friction(
+            load_configuration(SealSelection(), EstimatorSettings()).parameters().seals, 2e6, 2e6
+        )
+        assert (estimate.header.stamp.sec, estimate.header.stamp.nanosec, estimate.header.frame_id) == (5, 7, 'rod')
+        assert estimate.coulomb_friction == estimate.friction_force == friction.coulomb_friction
+        assert estimate.coulomb_friction_std == friction.coulomb_friction_std
+        assert (estimate.state, estimate.direction, estimate.status) == (FrictionEstimate.SLIDING, 1, 0)
+
+
+def test_it_says_stuck_and_breakaway_of_a_rod_at_rest():
+    with graph() as g:
+        g.connect()
+        stuck = g.estimate(SECOND, 0.0, force=-5.0)
+        assert (stuck.state, stuck.direction, stuck.friction_force) == (FrictionEstimate.STUCK, -1, -5.0)
+        broken = g.estimate(SECOND + 1, 0.0, force=500.0)
+        assert (broken.state, broken.friction_force) == (FrictionEstimate.BREAKAWAY, broken.breakaway_force)
+
+
+@pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf, 1e300])
+def test_bad_inputs_give_a_status_bit_a_finite_estimate_and_a_count_in_diagnostics(bad: float):
+    with graph() as g:
+        g.connect()
+        g.estimate(SECOND, 0.1)
+        for bits, sent in (
+            (FrictionEstimate.PRESSURE_NOT_FINITE | FrictionEstimate.PRESSURE_OUT_OF_RANGE, {'pressure': bad}),
+            (FrictionEstimate.FORCE_NOT_FINITE | FrictionEstimate.FORCE_OUT_OF_RANGE, {'force': bad}),
+            (FrictionEstimate.VELOCITY_NOT_FINITE | FrictionEstimate.VELOCITY_OUT_OF_RANGE, {'velocity': bad}),
+        ):
+            estimate = g.estimate(SECOND + 10**6, **{'velocity': 0.1, **sent})
+            assert estimate.status & bits
+            numbers = (estimate.coulomb_friction, estimate.friction_force, estimate.breakaway_force, estimate.input_age)
+            assert all(math.isfinite(number) for number in numbers)
+        kind = 'NOT_FINITE' if not math.isfinite(bad) else 'OUT_OF_RANGE'
+        assert g.spin_until(lambda: g.probe.values('estimate').get(f'estimates VELOCITY_{kind}') == '1')
+        assert g.estimate(SECOND + 2 * 10**6, 0.1).status == 0
+
+
+def test_diagnostics_come_once_a_second_with_rates_ages_latency_and_recorder_state():
+    with graph() as g:
+        g.connect()
+        for i in range(20):
+            g.probe.send(SECOND + i * 10**7, 0.1)
+            g.spin(0.01)
+        assert g.spin_until(lambda: g.probe.values('estimate').get('rod_velocity received') == '20')
+        values = g.probe.values('estimate')
+        assert float(values['rod_velocity rate [Hz]']) > 1.0
+        assert 0.0 < float(values['latency p50 [us]']) <= float(values['latency p99 [us]']) < 1e6
+        assert float(values['input age [s]']) >= 0.0
+        assert values['estimates all good'] == '20'
+        assert g.probe.values('recorder')['message'] == 'not recording'
+        stamps = [a.header.stamp.sec + a.header.stamp.nanosec * 1e-9 for a in g.probe.diagnostics]
+        g.spin_until(lambda: len(g.probe.diagnostics) >= len(stamps) + 3)
+        stamps = [a.header.stamp.sec + a.header.stamp.nanosec * 1e-9 for a in g.probe.diagnostics][-3:]
+        assert [b - a for a, b in pairwise(stamps)] == pytest.approx([1.0, 1.0], abs=0.2)
+
+
+def test_lifecycle_services_start_and_stop_it():
+    with graph(autostart=False) as g:
+        state = g.call(GetState, 'friction_estimator/get_state', GetState.Request()).current_state
+        assert state.label == 'unconfigured'
+        for number in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+            assert g.call(ChangeState, 'friction_estimator/change_state', transition(number)).success
+        g.connect()
+        assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
+        assert g.call(
+            ChangeState, 'friction_estimator/change_state', transition(Transition.TRANSITION_DEACTIVATE)
+        ).success
+        before = len(g.probe.estimates)
+        g.probe.send(2 * SECOND, 0.1)
+        g.spin(0.3)
+        assert len(g.probe.estimates) == before
+        for number in (
+            Transition.TRANSITION_CLEANUP,
+            Transition.TRANSITION_CONFIGURE,
+            Transition.TRANSITION_ACTIVATE,
+        ):
+            assert g.call(ChangeState, 'friction_estimator/change_state', transition(number)).success
+        g.connect()
+        assert g.estimate(3 * SECOND, -0.1).direction == -1
+
+
+def test_settings_change_while_running_and_the_new_configuration_is_published():
+    with graph() as g:
+        g.connect()
+        assert g.estimate(SECOND, 0.005).state == FrictionEstimate.SLIDING
+        request = SetParametersAtomically.Request(
+            parameters=[double('slip_velocity', 0.02), double('stick_velocity', 0.01)]
+        )
+        assert g.call(
+            SetParametersAtomically, 'friction_estimator/set_parameters_atomically', request
+        ).result.successful
+        assert g.estimate(2 * SECOND, 0.005).state == FrictionEstimate.STUCK
+        assert g.spin_until(lambda: len(g.probe.configurations) == 2)
+        assert json.loads(g.probe.configurations[-1].json)['settings']['stick_velocity'] == 0.01
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'words'),
+    [
+        ([double('stick_velocity', 0.5)], ['slip_velocity', '0.002', 'stick_velocity', '0.5']),
+        ([double('force_max', 2e6), double('pressure_timeout', -1.0)], ['pressure_timeout', '-1.0', '0.0001']),
+        ([double('force_max', math.nan)], ['force_max', 'nan']),
+        (
+            [Parameter(name='seals', value=ParameterValue(type=STRING_ARRAY, string_array_value=['x', 'y']))],
+            ['seals', 'unconfigured'],
+        ),
+    ],
+)
+def test_changes_that_make_no_sense_are_refused_whole_with_the_reason(parameters: list[Parameter], words: list[str]):
+    with graph() as g:
+        request = SetParametersAtomically.Request(parameters=parameters)
+        result = g.call(SetParametersAtomically, 'friction_estimator/set_parameters_atomically', request).result
+        assert not result.successful
+        assert [word for word in words if word not in result.reason] == []
+        assert g.estimator.get_parameter('force_max').value == EstimatorSettings().force_max
+
+
+def test_parameters_carry_unit_bounds_and_description():
+    with graph() as g:
+        request = DescribeParameters.Request(names=['pressure_timeout', 'seals'])
+        timeout, seals = g.call(DescribeParameters, 'friction_estimator/describe_parameters', request).descriptors
+        assert timeout.description.endswith('[s]')
+        assert timeout.floating_point_range[0].to_value == 60.0
+        assert 'unconfigured' in seals.additional_constraints
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'words'),
+    [
+        ({'pressure_timeout': -1.0}, ['pressure_timeout', '-1.0', '0.0001']),
+        ({'pressure_timeout': 'soon'}, ['pressure_timeout', 'soon']),
+    ],
+)
+def test_a_parameter_override_that_makes_no_sense_starts_nothing(parameters: dict[str, object], words: list[str]):
+    with pytest.raises(ValueError) as error, graph(parameters):
+        pass
+    assert [word for word in words if word not in str(error.value)] == []
+    assert '\n' not in str(error.value)
+
+
+def test_names_are_relative_so_namespaces_and_remapping_work():
+    arguments = ('-r', '__ns:=/left', '-r', 'rod_velocity:=piston/speed', '-r', 'friction_estimate:=out')
+    with graph(arguments=arguments, namespace='/left') as g:
+        names = {name for name, _ in g.estimator.get_publisher_names_and_types_by_node('friction_estimator', '/left')}
+        assert {'/left/out', '/left/friction_estimator/configuration', '/diagnostics'} <= names
+        inputs = {name for name, _ in g.estimator.get_subscriber_names_and_types_by_node('friction_estimator', '/left')}
+        assert {'/left/piston/speed', '/left/cylinder_pressure', '/left/force_sum'} <= inputs
+
+
+def test_quality_of_service_can_be_overridden():
+    with graph({'qos_overrides./rod_velocity.subscription.depth': 7}) as g:
+        infos = g.probe.get_subscriptions_info_by_topic('/rod_velocity')
+        assert g.spin_until(lambda: g.probe.get_subscriptions_info_by_topic('/rod_velocity')) or infos
+        assert g.estimator.get_parameter('qos_overrides./rod_velocity.subscription.depth').value == 7
+
+
+def test_a_best_effort_publisher_is_heard_too():
+    with graph(qos=qos_profile_sensor_data) as g:
+        assert g.spin_until(lambda: g.probe.velocity.get_subscription_count() == 1)
+        g.connect()
+        assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
+        (info,) = g.probe.get_subscriptions_info_by_topic('/rod_velocity')
+        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+
+
+def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_path: Path):
+    with graph({'record_directory': str(tmp_path)}) as g:
+        g.connect()
+        for i in range(5):
+            g.estimate(SECOND + i * 10**6, 0.0015 if i else 0.1, force=3.0)
+        started = g.call(Trigger, 'friction_estimator/start_recording', Trigger.Request())
+        assert started.success
+        assert not g.call(Trigger, 'friction_estimator/start_recording', Trigger.Request()).success
+        for i in range(5, 10):
+            g.estimate(SECOND + i * 10**6, 0.0015, force=math.nan if i == 7 else 3.0)
+        assert g.call(Trigger, 'friction_estimator/stop_recording', Trigger.Request()).success
+        assert not g.call(Trigger, 'friction_estimator/stop_recording', Trigger.Request()).success
+        assert replay(Path(started.message)).identical
+
+
+def test_a_parameter_change_amid_a_recording_replays_to_the_byte(tmp_path: Path):
+    with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
+        g.connect()
+        g.estimate(SECOND, 0.003)
+        request = SetParametersAtomically.Request(
+            parameters=[double('slip_velocity', 0.02), double('stick_velocity', 0.01)]
+        )
+        assert g.call(
+            SetParametersAtomically, 'friction_estimator/set_parameters_atomically', request
+        ).result.successful
+        assert g.estimate(2 * SECOND, 0.003).state == FrictionEstimate.STUCK
+        g.estimator.finish()
+    assert bag_topics(tmp_path / 'bag')['/friction_estimator/configuration'].message_count == 2
+    assert replay(tmp_path / 'bag').identical
+
+
+def test_a_bag_is_never_overwritten_and_the_estimate_goes_on(tmp_path: Path):
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'precious').write_text('data')
+    with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
+        g.connect()
+        assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
+        assert g.spin_until(lambda: 'exists already' in g.probe.values('recorder').get('message', ''))
+        assert g.probe.values('recorder')['level'] == '2'
+    assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['precious']
+
+
+def test_simulated_time_is_honoured_and_stops_nothing():
+    with graph({'use_sim_time': True}) as g:
+        g.connect()
+        assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
+        assert g.spin_until(lambda: g.probe.values('estimate').get('estimates') == '1')
+
+
+def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_path: Path, capfd):
+    seal = tmp_path / 'seal.yaml'
+    text = Path(__file__).parents[2].joinpath('config/seals/ms28775_114.yaml').read_text()
+    seal.write_text(text.replace('exponent: 0.562321', 'exponent: 1.7'))
+    with graph({'seals': [str(seal)], 'seal_chambers': ['a']}, autostart=False) as g:
+        assert not g.estimator.autostart()
+        said = [line for line in capfd.readouterr().err.splitlines() if 'exponent' in line]
+        assert len(said) == 1
+        assert str(seal) in said[0]
+        assert '1.7' in said[0]
+        assert '0.99' in said[0]
+        assert g.probe.count_publishers('friction_estimate') == 0
+
+
+def test_the_node_has_no_arithmetic_parameter_of_its_own():
+    with graph() as g:
+        declared = {name for name in g.estimator._parameters if not name.startswith(('qos_overrides', 'use_sim_time'))}
+        known = {'autostart', 'record', 'record_directory', 'record_name', 'seals', 'seal_chambers'}
+        assert declared - known - {'start_type_description_service'} == set(EstimatorSettings.__dataclass_fields__)
+        assert isinstance(g.estimator, FrictionEstimator)

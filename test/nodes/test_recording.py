@@ -1,0 +1,74 @@
+"""Recording from the node's side: what cannot be recorded is said, and the estimate goes on."""
+
+from pathlib import Path
+
+import pytest
+from live_graph import graph
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParametersAtomically
+from seal_friction_msgs.msg import FrictionEstimate
+from std_srvs.srv import Trigger
+
+from seal_friction_ros.nodes.recording import Recording
+from seal_friction_ros.offline.bag import BagError, BagWriter
+
+START = 'friction_estimator/start_recording'
+STOP = 'friction_estimator/stop_recording'
+
+
+@pytest.mark.parametrize(
+    ('directory', 'name'),
+    [('~no_such_user_here', ''), ('/proc/no/such/place', ''), ('.', 'n' * 250), ('/dev/null', 'bag')],
+)
+def test_a_place_that_cannot_be_is_refused_with_its_name_and_nothing_is_left(
+    directory: str, name: str, tmp_path: Path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    recording = Recording()
+    with pytest.raises(BagError, match='record_directory'):
+        recording.start(directory, name)
+    assert recording.failure
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_request_that_cannot_be_met_is_answered_and_the_estimate_goes_on():
+    with graph({'record_directory': '~no_such_user_here'}) as g:
+        g.connect()
+        answer = g.call(Trigger, START, Trigger.Request())
+        assert not answer.success
+        assert 'no_such_user_here' in answer.message
+        assert g.estimate(10**9, 0.1).state == FrictionEstimate.SLIDING
+
+
+def test_a_disk_that_fails_is_logged_and_a_new_recording_can_start(tmp_path: Path, monkeypatch, capfd):
+    def full(self, *message):
+        raise OSError(28, 'No space left on device')
+
+    with graph({'record_directory': str(tmp_path)}) as g:
+        g.connect()
+        with monkeypatch.context() as broken:
+            broken.setattr(BagWriter, 'write', full)
+            assert g.call(Trigger, START, Trigger.Request()).success
+            assert g.spin_until(lambda: 'No space left' in g.probe.values('recorder').get('message', ''))
+        assert capfd.readouterr().err.count('No space left on device') == 1
+        assert g.estimate(10**9, 0.1).state == FrictionEstimate.SLIDING
+        assert g.call(Trigger, START, Trigger.Request()).success
+        assert g.call(Trigger, STOP, Trigger.Request()).success
+
+
+@pytest.mark.parametrize('name', ['../escaped', '/absolute', '..', 'two\nlines'])
+def test_a_bag_name_that_leads_elsewhere_is_refused(name: str):
+    with graph() as g:
+        value = ParameterValue(type=4, string_value=name)
+        request = SetParametersAtomically.Request(parameters=[Parameter(name='record_name', value=value)])
+        result = g.call(SetParametersAtomically, 'friction_estimator/set_parameters_atomically', request).result
+        assert not result.successful
+        assert 'record_name' in result.reason
+
+
+@pytest.mark.parametrize('parameters', [{'qos_overrides./friction_estimate.publisher.reliability': 'garbage'}])
+def test_a_refusal_to_configure_gives_its_reason(parameters: dict[str, object], capfd):
+    with graph(parameters, autostart=False) as g:
+        assert not g.estimator.autostart()
+        assert 'garbage' in capfd.readouterr().err
+        assert not g.estimator.autostart()

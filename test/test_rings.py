@@ -1,0 +1,109 @@
+"""Who may import whom: core stands alone, offline and nodes do not know each other but for the recorder."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = 'seal_friction_ros'
+SOURCES = Path(__file__).parents[1] / PACKAGE
+ROS = {'rclpy', 'rcl_interfaces', 'std_msgs', 'std_srvs', 'diagnostic_msgs', 'lifecycle_msgs', 'seal_friction_msgs'}
+NOT_PHYSICS = {
+    *ROS,
+    'asyncio', 'builtins', 'datetime', 'importlib', 'io', 'mcap', 'os', 'pathlib', 'random', 'rosbags', 'secrets',
+    'shutil', 'socket', 'subprocess', 'sys', 'tempfile', 'threading', 'time', 'uuid', 'yaml',
+}  # fmt: skip
+THIRD_PARTY_OF_CORE = {'numpy', 'scipy', 'numba'}
+SHARED_WITH_NODES = {f'{PACKAGE}.offline.recorder', f'{PACKAGE}.offline.bag'}
+
+
+def imported(source: str) -> set[str]:
+    """Full names of the modules (or of what is taken from them) that a source imports anywhere, functions included."""
+    names = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            prefix = '.' * node.level + (node.module or '')
+            names |= {f'{prefix}.{alias.name}' for alias in node.names}
+    return names
+
+
+def imports_of(ring: str) -> list[tuple[str, str]]:
+    files = sorted((SOURCES / ring).rglob('*.py')) if ring != 'files' else [SOURCES / 'files.py']
+    assert files
+    return [(file.relative_to(SOURCES).as_posix(), name) for file in files for name in imported(file.read_text())]
+
+
+def is_below(name: str, module: str) -> bool:
+    return name == module or name.startswith(f'{module}.')
+
+
+def offenders(ring: str, forbidden) -> list[str]:
+    return [f'{file} imports {name}' for file, name in imports_of(ring) if forbidden(name)]
+
+
+def test_the_walk_sees_every_kind_of_import():
+    source = 'import os.path as p\nfrom a.b import c, d\ndef f():\n    from . import e\n    from ..g import h\n'
+    assert imported(source) == {'os.path', 'a.b.c', 'a.b.d', '..e', '..g.h'}
+
+
+def test_core_knows_neither_ros_nor_files_nor_clock_nor_chance():
+    assert not offenders('core', lambda name: name.split('.')[0] in NOT_PHYSICS)
+
+
+def test_core_stands_on_the_standard_library_and_numerics_alone():
+    def outside(name: str) -> bool:
+        top, _, _ = name.partition('.')
+        return top not in sys.stdlib_module_names | THIRD_PARTY_OF_CORE and not is_below(name, f'{PACKAGE}.core')
+
+    assert not offenders('core', outside)
+
+
+def test_core_does_not_draw_chance_from_numpy_or_scipy():
+    calls = [
+        f'{file.name}: {ast.unparse(node)}'
+        for file in (SOURCES / 'core').rglob('*.py')
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Attribute) and ast.unparse(node).startswith(('np.random', 'numpy.random'))
+    ]
+    assert not calls
+
+
+def test_core_opens_and_prints_nothing():
+    calls = [
+        f'{file.name}: {node.func.id}'
+        for file in (SOURCES / 'core').rglob('*.py')
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in {'open', 'print', 'input', 'eval', 'exec', '__import__'}
+    ]
+    assert not calls
+
+
+def test_offline_needs_no_ros_graph():
+    assert not offenders('offline', lambda name: name.split('.')[0] in ROS or is_below(name, f'{PACKAGE}.nodes'))
+
+
+def test_nodes_take_only_the_recorder_and_the_bag_from_offline():
+    def surplus(name: str) -> bool:
+        return is_below(name, f'{PACKAGE}.offline') and not any(is_below(name, module) for module in SHARED_WITH_NODES)
+
+    assert not offenders('nodes', surplus)
+
+
+def test_nodes_do_no_arithmetic_with_numpy():
+    assert not offenders('nodes', lambda name: name.split('.')[0] in THIRD_PARTY_OF_CORE)
+
+
+def test_the_yaml_door_knows_only_core():
+    own = [name for _, name in imports_of('files') if is_below(name, PACKAGE)]
+    assert own
+    assert all(is_below(name, f'{PACKAGE}.core') for name in own)
+
+
+@pytest.mark.parametrize('ring', ['core', 'offline', 'nodes', 'files'])
+def test_imports_are_written_in_full(ring):
+    assert not offenders(ring, lambda name: name.startswith('.'))

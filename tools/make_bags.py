@@ -1,0 +1,97 @@
+"""Make the small bags under ``bags/`` anew: ``python tools/make_bags.py``.
+
+They are reference runs: ``test/replay`` replays each and wants the recorded estimates back to the byte. So they are
+made anew only when an estimate is meant to change, and the change is then said in CHANGELOG.rst.
+"""
+
+import hashlib
+import math
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+import yaml
+
+from seal_friction_ros.core import wire
+from seal_friction_ros.core.records import Force, Pressure
+from seal_friction_ros.core.wire import Velocity
+from seal_friction_ros.nodes.processes import free_domain, play_live
+from seal_friction_ros.offline.bag import (
+    FORCE_TOPIC,
+    PRESSURE_TOPIC,
+    VELOCITY_TOPIC,
+    BagMessage,
+    BagWriter,
+    read_messages,
+)
+from seal_friction_ros.offline.import_thesis import import_thesis
+
+BAGS = Path(__file__).parents[1] / 'bags'
+SECOND = 1_000_000_000  # [ns]
+STEP = 10_000_000  # [ns]
+
+
+def pull_test(folder: Path) -> Iterable[BagMessage]:
+    """The first test of the thesis at 0, 100 and 200 psi, both directions: the first 9 s of the whole."""
+    import_thesis(folder / 'whole')
+    start = None
+    for message in read_messages(folder / 'whole'):
+        start = message.log_time if start is None else start
+        if message.log_time < start + 9 * SECOND:
+            yield message
+
+
+def faults(folder: Path) -> Iterable[BagMessage]:
+    """A rod that goes to and fro while every fault that has a status bit comes and goes."""
+    del folder
+    for i in range(600):
+        stamp = SECOND + i * STEP
+        pressure = 3e6 + 2e6 * math.sin(i / 40)
+        pressures = {100: math.nan, 110: math.inf, 120: 1e12, 130: -9e5, 140: 2e7}
+        forces = {160: math.nan, 170: -math.inf, 180: 1e9}
+        velocity = max(abs(math.sin(i / 30)) - 0.4, 0.0) * math.copysign(0.05, math.sin(i / 30))
+        velocities = {200: math.nan, 210: -math.inf, 220: 99.0}
+        if i >= 5 and not 300 <= i < 330:
+            sample = Pressure(stamp, pressures.get(i, pressure), pressure / 2)
+            yield BagMessage(PRESSURE_TOPIC, wire.PRESSURE_TYPE, stamp, wire.encode_pressure(sample, b'rod'))
+        if i >= 8 and not 400 <= i < 430:
+            force = Force(stamp, forces.get(i, 60.0 * math.sin(i / 30 + 0.3)))
+            yield BagMessage(FORCE_TOPIC, wire.FORCE_TYPE, stamp, wire.encode_force(force, b'rod'))
+        late = stamp - 5 * STEP if i == 500 else stamp
+        data = wire.encode_velocity(Velocity(late, velocities.get(i, velocity), b'rod'))
+        yield BagMessage(VELOCITY_TOPIC, wire.VELOCITY_TYPE, stamp, data)
+
+
+def main() -> int:
+    """Play each set of inputs through the live node and keep what it recorded."""
+    sources = {
+        'pull_test': (
+            pull_test,
+            'Thesis, Table A-1: readings played as signals (import thesis).',
+        ),
+        'faults': (faults, 'Made up: sine waves with one fault after another.'),
+    }
+    for name, (make, origin) in sources.items():
+        with tempfile.TemporaryDirectory() as folder:
+            with BagWriter(Path(folder) / 'inputs') as writer:
+                for message in make(Path(folder)):
+                    writer.write(*message)
+            play_live(Path(folder) / 'inputs', Path(folder) / name, free_domain(), 1.0)
+            shutil.rmtree(BAGS / name, ignore_errors=True)
+            shutil.copytree(Path(folder) / name, BAGS / name)
+        digest = hashlib.sha256((BAGS / name / f'{name}_0.mcap').read_bytes()).hexdigest()
+        provenance = {
+            'origin': origin,
+            'made_by': 'python tools/make_bags.py: played through the live node, which recorded it',
+            'licence': 'Apache-2.0',
+            'sha256': {f'{name}_0.mcap': digest},
+        }
+        (BAGS / name / 'provenance.yaml').write_text(yaml.safe_dump(provenance, sort_keys=False))
+        print(f'{BAGS / name}: made')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""Write the tables of docs/ that follow from the code: ``python tools/make_docs.py``; a test holds them to it.
+
+Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
+"""
+
+import dataclasses
+import re
+import sys
+from pathlib import Path
+
+from seal_friction_ros.core.configuration import SealSelection
+from seal_friction_ros.core.coulomb import PriorArtChart, Uncertainty
+from seal_friction_ros.core.estimator import EstimatorSettings
+from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.seal import SealGeometry
+from seal_friction_ros.core.validated import meanings
+from seal_friction_ros.nodes.parameters import NodeOptions
+
+DOCS = Path(__file__).parents[1] / 'docs'
+RECORDS = (
+    SealSelection,
+    EstimatorSettings,
+    NodeOptions,
+    SealGeometry,
+    AreaDeformationGain,
+    NormalForceTable,
+    PowerLaw,
+    CoefficientTable,
+    PriorArtChart,
+    Uncertainty,
+)
+
+
+def table(record_type: type) -> str:
+    """Markdown table of the described fields of a dataclass."""
+    defaults = {field.name: field.default for field in dataclasses.fields(record_type)}
+    rows = ['| name | unit | default | bounds | meaning |', '|---|---|---|---|---|']
+    for name, meaning in meanings(record_type).items():
+        default = '' if defaults[name] is dataclasses.MISSING else f'`{_yaml(defaults[name])}`'
+        rows.append(f'| `{name}` | {meaning.unit} | {default} | {meaning.bounds_text()} | {meaning.description} |')
+    return '\n'.join(rows)
+
+
+def _yaml(value: object) -> str:
+    if isinstance(value, tuple):
+        return f'[{", ".join(_yaml(item) for item in value)}]'
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if value == '' else str(value)
+
+
+def filled(text: str) -> str:
+    """Text of a page with every table in it made anew."""
+    tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
+    return re.sub(
+        r'<!-- table: (\w+) -->\n.*?<!-- end -->',
+        lambda found: f'<!-- table: {found[1]} -->\n{tables[found[1]]}\n<!-- end -->',
+        text,
+        flags=re.DOTALL,
+    )
+
+
+def main() -> int:
+    """Write every page."""
+    for page in sorted(DOCS.glob('*.md')):
+        page.write_text(filled(page.read_text()))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

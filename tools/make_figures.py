@@ -1,0 +1,36 @@
+"""The figures of README and docs, from the data in this repository: ``make figures``."""
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from seal_friction_ros.files import config_path
+from seal_friction_ros.offline.import_thesis import import_thesis
+from seal_friction_ros.offline.replay import replay
+from seal_friction_ros.offline.report import write_report
+from seal_friction_ros.offline.seal_charts import write_seal_charts
+
+FIGURES = Path(__file__).parents[1] / 'docs' / 'figures'
+
+
+def main() -> int:
+    """Replay the pull test, draw it and the seal's charts, and keep the pictures that are shown."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        import_thesis(folder / 'inputs')
+        replay(folder / 'inputs', out=folder / 'pull_test')
+        write_report(folder / 'pull_test', folder / 'report.html')
+        write_seal_charts(config_path('seals', 'ms28775_114'), folder / 'seal.html')
+        FIGURES.mkdir(parents=True, exist_ok=True)
+        for source, target in {
+            'report_figures/live_estimate.png': 'live_estimate.png',
+            'report_figures/friction_over_pressure.png': 'friction_over_pressure.png',
+            'seal_figures/fig23_states_2_and_3.png': 'friction_states.png',
+        }.items():
+            shutil.copy(folder / source, FIGURES / target)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
