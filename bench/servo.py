@@ -1,0 +1,69 @@
+"""Real-time factor of the servo by inner step: seconds of servo per second of computer, friction and all, no ROS graph.
+
+    python bench/servo.py [--json]
+
+``step``: one call a sample, as the simulator node does. ``simulate``: many samples in one call, as the tuning does.
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from seal_friction_ros.core.compiled import COMPILED  # noqa: E402
+from seal_friction_ros.core.coulomb import MountedSeal  # noqa: E402
+from seal_friction_ros.core.reference import Sine  # noqa: E402
+from seal_friction_ros.core.seal_file import parse_seal  # noqa: E402
+from seal_friction_ros.core.servo import ServoParameters, init, simulate, step  # noqa: E402
+
+INNER_STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)  # [s]
+PERIOD = 1e-3  # [s]
+
+
+def factors(servo: ServoParameters, seconds: float) -> tuple[float, float]:
+    """Real-time factors of `step` and of `simulate`; the best of three."""
+    count = round(seconds / servo.control_period)
+    references = [Sine().at(i * servo.control_period) for i in range(count)]
+    simulate(servo, init(servo), references[:10])
+    step(servo, init(servo), references[0])
+    by_step = by_simulate = 0.0
+    for _ in range(3):
+        state, start = init(servo), time.perf_counter()
+        for reference in references:
+            state, _out = step(servo, state, reference)
+        by_step = max(by_step, seconds / (time.perf_counter() - start))
+        start = time.perf_counter()
+        simulate(servo, init(servo), references)
+        by_simulate = max(by_simulate, seconds / (time.perf_counter() - start))
+    return by_step, by_simulate
+
+
+def main() -> None:
+    """Print the table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--json', action='store_true', help='print JSON')
+    arguments = parser.parse_args()
+    seal = parse_seal(yaml.safe_load((ROOT / 'config/seals/ms28775_114.yaml').read_text()))
+    seals = (MountedSeal(seal, 'a'), MountedSeal(seal, 'b'))
+    rows = []
+    for inner_step in INNER_STEPS:
+        servo = ServoParameters(seals=seals, inner_step=inner_step, control_period=PERIOD)
+        by_step, by_simulate = factors(servo, 5.0 if COMPILED else 0.5)
+        rows.append({'inner_step': inner_step, 'step': by_step, 'simulate': by_simulate})
+    if arguments.json:
+        print(json.dumps({'compiled': COMPILED, 'control_period': PERIOD, 'rows': rows}))
+        return
+    print(f'{"compiled (numba)" if COMPILED else "plain Python"}, sample {PERIOD * 1e3:g} ms; times real time')
+    print(f'{"inner step":>12} {"step":>9} {"simulate":>9}')
+    for row in rows:
+        print(f'{row["inner_step"] * 1e6:>9.0f} us {row["step"]:>9.1f} {row["simulate"]:>9.1f}')
+
+
+if __name__ == '__main__':
+    main()
