@@ -64,10 +64,18 @@ class FrictionEstimator(LifecycleNode):
                 declare(self, record_type)
         except ParameterException as error:
             raise ValueError(str(error)) from None
+        self._warn_of_unknown_parameters()
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.add_post_set_parameters_callback(self._on_parameters_set)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
+
+    def _warn_of_unknown_parameters(self) -> None:
+        # rclpy passes over what nobody declares, so a misspelt name would leave its default without a word.
+        given = getattr(self, '_parameter_overrides', {})
+        unknown = sorted(n for n in given if not n.startswith('qos_overrides') and not self.has_parameter(n))
+        if unknown:
+            self.get_logger().warning(f'no such parameter: {", ".join(unknown)}')
 
     def _forget(self) -> None:
         self._configuration: Configuration | None = None

@@ -179,6 +179,11 @@ def test_a_parameter_override_that_makes_no_sense_starts_nothing(parameters: dic
     assert '\n' not in str(error.value)
 
 
+def test_a_misspelt_parameter_is_said(capfd):
+    with graph({'stick_velocty': 0.5}):
+        assert 'no such parameter: stick_velocty' in capfd.readouterr().err
+
+
 def test_names_are_relative_so_namespaces_and_remapping_work():
     arguments = ('-r', '__ns:=/left', '-r', 'rod_velocity:=piston/speed', '-r', 'friction_estimate:=out')
     with graph(arguments=arguments, namespace='/left') as g:
