@@ -27,6 +27,7 @@ test:
 
 bench: setup
 	@$(python) bench/step.py
+	@$(python) bench/servo.py
 
 figures: setup
 	@$(python) tools/make_figures.py

@@ -7,20 +7,14 @@
 
 import argparse
 import json
-import sys
 import time
-from pathlib import Path
 
-import yaml
-
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-from seal_friction_ros.core.compiled import COMPILED  # noqa: E402
-from seal_friction_ros.core.coulomb import MountedSeal  # noqa: E402
-from seal_friction_ros.core.reference import Sine  # noqa: E402
-from seal_friction_ros.core.seal_file import parse_seal  # noqa: E402
-from seal_friction_ros.core.servo import ServoParameters, init, simulate, step  # noqa: E402
+from seal_friction_ros.core.compiled import COMPILED
+from seal_friction_ros.core.configuration import SealSelection
+from seal_friction_ros.core.estimator import EstimatorSettings
+from seal_friction_ros.core.reference import Sine
+from seal_friction_ros.core.servo import ServoParameters, init, simulate, step
+from seal_friction_ros.files import load_configuration
 
 INNER_STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)  # [s]
 PERIOD = 1e-3  # [s]
@@ -49,8 +43,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--json', action='store_true', help='print JSON')
     arguments = parser.parse_args()
-    seal = parse_seal(yaml.safe_load((ROOT / 'config/seals/ms28775_114.yaml').read_text()))
-    seals = (MountedSeal(seal, 'a'), MountedSeal(seal, 'b'))
+    seals = load_configuration(SealSelection(), EstimatorSettings()).parameters().seals
     rows = []
     for inner_step in INNER_STEPS:
         servo = ServoParameters(seals=seals, inner_step=inner_step, control_period=PERIOD)

@@ -115,7 +115,6 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
     unknown = sorted(str(name) for name in values if name not in known)
     if unknown:
         raise ValueError(f'{path}: friction_estimator has no parameter {", ".join(unknown)}')
-    return tuple(  # type: ignore[return-value]
-        from_mapping(kind, {k: v for k, v in values.items() if k in meanings(kind)}, str(path))
-        for kind in (SealSelection, EstimatorSettings)
-    )
+    selection = {name: value for name, value in values.items() if name in meanings(SealSelection)}
+    settings = {name: value for name, value in values.items() if name in meanings(EstimatorSettings)}
+    return from_mapping(SealSelection, selection, str(path)), from_mapping(EstimatorSettings, settings, str(path))

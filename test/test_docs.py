@@ -3,17 +3,16 @@
 import os
 import re
 import subprocess
-import sys
 import time
 from pathlib import Path
 
+import demo
+import make_docs
 import pytest
 
 from seal_friction_ros.nodes.processes import free_domain, graph_environment
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / 'tools'))
-import make_docs  # noqa: E402
 
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
 README = (ROOT / 'README.md').read_text()
@@ -119,7 +118,5 @@ def test_every_figure_is_made_by_a_command():
 
 
 def test_the_units_are_in_the_table_of_the_demo():
-    import demo  # noqa: PLC0415
-
     headings = [str(column.header) for column in (*demo.friction_table([]).columns, *demo.run_table([]).columns)]
     assert {'pressure [bar]', 'measured [N]', 'p99 [us]'} <= set(headings)

@@ -102,7 +102,7 @@ def estimates(
         data = encode_text(snapshot_text(Snapshot(configuration, state, held)))
         yield BagMessage(CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, 0, data), b''
     for message in messages:
-        estimate_bytes = b''
+        estimate_bytes, used = b'', message
         try:
             if message.topic == topics.velocity:
                 velocity = decode_velocity(message.data)
@@ -116,12 +116,12 @@ def estimates(
                 configuration, state, held = parse_snapshot(decode_text(message.data))
                 if override:
                     data = encode_text(snapshot_text(Snapshot(override, state, held)))
-                    message = message._replace(data=data)  # noqa: PLW2901
+                    used = message._replace(data=data)
                 else:
                     parameters = configuration.parameters()
         except ValueError as error:
             raise BagError(f'message on {message.topic} at {message.log_time} ns: {error}') from None
-        yield message, estimate_bytes
+        yield used, estimate_bytes
 
 
 @dataclass(frozen=True)
