@@ -236,6 +236,7 @@ class _Collector:
         self._configurations: list[tuple[int, str]] = []
 
     def take(self, message: BagMessage) -> None:
+        """Take one message in; a damaged one is an error that names it."""
         try:
             self._take(message)
         except ValueError as error:
@@ -270,6 +271,7 @@ class _Collector:
         self._rows.extend(estimate[1:])
 
     def run(self, name: str, counts: dict[str, tuple[str, int]]) -> RecordedRun:
+        """Arrays of all that was taken in; what cannot be a measurement is NaN."""
         stamps = np.frombuffer(self.stamps, dtype=np.int64)
         columns = np.frombuffer(self._rows, dtype=np.float64).reshape(len(stamps), len(_COLUMNS)).T.copy()
         values: dict[str, Any] = dict(zip(_COLUMNS, columns, strict=True))

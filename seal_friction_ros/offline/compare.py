@@ -100,6 +100,7 @@ class _Tally:
         self._outside: dict[str, int] = {}
 
     def add(self, a: tuple[bytes, dict[str, Any]] | None, b: tuple[bytes, dict[str, Any]] | None) -> None:
+        """Count one pair of messages; None where one bag has ended."""
         self.messages_a += a is not None
         self.messages_b += b is not None
         if a is None or b is None:
@@ -119,6 +120,7 @@ class _Tally:
             self._first = f'message {self.messages_a} at {stamp} ns: {name} {a!r} -> {b!r}'
 
     def comparison(self, topic: str) -> Comparison:
+        """Sum it up."""
         pairs = max(min(self.messages_a, self.messages_b), 1)
         fields = {
             name: FieldDifference(self._largest[name], math.sqrt(self._squares[name] / pairs), self._outside[name])

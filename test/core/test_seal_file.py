@@ -9,13 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seal_friction_ros.core.configuration import Configuration, SealSelection, Snapshot, snapshot_text
 from seal_friction_ros.core.coulomb import PhysicsBased, PriorArtChart, coulomb_friction
-from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings, init, step
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
-from seal_friction_ros.core.held_inputs import HeldInputs
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
-from seal_friction_ros.core.records import Force, Pressure, RodSample
 from seal_friction_ros.core.seal_file import mount_seals, parse_seal
 from seal_friction_ros.files import read_yaml
 
@@ -260,27 +256,15 @@ def test_a_source_that_is_no_text_is_refused(source):
 
 
 @pytest.mark.parametrize('source', [date(2008, 5, 1), math.nan, b'thesis'], ids=repr)
-def test_what_makes_a_seal_can_also_be_recorded(source):
-    try:
-        document = changed(POWER, 'source', source)
-        configuration = Configuration(SealSelection(('x',), ('a',)), (document,), EstimatorSettings())
-        parameters = configuration.parameters()
-    except ValueError:
-        return
-    snapshot_text(Snapshot(configuration, init(parameters), HeldInputs()))
+def test_a_source_that_could_not_be_recorded_is_refused(source):
+    assert 'source' in complaint(changed(POWER, 'source', source))
 
 
-def test_a_table_of_absurd_numbers_is_refused_or_gives_finite_estimates():
-    try:
-        document = changed(TABLE, 'friction_coefficient.coefficients', [1e300] * 5)
-        parameters = EstimatorParameters(EstimatorSettings(), mount_seals((document,), ('a',)))
-    except ValueError:
-        return
-    sample = RodSample(0, 1.0, Pressure(0, 1e6, 1e6), Force(0, 1.0))
-    _, estimate = step(parameters, init(parameters), sample)
-    assert all(math.isfinite(value) for value in estimate)
+def test_a_table_of_absurd_numbers_is_refused():
+    said = complaint(changed(TABLE, 'friction_coefficient.coefficients', [1e300] * 5))
+    assert 'coefficients[0] = 1e+300' in said
 
 
 @pytest.mark.parametrize('path', ['name', 'geometry.two\nlines'])
 def test_a_line_break_in_a_name_does_not_break_the_line(path):
-    complaint(changed(changed(POWER, path, 'two\nlines'), 'stiction', -1.0))
+    assert 'two\\nlines' in complaint(changed(changed(POWER, path, 'two\nlines'), 'stiction', -1.0))

@@ -163,3 +163,20 @@ def test_a_replayed_bag_of_inputs_says_what_it_was_replayed_with(tmp_path: Path)
     replay(write_inputs(tmp_path / 'inputs'), out=tmp_path / 'out')
     assert next(read_messages(tmp_path / 'out')).type_name == wire.CONFIGURATION_TYPE
     assert replay(tmp_path / 'out').identical
+
+
+def test_one_lost_estimate_is_one_difference_and_not_all_that_follow(recorded: Path, tmp_path: Path):
+    chosen = [n for n, message in enumerate(read_messages(recorded)) if message.topic == ESTIMATE_TOPIC][100]
+    bag = rewrite(recorded, tmp_path / 'lost', lambda n, message: None if n == chosen else message)
+    verdict = replay(bag)
+    assert (verdict.recorded_estimates, verdict.differing) == (299, 1)
+
+
+def test_a_namespace_is_whole_names(recorded: Path, tmp_path: Path):
+    with BagWriter(tmp_path / 'two') as writer:
+        for message in read_messages(recorded):
+            for side in ('/arm', '/arm2'):
+                writer.write(*message._replace(topic=side + message.topic))
+    assert replay(tmp_path / 'two', namespace='arm').identical
+    with pytest.raises(BagError, match='nothing to estimate from'):
+        replay(tmp_path / 'two', namespace='/ar')
