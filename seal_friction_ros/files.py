@@ -8,10 +8,12 @@ import yaml
 
 from seal_friction_ros.core.configuration import Configuration, SealSelection
 from seal_friction_ros.core.estimator import EstimatorSettings
-from seal_friction_ros.core.validated import from_mapping, meanings
+from seal_friction_ros.core.feedforward import FeedForwardSettings
+from seal_friction_ros.core.validated import from_mapping, meanings, plain
 
 _CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # what PyYAML lets out for '!!int foo'
 _OF_THE_NODE = ('autostart', 'record', 'record_directory', 'record_name', 'use_sim_time', 'qos_overrides')
+DEFAULT_FEEDFORWARD = FeedForwardSettings()
 _LARGEST_YAML = 1 << 20  # [bytes] a seal or parameter file has a few thousand
 
 
@@ -79,14 +81,16 @@ def config_path(kind: str, name: str) -> Path:
     return share_directory('seal_friction_ros', __file__) / 'config' / kind / f'{name}.yaml'
 
 
-def load_configuration(selection: SealSelection, settings: EstimatorSettings) -> Configuration:
+def load_configuration(
+    selection: SealSelection, settings: EstimatorSettings, feedforward: FeedForwardSettings = DEFAULT_FEEDFORWARD
+) -> Configuration:
     """Configuration with the seal files that ``selection`` names.
 
     Raises:
         ValueError: A seal file cannot be read or makes no sense; one line that names file, field, value and bound.
     """
     paths = [config_path('seals', name) for name in selection.seals]
-    configuration = Configuration(selection, tuple(read_yaml(path) for path in paths), settings)
+    configuration = Configuration(selection, tuple(read_yaml(path) for path in paths), settings, feedforward)
     try:
         configuration.parameters()
     except ValueError as error:
@@ -94,8 +98,17 @@ def load_configuration(selection: SealSelection, settings: EstimatorSettings) ->
     return configuration
 
 
-def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
-    """Selection and settings from the parts of a ROS parameter file that are for ``friction_estimator`` or every node.
+def default_configuration() -> Configuration:
+    """Configuration of a node that was told nothing."""
+    return load_configuration(SealSelection(), EstimatorSettings())
+
+
+FEEDFORWARD_PREFIX = 'feedforward.'
+"""What the ROS parameters of the feed-forward begin with."""
+
+
+def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, FeedForwardSettings]:
+    """What the parts of a ROS parameter file that are for ``friction_estimator`` or every node say.
 
     A file with one node only is for that node, whatever its name. Parameters of the node that are not the estimator's
     (recording, QoS) are passed over.
@@ -108,13 +121,31 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings]:
     try:
         for node, content in document.items():
             if len(document) == 1 or str(node).rsplit('/', maxsplit=1)[-1] in ('friction_estimator', '*', '**'):
-                values.update(content['ros__parameters'].items())
+                values.update(_flat(content['ros__parameters']))
     except (AttributeError, KeyError, TypeError):
         raise ValueError(f'{path}: not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)') from None
-    known = {*meanings(SealSelection), *meanings(EstimatorSettings), *_OF_THE_NODE}
-    unknown = sorted(str(name) for name in values if name not in known)
+    chosen: dict[type, dict[str, Any]] = {SealSelection: {}, EstimatorSettings: {}, FeedForwardSettings: {}}
+    known: dict[str, tuple[type, str]] = {
+        name: (record, name) for record in (SealSelection, EstimatorSettings) for name in meanings(record)
+    }
+    known |= {FEEDFORWARD_PREFIX + name: (FeedForwardSettings, name) for name in meanings(FeedForwardSettings)}
+    unknown = sorted(name for name in values if name not in known and name.split('.')[0] not in _OF_THE_NODE)
     if unknown:
-        raise ValueError(f'{path}: friction_estimator has no parameter {", ".join(unknown)}')
-    selection = {name: value for name, value in values.items() if name in meanings(SealSelection)}
-    settings = {name: value for name, value in values.items() if name in meanings(EstimatorSettings)}
-    return from_mapping(SealSelection, selection, str(path)), from_mapping(EstimatorSettings, settings, str(path))
+        raise ValueError(f'{path}: friction_estimator has no parameter {", ".join(map(plain, unknown))}')
+    for name, value in values.items():
+        if name in known:
+            record, field = known[name]
+            chosen[record][field] = value
+    return (
+        from_mapping(SealSelection, chosen[SealSelection], str(path)),
+        from_mapping(EstimatorSettings, chosen[EstimatorSettings], str(path)),
+        from_mapping(FeedForwardSettings, chosen[FeedForwardSettings], str(path)),
+    )
+
+
+def _flat(values: Any, above: str = '') -> dict[str, Any]:
+    """Parameters with the dotted names that ROS gives to nested ones."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        flat |= _flat(value, f'{above}{name}.') if isinstance(value, dict) else {f'{above}{name}': value}
+    return flat

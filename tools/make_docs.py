@@ -11,17 +11,20 @@ from pathlib import Path
 from seal_friction_ros.core.configuration import SealSelection
 from seal_friction_ros.core.coulomb import PriorArtChart, Uncertainty
 from seal_friction_ros.core.estimator import EstimatorSettings
+from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.validated import meanings
-from seal_friction_ros.nodes.parameters import NodeOptions
+from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
 
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
     SealSelection,
     EstimatorSettings,
-    NodeOptions,
+    FeedForwardSettings,
+    StartOptions,
+    RecordingOptions,
     SealGeometry,
     AreaDeformationGain,
     NormalForceTable,

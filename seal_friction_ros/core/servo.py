@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seal_friction_ros.core.compiled import COMPILED, compiled
+from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.coulomb import MountedSeal
 from seal_friction_ros.core.friction_state import state_friction
 from seal_friction_ros.core.records import FrictionState
@@ -308,6 +308,5 @@ def simulate(
     inputs[:, :3], inputs[:, 3], inputs[:, 4] = wanted, feedforward, load_force
     rows = np.empty((len(wanted), len(Trajectory._fields)))
     c, g = parameters.constants, parameters.gains
-    samples: Any = inputs if COMPILED else inputs.tolist()  # Python is twice as fast on its own floats
-    state = _simulate(c, g, state, samples, parameters.inner_step, parameters.inner_steps, rows)
+    state = _simulate(c, g, state, inputs, parameters.inner_step, parameters.inner_steps, rows)
     return state, Trajectory(*rows.T)

@@ -20,7 +20,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.compiled import compiled, table
+import numpy as np
+
+from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.coulomb import MountedSeal, actuator_friction
 from seal_friction_ros.core.units import INCH, PSI
 from seal_friction_ros.core.validated import check, parameter
@@ -247,8 +249,8 @@ def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[Mo
         damping=load.viscous_damping,
         stiction=math.fsum(m.seal.stiction for m in seals),
         table_interval=interval,
-        coulomb_a=table([actuator_friction(on_a, p, 0.0).coulomb_friction for p in pressures]),
-        coulomb_b=table([actuator_friction(on_b, 0.0, p).coulomb_friction for p in pressures]),
+        coulomb_a=np.array([actuator_friction(on_a, p, 0.0).coulomb_friction for p in pressures]),
+        coulomb_b=np.array([actuator_friction(on_b, 0.0, p).coulomb_friction for p in pressures]),
     )
 
 

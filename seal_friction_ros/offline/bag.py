@@ -27,8 +27,11 @@ from seal_friction_ros.files import share_directory
 CHUNK_SIZE = 64 * 1024  # [bytes] small chunks keep the writing thread short; the file is no larger for it
 PRESSURE_TOPIC = '/cylinder_pressure'
 VELOCITY_TOPIC = '/rod_velocity'
+POSITION_TOPIC = '/rod_position'
 FORCE_TOPIC = '/force_sum'
+REFERENCE_TOPIC = '/servo_reference'
 ESTIMATE_TOPIC = '/friction_estimate'
+FEEDFORWARD_TOPIC = '/friction_feedforward'
 CONFIGURATION_TOPIC = '/friction_estimator/configuration'
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 

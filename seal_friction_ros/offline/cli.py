@@ -40,8 +40,10 @@ def _replay(arguments: argparse.Namespace) -> int:
     if not arguments.verify:
         return _tell(arguments, figures, f'{verdict.velocity_samples} velocity samples replayed')
     if verdict.identical:
-        return _tell(arguments, figures, f'{verdict.recorded_estimates} estimates, identical to the byte')
-    what = f'{verdict.differing} of {verdict.recorded_estimates} estimates differ; {verdict.first_difference}'
+        counts = f'{verdict.recorded_estimates} estimates and {verdict.recorded_feedforwards} feed-forwards'
+        return _tell(arguments, figures, f'{counts}, identical to the byte')
+    recorded = verdict.recorded_estimates + verdict.recorded_feedforwards
+    what = f'{verdict.differing} of {recorded} recorded messages differ; {verdict.first_difference}'
     _tell(arguments, figures, what if verdict.recorded_estimates else 'no estimates in the bag to compare with')
     return DIFFERENT
 

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import SealSelection, Snapshot, snapshot_text
+from seal_friction_ros.core.configuration import SealSelection, first_snapshot, snapshot_text
 from seal_friction_ros.core.coulomb import actuator_friction
-from seal_friction_ros.core.estimator import EstimatorSettings, init
-from seal_friction_ros.core.held_inputs import HeldInputs
+from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bag import BagError, BagWriter, read_messages
@@ -29,8 +28,8 @@ CONFIGURATION = load_configuration(SealSelection(), EstimatorSettings())
 
 def make_bag(folder, *, name='bag', frame=b'rod', topic='/rod_velocity', pressures=(1e6, 4e6), configuration=None):
     """Two strokes at each pressure, with a lost velocity so that there is something to say."""
-    snapshot = Snapshot(CONFIGURATION, init(CONFIGURATION.parameters()), HeldInputs())
-    seals = CONFIGURATION.parameters().seals
+    snapshot = first_snapshot(CONFIGURATION)
+    seals = CONFIGURATION.parameters().estimator.seals
     rows = []
     for pressure in pressures:
         friction = actuator_friction(seals, pressure, pressure)
