@@ -21,6 +21,7 @@ setup(
         ('share/' + NAME, ['package.xml']),
         shared('config', '*.yaml'),
         shared('config/seals', '*.yaml'),
+        shared('config/programs', '*.yaml'),
         shared('config/rigs', '*.yaml'),
         shared('data/thesis', '*.csv'),
     ],
