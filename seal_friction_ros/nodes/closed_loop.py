@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -71,14 +71,14 @@ def _operator(domain: int) -> Iterator[_Operator]:
         rclpy.try_shutdown(context=context)
 
 
-def close_loop_live(out: Path, domain: int, seconds: float, simulator: Mapping[str, object]) -> dict[str, str]:
+def close_loop_live(out: Path, domain: int, seconds: float, simulator: Path) -> dict[str, str]:
     """Run simulator and estimator in separate processes and record: first without feed-forward, then as long with it.
 
     Args:
         out: Bag to record; must not exist.
         domain: ROS domain.
         seconds: How long each half lasts [s].
-        simulator: ROS parameters of the simulator.
+        simulator: ROS parameter file of the simulator.
 
     Returns:
         What the two nodes said last on ``/diagnostics``.
@@ -91,7 +91,7 @@ def close_loop_live(out: Path, domain: int, seconds: float, simulator: Mapping[s
     recording = {'record': True, 'record_directory': str(out.parent), 'record_name': out.name}
     with (
         running('friction_estimator', domain, {**recording, _SCALE: 0.0}, log),
-        running('servo_simulator', domain, simulator, log),
+        running('servo_simulator', domain, {}, log, parameter_file=simulator),
         _operator(domain) as operator,
     ):
         start = time.monotonic()
