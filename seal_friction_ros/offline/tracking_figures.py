@@ -41,8 +41,11 @@ def tracking_verdict(evaluation: TrackingEvaluation) -> str:
     """What the comparison found, in one line."""
     without, compensated = evaluation.without, evaluation.compensated
     if compensated is None or without is None or compensated.rms_change is None:
-        best = compensated or without
-        return f'Tracking error {length(best.rms)} RMS' if best else 'No tracking to evaluate'
+        alone = compensated or without
+        if alone is None:
+            return 'No stretch is long enough to say how the servo tracked'
+        kind = 'with' if alone.has_feedforward else 'without'
+        return f'Tracking error {length(alone.rms)} RMS {kind} feed-forward'
     verb = 'cuts' if compensated.rms_change < 0.0 else 'raises'
     return f'Feed-forward {verb} the tracking error from {length(without.rms)} to {length(compensated.rms)} RMS'
 
@@ -121,7 +124,7 @@ def tracking_figure(run: RecordedRun, evaluation: TrackingEvaluation, shown: Seq
         _name(above, stretch, len(shown))
         below.set_title(_numbers(stretch), fontsize=9.0, pad=4.0)
         below.set_xlabel(f'time [s], from {run.time[part][0]:.2f} s of the bag')
-        below.set_xlim(0.0, time[-1])
+        below.set_xlim(0.0, time[-1] or 1.0)
     axes[1, 0].set_ylim(-1.12 * largest / size, 1.12 * largest / size)
     axes[0, 0].set_ylabel('position [mm]')
     axes[1, 0].set_ylabel(f'reference less\nposition [{unit}]')
@@ -173,7 +176,7 @@ def compensation_figure(run: RecordedRun, shown: Sequence[TrackingStretch]) -> P
         ax.axhline(0.0, color=GREY, lw=0.6, zorder=1.0)
         _name(ax, stretch, len(shown))
         ax.set_xlabel(f'time [s], from {run.time[part][0]:.2f} s of the bag')
-        ax.set_xlim(0.0, time[-1])
+        ax.set_xlim(0.0, time[-1] or 1.0)
     axes[0, 0].set_ylabel(f'force [{unit}]')
     legend_above(axes[0, 0])
     return Plot(
