@@ -20,6 +20,7 @@ from seal_friction_ros.core.units import BAR
 from seal_friction_ros.files import config_path
 from seal_friction_ros.nodes.closed_loop import close_loop_live
 from seal_friction_ros.nodes.processes import free_domain, play_live
+from seal_friction_ros.nodes.realtime import realtime_granted
 from seal_friction_ros.offline.bag_evaluation import evaluate, read_run
 from seal_friction_ros.offline.import_log import import_log
 from seal_friction_ros.offline.import_thesis import import_thesis
@@ -33,6 +34,7 @@ OUT = ROOT / 'build' / 'demo'
 RIG_LOGS = ROOT.parent / 'shared' / 'data' / 'delft'
 PULL_TEST_RATE = 10.0  # [times the pace of the data] 100 Hz of readings become the 1 kHz of a servo controller
 LOOP_TIME = 10.0  # [s] without feed-forward, and as long with it
+REALTIME_PRIORITY = 50  # where the system grants it
 RIG_RATE = 25.0  # [times the pace of the data] the runs last minutes
 
 
@@ -57,6 +59,11 @@ def inputs(folder: Path) -> Iterator[tuple[Path, float, dict[str, object]]]:
         yield folder / log.stem, RIG_RATE, rig
 
 
+def priority() -> int:
+    """Real-time priority of the nodes: none where the system does not grant it."""
+    return REALTIME_PRIORITY if realtime_granted() else 0
+
+
 def run_live(bag: Path, rate: float, parameters: dict[str, object]) -> Run:
     """Play one bag live, verify what was recorded, report it."""
     recorded = OUT / bag.name
@@ -67,15 +74,14 @@ def run_live(bag: Path, rate: float, parameters: dict[str, object]) -> Run:
     return Run(bag.name, figures, identical, recorded, report)
 
 
-def close_loop() -> tuple[Run, TrackingEvaluation]:
+def close_loop() -> tuple[Run, TrackingEvaluation | None]:
     """Close the loop live, verify what was recorded, report it; the run, and how the servo tracked in each half."""
     bag = OUT / 'closed_loop'
-    figures = close_loop_live(bag, free_domain(), LOOP_TIME, ROOT / 'config' / 'servo_simulator.yaml')
+    simulator = ROOT / 'config' / 'servo_simulator.yaml'
+    figures = close_loop_live(bag, free_domain(), LOOP_TIME, simulator, priority())
     report = OUT / 'closed_loop.html'
     write_report(bag, report)
-    evaluation = evaluate_tracking(read_run(bag))
-    assert evaluation is not None  # the simulator sends reference and position
-    return Run(bag.name, figures, replay(bag).identical, bag, report), evaluation
+    return Run(bag.name, figures, replay(bag).identical, bag, report), evaluate_tracking(read_run(bag))
 
 
 def friction_table(runs: list[Run]) -> Table:
@@ -104,15 +110,16 @@ def run_table(runs: list[Run]) -> Table:
     return table
 
 
-def tracking_table(loop: Run, evaluation: TrackingEvaluation) -> Table:
+def tracking_table(loop: Run, evaluation: TrackingEvaluation | None) -> Table:
     """How the servo tracked without and with feed-forward, and what that cost."""
     missed = f'{loop.figures.get("missed ticks")} of {loop.figures.get("ticks")} ticks missed'
     share = f'{loop.figures.get("share of a core [%]")} % of a core'
-    title = f'Closed loop at {loop.figures.get("rate [Hz]")} Hz; simulator: {share}, {missed}'
+    kind = 'real-time' if priority() else 'normal'
+    title = f'Closed loop at {loop.figures.get("rate [Hz]")} Hz, {kind} priority; simulator: {share}, {missed}'
     table = Table(title=title)
     for heading in ('feed-forward', 'RMS [um]', 'peak [um]', 'rest per reversal [ms]', 'RMS [%]', 'rest [%]'):
         table.add_column(Text(heading), justify='left' if heading == 'feed-forward' else 'right')
-    for stretch in evaluation.stretches:
+    for stretch in evaluation.stretches if evaluation else ():
         name = f'up to {stretch.feedforward_peak:.0f} N' if stretch.has_feedforward else 'none'
         dwell = 'no reversal' if stretch.dwell is None else f'{stretch.dwell * 1e3:.1f}'
         changes = ('' if c is None else f'{c:+.0f}' for c in (stretch.rms_change, stretch.dwell_change))

@@ -71,7 +71,7 @@ def _operator(domain: int) -> Iterator[_Operator]:
         rclpy.try_shutdown(context=context)
 
 
-def close_loop_live(out: Path, domain: int, seconds: float, simulator: Path) -> dict[str, str]:
+def close_loop_live(out: Path, domain: int, seconds: float, simulator: Path, priority: int = 0) -> dict[str, str]:
     """Run simulator and estimator in separate processes and record: first without feed-forward, then as long with it.
 
     Args:
@@ -79,6 +79,7 @@ def close_loop_live(out: Path, domain: int, seconds: float, simulator: Path) -> 
         domain: ROS domain.
         seconds: How long each half lasts [s].
         simulator: ROS parameter file of the simulator.
+        priority: Real-time priority of both; 0: none.
 
     Returns:
         What the two nodes said last on ``/diagnostics``.
@@ -89,9 +90,10 @@ def close_loop_live(out: Path, domain: int, seconds: float, simulator: Path) -> 
     out.parent.mkdir(parents=True, exist_ok=True)
     log = out.with_suffix('.log')
     recording = {'record': True, 'record_directory': str(out.parent), 'record_name': out.name}
+    realtime = {'realtime_priority': priority}
     with (
-        running('friction_estimator', domain, {**recording, _SCALE: 0.0}, log),
-        running('servo_simulator', domain, {}, log, parameter_file=simulator),
+        running('friction_estimator', domain, {**recording, **realtime, _SCALE: 0.0}, log),
+        running('servo_simulator', domain, realtime, log, parameter_file=simulator),
         _operator(domain) as operator,
     ):
         start = time.monotonic()

@@ -17,6 +17,14 @@ class StartOptions:
     """How a node starts, one field per ROS parameter."""
 
     autostart: bool = parameter(True, unit='', live=False, description='Configure and activate by itself at start.')
+    realtime_priority: int = parameter(
+        0,
+        unit='',
+        lower=0,
+        upper=99,
+        live=False,
+        description='SCHED_FIFO priority of the whole process from configuration on; 0: none.',
+    )
 
 
 @dataclasses.dataclass(frozen=True)

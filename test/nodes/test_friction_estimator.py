@@ -274,7 +274,15 @@ def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_
 def test_the_node_has_no_arithmetic_parameter_of_its_own():
     with graph() as g:
         declared = {name for name in g.estimator._parameters if not name.startswith(('qos_overrides', 'use_sim_time'))}
-        known = {'autostart', 'record', 'record_directory', 'record_name', 'seals', 'seal_chambers'}
+        known = {
+            'autostart',
+            'realtime_priority',
+            'record',
+            'record_directory',
+            'record_name',
+            'seals',
+            'seal_chambers',
+        }
         settings = {*meanings(EstimatorSettings), *(f'feedforward.{name}' for name in meanings(FeedForwardSettings))}
         assert declared - known - {'start_type_description_service'} == settings
         assert isinstance(g.estimator, FrictionEstimator)
