@@ -247,12 +247,6 @@ def dwell(velocity: Samples, period: float, turns: int) -> float:
     return float(np.count_nonzero(velocity == 0.0)) * period / turns
 
 
-def performance(axis: Axis, motions: TestMotions, delay: float, noise: Samples | None = None) -> Performance:
-    """Judge an axis by the test motions; arguments as `closed_loop`."""
-    sine, move, step = motions.runs(axis, delay, noise)
-    return judge(axis.servo.control_period, motions, sine, move, step)
-
-
 def judge(period: float, motions: TestMotions, sine: Run, move: Run, step: Run) -> Performance:
     """Figures of the three runs of `TestMotions.runs`, with the sample ``period`` [s]."""
     part = motions.judged(sine)

@@ -25,6 +25,7 @@ from seal_friction_ros.core import feedforward
 from seal_friction_ros.core.feedforward import UNUSABLE, FeedForwardSettings, Motion
 from seal_friction_ros.core.records import FrictionEstimate, FrictionState
 from seal_friction_ros.core.tuning import bounded, nearest_preferred, preferred
+from seal_friction_ros.core.tuning_settings import MatchSettings
 
 ACCELERATION_WINDOW = 11  # samples of velocity to whose parabola an acceleration belongs
 MOST_UNEVEN = 0.5  # of the median period; a sample further off the beat has no acceleration
@@ -241,35 +242,28 @@ def residual(law: Law, reversal: Choice, force: Samples) -> Residual:
     return Residual(_rms(left[law.sliding & known]), _rms(left[reversal & known]))
 
 
-def match(
-    recording: Recording,
-    settings: FeedForwardSettings,
-    mass: float | None = None,
-    delay: float | None = None,
-    friction_error: float = 0.3,
-    delay_error: float = 0.2,
-) -> Match:
+def match(recording: Recording, settings: FeedForwardSettings, known: MatchSettings) -> Match:
     """Parameters of the feed-forward from what an axis did.
 
     Args:
         recording: What it did.
         settings: Settings of the feed-forward until now: what the recording does not tell stays as it is.
-        mass: [kg] if it is known.
-        delay: From a velocity sample until its feed-forward is force on the rod [s], if it is known: the lead time.
-        friction_error: Share by which the model is made wrong, either way.
-        delay_error: Likewise the delay.
+        known: What else is known, and how wrong model and delay may be.
 
     Raises:
         ValueError: The recording has not what is needed; one line that says what to record.
     """
     time = recording.time
     reversal = near_reversals(time, recording.reference_velocity)
-    law = fit_law(recording, mass)
-    told = {'coulomb_scale': law.scale > 0.0 and law.scale_std <= TOLD * law.scale, 'lead_time': delay is not None}
+    law = fit_law(recording, known.mass or None)
+    told = {
+        'coulomb_scale': law.scale > 0.0 and law.scale_std <= TOLD * law.scale,
+        'lead_time': known.whole_delay > 0.0,
+    }
     if told['coulomb_scale']:
         settings = replace(settings, coulomb_scale=bounded('coulomb_scale', round(law.scale, 2)))
-    if delay is not None:
-        settings = replace(settings, lead_time=bounded('lead_time', delay))
+    if told['lead_time']:
+        settings = replace(settings, lead_time=known.whole_delay)
     smoothing = _smoothing(recording, law)
     slew = None
     if smoothing is not None:
@@ -281,9 +275,9 @@ def match(
 
     cases = []
     late = settings.lead_time
-    for friction in dict.fromkeys((-friction_error, 0.0, friction_error)):
+    for friction in dict.fromkeys((-known.friction_error, 0.0, known.friction_error)):
         force = feedforward_force(settings, recording, friction)
-        for lateness in dict.fromkeys((-delay_error, 0.0, delay_error)):
+        for lateness in dict.fromkeys((-known.delay_error, 0.0, known.delay_error)):
             left = residual(law, reversal, delayed(time, force, (1.0 + lateness) * late))
             cases.append(MatchCase(friction, lateness, left))
     acting = delayed(time, feedforward_force(settings, recording), late)

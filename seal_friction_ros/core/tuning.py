@@ -22,16 +22,18 @@ from typing import NamedTuple
 from seal_friction_ros.core.closed_loop import (
     Axis,
     Performance,
+    Run,
     Samples,
     TestMotions,
-    performance,
+    judge,
     whole_delay,
     with_wrong_friction,
     without_feedforward,
 )
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.reference import Sine
-from seal_friction_ros.core.validated import check, meanings, parameter
+from seal_friction_ros.core.tuning_settings import TuningSettings
+from seal_friction_ros.core.validated import meanings
 
 MOST_CANDIDATES = 100
 """The search ends after as many, so that its time is bounded."""
@@ -44,56 +46,6 @@ GRID_LEADS = (0.0, 1.0, 2.0)  # of the whole delay
 STRIDES = (8, 4, 2, 1)  # steps of the raster that the compass search takes
 AS_GOOD = 1.05  # J that is nearly as good
 SEARCH_HOLD = 0.2  # [s] of rest that is watched while searching; what is found is watched for `hold_time`
-
-
-@dataclass(frozen=True)
-class TuningSettings:
-    """What the axis shall do, and how well it is known.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
-
-    amplitude: float = parameter(0.001, unit='m', lower=1e-6, upper=1.0, description='Half the way of the sine.')
-    frequency: float = parameter(5.0, unit='Hz', lower=0.05, upper=50.0, description='Of the sine.')
-    delay: float = parameter(
-        0.001,
-        unit='s',
-        lower=0.0,
-        upper=0.1,
-        description='From a velocity sample until its feed-forward is in the controller.',
-    )
-    friction_error: float = parameter(
-        0.3, unit='1', lower=0.0, upper=0.9, description='The model of the friction may be wrong by this share.'
-    )
-    delay_error: float = parameter(
-        0.2,
-        unit='1',
-        lower=0.0,
-        upper=1.0,
-        description='Likewise the whole delay from velocity sample to force on the rod.',
-    )
-    overshoot_limit: float = parameter(
-        0.05, unit='1', lower=0.0, upper=1.0, description='Largest overshoot of a move in any case, share of its way.'
-    )
-    hold_time: float = parameter(
-        2.0, unit='s', lower=0.05, upper=60.0, description='Rest after each motion that is watched for a limit cycle.'
-    )
-    pressure_noise: float = parameter(
-        2e3, unit='Pa', lower=0.0, upper=1e6, description='Standard deviation of the noise of each pressure.'
-    )
-    force_noise: float = parameter(1.0, unit='N', lower=0.0, upper=1e4, description='Likewise of the force sum.')
-    velocity_noise: float = parameter(
-        2e-4, unit='m/s', lower=0.0, upper=1.0, description='Likewise of the velocity; all before the estimator.'
-    )
-    seed: int = parameter(1, unit='', lower=0, upper=2**31 - 1, description='Of the noise.')
-
-    def __post_init__(self) -> None:
-        check(self)
-
-    def motions(self, hold_time: float) -> TestMotions:
-        """The motions that the axis is judged by, with a rest [s] after each."""
-        return TestMotions(Sine(self.amplitude, self.frequency), hold_time)
 
 
 class Case(NamedTuple):
@@ -182,6 +134,10 @@ class Problem:
                     f'than the {most:.4g} {unit} that the servo follows'
                 )
 
+    def motions(self, hold_time: float) -> TestMotions:
+        """The motions that the axis is judged by, with a rest [s] after each."""
+        return TestMotions(Sine(self.settings.amplitude, self.settings.frequency), hold_time)
+
     @property
     def lead_step(self) -> float:
         """Raster of the lead time [s]."""
@@ -205,11 +161,22 @@ class Problem:
         The delay error is one of `whole_delay`, all of it on the way to the controller, which cannot become shorter
         than nothing.
         """
+        motions = self.motions(hold_time)
+        runs = self.runs(feedforward, friction_error, delay_error, hold_time)
+        return Case(friction_error, delay_error, judge(self.axis.servo.control_period, motions, *runs))
+
+    def runs(
+        self,
+        feedforward: FeedForwardSettings,
+        friction_error: float = 0.0,
+        delay_error: float = 0.0,
+        hold_time: float = SEARCH_HOLD,
+    ) -> tuple[Run, Run, Run]:
+        """Sine, move and step of `case`."""
         plant, parameters = self.axis
         delay = self.settings.delay + delay_error * whole_delay(plant, self.settings.delay)
         wrong = with_wrong_friction(parameters._replace(feedforward=feedforward), friction_error)
-        judged = performance(Axis(plant, wrong), self.settings.motions(hold_time), max(delay, 0.0), self.noise)
-        return Case(friction_error, delay_error, judged)
+        return self.motions(hold_time).runs(Axis(plant, wrong), max(delay, 0.0), self.noise)
 
     def without(self) -> Performance:
         """The axis without feed-forward."""
