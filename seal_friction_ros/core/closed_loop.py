@@ -124,6 +124,8 @@ def whole_delay(parameters: ServoParameters, delay: float) -> float:
 def closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: Samples | None = None) -> Run:
     """Run the loop from rest at the start of the wave.
 
+    The sensors are there a sample before the first reference, so that the feed-forward has no need to fade in.
+
     Args:
         axis: Servo, estimator and feed-forward.
         wave: Reference.
@@ -146,12 +148,10 @@ def closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: Sampl
         stamp = round(i * period * 1e9)
         reference = wave.at(i * period)
         a, b, f, v = errors[i % len(errors)]
-        for message in (
-            Pressure(stamp, out.pressure_a + a, out.pressure_b + b),
-            Force(stamp, out.force_sum + f),
-            ServoReference(stamp, *reference),
-        ):
-            seen, _ = pipeline.receive(parameters, seen, message)
+        seen, _ = pipeline.receive(parameters, seen, Pressure(stamp, out.pressure_a + a, out.pressure_b + b))
+        seen, _ = pipeline.receive(parameters, seen, Force(stamp, out.force_sum + f))
+        if i:
+            seen, _ = pipeline.receive(parameters, seen, ServoReference(stamp, *reference))
         seen, answer = pipeline.receive(parameters, seen, Velocity(stamp, out.velocity + v, b''))
         forces.append(answer.feedforward.force if answer.feedforward is not None else 0.0)
         force = (1.0 - part) * forces[-1 - back] + part * forces[-2 - back]

@@ -6,7 +6,7 @@ The left side is the friction: force sum less what accelerates the mass, less a 
 the rod slides, s, m and F_0 follow by least squares from force sum, acceleration and the Coulomb friction f_c of the
 estimator. s is the scale that a feed-forward needs, wrong model and all.
 
-The smoothing is the widest with which the law, along the rod's own motion, is nearly as good as with the sharpest; the
+The smoothing is the widest with which the law, along the rod's own motion, is nearly as good as with the best; the
 slew limit the lowest with which the force that the recorded reference asks for is nearly the same. Along the reference
 the smoothing would be far too wide, since a rod without compensation reverses late. How late the force of an axis comes
 after its command cannot be seen in a recording of it. All of it is our choice.
@@ -90,11 +90,15 @@ class Law(NamedTuple):
 
 
 class Residual(NamedTuple):
-    """RMS [N] of the friction that a feed-forward leaves to the controller."""
+    """RMS [N] of the friction that a feed-forward leaves to the controller while the rod slides.
+
+    At rest friction is whatever the rod is pushed with, so there is nothing to match.
+    """
 
     sliding: float
+    """all of the time"""
     reversal: float
-    """near a reversal of the reference"""
+    """near a reversal of the reference; 0 where the rod never slides there"""
 
 
 class MatchCase(NamedTuple):
@@ -238,8 +242,7 @@ def delayed(time: Samples, force: Samples, delay: float) -> Samples:
 def residual(law: Law, reversal: Choice, force: Samples) -> Residual:
     """Friction that ``force`` [N], shape (n,), leaves."""
     left = law.friction - force
-    known = np.isfinite(left)
-    return Residual(_rms(left[law.sliding & known]), _rms(left[reversal & known]))
+    return Residual(_rms(left[law.sliding]), _rms(left[law.sliding & reversal]))
 
 
 def match(recording: Recording, settings: FeedForwardSettings, known: MatchSettings) -> Match:
@@ -286,19 +289,16 @@ def match(recording: Recording, settings: FeedForwardSettings, known: MatchSetti
 
 
 def _smoothing(recording: Recording, law: Law) -> float | None:
-    """Widest smoothing that is nearly as good as the sharpest [m/s]; None if any is: the rod was never slow."""
+    """Widest smoothing that is nearly as good as the best [m/s]; None if any is: the rod was never slow."""
     velocity = recording.velocity[law.sliding]
     friction = law.friction[law.sliding]
     coulomb = law.scale * recording.coulomb_friction[law.sliding]
-    index = nearest_preferred(SHARPEST_SMOOTHING)
-    sharp = _rms(friction - coulomb * np.sign(velocity))
-    most = math.hypot(sharp, NEARLY * _rms(friction))
     fastest = float(np.abs(velocity).max())
-    while preferred(index) < fastest:
-        if _rms(friction - coulomb * np.tanh(velocity / preferred(index + 1))) > most:
-            return preferred(index)
-        index += 1
-    return None
+    widths = [preferred(i) for i in range(nearest_preferred(SHARPEST_SMOOTHING), nearest_preferred(fastest) + 1)]
+    left = [_rms(friction - coulomb * np.tanh(velocity / width)) for width in widths]
+    most = math.hypot(min(left), NEARLY * _rms(friction))
+    widest = max(width for width, value in zip(widths, left, strict=True) if value <= most)
+    return widest if widest < widths[-1] else None
 
 
 def _slew(recording: Recording, settings: FeedForwardSettings) -> float | None:

@@ -119,6 +119,7 @@ def tracking_figure(problem: Problem, found: Tuning, without: Run, with_it: Run)
     axes[2].set_xlabel('time [s]')
     axes[1].set_title('Shaded part: a reversal')
     legend_above(axes[0])
+    figure.align_ylabels(axes)
     return Plot(
         'tracking',
         figure,
@@ -152,7 +153,7 @@ def move_figure(problem: Problem, found: Tuning, without: Run, with_it: Run) -> 
     worst = problem.runs(found.feedforward, friction_error=problem.settings.friction_error)[1]
     over = max(case.performance.overshoot for case in found.cases)
     title = f'Largest overshoot of the move: {over / MICROMETRE:.3g} µm, with a model that is wrong'
-    figure, axes = new_figure(title, 4.6, nrows=2, sharex=True)
+    figure, axes = new_figure(title, 4.8, nrows=2, sharex=True)
     percent = f'{100.0 * problem.settings.friction_error:.3g} %'
     axes[0].plot(without.time, without.reference / MM, color=GREY, lw=2.2, alpha=0.6, label='reference')
     for run, colour, name in (
@@ -169,6 +170,7 @@ def move_figure(problem: Problem, found: Tuning, without: Run, with_it: Run) -> 
     axes[1].set_xlim(0.0, without.time[-1])
     legend_above(axes[0])
     legend_above(axes[1])
+    figure.align_ylabels(axes)
     return Plot(
         'move',
         figure,
@@ -277,7 +279,7 @@ def match_figure(recording: Recording, found: Match) -> Plot:
         figure,
         'Part of the bag. Friction is the force sum less inertia and offset; the feed-forward is what would have been '
         'commanded from the recorded reference, after its delay. Shaded: near a reversal of the reference. A rod that '
-        'was not compensated reverses late, so there the two cannot meet.',
+        'was not compensated rests there until the controller has built up its force, so the two cannot meet.',
     )
 
 
@@ -545,7 +547,7 @@ is the slope of a parabola through neighbouring velocity samples.</dd>
 <dd>Least squares over {sliding} of {len(recording.estimates)} samples, those in which the rod slides and the
 estimate is good.</dd>
 <dt>smoothing_velocity</dt>
-<dd>The widest with which the law, along the rod's own motion, is nearly as good as with the sharpest.</dd>
+<dd>The widest with which the law, along the rod's own motion, is nearly as good as with the best.</dd>
 <dt>slew_limit</dt>
 <dd>The lowest with which the force along the recorded reference is nearly the same as without a limit.</dd>
 <dt>lead_time</dt>
@@ -554,7 +556,8 @@ was.</dd>
 <dt>Friction left</dt>
 <dd>RMS of the friction less the force that the feed-forward would have had from the recorded reference,
 {late:.3g} ms after it was commanded; over the sliding samples, and over those nearer to a reversal of the
-reference than {100.0 * NEAR_REVERSAL:.0f} % of the time between two.</dd>
+reference than {100.0 * NEAR_REVERSAL:.0f} % of the time between two. At rest friction is whatever the rod is pushed with, so
+rest does not count.</dd>
 <dt>Tracking and dwell with the feed-forward</dt>
 <dd>A bag cannot tell them. Tune on the simulated servo for that, or record the axis with these parameters.</dd>
 </dl>"""
