@@ -293,7 +293,7 @@ def _smoothing(recording: Recording, law: Law) -> float | None:
     velocity = recording.velocity[law.sliding]
     friction = law.friction[law.sliding]
     coulomb = law.scale * recording.coulomb_friction[law.sliding]
-    fastest = float(np.abs(velocity).max())
+    fastest = max(float(np.abs(velocity).max()), SHARPEST_SMOOTHING)
     widths = [preferred(i) for i in range(nearest_preferred(SHARPEST_SMOOTHING), nearest_preferred(fastest) + 1)]
     left = [_rms(friction - coulomb * np.tanh(velocity / width)) for width in widths]
     most = math.hypot(min(left), NEARLY * _rms(friction))

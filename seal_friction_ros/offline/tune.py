@@ -5,6 +5,7 @@ where they were made, so the same plant gives the same bytes.
 """
 
 import os
+import textwrap
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +26,7 @@ from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.core.wire import Position, ServoReference, Velocity
 from seal_friction_ros.files import FEEDFORWARD_PREFIX, default_configuration
 from seal_friction_ros.offline.bag import BagError, bag_topics, read_messages
+from seal_friction_ros.offline.bag_evaluation import FloatArray
 from seal_friction_ros.offline.figures import house_style
 from seal_friction_ros.offline.progress import progress
 from seal_friction_ros.offline.replay import Step, Topics, find_topics, steps
@@ -75,9 +77,7 @@ def tune_simulator(out: Path, settings: TuningSettings, configuration: Configura
     chosen = configuration or default_configuration()
     parameters = chosen.parameters()
     servo = ServoParameters(seals=parameters.estimator.seals, control_period=CONTROL_PERIOD, inner_step=INNER_STEP)
-    spread = [settings.pressure_noise, settings.pressure_noise, settings.force_noise, settings.velocity_noise]
-    noise = np.random.default_rng(settings.seed).normal(size=(NOISE_LENGTH, 4)) * spread
-    problem = Problem(Axis(servo, parameters), settings, noise)
+    problem = Problem(Axis(servo, parameters), settings, sensor_noise(settings))
     with progress('tune', MOST_CANDIDATES) as advance:
         found = tune(problem, advance)
     task = Task('the simulated servo', _motion_text(settings), _seals_text(chosen), parameters.feedforward, TUNED)
@@ -135,6 +135,12 @@ def tune_bag(
 
 
 # -- what goes in -----------------------------------------------------------------------------------------------------
+
+
+def sensor_noise(settings: TuningSettings) -> FloatArray:
+    """White noise of the sensors of the estimator, shape (`NOISE_LENGTH`, 4), as `closed_loop` takes it."""
+    spread = [settings.pressure_noise, settings.pressure_noise, settings.force_noise, settings.velocity_noise]
+    return np.random.default_rng(settings.seed).normal(size=(NOISE_LENGTH, 4)) * spread
 
 
 class ReadBag(NamedTuple):
@@ -242,7 +248,9 @@ def _page(out: Path) -> Path:
 
 def parameter_text(settings: FeedForwardSettings, task: Task, verdict: str) -> str:
     """ROS parameter file of a feed-forward, with what it was tuned on as a comment."""
-    lines = [MADE_BY, f'# Tuned on {task.source}: {task.motion}; seals: {task.seals}.', f'# {verdict}']
+    comment = f'# Tuned on {task.source}: {task.motion}; seals: {task.seals}. {verdict}'
+    comment = ''.join(letter if letter.isprintable() else '?' for letter in comment)  # names that came from outside
+    lines = [MADE_BY, *textwrap.wrap(comment, 110, subsequent_indent='# ', break_on_hyphens=False)]
     lines += [f'{NODE}:', '  ros__parameters:', f'    {FEEDFORWARD_PREFIX.rstrip(".")}:']
     for name, meaning in meanings(settings).items():
         value = yaml.safe_dump({name: getattr(settings, name)}).strip()
@@ -307,8 +315,7 @@ def _motion_text(settings: TuningSettings) -> str:
 def _seals_text(configuration: Configuration) -> str:
     names = [str(document.get('name', 'no name')) for document in configuration.seal_documents]
     chambers = configuration.selection.seal_chambers
-    text = ', '.join(f'{name} on chamber {chamber}' for name, chamber in zip(names, chambers, strict=True))
-    return ' '.join(text.split())  # a name from a bag must not end the comment
+    return ', '.join(f'{name} on chamber {chamber}' for name, chamber in zip(names, chambers, strict=True))
 
 
 def _tuning_numbers(found: Tuning) -> dict[str, Any]:

@@ -556,8 +556,8 @@ was.</dd>
 <dt>Friction left</dt>
 <dd>RMS of the friction less the force that the feed-forward would have had from the recorded reference,
 {late:.3g} ms after it was commanded; over the sliding samples, and over those nearer to a reversal of the
-reference than {100.0 * NEAR_REVERSAL:.0f} % of the time between two. At rest friction is whatever the rod is pushed with, so
-rest does not count.</dd>
+reference than {100.0 * NEAR_REVERSAL:.0f} % of the time between two. At rest friction is whatever the rod is
+pushed with, so rest does not count.</dd>
 <dt>Tracking and dwell with the feed-forward</dt>
 <dd>A bag cannot tell them. Tune on the simulated servo for that, or record the axis with these parameters.</dd>
 </dl>"""
