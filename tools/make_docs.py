@@ -15,6 +15,7 @@ from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
+from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
 
@@ -23,6 +24,8 @@ RECORDS = (
     SealSelection,
     EstimatorSettings,
     FeedForwardSettings,
+    TuningSettings,
+    MatchSettings,
     StartOptions,
     RecordingOptions,
     SealGeometry,

@@ -237,6 +237,8 @@ def check_target(out: Path) -> None:
         raise ValueError(f'{out}: cannot write a file there')
     if out.exists() and not out.read_text(encoding='utf-8', errors='replace').startswith(MADE_BY):
         raise ValueError(f'{out} exists already and is not from tune: not overwriting')
+    if _page(out).exists() and not out.exists():
+        raise ValueError(f'{_page(out)} exists already and is not from tune: not overwriting')
 
 
 def _page(out: Path) -> Path:

@@ -260,14 +260,16 @@ def test_option_of_the_simulator_is_refused_with_a_bag(axis: Path, tmp_path: Pat
     assert '--frequency is not for a --bag' in refused(arguments, tmp_path, capsys)
 
 
-@pytest.mark.parametrize('kind', ['html', 'folder', 'other file', 'below a file'])
+@pytest.mark.parametrize('kind', ['html', 'folder', 'other file', 'other page', 'below a file'])
 def test_target_that_must_not_be_written_is_refused_before_the_work(kind: str, tmp_path: Path, capsys):
     out = tmp_path / ('f.html' if kind == 'html' else 'f.yaml')
     if kind == 'folder':
         out.mkdir()
     elif kind == 'other file':
         out.write_text('friction_estimator: {ros__parameters: {stick_velocity: 0.002}}\n')
+    elif kind == 'other page':
+        out.with_suffix('.html').write_text('my notes')
     elif kind == 'below a file':
         out.write_text('')
         out = out / 'g.yaml'
-    assert str(out) in refused(['tune', '--out', str(out)], tmp_path, capsys)
+    assert str(out.with_suffix('')) in refused(['tune', '--out', str(out)], tmp_path, capsys)
