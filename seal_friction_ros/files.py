@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 
 from seal_friction_ros.core.configuration import Configuration, SealSelection
+from seal_friction_ros.core.coulomb import MountedSeal
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.validated import from_mapping, meanings, plain
@@ -96,6 +97,15 @@ def load_configuration(
     except ValueError as error:
         raise ValueError(f'{", ".join(sorted({str(p) for p in paths}))}: {error}') from None
     return configuration
+
+
+def load_seals(selection: SealSelection) -> tuple[MountedSeal, ...]:
+    """The seals that ``selection`` names.
+
+    Raises:
+        ValueError: As `load_configuration`.
+    """
+    return load_configuration(selection, EstimatorSettings()).parameters().estimator.seals
 
 
 def default_configuration() -> Configuration:

@@ -11,6 +11,7 @@ import make_docs
 import pytest
 
 from seal_friction_ros.nodes.processes import free_domain, graph_environment
+from seal_friction_ros.offline.replay import replay
 
 ROOT = Path(__file__).parents[1]
 
@@ -76,6 +77,32 @@ def test_the_node_runs_as_the_readme_says_and_records(checkout: Path):
         _, errors = process.communicate(timeout=20.0)
     assert process.returncode == 0
     assert 'estimating' in errors
+
+
+def test_the_servo_on_the_desk_runs_as_the_readme_says_and_gets_its_feed_forward(checkout: Path):
+    environment = graph_environment(free_domain())
+    processes = [
+        subprocess.Popen(
+            command.replace('.venv/bin', str(ROOT / '.venv' / 'bin')).replace('build/bags', 'build/desk').split(),
+            cwd=checkout,
+            env=environment,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for command in commands(' desk')
+    ]
+    try:
+        time.sleep(12.0)  # five of them for the simulator to compile
+    finally:
+        for process in processes:
+            process.terminate()
+        said = [process.communicate(timeout=20.0)[1] for process in processes]
+    assert [process.returncode for process in processes] == [0, 0]
+    assert 'simulating' in said[0]
+    (bag,) = (path.parent for path in checkout.glob('build/desk/*/metadata.yaml'))
+    verdict = replay(bag)
+    assert verdict.identical
+    assert verdict.recorded_feedforwards > 500
 
 
 def test_the_workspace_builds_and_runs_as_the_readme_says(checkout: Path):

@@ -1,7 +1,8 @@
 """``make demo``: real friction readings through the live node on a real graph, recorded, replayed, reported.
 
 Plays the thesis's pull test and, where they are, the runs of the O-ring rig into the estimator, in separate processes;
-verifies each recording byte for byte; writes a report for each; ends with measured against estimated friction.
+then closes the loop with the simulated servo, without feed-forward and with it; verifies each recording byte for byte;
+writes a report for each; ends with measured against estimated friction and with how the servo tracked.
 """
 
 import shutil
@@ -17,17 +18,21 @@ from rich.text import Text
 
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.files import config_path
+from seal_friction_ros.nodes.closed_loop import close_loop_live
 from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.offline.bag_evaluation import evaluate, read_run
 from seal_friction_ros.offline.import_log import import_log
 from seal_friction_ros.offline.import_thesis import import_thesis
 from seal_friction_ros.offline.replay import replay
 from seal_friction_ros.offline.report import write_report
+from seal_friction_ros.offline.servo_charts import write_servo_charts
+from seal_friction_ros.offline.tracking_evaluation import TrackingEvaluation, evaluate_tracking
 
 ROOT = Path(__file__).parents[1]
 OUT = ROOT / 'build' / 'demo'
 RIG_LOGS = ROOT.parent / 'shared' / 'data' / 'delft'
 PULL_TEST_RATE = 10.0  # [times the pace of the data] 100 Hz of readings become the 1 kHz of a servo controller
+LOOP_TIME = 10.0  # [s] without feed-forward, and as long with it
 RIG_RATE = 25.0  # [times the pace of the data] the runs last minutes
 
 
@@ -62,6 +67,17 @@ def run_live(bag: Path, rate: float, parameters: dict[str, object]) -> Run:
     return Run(bag.name, figures, identical, recorded, report)
 
 
+def close_loop() -> tuple[Run, TrackingEvaluation]:
+    """Close the loop live, verify what was recorded, report it; the run, and how the servo tracked in each half."""
+    bag = OUT / 'closed_loop'
+    figures = close_loop_live(bag, free_domain(), LOOP_TIME, ROOT / 'config' / 'servo_simulator.yaml')
+    report = OUT / 'closed_loop.html'
+    write_report(bag, report)
+    evaluation = evaluate_tracking(read_run(bag))
+    assert evaluation is not None  # the simulator sends reference and position
+    return Run(bag.name, figures, replay(bag).identical, bag, report), evaluation
+
+
 def friction_table(runs: list[Run]) -> Table:
     """Measured and estimated Coulomb friction at every pressure of every run."""
     table = Table(title='Coulomb friction, measured and estimated live')
@@ -83,8 +99,24 @@ def run_table(runs: list[Run]) -> Table:
     for run in runs:
         f = run.figures
         verdict = 'identical' if run.identical else 'DIFFERENT'
-        figures = (f['velocity samples'], f['round trip p50 [us]'], f['round trip p99 [us]'])
+        figures = (f.get(name, '') for name in ('velocity samples', 'round trip p50 [us]', 'round trip p99 [us]'))
         table.add_row(run.name, *figures, verdict, *(str(p.relative_to(ROOT)) for p in (run.bag, run.report)))
+    return table
+
+
+def tracking_table(loop: Run, evaluation: TrackingEvaluation) -> Table:
+    """How the servo tracked without and with feed-forward, and what that cost."""
+    missed = f'{loop.figures.get("missed ticks")} of {loop.figures.get("ticks")} ticks missed'
+    share = f'{loop.figures.get("share of a core [%]")} % of a core'
+    title = f'Closed loop at {loop.figures.get("rate [Hz]")} Hz; simulator: {share}, {missed}'
+    table = Table(title=title)
+    for heading in ('feed-forward', 'RMS [um]', 'peak [um]', 'rest per reversal [ms]', 'RMS [%]', 'rest [%]'):
+        table.add_column(Text(heading), justify='left' if heading == 'feed-forward' else 'right')
+    for stretch in evaluation.stretches:
+        name = f'up to {stretch.feedforward_peak:.0f} N' if stretch.has_feedforward else 'none'
+        dwell = 'no reversal' if stretch.dwell is None else f'{stretch.dwell * 1e3:.1f}'
+        changes = ('' if c is None else f'{c:+.0f}' for c in (stretch.rms_change, stretch.dwell_change))
+        table.add_row(name, f'{stretch.rms * 1e6:.0f}', f'{stretch.peak * 1e6:.0f}', dwell, *changes)
     return table
 
 
@@ -99,9 +131,13 @@ def main() -> int:
         runs.append(run_live(bag, rate, parameters))
     if len(runs) == 1:
         console.print(f'no rig logs at {RIG_LOGS.relative_to(ROOT.parent)}: only the pull test was played')
-    console.print(friction_table(runs), run_table(runs))
+    console.print(f'closing the loop with the simulated servo for {2 * LOOP_TIME:.0f} s ...')
+    loop, tracking = close_loop()
+    write_servo_charts(OUT / 'servo.html')
+    console.print(friction_table(runs), run_table([*runs, loop]), tracking_table(loop, tracking))
+    console.print(f'Figure 25, with and without friction: {(OUT / "servo.html").relative_to(ROOT)}')
     console.print(f'{time.monotonic() - started:.0f} s in all')
-    return 0 if all(run.identical for run in runs) else 1
+    return 0 if all(run.identical for run in (*runs, loop)) else 1
 
 
 if __name__ == '__main__':

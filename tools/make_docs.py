@@ -14,10 +14,15 @@ from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.reference import Chirp, PullTest, Sine, Step, Trapezoid
 from seal_friction_ros.core.seal import SealGeometry
+from seal_friction_ros.core.sensors import SensorSettings
+from seal_friction_ros.core.servo_controller import ServoController
+from seal_friction_ros.core.servo_plant import Cylinder, Load, ServoValve
 from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
+from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
 
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
@@ -27,6 +32,17 @@ RECORDS = (
     TuningSettings,
     MatchSettings,
     StartOptions,
+    SimulatorSettings,
+    SensorSettings,
+    ServoValve,
+    Cylinder,
+    Load,
+    ServoController,
+    Sine,
+    Step,
+    Trapezoid,
+    Chirp,
+    PullTest,
     RecordingOptions,
     SealGeometry,
     AreaDeformationGain,

@@ -94,10 +94,8 @@ class FrictionEstimator(ManagedNode):
         """Stop estimating; finish the bag."""
         self.active = False
         outcome = self._recording.stop()
-        if outcome and self.context.ok():
+        if outcome:
             self.get_logger().info(outcome)
-        elif outcome:  # stopped by a signal: the logger has no graph any more
-            print(outcome, file=sys.stderr)
 
     def _subscribe(self, name: str, profile: QoSProfile) -> None:
         if name in self._inputs:

@@ -116,6 +116,12 @@ def _tuning_options() -> dict[str, Meaning]:
     return meanings(TuningSettings) | meanings(MatchSettings)
 
 
+def _servo(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.servo_charts import write_servo_charts
+
+    return _tell(arguments, write_servo_charts(arguments.out), f'{arguments.out}: written')
+
+
 def _counts(counts: dict[str, int]) -> Iterable[str]:
     return [f'{name} {count}' for name, count in counts.items()]
 
@@ -190,7 +196,10 @@ def make_parser() -> argparse.ArgumentParser:
     report.add_argument('--namespace', default='', help='look only at topics below it')
     charts = _add(commands, 'charts', _charts, 'a page with the curves of a seal file, PNG and SVG beside it')
     charts.add_argument('seal', help='seal file: a path, or the name of one in config/seals')
-    for page in (report, charts):
+    servo = _add(
+        commands, 'servo', _servo, 'a page on a simulated servo with and without friction, PNG and SVG beside it'
+    )
+    for page in (report, charts, servo):
         page.add_argument('--out', type=Path, required=True, metavar='FILE.html')
 
     tune = _add(commands, 'tune', _tune, 'parameters of the feed-forward for the simulated servo or a recorded axis')
