@@ -1,8 +1,8 @@
 """The SROS2 policy allows what the running nodes have, and nothing else: neither can drift from the other."""
 
+import xml.etree.ElementTree as ElementTree
 from contextlib import contextmanager
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 import rclpy
