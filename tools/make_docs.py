@@ -19,6 +19,7 @@ from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.sensors import SensorSettings
 from seal_friction_ros.core.servo_controller import ServoController
 from seal_friction_ros.core.servo_plant import Cylinder, Load, ServoValve
+from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
 from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
@@ -28,6 +29,8 @@ RECORDS = (
     SealSelection,
     EstimatorSettings,
     FeedForwardSettings,
+    TuningSettings,
+    MatchSettings,
     StartOptions,
     SimulatorSettings,
     SensorSettings,

@@ -14,6 +14,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
+from seal_friction_ros.core.validated import Meaning, meanings
+
 DIFFERENT, UNUSABLE, INTERRUPTED = 1, 2, 130
 
 
@@ -85,6 +88,32 @@ def _charts(arguments: argparse.Namespace) -> int:
 
     path = config_path('seals', arguments.seal)
     return _tell(arguments, write_seal_charts(path, arguments.out), f'{arguments.out}: written')
+
+
+def _tune(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.replay import chosen_configuration
+    from seal_friction_ros.offline.tune import tune_bag, tune_simulator
+
+    kind, other = (MatchSettings, TuningSettings) if arguments.bag else (TuningSettings, MatchSettings)
+    given = {name: value for name in _tuning_options() if (value := getattr(arguments, name)) is not None}
+    foreign = [name for name in given if name in meanings(other) and name not in meanings(kind)]
+    if foreign or (arguments.namespace and not arguments.bag):
+        name = (foreign or ['namespace'])[0].replace('_', '-')
+        raise ValueError(f'--{name} is {"not for" if arguments.bag else "only for"} a --bag')
+    configuration = chosen_configuration(arguments.params, arguments.seal)
+    if arguments.bag:
+        known = MatchSettings(**given)
+        summary = tune_bag(arguments.bag, arguments.out, known, configuration, arguments.namespace)
+    else:
+        summary = tune_simulator(arguments.out, TuningSettings(**given), configuration)
+    figures = {**summary.numbers, 'file': summary.file, 'page': summary.page, 'figures': summary.figures}
+    _tell(arguments, figures, f'{summary.verdict}\n{summary.file} and {summary.page}: written')
+    return 0 if summary.better_in_every_case else DIFFERENT
+
+
+def _tuning_options() -> dict[str, Meaning]:
+    """Settings of both kinds of tuning by name."""
+    return meanings(TuningSettings) | meanings(MatchSettings)
 
 
 def _servo(arguments: argparse.Namespace) -> int:
@@ -172,6 +201,19 @@ def make_parser() -> argparse.ArgumentParser:
     )
     for page in (report, charts, servo):
         page.add_argument('--out', type=Path, required=True, metavar='FILE.html')
+
+    tune = _add(commands, 'tune', _tune, 'parameters of the feed-forward for the simulated servo or a recorded axis')
+    tune.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
+    tune.add_argument('--out', type=Path, required=True, metavar='FILE', help='parameter file; a report goes beside it')
+    tune.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file with seals and what is not tuned')
+    tune.add_argument('--seal', type=Path, metavar='FILE', help='seal file for every seal')
+    tune.add_argument('--namespace', default='', help='with --bag: look only at topics below it')
+    for name, meaning in _tuning_options().items():
+        where = '' if name in meanings(TuningSettings) else 'with --bag: '
+        number = int if name == 'seed' else float
+        unit = f' [{meaning.unit}]' if meaning.unit else ''
+        text = f'{where}{meaning.description}{unit}'.replace('%', '%%')
+        tune.add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
     return parser
 
 

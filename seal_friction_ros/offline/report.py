@@ -195,13 +195,13 @@ def write_page(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for path, content in {**files, out: page.encode('utf-8', 'replace')}.items():
-            _write_whole(path, content)
+            write_whole(path, content)
     except OSError as error:
         raise ValueError(f'{out}: cannot write the page or its figures: {error.strerror or error}') from None
     return tuple(files)
 
 
-def _write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that it is there whole or not at all."""
     partial = path.with_name(f'.{path.name}.partial')
     try:
