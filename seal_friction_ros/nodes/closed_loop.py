@@ -13,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
+from seal_friction_msgs.msg import FrictionEstimate
 
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.nodes.processes import graph_environment, running
@@ -27,18 +28,20 @@ class _Operator(Node):
     def __init__(self, context: Context) -> None:
         super().__init__('operator', context=context)
         self.said: dict[str, str] = {}
+        self.estimating = False
+        self._first = self.create_subscription(FrictionEstimate, 'friction_estimate', self._on_estimate, 1, raw=True)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self._estimator = AsyncParameterClient(self, 'friction_estimator')
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self)
 
+    def _on_estimate(self, _: bytes) -> None:
+        self.estimating = True
+        self.destroy_subscription(self._first)  # one is enough
+
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.said |= {value.key: value.value for value in status.values}
-
-    def estimating(self) -> bool:
-        """Whether the estimator has said that it makes estimates."""
-        return self.said.get('estimates', '0') != '0'
 
     def wait(self, seconds: float) -> None:
         """Let time pass [s]."""
@@ -97,7 +100,7 @@ def close_loop_live(out: Path, domain: int, seconds: float, simulator: Path, pri
         _operator(domain) as operator,
     ):
         start = time.monotonic()
-        while not operator.estimating():
+        while not operator.estimating:
             if time.monotonic() > start + _START:
                 raise RuntimeError(f'no estimate within {_START} s; {log}: {log.read_text().strip()}')
             operator.wait(0.1)

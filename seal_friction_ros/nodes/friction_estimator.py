@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
@@ -103,7 +104,13 @@ class FrictionEstimator(ManagedNode):
         overriding = qos.overridable() if profile is qos.STREAM else None
         kind, callback = message_class(wire.INPUTS[name]), partial(self._on_input, name)
         self._inputs[name] = self.create_subscription(
-            kind, name, callback, profile, raw=True, qos_overriding_options=overriding
+            kind,
+            name,
+            callback,
+            profile,
+            raw=True,
+            qos_overriding_options=overriding,
+            event_callbacks=SubscriptionEventCallbacks(matched=self.on_matched),
         )
         self._topics[name] = self._inputs[name].topic_name
 

@@ -179,6 +179,11 @@ class ManagedNode(LifecycleNode):
         self._diagnostics_timer = self._diagnostics_publisher = None
         self.release()
 
+    def on_matched(self, _: Any) -> None:
+        """Say at once, in diagnostics, that a publisher came or went."""
+        if self._diagnostics_timer is not None:
+            self._on_diagnostics()
+
     def _on_diagnostics(self) -> None:
         message = DiagnosticArray()
         for part, status in self.diagnostics().items():
