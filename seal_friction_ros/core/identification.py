@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares, nnls
+from scipy.stats import t as student_t
 
 from seal_friction_ros.core.friction_laws import Conditions, Rung, Values, values_of
 from seal_friction_ros.core.friction_readings import Readings, level_friction
@@ -22,7 +23,8 @@ BAND_95 = 1.96  # standard deviations on each side that hold 95 % of a normal di
 COLLINEAR = 0.9  # correlation of two regressors from which on they are called collinear (our choice)
 TRADED_OFF = 0.95  # correlation of two fitted parameters from which on neither is known alone (our choice)
 ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
-BEATEN = 2.0  # standard errors of the paired difference by which a law must be beaten
+BEATEN = 0.95  # how sure it must be that a law is beaten (our choice)
+WORTHWHILE = 0.1  # share of its loss by which a law must be beaten (our choice)
 OUTLIER = 3.0  # standard deviations from what the other pressures say (our choice)
 CHANGED = 0.2  # share by which two files must differ to be called two states; runs on a rig repeat within 10 to 15 %
 SETTLED = 0.1  # change of the friction over one run from which on the run is said not to have settled (our choice)
@@ -126,12 +128,13 @@ def fit(rung: Rung, readings: Readings, known: Values | None = None, *, is_close
     size = np.abs([p.start(_mean_friction(readings), readings.at) for p in rung.parameters])
     at_zero = (lower == 0.0) & (np.abs(best.x) < 1e-6 * size)
     values = values_of(rung, np.where(at_zero, 0.0, best.x))  # a term that does not pay is nothing, not 1e-18
-    return Fit(rung, values, offsets_of(readings, rung.friction(readings.at, values)), np.asarray(best.jac))
+    jacobian: Array = np.asarray(best.jac)
+    return Fit(rung, values, offsets_of(readings, rung.friction(readings.at, values)), jacobian)
 
 
 def _mean_friction(readings: Readings) -> float:
     """Mean force of one seal [N], to begin from."""
-    return float(np.abs(readings.force).mean()) / readings.at.pressure.shape[1]
+    return float(np.abs(readings.force).mean() / readings.at.pressure.shape[1])
 
 
 _TRIED = (0.2, 1.0, 4.0)  # Stribeck velocities that a fit begins from, as factors on the first guess
@@ -310,14 +313,13 @@ def _score(rung: Rung, readings: Readings, known: Values, tick: Ticks) -> Score:
 def recommended(scores: Sequence[Score]) -> Score:
     """The lowest rung that is not beaten beyond the noise.
 
-    The best rung has the smallest mean loss over the groups. Another is beaten if its loss is higher by more than
-    `BEATEN` standard errors of the difference, group by group.
+    The best rung has the smallest mean loss over the groups. Another is beaten if its losses are higher, group by
+    group, by more than chance allows.
 
     Raises:
         ValueError: No rung was scored.
 
-    Source: after the one-standard-error rule of [Breiman1984]_; paired differences and two standard errors, since
-    several rungs are compared, are our choice.
+    Source: after the one-standard-error rule of [Breiman1984]_; the paired t-test in its place is our choice.
     """
     scored = [(score, score.validation) for score in scores if score.validation is not None]
     if not scored:
@@ -328,11 +330,19 @@ def recommended(scores: Sequence[Score]) -> Score:
 
 
 def is_beaten(losses: Array, others: Array) -> bool:
-    """Whether ``others`` are lower than ``losses`` by more than `BEATEN` standard errors of the paired difference."""
+    """Whether ``others`` are lower than ``losses`` beyond the noise, and by enough to be worth a term.
+
+    Beyond the noise: by a one-sided paired t-test at `BEATEN`. Enough: `WORTHWHILE` of the mean loss.
+
+    Args:
+        losses: Of each group, shape (groups,), groups >= 2.
+        others: Of the same groups by another law.
+    """
     difference = losses - others
     groups = len(difference)
-    error = float(difference.std(ddof=1)) / math.sqrt(groups) if groups > 1 else 0.0
-    return float(difference.mean()) > BEATEN * error
+    error = float(difference.std(ddof=1)) / math.sqrt(groups)
+    noise = float(student_t.ppf(BEATEN, groups - 1)) * error
+    return float(difference.mean()) > max(noise, WORTHWHILE * float(losses.mean()))
 
 
 # -- how sure ---------------------------------------------------------------------------------------------------------
@@ -619,6 +629,34 @@ def compare_with_law(found: Fit, other: Readings) -> Change:
     )
 
 
+class LevelChange(NamedTuple):
+    """Two sources that disagree at one pressure."""
+
+    pressure: float
+    """[Pa]"""
+    name: str
+    friction: float
+    """[N]"""
+    other_name: str
+    other_friction: float
+    """[N]"""
+
+
+def changed_levels(readings: Readings) -> list[LevelChange]:
+    """Pressures at which a later source differs from the first one there by more than `CHANGED`."""
+    found = []
+    for level in np.unique(readings.level):
+        inside = readings.level == level
+        sources = [int(source) for source in np.unique(readings.source[inside])]
+        frictions = [level_friction(readings, inside & (readings.source == source)).friction for source in sources]
+        for source, friction in zip(sources[1:], frictions[1:], strict=True):
+            if abs(friction / frictions[0] - 1.0) > CHANGED:
+                pressure = float(readings.seal_pressure[inside].mean())
+                names = readings.names[sources[0]], readings.names[source]
+                found.append(LevelChange(pressure, names[0], frictions[0], names[1], friction))
+    return found
+
+
 # -- breakaway --------------------------------------------------------------------------------------------------------
 
 
@@ -626,7 +664,7 @@ class Stiction(NamedTuple):
     """Breakaway force of one seal above its Coulomb friction: stiction + ratio * f_c."""
 
     law: str
-    """none, constant or load_dependent"""
+    """constant or load_dependent"""
     stiction: float
     """[N] of one seal"""
     ratio: float
@@ -650,7 +688,7 @@ def identify_stiction(readings: Readings, friction: Array, offsets: Array) -> St
     """
     seals = readings.at.pressure.shape[1]
     excess = deviations(readings, friction, offsets)
-    laws = {'none': np.zeros(readings.count), 'constant': np.ones(readings.count), 'load_dependent': friction}
+    laws = {'constant': np.ones(readings.count), 'load_dependent': friction}
     groups = np.unique(readings.group)
     losses, rms = {}, {}
     for name, regressor in laws.items():
@@ -672,9 +710,8 @@ def identify_stiction(readings: Readings, friction: Array, offsets: Array) -> St
 
 
 def _slope(regressor: Array, excess: Array) -> float:
-    """Non-negative slope of least squares through the origin; 0 for a regressor of zeros."""
-    square = float(np.sum(regressor**2))
-    return max(float(np.sum(regressor * excess)) / square, 0.0) if square > 0.0 else 0.0
+    """Non-negative slope of least squares through the origin."""
+    return max(float(np.sum(regressor * excess)) / float(np.sum(regressor**2)), 0.0)
 
 
 def _lowest_unbeaten(losses: dict[str, Array]) -> str:
