@@ -602,12 +602,29 @@ class Change(NamedTuple):
         return abs(self.ratio - 1.0) > max(CHANGED, 2.0 * self.standard_error)
 
 
-def compare_with_law(found: Fit, other: Readings) -> Change:
+def compare_with_law(found: Fit, fitted: Readings, other: Readings) -> Change:
     """How the friction of another source compares with a law that was fitted without it.
 
-    The ratio is that of least squares, offset taken out, over the samples within the law's conditions; its standard
-    error comes from leaving each group out.
+    The ratio is that of least squares, offset taken out, over the samples up to the highest pressure and speed that the
+    law was fitted to; its standard error comes from leaving each group out.
+
+    Args:
+        found: The law.
+        fitted: What it was fitted to.
+        other: Samples of the other source.
+
+    Raises:
+        ValueError: Hardly any sample of the other source is under conditions of the law.
     """
+    inside = other.seal_pressure <= fitted.seal_pressure.max()
+    if np.isfinite(other.at.velocity).all() and np.isfinite(fitted.at.velocity).all():
+        inside &= np.abs(other.at.velocity) <= np.abs(fitted.at.velocity).max()
+    if inside.sum() < 0.1 * other.count:
+        raise ValueError(
+            f'{other.names[0]}: {100.0 * inside.mean():.0f} % of its samples are at pressures and speeds of '
+            f'{fitted.names[0]}, so they cannot be compared: identify each for itself'
+        )
+    other = other.taken(inside)
     friction = found.friction(other.at)
 
     def ratio(index: BoolArray) -> float:

@@ -105,7 +105,7 @@ def _identify(arguments: argparse.Namespace) -> int:
         name=arguments.name,
     )
     found = identify(arguments.sources, wishes, arguments.out.stem)
-    written = {'seal_file': str(arguments.out)}
+    written: dict[str, Any] = {'seal_file': str(arguments.out)}
     if arguments.report:
         from seal_friction_ros.offline.identification_report import write_identification_report
 

@@ -219,6 +219,8 @@ def _read_log(path: Path, choices: Choices) -> _Source:
 def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
     """The one rig of config/rigs that can read a log, and the remark that it was concluded.
 
+    A rig whose columns go by name and are all there is surer than one that goes by their number.
+
     Raises:
         ValueError: None can, or several can.
     """
@@ -232,6 +234,7 @@ def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
             reasons.append(f'{rig_file.stem}: {str(error).removeprefix(f"{path}: ")}')
         else:
             found.append((rig, rig_file.stem))
+    found = [(rig, name) for rig, name in found if rig.header != 'none'] or found
     if len(found) == 1:
         rig, name = found[0]
         return rig, (f'{path.name} was read as a log of rig {name}; if it is another say so with --rig',)

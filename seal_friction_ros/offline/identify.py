@@ -246,7 +246,12 @@ def _ring(sources: Sources, wishes: Wishes) -> Ring | None:
     return Ring(geometry, law)
 
 
-def _normal_force_law(document: Mapping[str, Any]) -> NormalForceLaw:
+def normal_force_law(document: Mapping[str, Any]) -> NormalForceLaw:
+    """Law of the normal force from the part of a seal file.
+
+    Raises:
+        ValueError: It makes no sense.
+    """
     name = document.get('law')
     if name not in NORMAL_FORCE_LAWS:
         raise ValueError(f'normal_force: law = {name!r} is not one of {", ".join(NORMAL_FORCE_LAWS)}')
@@ -258,7 +263,7 @@ def _normal_force_law(document: Mapping[str, Any]) -> NormalForceLaw:
 def _with_normal_force(readings: Readings, ring: Ring | None) -> Readings:
     if ring is None:
         return readings
-    forces = normal_forces(readings.at.pressure, ring.geometry, _normal_force_law(ring.normal_force))
+    forces = normal_forces(readings.at.pressure, ring.geometry, normal_force_law(ring.normal_force))
     return dataclasses.replace(readings, at=readings.at._replace(normal_force=forces))
 
 
@@ -275,9 +280,9 @@ def _one_state(sources: Sources) -> tuple[Prepared, tuple[Change, ...], tuple[in
         together = sources.prepare()
         _refuse_changed_levels(together.readings)
         return together, (), index
-    law = recommended(_climbed(_rungs(first.readings, with_geometry=False), first.readings))
-    assert law.fit is not None  # noqa: S101
-    changes = tuple(compare_with_law(law.fit, sources.prepare([i]).readings) for i in index[1:])
+    rungs = {rung.name: rung for rung in _rungs(first.readings, with_geometry=False)}
+    law = fit(rungs.get('pressure_power_law_viscous', rungs['pressure_power_law']), first.readings)
+    changes = tuple(compare_with_law(law, first.readings, sources.prepare([i]).readings) for i in index[1:])
     kept = (0, *(i for i, change in zip(index[1:], changes, strict=True) if not change.is_change))
     return (sources.prepare(kept) if len(kept) > 1 else first), changes, kept
 

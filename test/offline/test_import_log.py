@@ -13,8 +13,7 @@ from scipy.optimize import least_squares
 from seal_friction_ros.core import units, wire
 from seal_friction_ros.core.seal import projected_area, squeeze
 from seal_friction_ros.core.seal_file import parse_seal
-from seal_friction_ros.core.signal_preparation import SavitzkyGolay
-from seal_friction_ros.core.signal_preparation import slope
+from seal_friction_ros.core.signal_preparation import SavitzkyGolay, slope
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline import import_log as module
 from seal_friction_ros.offline.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagError, read_messages
