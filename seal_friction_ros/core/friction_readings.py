@@ -13,6 +13,7 @@ import numpy as np
 
 from seal_friction_ros.core.friction_laws import Conditions
 from seal_friction_ros.core.signal_preparation import (
+    LONGEST_GAP,
     Array,
     BoolArray,
     HalfRange,
@@ -418,6 +419,12 @@ def check_signals(measurement: Measurement) -> None:
             f'{name}: {len(signals.time)} samples are too few: record several strokes in both directions, at '
             f'{FEWEST_PRESSURES} pressures at least'
         )
+    step = float(np.median(np.diff(signals.time)))
+    if step > LONGEST_GAP:
+        raise ValueError(
+            f'{name}: samples are {step:.4g} s apart, so starts and stops are not seen: record at 20 Hz at least (or '
+            'is the time in a wrong unit?)'
+        )
     for what, column in zip(Signals._fields[1:], signals[1:], strict=True):
         _check_finite(name, what.replace('_', ' '), signals.time, column)
     _check_bounds(name, signals.pressure_a, signals.pressure_b, np.abs(signals.velocity), signals.force_sum)
@@ -435,10 +442,11 @@ def check_signals(measurement: Measurement) -> None:
             'is in the force: drive strokes at even speed'
         )
     if min(sides) < 0.01 * sum(sides):
-        which = 'retraction' if sides[0] > sides[1] else 'extension'
+        velocity = signals.velocity[even]
+        spread = f'{1e3 * float(velocity.min()):.4g} to {1e3 * float(velocity.max()):.4g} mm/s'
         raise ValueError(
-            f'{name}: hardly any {which} ({min(sides)} of {sum(sides)} samples): friction cannot be told from an '
-            'offset of the force: drive strokes in both directions'
+            f'{name}: the rod goes one way only ({spread}, {min(sides)} of {sum(sides)} samples the other way): '
+            'friction cannot be told from an offset of the force: drive strokes in both directions, at several speeds'
         )
     for what, column in (('force sum', signals.force_sum), ('pressure of chamber a', signals.pressure_a),
                          ('pressure of chamber b', signals.pressure_b)):  # fmt: skip
@@ -531,7 +539,8 @@ def _check_signs(where: str, readings: Readings, levels: IntArray) -> None:
         pressure = float(readings.seal_pressure[readings.level == level].mean())
         raise ValueError(
             f'{where}: friction comes out as {frictions[level]:.4g} N at {pressure / BAR:.4g} bar, and would drive the '
-            'rod: the sign of the force sum or of the velocity is turned (both are positive on extension)'
+            'rod: the sign of force sum or velocity is turned (both are positive on extension), or a unit in the '
+            'force sum is wrong'
         )
 
 

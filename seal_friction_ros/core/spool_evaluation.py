@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import filtfilt, iirnotch
 
 from seal_friction_ros.core.signal_preparation import Array, IntArray
@@ -37,7 +37,7 @@ class SpoolEvaluation:
         50.0, unit='Hz', lower=0.1, upper=1e5, description='Below it an oscillation belongs to the motion.'
     )
     resonance_prominence: float = parameter(
-        8.0, unit='1', lower=1.0, upper=1e6, description='Peak over median amplitude that makes a resonance.'
+        2.2, unit='1', lower=1.0, upper=1e6, description='Hump over its two sides that makes a resonance.'
     )
     notch_quality: float = parameter(
         5.0, unit='1', lower=0.5, upper=1e3, description='Resonance over width of the notch.'
@@ -104,9 +104,10 @@ def moving_average(values: Array, width: int) -> Array:
 def resonance_frequency(time: Array, force: Array, law: SpoolEvaluation) -> float | None:
     """Frequency of the measuring chain [Hz], recognised in a force; None if none stands out.
 
-    The highest line of the amplitude spectrum above ``lowest_resonance``, if it is ``resonance_prominence`` times the
-    median one there. Its place between two lines comes from the parabola through the logarithms of it and its two
-    neighbours.
+    A motion to and fro has lines in its spectrum at all multiples of its frequency, which fall steadily; a resonance is
+    a hump among them. So the envelope of the spectrum (the highest line within 10 Hz) is compared with itself at two
+    thirds and at three halves of each frequency: where it is highest above both, by ``resonance_prominence``, is the
+    resonance. Its place is the mean of the lines under the hump, weighted by their power.
 
     Args:
         time: [s], even steps, shape (n,).
@@ -116,21 +117,20 @@ def resonance_frequency(time: Array, force: Array, law: SpoolEvaluation) -> floa
     Source: spool-valve paper, section 6.2, for what it is; how it is recognised is our choice.
     """
     step = float(np.median(np.diff(time)))
-    steady = force - moving_average(force, max(round(1.0 / (law.lowest_resonance * step)), 1))
-    amplitude = np.abs(np.fft.rfft(steady * np.hanning(len(steady))))
-    frequency = np.fft.rfftfreq(len(steady), step)
-    looked_at = np.flatnonzero(frequency > law.lowest_resonance)
+    amplitude = np.abs(np.fft.rfft((force - force.mean()) * np.hanning(len(force))))
+    frequency = np.fft.rfftfreq(len(force), step)
+    width = max(round(20.0 / frequency[1]), 3)
+    envelope = np.maximum(maximum_filter1d(amplitude, width), 1e-12 * amplitude.max())
+    looked_at = np.flatnonzero((frequency > law.lowest_resonance) & (frequency < frequency[-1] / 1.5))
     if len(looked_at) < 10:
         return None
-    peak = int(looked_at[np.argmax(amplitude[looked_at])])
-    if amplitude[peak] < law.resonance_prominence * float(np.median(amplitude[looked_at])) or amplitude[peak] == 0.0:
+    sides = [np.interp(frequency[looked_at] * ratio, frequency, envelope) for ratio in (1.0 / 1.5, 1.5)]
+    prominence = envelope[looked_at] / np.maximum(*sides)
+    best = int(np.argmax(prominence))
+    if not prominence[best] > law.resonance_prominence:
         return None
-    if not 0 < peak < len(amplitude) - 1:
-        return float(frequency[peak])
-    left, top, right = np.log(np.maximum(amplitude[peak - 1 : peak + 2], 1e-300))
-    bend = left - 2.0 * top + right
-    shift = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
-    return float(frequency[peak] + shift * (frequency[1] - frequency[0]))
+    near = np.abs(frequency - frequency[looked_at[best]]) <= 0.15 * frequency[looked_at[best]]
+    return float(np.average(frequency[near], weights=amplitude[near] ** 2))
 
 
 def without_resonance(time: Array, force: Array, resonance: float, law: SpoolEvaluation) -> Array:

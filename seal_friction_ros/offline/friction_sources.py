@@ -207,7 +207,7 @@ def _read_log(path: Path, choices: Choices) -> _Source:
     log = read_samples(path, rig)
     for term, column in log.columns.items():
         if term is not rig.time:
-            check_clipping(path.name, f'column {term.column_name or term.column}', column)
+            check_clipping(path.name, f'signal in column {term.column_name or term.column}', column)
     samples = log.samples
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)

@@ -599,6 +599,12 @@ def fitted_readings(mounted: tuple[MountedSeal, ...], chambers: Array, velocity:
 
 def _warnings(data: Data, choice: Choice, worth: Worth, levels: Sequence[Level]) -> Iterator[str]:
     yield from (_change_in_words(data, change) for change in data.changes if abs(change.ratio - 1.0) > 0.0)
+    one_way = [name for name, index in zip(data.used.names, data.used.two_sided, strict=True) if not len(index)]
+    if one_way:
+        yield (
+            f'{", ".join(one_way)}: readings in one direction only, so an offset of the force would be taken for '
+            'friction: measure the other direction too'
+        )
     if data.outlier is not None:
         yield _outlier_in_words(data, levels)
     yield from _collinear_in_words(data, choice)
