@@ -16,6 +16,11 @@ from typing import Any
 
 DIFFERENT, UNUSABLE, INTERRUPTED = 1, 2, 130
 
+# Before numpy is loaded: with several threads the last bits of a sum depend on how many there are, and the long, narrow
+# matrices of a fit take many times longer.
+for _library in ('OPENBLAS', 'MKL', 'OMP'):
+    os.environ.setdefault(f'{_library}_NUM_THREADS', '1')
+
 
 def _import_log(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.files import config_path
