@@ -150,6 +150,15 @@ def _sheet(arguments: argparse.Namespace) -> int:
     return _tell(arguments, {'sheet': str(sheet), 'page': str(page)}, f'{sheet}, {page}: written')
 
 
+def _spool(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
+    from seal_friction_ros.offline.spool import write_spool_report
+
+    law = SpoolEvaluation(cycles=arguments.cycles, evaluated_cycle=arguments.cycle, moving_average=arguments.average)
+    summary = write_spool_report(arguments.table, arguments.out, law, arguments.reference)
+    return _tell(arguments, summary, f'{arguments.out}: written')
+
+
 def _counts(counts: dict[str, int]) -> Iterable[str]:
     return [f'{name} {count}' for name, count in counts.items()]
 
@@ -221,6 +230,7 @@ def make_parser() -> argparse.ArgumentParser:
 
     _add_identify(commands)
     _add_sheet(commands)
+    _add_spool(commands)
 
     report = _add(commands, 'report', _report, 'a page with figures and numbers, PNG and SVG beside it')
     report.add_argument('bag', type=Path)
@@ -255,6 +265,16 @@ def _add_identify(commands: Any) -> None:
         '--largest-acceleration', type=_tolerance, metavar='M/S2', help='samples beyond it are not used'
     )
     identify.add_argument('--namespace', default='', help='look only at topics below it')
+
+
+def _add_spool(commands: Any) -> None:
+    spool = _add(commands, 'spool', _spool, 'a rig that drives to and fro, evaluated as the spool-valve paper does')
+    spool.add_argument('table', type=Path, help='columns time_s, displacement_mm, force_N')
+    spool.add_argument('--out', type=Path, required=True, metavar='FILE.html')
+    spool.add_argument('--cycles', type=int, default=10, help='cycles of a measurement, default 10')
+    spool.add_argument('--cycle', type=int, default=9, help='the one to evaluate, default 9')
+    spool.add_argument('--average', type=int, default=50, metavar='SAMPLES', help='moving average, default 50')
+    spool.add_argument('--reference', type=float, metavar='N', help='reference force of another measurement')
 
 
 def _add_sheet(commands: Any) -> None:

@@ -332,15 +332,15 @@ def read_table(path: Path) -> tuple[Noted, Noted]:
     Raises:
         ValueError: The table cannot be read or makes no sense; one line that names file, row and column.
     """
-    rows = _table_rows(path)
+    rows = table_rows(path)
     names = list(rows[0]) if rows else []
     if not rows:
         raise ValueError(f'{path}: no reading in it')
-    pressure = _column(path, rows, names, 'pressure', PRESSURE_UNITS)
-    friction = _column(path, rows, names, 'friction', FRICTION_UNITS)
+    pressure = column_in_si(path, rows, names, 'pressure', PRESSURE_UNITS)
+    friction = column_in_si(path, rows, names, 'friction', FRICTION_UNITS)
     speed = np.full(len(rows), np.nan)
     if any(name.startswith('velocity') for name in names):
-        speed = np.abs(_column(path, rows, names, 'velocity', VELOCITY_UNITS))
+        speed = np.abs(column_in_si(path, rows, names, 'velocity', VELOCITY_UNITS))
     direction = np.array([_one_of(path, i, row, 'direction', DIRECTIONS, 1) for i, row in enumerate(rows, start=2)])
     is_static = np.array(
         [_one_of(path, i, row, 'kind', {'dynamic': 0, 'static': 1}, 0) for i, row in enumerate(rows, start=2)]
@@ -356,7 +356,12 @@ def read_table(path: Path) -> tuple[Noted, Noted]:
     return taken(0), taken(1)
 
 
-def _table_rows(path: Path) -> list[dict[str, str]]:
+def table_rows(path: Path) -> list[dict[str, str]]:
+    """Rows of a table of comma-separated values, by the names in its first row, in lower case.
+
+    Raises:
+        ValueError: It cannot be read, or a row has not as many cells as the first one.
+    """
     try:
         with path.open(encoding='utf-8-sig', newline='') as file:
             lines = [line for line in file if line.strip() and not line.startswith('#')]
@@ -371,10 +376,21 @@ def _table_rows(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def _column(
+def column_in_si(
     path: Path, rows: Sequence[Mapping[str, str]], names: Iterable[str], quantity: str, units: Mapping[str, str]
 ) -> Array:
-    """A column in SI, found by the beginning of its name; the rest of the name is the unit."""
+    """A column in SI, found by the beginning of its name; the rest of the name is the unit.
+
+    Args:
+        path: Of the table, for the error message.
+        rows: Of the table.
+        names: Of its columns.
+        quantity: What the name begins with.
+        units: Unit as the name has it -> unit as `UNITS` has it.
+
+    Raises:
+        ValueError: There is no such column, or several, or a cell is no number.
+    """
     found = [name for name in names if name.startswith(quantity)]
     unit = found[0].removeprefix(quantity).strip('_ ()[]') if found else ''
     if len(found) != 1 or unit not in units:
