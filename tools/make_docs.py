@@ -9,11 +9,13 @@ import sys
 from pathlib import Path
 
 from seal_friction_ros.core.configuration import SealSelection
-from seal_friction_ros.core.coulomb import PriorArtChart, Uncertainty
+from seal_friction_ros.core.coulomb import ConstantCoulomb, PressurePowerLaw, PriorArtChart, Uncertainty, VelocityTerms
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
+from seal_friction_ros.core.signal_preparation import SavitzkyGolay, Sliding
+from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.nodes.parameters import NodeOptions
 
@@ -28,7 +30,13 @@ RECORDS = (
     PowerLaw,
     CoefficientTable,
     PriorArtChart,
+    PressurePowerLaw,
+    ConstantCoulomb,
+    VelocityTerms,
     Uncertainty,
+    SavitzkyGolay,
+    Sliding,
+    SpoolEvaluation,
 )
 
 

@@ -16,6 +16,7 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
 ``seal_friction identify`` says of its data and is passed over here.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -78,8 +79,9 @@ def parse_seal(document: Any) -> Seal:
     terms = None
     if 'velocity_terms' in document:
         terms = from_mapping(VelocityTerms, document['velocity_terms'], f'{where}: velocity_terms')
-    if not isinstance(document.get('identification', {}), Mapping):
-        raise ValueError(f'{where}: identification = {document["identification"]!r} is not a mapping')
+    about = document.get('identification', {})
+    if not isinstance(about, Mapping) or not _can_be_recorded(about):
+        raise ValueError(f'{where}: identification is not a mapping of texts, finite numbers, and lists of them')
     uncertainty = from_mapping(Uncertainty, document.get('uncertainty'), f'{where}: uncertainty')
     pressure_min, pressure_max = _range(document, where)
     numbers = {'pressure_min': pressure_min, 'pressure_max': pressure_max}
@@ -115,6 +117,15 @@ def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[
             f'seals has {len(documents)} entries but seal_chambers has {len(chambers)}: give one chamber a seal'
         )
     return tuple(MountedSeal(parse_seal(d), chamber) for d, chamber in zip(documents, chambers, strict=True))
+
+
+def _can_be_recorded(value: Any) -> bool:
+    """Whether a value can be kept in a bag: what JSON can hold."""
+    if isinstance(value, Mapping):
+        return all(isinstance(key, str) and _can_be_recorded(item) for key, item in value.items())
+    if isinstance(value, list | tuple):
+        return all(map(_can_be_recorded, value))
+    return value is None or isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
 
 
 def _choice(document: Mapping[str, Any], key: str, choices: Any, where: str) -> str:
