@@ -448,13 +448,19 @@ def check_signals(measurement: Measurement) -> None:
             f'{name}: the rod goes one way only ({spread}, {min(sides)} of {sum(sides)} samples the other way): '
             'friction cannot be told from an offset of the force: drive strokes in both directions, at several speeds'
         )
+    moving = np.abs(signals.velocity) > sliding.slowest
     for what, column in (('force sum', signals.force_sum), ('pressure of chamber a', signals.pressure_a),
                          ('pressure of chamber b', signals.pressure_b)):  # fmt: skip
-        check_clipping(name, what, column)
+        check_clipping(name, what, column[moving])
 
 
 def check_clipping(name: str, what: str, column: Array) -> None:
     """Refuse a signal that stands at the end of its sensor's range.
+
+    Args:
+        name: Of the source, for the error message.
+        what: Of the signal, for the error message.
+        column: Samples taken while the rod moves, shape (n,): at rest everything may stand still.
 
     Raises:
         ValueError: It does.

@@ -466,6 +466,18 @@ def run_drift(readings: Readings, offsets: Array) -> dict[int, float]:
     return {level: float(np.mean(values)) for level, values in result.items()}
 
 
+def between_runs(readings: Readings) -> float:
+    """Relative standard deviation of the friction between sources at one pressure [-]; NaN where none was repeated."""
+    squares = freedom = 0.0
+    for level in np.unique(readings.level):
+        inside = readings.level == level
+        sources = np.unique(readings.source[inside])
+        frictions = np.array([level_friction(readings, inside & (readings.source == s)).friction for s in sources])
+        squares += float(np.sum((frictions / frictions.mean() - 1.0) ** 2))
+        freedom += len(sources) - 1
+    return math.sqrt(squares / freedom) if freedom else math.nan
+
+
 # -- what the data cannot tell ----------------------------------------------------------------------------------------
 
 

@@ -205,15 +205,14 @@ def _sliding(base: Sliding, choices: Choices) -> Sliding:
 def _read_log(path: Path, choices: Choices) -> _Source:
     rig, remarks = _recognised(path) if choices.rig is None else (read_rig(config_path('rigs', choices.rig)), ())
     log = read_samples(path, rig)
+    samples, sliding = log.samples, _sliding(rig.sliding, choices)
+    moving = np.abs(samples.velocity) > sliding.slowest
     for term, column in log.columns.items():
         if term is not rig.time:
-            check_clipping(path.name, f'signal in column {term.column_name or term.column}', column)
-    samples = log.samples
+            check_clipping(path.name, f'signal in column {term.column_name or term.column}', column[moving])
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
-    return _Source(
-        _data_file(path), None, Measurement(path.name, signals, _sliding(rig.sliding, choices)), remarks=remarks
-    )
+    return _Source(_data_file(path), None, Measurement(path.name, signals, sliding), remarks=remarks)
 
 
 def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:

@@ -29,6 +29,7 @@ from seal_friction_ros.core.identification import (
     Spread,
     Stiction,
     band_coverage,
+    between_runs,
     changed_levels,
     climb,
     collinear_regressors,
@@ -130,7 +131,9 @@ class Worth:
     spread: Spread
     """standard deviation of a new reading, all seals"""
     run_to_run: float
-    """[-] part of it that the deviations cannot show: runs that were not repeated"""
+    """[-] part of it that the deviations cannot show: how far one run is off another"""
+    is_drift: bool
+    """whether the drift within the runs stands in for that"""
     coverage: float
     """share of left-out readings in a 95 % band that had not seen them"""
     repeatability: float
@@ -379,13 +382,14 @@ def judge(data: Data, choice: Choice, run_to_run: float | None) -> Worth:
     everything = data.prepared.readings
     offsets = offsets_of(everything, found.friction(everything.at))
     drift = {} if used.are_samples else run_drift(everything, offsets)
-    more = _run_to_run(data, drift) if run_to_run is None else run_to_run
+    more, is_drift = _run_to_run(data, drift) if run_to_run is None else (run_to_run, False)
     with progress('test the band', groups * (groups - 1)) as advance:
         coverage = band_coverage(choice.rung, used, found.values, more, advance)
     names = [parameter.name for parameter in choice.rung.parameters]
     return Worth(
         spread_of(validation.predicted, validation.deviation, groups, more),
         more,
+        is_drift,
         coverage,
         repeatability(used, found.offsets),
         drift,
@@ -395,16 +399,20 @@ def judge(data: Data, choice: Choice, run_to_run: float | None) -> Worth:
     )
 
 
-def _run_to_run(data: Data, drift: Mapping[int, float]) -> float:
-    """Relative standard deviation between runs, where no run was repeated: how far the runs drifted, root mean square.
+def _run_to_run(data: Data, drift: Mapping[int, float]) -> tuple[float, bool]:
+    """Relative standard deviation between runs, where each pressure has runs of its own; and whether it is the drift.
 
-    A seal that changes while it is measured is not the same when it is measured again. Runs of the Delft O-ring drift
+    If pressures were repeated it is measured. If none was, how far the runs drifted stands in for it, root mean square:
+    a seal that changes while it is measured is not the same when it is measured again. Runs of the Delft O-ring drift
     by 11 to 18 %, and repeat within 10 to 15 %. That the one stands in for the other is our choice.
     """
-    if data.used.left_out_by != 'pressure' or data.used.are_samples or not drift:
-        return 0.0
+    if data.used.left_out_by != 'pressure' or data.used.are_samples or not data.used.samples:
+        return 0.0, False
+    measured = between_runs(data.used)
+    if math.isfinite(measured):
+        return measured, False
     kept = [change for level, change in drift.items() if data.outlier is None or level != data.outlier.level]
-    return math.sqrt(sum(change**2 for change in kept) / len(kept)) if kept else 0.0
+    return (math.sqrt(sum(change**2 for change in kept) / len(kept)), True) if kept else (0.0, False)
 
 
 def _stiction(data: Data, found: Fit) -> Stiction | None:
@@ -610,7 +618,7 @@ def _warnings(data: Data, choice: Choice, worth: Worth, levels: Sequence[Level])
     yield from _collinear_in_words(data, choice)
     yield from _no_pressure_gain_in_words(choice)
     yield from _parameters_in_words(choice)
-    if worth.run_to_run > 0.0:
+    if worth.is_drift:
         yield (
             'every pressure was measured in one run, so how far a new run may be off is not in these data: the drift '
             f'of the runs ({100.0 * worth.run_to_run:.0f} %) stands in for it in the standard deviation; repeat runs, '

@@ -421,6 +421,38 @@ def test_a_few_samples_that_are_not_numbers_are_left_out_and_counted(tmp_path):
     assert run.figures['samples_left_out']['not finite'] == 5
 
 
+def test_runs_that_were_repeated_tell_how_far_a_new_one_may_be_off(tmp_path):
+    """Two runs at each pressure, one 17 % above the other, which is 11 % as a standard deviation between runs."""
+    for name, factor in (('low', 0.9), ('high', 1.2)):
+        for bar in (1, 3, 5, 7):
+            part = wave((bar * 1e5,), friction=lambda p, k=factor: k * (4.0 + 6e-6 * p))
+            write_samples(tmp_path / f'{name}{bar}', part, 'rod')
+    bags = sorted(str(path) for path in tmp_path.iterdir())
+    run = Run(tmp_path, *bags)
+    assert run.code == 2  # a quarter apart: that is no repetition
+    assert 'the friction has changed' in run.errors
+    for bar in (1, 3, 5, 7):
+        shutil.rmtree(tmp_path / f'high{bar}')
+        part = wave((bar * 1e5,), friction=lambda p: 1.05 * (4.0 + 6e-6 * p))
+        write_samples(tmp_path / f'high{bar}', part, 'rod')
+    run = Run(tmp_path, *bags)
+    assert run.code == 0, run.errors
+    assert not run.has_warning('every pressure was measured in one run')
+    between = 0.15 / 1.95 * 2.0**0.5  # standard deviation of 0.9 and 1.05 over their mean
+    shares = np.array(run.figures['std_N']) / np.array(run.figures['fitted_N'])
+    assert between < shares.min()
+    assert shares.max() < 2.0 * between
+
+
+def test_a_sensor_that_stands_still_while_the_rod_rests_is_not_clipped(tmp_path):
+    rest = Samples(*(np.repeat(column[:1], 600) for column in GOOD))
+    rest = rest._replace(velocity=np.zeros(600), force_sum=np.full(600, -30.0))
+    parts = [np.concatenate(columns) for columns in zip(rest, GOOD, strict=True)]
+    stamp = 1_000_000_000 + 10_000_000 * np.arange(5400)
+    write_samples(tmp_path / 'bag', Samples(stamp, *parts[1:]), 'rod')
+    assert Run(tmp_path, str(tmp_path / 'bag')).code == 0
+
+
 def rows_of_thesis() -> list[dict[str, str]]:
     with THESIS.open() as file:
         return list(csv.DictReader(file))
