@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from seal_friction_ros.core.configuration import SealSelection
-from seal_friction_ros.core.coulomb import PriorArtChart, Uncertainty
+from seal_friction_ros.core.coulomb import ConstantCoulomb, PressurePowerLaw, PriorArtChart, Uncertainty, VelocityTerms
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
@@ -19,6 +19,8 @@ from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.sensors import SensorSettings
 from seal_friction_ros.core.servo_controller import ServoController
 from seal_friction_ros.core.servo_plant import Cylinder, Load, ServoValve
+from seal_friction_ros.core.signal_preparation import SavitzkyGolay, Sliding
+from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
@@ -50,7 +52,13 @@ RECORDS = (
     PowerLaw,
     CoefficientTable,
     PriorArtChart,
+    PressurePowerLaw,
+    ConstantCoulomb,
+    VelocityTerms,
     Uncertainty,
+    SavitzkyGolay,
+    Sliding,
+    SpoolEvaluation,
 )
 
 

@@ -405,7 +405,7 @@ def _steady_stroke(run: RecordedRun, usable: BoolArray, direction: int, index: I
         direction,
         pressure=float(run.pressure[steady].mean()),
         force_sum=float(run.force_sum[steady].mean()),
-        estimated=float(run.coulomb_friction[steady].mean()),
+        estimated=float((direction * run.friction_force[steady]).mean()),  # Coulomb, and what the velocity adds
         std=float(run.coulomb_friction_std[steady].mean()),
         samples=len(steady),
         first=int(index[0]),
