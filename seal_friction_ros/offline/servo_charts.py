@@ -111,12 +111,12 @@ def follow(parameters: ServoParameters, wave: Sine) -> Simulated:
     return Simulated(np.linspace(0.0, (count - 1) * step, count), reference, trajectory, tracking)
 
 
-def friction_force(parameters: ServoParameters, trajectory: Trajectory) -> FloatArray:
+def friction_force(trajectory: Trajectory) -> FloatArray:
     """Friction force of the seals [N]: Coulomb friction in motion, at rest what holds the rod.
 
     Source: `seal_friction_ros.core.friction_state.state_friction`, for arrays.
     """
-    breakaway = trajectory.coulomb_friction + parameters.constants.stiction
+    breakaway = trajectory.breakaway_force
     held = np.clip(trajectory.force_sum, -breakaway, breakaway)
     sliding = np.sign(trajectory.velocity) * trajectory.coulomb_friction
     return np.where(trajectory.velocity == 0.0, held, sliding)
@@ -140,7 +140,7 @@ def write_servo_charts(
         raise ValueError('the servo has no seals: there is no friction to compare with none')
     rubbing, free = follow(servo, wave), follow(without_seals(servo), wave)
     with house_style():
-        plots = [figure_25(wave, rubbing, free), forces_figure(servo, wave, rubbing)]
+        plots = [figure_25(wave, rubbing, free), forces_figure(wave, rubbing)]
         written = write_page(
             out,
             'Position servo with and without seal friction',
@@ -205,12 +205,12 @@ def figure_25(wave: Sine, rubbing: Simulated, free: Simulated) -> Plot:
     )
 
 
-def forces_figure(parameters: ServoParameters, wave: Sine, rubbing: Simulated) -> Plot:
+def forces_figure(wave: Sine, rubbing: Simulated) -> Plot:
     """Why it rests: force sum and friction force against what the seals hold, and the chamber pressures."""
     part = _shown(rubbing, wave)
     time, trajectory = rubbing.time[part], Trajectory(*(column[part] for column in rubbing.trajectory))
-    friction = friction_force(parameters, trajectory)
-    breakaway = trajectory.coulomb_friction + parameters.constants.stiction
+    friction = friction_force(trajectory)
+    breakaway = trajectory.breakaway_force
     unit, size = force_unit(float(np.abs(trajectory.force_sum).max()))
     figure, axes = new_figure(
         f'The seals hold the rod until {breakaway.max() / size:.3g} {unit} act on it', 5.2, nrows=2, sharex=True

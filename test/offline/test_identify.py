@@ -241,7 +241,7 @@ def estimates_of(run: Run, pressure: float, velocity: float, force: float = 0.0)
     """What the estimator says with the identified seals at one sample."""
     chambers = tuple(run.figures['seal_chambers'])
     selection = SealSelection((str(run.out),) * len(chambers), chambers)
-    parameters = load_configuration(selection, EstimatorSettings()).parameters()
+    parameters = load_configuration(selection, EstimatorSettings()).parameters().estimator
     sample = RodSample(10, velocity, Pressure(10, pressure, pressure), Force(10, force))
     return step(parameters, init(parameters), sample)[1]
 

@@ -57,7 +57,7 @@ def test_a_larger_wave_has_shorter_rests():
 def test_friction_force_is_that_of_the_estimator():
     trajectory = RUBBING.trajectory
     coulomb = trajectory.coulomb_friction
-    breakaway = coulomb + SERVO.constants.stiction
+    breakaway = trajectory.breakaway_force
     expected = [
         state_friction(v, f, v == 0.0, c, b).friction_force
         for v, f, c, b in zip(
@@ -65,7 +65,7 @@ def test_friction_force_is_that_of_the_estimator():
             strict=True,
         )
     ]
-    assert friction_force(SERVO, trajectory) == pytest.approx(np.array(expected))
+    assert friction_force(trajectory) == pytest.approx(np.array(expected))
 
 
 def test_the_page_stands_alone_and_gives_the_same_bytes_again(tmp_path):
