@@ -248,7 +248,7 @@ def ladder_figure(found: Identification) -> Plot:
     """Out-of-sample error of each law."""
     scored = [score for score in found.choice.scores if score.validation is not None]
     errors = [100.0 * score.validation.error for score in scored if score.validation is not None]
-    names = [score.rung.words for score in scored]
+    names = [score.rung.words.replace(' + ', '\n+ ') for score in scored]
     figure, ax = new_figure('What each law is off by, on readings it has not seen', 1.5 + 0.33 * len(scored))
     colours = [GREEN if score is found.choice.best else SKY for score in scored]
     bars = ax.barh(range(len(scored)), errors, color=colours, height=0.65)
