@@ -93,7 +93,7 @@ class FrictionEstimator(ManagedNode):
     def finish(self) -> None:
         """Stop estimating; finish the bag."""
         self.active = False
-        outcome = self._recording.stop()
+        outcome = self._recording.close()
         if outcome:
             self.get_logger().info(outcome)
 
@@ -158,9 +158,8 @@ class FrictionEstimator(ManagedNode):
 
     def _start_recording(self) -> tuple[bool, str]:
         """Start a bag, which begins with a snapshot; whether that went well, and where the bag is or why not."""
-        options = self.settings(RecordingOptions)
         try:
-            path = self._recording.start(options.record_directory, options.record_name)
+            path = self._recording.start(self.settings(RecordingOptions))
         except ValueError as error:
             self.get_logger().error(str(error))
             self._publish_configuration()

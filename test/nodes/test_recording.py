@@ -9,6 +9,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
+from seal_friction_ros.nodes.parameters import RecordingOptions
 from seal_friction_ros.nodes.recording import Recording
 from seal_friction_ros.offline.bag import BagError, BagWriter
 
@@ -26,7 +27,7 @@ def test_a_place_that_cannot_be_is_refused_with_its_name_and_nothing_is_left(
     monkeypatch.chdir(tmp_path)
     recording = Recording()
     with pytest.raises(BagError, match='record_directory'):
-        recording.start(directory, name)
+        recording.start(RecordingOptions(record_directory=directory, record_name=name))
     assert recording.failure
     assert list(tmp_path.iterdir()) == []
 
