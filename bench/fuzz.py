@@ -1,8 +1,8 @@
 """Readers against files nobody would write: ``python bench/fuzz.py READER --cases 1000000 [--seed S] [--json]``.
 
 READER is ``all`` or one of those in the table. What is read are the files of test/corpus, and what random mutations
-make of them. The only way out of a reader is a result or a ValueError of one line; anything else counts as a crash, and its
-file is kept. Times are of the processor; memory is the most that the process ever held, Python and libraries included.
+make of them. The only way out of a reader is a result or a ValueError of one line; anything else counts as a crash, and
+its file is kept. Times are of the processor; memory is the most that the process ever held, libraries included.
 """
 
 import argparse

@@ -23,6 +23,8 @@ from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.parameters import Group, RecordingOptions
 from seal_friction_ros.nodes.recording import Recording
 
+_SWITCH_INTERVAL = 2e-4  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
+
 
 class FrictionEstimator(ManagedNode):
     """Lifecycle node around ``core.pipeline``.
@@ -215,6 +217,7 @@ class FrictionEstimator(ManagedNode):
 
 def main() -> int:
     """Run the node: ``friction_estimator --ros-args -p seals:=[...] --params-file FILE``."""
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     return run(FrictionEstimator, FrictionEstimator.autostart, FrictionEstimator.finish)
 
 

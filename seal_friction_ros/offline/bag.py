@@ -108,6 +108,7 @@ class BagWriter:
         self._descriptions: dict[tuple[str, str], Description] = {}
         self._listed = 0
         self._last_time = -1
+        self._taken = 0
         self._custom_data: dict[str, str] = {}
         self._finished: list[tuple[str, Span]] = []
         self._finished_counts: dict[tuple[str, str], int] = {}
@@ -153,6 +154,7 @@ class BagWriter:
         if self._is_full(log_time, len(data)):
             self._split()
         self._last_time = log_time
+        self._taken += 1
         self._output.write(topic, known, log_time, data)
         return log_time
 
@@ -181,19 +183,27 @@ class BagWriter:
         self._output.finish(_yaml_text(self._information()))
         self._write_metadata()
 
-    def rescue(self, custom_data: dict[str, str]) -> None:
+    def rescue(self, failure: str, dropped: int) -> int:
         """After a failure: leave a valid bag of all whole chunks; on a full disk without the last, to make room.
+
+        Args:
+            failure: What went wrong; kept in ``metadata.yaml``.
+            dropped: Messages that never came to be written; kept there, too, with those that are lost now.
+
+        Returns:
+            Messages that are lost now.
 
         Raises:
             OSError: Not even that could be done; what is there is for ``seal_friction recover``.
         """
-        self._custom_data = custom_data
         try:
             while True:
                 try:
                     self._output.finish_early()
+                    lost = self._taken - self.message_count
+                    self._custom_data = {'dropped_messages': str(dropped + lost), 'failure': failure}
                     self._write_metadata()
-                    return
+                    return lost
                 except OSError:
                     if not self._output.give_back():
                         raise

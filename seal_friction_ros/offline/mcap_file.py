@@ -35,6 +35,7 @@ _RECORD = struct.Struct('<BQ')  # opcode, length
 _CHUNK = struct.Struct('<QQQII')  # first and last log time, unpacked size, checksum, length of the compression's name
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log time, publish time
 _SIZE = struct.Struct('<Q')
+_SHORT = 'a record is shorter than what it claims to hold'  # the library says nothing
 _ERRORS = (ValueError, McapError, struct.error, EOFError, RuntimeError, zstandard.ZstdError)  # RuntimeError: of lz4
 
 
@@ -100,7 +101,7 @@ def scan(file: BinaryIO) -> Layout:
     try:
         walk.to_the_end()
     except _ERRORS as error:
-        damage = str(error) or type(error).__name__
+        damage = str(error) or _SHORT
     walk.finish_bare()
     return Layout(tuple(walk.blocks), walk.names.channels, walk.counts, damage, walk.position)
 
@@ -352,7 +353,7 @@ def _contents(file: BinaryIO, block: Block, names: _Names, on_fault: Callable[[B
     try:
         return _indexed(_unpacked(file, block), block, names)
     except _ERRORS as error:
-        reason = str(error) or type(error).__name__
+        reason = str(error) or _SHORT
         if on_fault is None:
             raise ValueError(f'chunk at byte {block.offset}: {reason}') from None
         on_fault(block, reason)

@@ -11,7 +11,7 @@ import time
 from collections import deque
 from pathlib import Path
 
-from seal_friction_ros.offline.bag import BagMessage, BagWriter
+from seal_friction_ros.offline.bag import BagWriter
 
 QUEUE_LENGTH = 100_000  # [messages] fourteen seconds of seven topics at 1 kHz
 FLUSH_PERIOD = 0.3  # [s]
@@ -40,7 +40,7 @@ class Recorder:
         self.dropped = 0
         self.error = ''
         self._queue_length = queue_length
-        self._queue: deque[BagMessage] = deque()
+        self._queue: deque[tuple[str, str, int, bytes]] = deque()  # plain tuples: the garbage collector lets go of them
         self._writer = BagWriter(path, split_size=split_size, split_duration=split_duration)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
@@ -51,7 +51,7 @@ class Recorder:
         if self.error or len(self._queue) >= self._queue_length:
             self.dropped += 1
         else:
-            self._queue.append(BagMessage(topic, type_name, log_time, data))
+            self._queue.append((topic, type_name, log_time, data))
 
     @property
     def written(self) -> int:
@@ -82,10 +82,7 @@ class Recorder:
             self._write_until_stopped()
             self._writer.close({'dropped_messages': str(self.dropped)})
         except Exception as error:  # noqa: BLE001  whatever it is, the thread must not end without a word
-            words = f'{self.path}: recording stopped: {error}{self._rescue(error)}'
-            self.error = words
-            self.dropped += len(self._queue)
-            self._queue.clear()
+            self._rescue(error)
 
     def _write_until_stopped(self) -> None:
         flushed = time.monotonic()
@@ -97,11 +94,14 @@ class Recorder:
                 flushed = time.monotonic()
             time.sleep(_HASTE if self._queue else _PERIOD)
 
-    def _rescue(self, failure: Exception) -> str:
-        """Leave a valid bag of what was written; what is to be added to the reason if that failed, too."""
-        lost = self.dropped + len(self._queue)
+    def _rescue(self, failure: Exception) -> None:
+        """Leave a valid bag of what was written, and say what happened."""
+        words = f'{self.path}: recording stopped: {failure}'
         try:
-            self._writer.rescue({'dropped_messages': str(lost), 'failure': str(failure)})
+            lost = self._writer.rescue(str(failure), self.dropped + len(self._queue))
         except Exception as error:  # noqa: BLE001  as above
-            return f'; and the bag could not be finished ({error}): seal_friction recover makes one of it'
-        return ''
+            lost = 0
+            words += f'; and the bag could not be finished ({error}): seal_friction recover makes one of it'
+        self.error = words
+        self.dropped += lost + len(self._queue)
+        self._queue.clear()

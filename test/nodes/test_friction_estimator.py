@@ -220,7 +220,8 @@ def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_pat
             g.estimate(SECOND + i * 10**6, 0.0015, force=math.nan if i == 7 else 3.0)
         assert g.call(Trigger, 'friction_estimator/stop_recording', Trigger.Request()).success
         assert not g.call(Trigger, 'friction_estimator/stop_recording', Trigger.Request()).success
-        assert replay(Path(started.message)).identical
+        g.estimator.finish()
+    assert replay(Path(started.message)).identical
 
 
 def test_a_parameter_change_amid_a_recording_replays_to_the_byte(tmp_path: Path):
