@@ -38,7 +38,8 @@ from seal_friction_ros.offline.recover import recover
 CORPUS = Path(__file__).parents[1] / 'test' / 'corpus'
 SLOWEST = 1.0  # [s]
 MOST_MEMORY = 200.0  # [MB]
-_HANGS = 20.0  # [s] of the clock after which a case is given up
+_HANGS = 5.0  # [s] of the processor after which a case is given up
+_WAITS = 300.0  # [s] of the clock after which a case is given up: it waits for something
 _ROOM = 1 << 30  # [bytes] of address space beyond what is in use: a claim of 1 TB fails at once
 _LONGEST_ERROR = 100_000  # characters
 
@@ -228,7 +229,8 @@ def fuzz(name: str, cases: int, seed: int, keep: Path) -> Outcome:
     """Run a reader on its corpus and on mutations of it."""
     reader, outcome, chance = READERS[name], Outcome(name), random.Random(f'{name} {seed}')  # noqa: S311
     seeds = [path.read_bytes() for path in sorted((CORPUS / reader.corpus).iterdir())]
-    signal.signal(signal.SIGALRM, _give_up)
+    for number in (signal.SIGPROF, signal.SIGALRM):
+        signal.signal(number, _give_up)
     _limit_memory()
     shared = Path('/dev/shm')  # noqa: S108  a folder of its own is made in it
     with tempfile.TemporaryDirectory(dir=shared if shared.is_dir() else None) as folder:
@@ -243,7 +245,8 @@ def fuzz(name: str, cases: int, seed: int, keep: Path) -> Outcome:
 
 def _one(reader: Reader, path: Path, data: bytes, outcome: Outcome, keep: Path) -> None:
     failure = ''
-    signal.setitimer(signal.ITIMER_REAL, _HANGS)
+    signal.setitimer(signal.ITIMER_PROF, _HANGS)
+    signal.setitimer(signal.ITIMER_REAL, _WAITS)
     started = time.process_time()
     try:
         reader.read(path)
@@ -255,7 +258,8 @@ def _one(reader: Reader, path: Path, data: bytes, outcome: Outcome, keep: Path) 
     except (Exception, Hang) as error:  # noqa: BLE001  that is what is looked for
         failure = f'{type(error).__name__}: {error}; {traceback.format_exc().splitlines()[-3].strip()}'
     seconds = time.process_time() - started
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):
+        signal.setitimer(timer, 0.0)
     outcome.cases += 1
     outcome.slowest = max(outcome.slowest, seconds)
     outcome.crashes += bool(failure)

@@ -1,9 +1,9 @@
 """Writes test/corpus: small good and evil files from which the fuzzing of each reader starts.
 
-``python tools/make_corpus.py`` writes it anew; the evil ones are each a known way to hurt a reader.
+``python tools/make_corpus.py`` writes it anew; the evil ones are each a known way to hurt a reader. Files whose names
+begin with ``found_`` were found by fuzzing, and stay.
 """
 
-import shutil
 import sqlite3
 import struct
 import sys
@@ -222,9 +222,8 @@ def main() -> int:
         'snapshot': snapshots(),
         'wire': {type_name.rsplit('/', 1)[-1]: data for type_name, data in MESSAGES.items()},
     }
-    shutil.rmtree(CORPUS, ignore_errors=True)
     for reader, seeds in files.items():
-        (CORPUS / reader).mkdir(parents=True)
+        (CORPUS / reader).mkdir(parents=True, exist_ok=True)
         for name, content in seeds.items():
             (CORPUS / reader / name).write_bytes(content.encode() if isinstance(content, str) else content)
     return 0

@@ -276,8 +276,12 @@ class BagWriter:
     def _write_metadata(self) -> None:
         text = _yaml_text({'rosbag2_bagfile_information': self._information()})
         partial = self.path / 'metadata.yaml.partial'
-        partial.write_text(text)
-        partial.replace(self.path / 'metadata.yaml')
+        try:
+            partial.write_text(text)
+            partial.replace(self.path / 'metadata.yaml')
+        except OSError:
+            partial.unlink(missing_ok=True)
+            raise
         self._listed = len(self._descriptions)
 
 

@@ -2,7 +2,7 @@
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from seal_friction_ros.offline.mcap_file import LARGEST_CHUNK
@@ -20,7 +20,7 @@ def topics(path: Path) -> list[tuple[str, str, int]]:
         ValueError: The file is no such database.
         sqlite3.Error: It is damaged.
     """
-    with closing(_open(path)) as database:
+    with _opened(path) as database:
         counts = {number: int(count) for number, count in database.execute(_COUNTS)}
         return [(name, type_name, counts.get(number, 0)) for number, name, type_name in _names(database)]
 
@@ -32,7 +32,7 @@ def messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
         ValueError: The file is no such database.
         sqlite3.Error: It is damaged.
     """
-    with closing(_open(path)) as database:
+    with _opened(path) as database:
         names = {number: (name, type_name) for number, name, type_name in _names(database)}
         for number, log_time, data in database.execute(_MESSAGES):
             if number not in names or not isinstance(log_time, int) or not isinstance(data, bytes):
@@ -40,20 +40,25 @@ def messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
             yield *names[number], log_time, data
 
 
-def _open(path: Path) -> sqlite3.Connection:
-    database = sqlite3.connect(f'{path.resolve().as_uri()}?mode=ro&immutable=1', uri=True)
-    try:
-        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_CHUNK)
-        database.execute('PRAGMA trusted_schema = OFF')
-        for table in ('topics', 'messages'):  # neither a view nor virtual, and no column is computed
-            stored = "SELECT count(*) FROM sqlite_schema WHERE name = ? AND type = 'table' AND rootpage > 0"
-            computed = 'SELECT count(*) FROM pragma_table_xinfo(?) WHERE hidden'
-            if database.execute(stored, (table,)).fetchone() != (1,) or any(*database.execute(computed, (table,))):
-                raise ValueError(f'no plain table of {table} in it')
-    except BaseException:
-        database.close()
-        raise
-    return database
+@contextmanager
+def _opened(path: Path) -> Iterator[sqlite3.Connection]:
+    with closing(sqlite3.connect(f'{path.resolve().as_uri()}?mode=ro&immutable=1', uri=True)) as database:
+        try:
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_CHUNK)
+            database.execute('PRAGMA trusted_schema = OFF')
+            for table in ('topics', 'messages'):
+                _check_plain(database, table)
+            yield database
+        except MemoryError:  # so SQLite answers to some damaged sizes, which it has not tried to get
+            raise ValueError('a size in it makes no sense') from None
+
+
+def _check_plain(database: sqlite3.Connection, table: str) -> None:
+    """Refuse a view and a virtual table, and columns that are computed: reading them need not end."""
+    stored = "SELECT count(*) FROM sqlite_schema WHERE name = ? AND type = 'table' AND rootpage > 0"
+    computed = 'SELECT count(*) FROM pragma_table_xinfo(?) WHERE hidden'
+    if database.execute(stored, (table,)).fetchone() != (1,) or any(*database.execute(computed, (table,))):
+        raise ValueError(f'no plain table of {table} in it')
 
 
 def _names(database: sqlite3.Connection) -> Iterator[tuple[int, str, str]]:
