@@ -20,6 +20,8 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import NamedTuple
 
@@ -39,7 +41,6 @@ CORPUS = Path(__file__).parents[1] / 'test' / 'corpus'
 SLOWEST = 1.0  # [s]
 MOST_MEMORY = 200.0  # [MB]
 _HANGS = 5.0  # [s] of the processor after which a case is given up
-_WAITS = 300.0  # [s] of the clock after which a case is given up: it waits for something
 _ROOM = 1 << 30  # [bytes] of address space beyond what is in use: a claim of 1 TB fails at once
 _LONGEST_ERROR = 100_000  # characters
 
@@ -229,8 +230,7 @@ def fuzz(name: str, cases: int, seed: int, keep: Path) -> Outcome:
     """Run a reader on its corpus and on mutations of it."""
     reader, outcome, chance = READERS[name], Outcome(name), random.Random(f'{name} {seed}')  # noqa: S311
     seeds = [path.read_bytes() for path in sorted((CORPUS / reader.corpus).iterdir())]
-    for number in (signal.SIGPROF, signal.SIGALRM):
-        signal.signal(number, _give_up)
+    signal.signal(signal.SIGPROF, _give_up)
     _limit_memory()
     shared = Path('/dev/shm')  # noqa: S108  a folder of its own is made in it
     with tempfile.TemporaryDirectory(dir=shared if shared.is_dir() else None) as folder:
@@ -246,7 +246,6 @@ def fuzz(name: str, cases: int, seed: int, keep: Path) -> Outcome:
 def _one(reader: Reader, path: Path, data: bytes, outcome: Outcome, keep: Path) -> None:
     failure = ''
     signal.setitimer(signal.ITIMER_PROF, _HANGS)
-    signal.setitimer(signal.ITIMER_REAL, _WAITS)
     started = time.process_time()
     try:
         reader.read(path)
@@ -258,8 +257,7 @@ def _one(reader: Reader, path: Path, data: bytes, outcome: Outcome, keep: Path) 
     except (Exception, Hang) as error:  # noqa: BLE001  that is what is looked for
         failure = f'{type(error).__name__}: {error}; {traceback.format_exc().splitlines()[-3].strip()}'
     seconds = time.process_time() - started
-    for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):
-        signal.setitimer(timer, 0.0)
+    signal.setitimer(signal.ITIMER_PROF, 0.0)
     outcome.cases += 1
     outcome.slowest = max(outcome.slowest, seconds)
     outcome.crashes += bool(failure)
@@ -279,6 +277,30 @@ def _limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (in_use + _ROOM, -1))
 
 
+def _start(name: str, arguments: argparse.Namespace) -> tuple[str, BaseProcess, Connection]:
+    """A process of its own: its memory is that of one reader, and a reader that kills it is noticed."""
+    context = multiprocessing.get_context('fork')
+    ours, theirs = context.Pipe(duplex=False)
+
+    def run() -> None:
+        theirs.send(fuzz(name, arguments.cases, arguments.seed, arguments.keep))
+
+    process = context.Process(target=run)
+    process.start()
+    theirs.close()
+    return name, process, ours
+
+
+def _outcome(name: str, process: BaseProcess, pipe: Connection) -> Outcome:
+    try:
+        outcome: Outcome = pipe.recv()
+    except EOFError:
+        process.join()
+        outcome = Outcome(name, crashes=1, kept=[f'the process ended with exit code {process.exitcode}'])
+    process.join()
+    return outcome
+
+
 def main() -> int:
     """Fuzz, each reader in a process of its own; print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
@@ -290,9 +312,10 @@ def main() -> int:
     parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
     names = list(READERS) if arguments.reader == 'all' else [arguments.reader]
-    tasks = [(name, arguments.cases, arguments.seed, arguments.keep) for name in names]
-    with multiprocessing.get_context('fork').Pool(arguments.parallel, maxtasksperchild=1) as pool:
-        outcomes = pool.starmap(fuzz, tasks, chunksize=1)
+    outcomes = []
+    for first in range(0, len(names), arguments.parallel):
+        started = [_start(name, arguments) for name in names[first : first + arguments.parallel]]
+        outcomes += [_outcome(*run) for run in started]
     good = all(outcome.good for outcome in outcomes)
     if arguments.json:
         print(json.dumps({'good': good, 'readers': [asdict(outcome) for outcome in outcomes]}))

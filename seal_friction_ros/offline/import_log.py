@@ -281,7 +281,7 @@ class _Cells(NamedTuple):
 
 
 def _read_cells(log: Path, rig: Rig) -> _Cells:
-    if log.exists() and not log.is_file():  # a pipe or a device never ends
+    if log.exists() and not (log.is_file() or log.is_dir()):  # a pipe or a device never ends
         raise ValueError(f'{log}: not a file')
     terms = list(dict(rig.terms()).values())
     line_numbers, numbers = array('q'), array('d')

@@ -21,6 +21,7 @@ from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.parameters import RecordingOptions
 from seal_friction_ros.offline.bag import bag_topics
 from seal_friction_ros.offline.replay import replay
 
@@ -275,7 +276,7 @@ def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_
 def test_the_node_has_no_arithmetic_parameter_of_its_own():
     with graph() as g:
         declared = {name for name in g.estimator._parameters if not name.startswith(('qos_overrides', 'use_sim_time'))}
-        known = {'autostart', 'record', 'record_directory', 'record_name', 'seals', 'seal_chambers'}
+        known = {'autostart', 'seals', 'seal_chambers', *meanings(RecordingOptions)}
         settings = {*meanings(EstimatorSettings), *(f'feedforward.{name}' for name in meanings(FeedForwardSettings))}
         assert declared - known - {'start_type_description_service'} == settings
         assert isinstance(g.estimator, FrictionEstimator)
