@@ -24,6 +24,8 @@ from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.parameters import Group, RecordingOptions
 from seal_friction_ros.nodes.recording import Recording
 
+_SWITCH_INTERVAL = 2e-4  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
+
 
 class FrictionEstimator(ManagedNode):
     """Lifecycle node around ``core.pipeline``.
@@ -94,7 +96,7 @@ class FrictionEstimator(ManagedNode):
     def finish(self) -> None:
         """Stop estimating; finish the bag."""
         self.active = False
-        outcome = self._recording.stop()
+        outcome = self._recording.close()
         if outcome:
             self.get_logger().info(outcome)
 
@@ -165,9 +167,8 @@ class FrictionEstimator(ManagedNode):
 
     def _start_recording(self) -> tuple[bool, str]:
         """Start a bag, which begins with a snapshot; whether that went well, and where the bag is or why not."""
-        options = self.settings(RecordingOptions)
         try:
-            path = self._recording.start(options.record_directory, options.record_name)
+            path = self._recording.start(self.settings(RecordingOptions))
         except ValueError as error:
             self.get_logger().error(str(error))
             self._publish_configuration()
@@ -223,6 +224,7 @@ class FrictionEstimator(ManagedNode):
 
 def main() -> int:
     """Run the node: ``friction_estimator --ros-args -p seals:=[...] --params-file FILE``."""
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     return run(FrictionEstimator, FrictionEstimator.autostart, FrictionEstimator.finish)
 
 

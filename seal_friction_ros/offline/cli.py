@@ -79,6 +79,13 @@ def _info(arguments: argparse.Namespace) -> int:
     return _tell(arguments, info, '\n'.join(lines))
 
 
+def _recover(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.recover import recover
+
+    found = recover(arguments.bag, arguments.out)
+    return _tell(arguments, found, found.in_words())
+
+
 def _report(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.report import write_report
 
@@ -268,6 +275,10 @@ def make_parser() -> argparse.ArgumentParser:
     _add_identify(commands)
     _add_sheet(commands)
     _add_spool(commands)
+
+    recover = _add(commands, 'recover', _recover, 'a valid bag of what can be read of a damaged or unfinished one')
+    recover.add_argument('bag', type=Path)
+    recover.add_argument('--out', type=Path, metavar='BAG', help='bag to make; default: BAG_recovered')
 
     report = _add(commands, 'report', _report, 'a page with figures and numbers, PNG and SVG beside it')
     report.add_argument('bag', type=Path)

@@ -20,10 +20,11 @@ files in ``config/rigs`` are examples::
     sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # what identification takes; absent: these values
 """
 
-from collections.abc import Iterator, Mapping
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ from seal_friction_ros.offline.progress import progress
 Array = NDArray[np.float64]
 
 _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one that the int32 seconds of a ROS stamp do not hold
+_LONGEST_LINE = 1 << 18  # characters
 _SHOWN = 40  # characters of a wrong cell that an error repeats
 _PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
 _HEADERS = ('none', 'row', 'comment')
@@ -216,7 +218,7 @@ def read_samples(log: Path, rig: Rig) -> ReadLog:
     Raises:
         ValueError: The log cannot be read or makes no sense; one line that names file and field or line.
     """
-    cells = _read_log(log, rig)
+    cells = _read_cells(log, rig)
     return ReadLog(_samples(log, rig, cells), cells.columns)
 
 
@@ -268,17 +270,18 @@ def _combination(document: Any, where: str) -> Combination:
 class _Cells(NamedTuple):
     """The cells of a log that the rig file asks for."""
 
-    line_numbers: list[int]
+    line_numbers: Sequence[int]
     columns: dict[Term, Array]
 
 
-def _read_log(log: Path, rig: Rig) -> _Cells:
+def _read_cells(log: Path, rig: Rig) -> _Cells:
+    if log.exists() and not (log.is_file() or log.is_dir()):  # a pipe or a device never ends
+        raise ValueError(f'{log}: not a file')
     terms = list(dict(rig.terms()).values())
-    line_numbers: list[int] = []
-    rows: list[list[float]] = []
+    line_numbers, numbers = array('q'), array('d')
     try:
         with log.open(encoding='utf-8-sig') as file:
-            header, lines = _parted(enumerate(file, start=1), rig.header)
+            header, lines = _parted(enumerate(_lines(file, log), start=1), rig.header)
             width = len(header)
             positions: list[int] = []
             for count, (number, cells) in enumerate(lines):
@@ -286,16 +289,23 @@ def _read_log(log: Path, rig: Rig) -> _Cells:
                 if not positions:
                     positions = [_position(term, where, header, width, log) for where, term in rig.terms()]
                 if count >= rig.skip_rows:
-                    rows.append(_numbers(cells, positions, width, f'{log}: line {number}'))
+                    numbers.extend(_numbers(cells, positions, width, f'{log}: line {number}'))
                     line_numbers.append(number)
     except OSError as error:
         raise ValueError(f'{log}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{log}: not a text file') from None
-    if not rows:
+    if not line_numbers:
         raise ValueError(f'{log}: no row of numbers in it after the {rig.skip_rows} that the rig file passes over')
-    columns = np.array(rows, dtype=np.float64).T
+    columns = np.frombuffer(numbers, dtype=np.float64).reshape(len(line_numbers), len(terms)).T
     return _Cells(line_numbers, dict(zip(terms, columns, strict=True)))
+
+
+def _lines(file: TextIO, log: Path) -> Iterator[str]:
+    while line := file.readline(_LONGEST_LINE):
+        if len(line) == _LONGEST_LINE:
+            raise ValueError(f'{log}: a line of more than {_LONGEST_LINE} characters, so not a log')
+        yield line
 
 
 def _parted(
