@@ -5,6 +5,7 @@ inside. What is read may be any rosbag2 bag (MCAP or SQLite), a bare MCAP or SQL
 look like one: memory is bounded, and nothing outside of the bag is opened.
 """
 
+import errno
 import shutil
 import sqlite3
 import struct
@@ -35,6 +36,7 @@ ESTIMATE_TOPIC = '/friction_estimate'
 FEEDFORWARD_TOPIC = '/friction_feedforward'
 CONFIGURATION_TOPIC = '/friction_estimator/configuration'
 _LARGEST_METADATA = 1 << 20  # [bytes] of metadata.yaml, with some 5000 files or 1000 topics
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 
 
@@ -199,7 +201,9 @@ class BagWriter:
                     self._custom_data = {'dropped_messages': str(offered - self.message_count), 'failure': failure}
                     self._write_metadata()
                     return
-                except OSError:
+                except OSError as error:
+                    if error.errno not in _FULL:
+                        raise
                     if not self._output.give_back():
                         break
             if self._finished:
