@@ -147,7 +147,7 @@ def _unusable() -> Iterator[Row]:
             f'force sum {words}',
             with_value('force_sum', value),
             f'FORCE_{bit} FORCE_STALE',
-            estimate='as usual while sliding; at rest UNKNOWN once stale',
+            estimate='as usual while sliding',
         )
         yield Row(
             f'velocity {words}',
@@ -190,7 +190,14 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         'force sum stops',
         without('force_sum'),
         'FORCE_STALE',
-        estimate='as usual while sliding; at rest UNKNOWN',
+        estimate='as usual while sliding',
+    ),
+    Row(
+        'force sum stops, the rod rests',
+        lambda tick, n: {**with_value('rod_velocity', 0.0)(tick, n), 'force_sum': []},
+        'FORCE_STALE',
+        (FrictionState.BREAKAWAY, FrictionState.UNKNOWN),
+        estimate='UNKNOWN once stale, Coulomb friction as usual',
     ),
     Row(
         'velocity stops',

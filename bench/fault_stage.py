@@ -15,6 +15,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.feedforward import LONGEST_STEP, FeedForward, FeedForwardSettings, Limited
@@ -35,6 +36,7 @@ SETTINGS = {
 }
 LEVELS = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN', DiagnosticStatus.ERROR: 'ERROR'}
 LEVELS[DiagnosticStatus.STALE] = 'STALE'
+DEEP = QoSProfile(depth=10_000)  # what the driver hears is to be all that was said
 Outputs = list[FrictionEstimate | FeedForward]
 
 
@@ -63,11 +65,13 @@ class Driver(Node):
         self.estimates = self.feedforwards = 0
         self.outputs: Outputs = []
         self.levels: list[str] = []
+        self.diagnosed = 0
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         for topic, type_name in wire.OUTPUTS.items():
-            self.create_subscription(message_class(type_name), topic, self._listen(type_name), qos.STREAM, raw=True)
+            self.create_subscription(message_class(type_name), topic, self._listen(type_name), DEEP, raw=True)
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
+        self.diagnosed = array.header.stamp.sec * 10**9 + array.header.stamp.nanosec
         self.levels += [LEVELS[status.level] for status in array.status if status.name.endswith(': estimate')]
 
     def _listen(self, type_name: str) -> Callable[[bytes], None]:
@@ -156,8 +160,11 @@ class Stage:
 
     def level(self) -> str:
         """Level of the diagnostics of the estimate since they were last asked for; STALE if nothing else was said."""
-        self.spin(0.003)
-        said = {*self.driver.levels, LEVELS[self.estimator.diagnostics()['estimate'].level]}
+        before = self.driver.get_clock().now().nanoseconds
+        self.estimator.on_matched(None)  # says it at once
+        if not self.spin_until(lambda: self.driver.diagnosed >= before):
+            raise RuntimeError('no diagnostics')
+        said = set(self.driver.levels)
         self.driver.levels.clear()
         return next(level for level in ('ERROR', 'WARN', 'OK', 'STALE') if level in said)
 

@@ -26,6 +26,10 @@ from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.nodes.parameters import InputOptions, RecordingOptions, StartOptions
 from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
 
+sys.path.insert(0, str(Path(__file__).parents[1] / 'bench'))
+from fault_rows import SIGNAL_ROWS, Row
+from faults import TRIALS
+
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
     SealSelection,
@@ -81,9 +85,36 @@ def _yaml(value: object) -> str:
     return repr(value) if value == '' else str(value)
 
 
+_FEEDFORWARD = {
+    'fades': 'fades to 0 within `feedforward.fade_time`',
+    'dips': 'fades for that sample',
+    'nothing': 'none is published',
+}
+
+
+def signal_faults() -> str:
+    """Markdown table of the faults of a signal, those with the same consequences in one row."""
+    rows = ['| fault | estimate | feed-forward | status | diagnostics | back to normal |', '|---|---|---|---|---|---|']
+    alike: dict[tuple[str, ...], list[Row]] = {}
+    for row in SIGNAL_ROWS:
+        bits = ', '.join(f'`{bit}`' for bit in row.status.split()) if row.status != 'any' else 'one for each'
+        force = _FEEDFORWARD.get(row.feedforward, row.feedforward)
+        alike.setdefault((row.estimate, force, bits, row.level, row.recovery), []).append(row)
+    for consequences, faults in alike.items():
+        rows.append(f'| {"; ".join(row.fault for row in faults)} | {" | ".join(consequences)} |')
+    return '\n'.join(rows)
+
+
+def other_faults() -> str:
+    """Markdown table of the faults of graph, process and disk."""
+    rows = [f'| {trial.fault} | {trial.required} |' for trial in TRIALS]
+    return '\n'.join(['| fault | what happens |', '|---|---|', *rows])
+
+
 def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
     tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
+    tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(
         r'<!-- table: (\w+) -->\n.*?<!-- end -->',
         lambda found: f'<!-- table: {found[1]} -->\n{tables[found[1]]}\n<!-- end -->',

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
@@ -22,7 +22,13 @@ from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.live_statistics import LiveStatistics
 from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.parameters import Group, InputOptions, RecordingOptions
-from seal_friction_ros.nodes.publishers import full_name, offers_best_effort_only, publishers, why_unheard
+from seal_friction_ros.nodes.publishers import (
+    full_name,
+    incompatibility,
+    offers_best_effort_only,
+    publishers,
+    why_unheard,
+)
 from seal_friction_ros.nodes.recording import Recording
 
 _SWITCH_INTERVAL = 2e-4  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
@@ -45,6 +51,7 @@ class FrictionEstimator(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         self._said: dict[str, str] = {}
+        self._deaf_to: set[str] = set()
         self._recording = Recording()
         self._configuration: Configuration | None = None
         self._inputs: dict[str, Any] = {}
@@ -63,7 +70,11 @@ class FrictionEstimator(ManagedNode):
         self._statistics = LiveStatistics()
         for topic, type_name in wire.OUTPUTS.items():
             self._outputs[type_name] = self.create_lifecycle_publisher(
-                message_class(type_name), topic, qos.STREAM, qos_overriding_options=qos.overridable()
+                message_class(type_name),
+                topic,
+                qos.STREAM,
+                qos_overriding_options=qos.overridable(),
+                event_callbacks=PublisherEventCallbacks(incompatible_qos=partial(self._on_deaf, type_name)),
             )
         self._outputs[wire.CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(wire.CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
@@ -81,6 +92,7 @@ class FrictionEstimator(ManagedNode):
             self.destroy_publisher(publisher)
         self._inputs.clear()
         self._outputs.clear()
+        self._deaf_to.clear()
         self._configuration = None
 
     def start(self) -> None:
@@ -118,6 +130,20 @@ class FrictionEstimator(ManagedNode):
             event_callbacks=SubscriptionEventCallbacks(matched=self.on_matched),
         )
         self._topics[name] = self._inputs[name].topic_name
+
+    def _on_deaf(self, type_name: str, _: Any) -> None:
+        self._deaf_to.add(type_name)  # the name of the node comes later, see diagnostics
+
+    def _who_is_deaf(self) -> list[str]:
+        """Nodes that want more than a publisher offers, so hear nothing, in words."""
+        deaf = []
+        for type_name in sorted(self._deaf_to):
+            topic, offered = self._topics[type_name], self._outputs[type_name].qos_profile
+            for subscriber in self.get_subscriptions_info_by_topic(topic):
+                reason = incompatibility(offered, subscriber.qos_profile)
+                if reason:
+                    deaf.append(f'{topic}: {full_name(subscriber)} wants incompatible quality of service ({reason})')
+        return deaf
 
     def _ros_time(self) -> int:
         return self.get_clock().now().nanoseconds
@@ -203,11 +229,12 @@ class FrictionEstimator(ManagedNode):
         crowd = self._look_at_publishers()
         counts = {name: self._publisher_count(name) for name in wire.INPUTS}
         recorder = self._recording.report()
-        unheard = self._listen_to_the_silent() if self.active else []
+        unheard = (self._listen_to_the_silent() if self.active else []) + self._who_is_deaf()
         estimate = self._statistics.report(self.active, counts)
-        if crowd:
-            refused = self.active and self._state.refused
-            estimate.level = max(estimate.level, DiagnosticStatus.ERROR if refused else DiagnosticStatus.WARN)
+        if self.active and self._state.refused:
+            estimate.level = DiagnosticStatus.ERROR
+        elif (crowd or unheard) and estimate.level == DiagnosticStatus.OK:
+            estimate.level = DiagnosticStatus.WARN
         estimate.message = '; '.join([*crowd, *unheard, estimate.message])
         self._say_once('publishers', '; '.join(crowd))
         self._say_once('unheard', '; '.join(unheard))

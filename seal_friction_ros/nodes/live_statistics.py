@@ -1,7 +1,8 @@
 """What the estimator counts while it runs, and how it says it on ``/diagnostics``."""
 
 import time
-from collections import Counter
+from collections import Counter, deque
+from statistics import median
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -13,24 +14,26 @@ from seal_friction_ros.core.records import FrictionEstimate, Status
 class Gaps:
     """Samples of one input that are missing, as the gaps between its stamps tell.
 
-    The middleware says nothing of samples that it throws away when the node is too slow. The period is learnt, so one
-    that changes counts as a few missing samples; our choice.
+    The middleware says nothing of samples that it throws away when the node is too slow. The period is the median of
+    the last steps, so a rate that falls counts as a few missing samples; our choice.
     """
 
     def __init__(self) -> None:
         self.missing = 0
         self._stamp = 0
         self._period = 0.0
+        self._steps: deque[int] = deque(maxlen=15)
 
     def on_stamp(self, stamp: int) -> None:
         """Take the stamp [ns] of the next sample."""
         step, self._stamp = stamp - self._stamp if self._stamp else 0, stamp
         if step <= 0:
             return
-        if self._period and step > 1.5 * self._period:
-            self.missing += round(step / self._period) - 1
-            step = min(step, int(2.0 * self._period))
-        self._period += (step - self._period) * (0.05 if self._period else 1.0)
+        if self._steps and not 0.7 * self._period < step < 1.5 * self._period:  # seldom: the median takes time
+            self._period = median(self._steps)
+            if step > 1.5 * self._period:
+                self.missing += round(step / self._period) - 1
+        self._steps.append(step)
 
 
 class LiveStatistics:

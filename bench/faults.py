@@ -1,0 +1,653 @@
+"""The fault campaign: ``python bench/faults.py [--times 20] [--only WORDS] [--seed 1] [--json]``.
+
+Every fault is tried so many times on the live node, and a table says what was required and what happened. The signal
+faults are the rows of ``fault_rows.py``; the others, of graph, process and disk, are here.
+"""
+
+import argparse
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from fault_rows import AFTER, MS, SIGNAL_ROWS, UNKNOWN, good
+from fault_stage import SETTINGS, Driver, Outputs, Stage, complaints_at_any_time, encoded, stage, try_row
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import Log
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+from rosgraph_msgs.msg import Clock
+from seal_friction_msgs.msg import CylinderPressure, FrictionEstimate, RodVelocity
+from stalled_disk import StallingDisk
+from std_msgs.msg import Float64
+
+from seal_friction_ros.core import records
+from seal_friction_ros.core.feedforward import FeedForward
+from seal_friction_ros.core.records import Status
+from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.processes import free_domain, graph_environment
+from seal_friction_ros.offline import mcap_output
+from seal_friction_ros.offline.bag import read_messages
+from seal_friction_ros.offline.recover import recover
+from seal_friction_ros.offline.replay import replay
+
+PATIENCE = 20.0  # [s]
+OWN_MOUNTS = ('unshare', '--map-root-user', '--mount')
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A fault of graph, process or disk."""
+
+    fault: str
+    required: str
+    attempt: Callable[[random.Random, Path], list[str]]
+    """one try, with a folder of its own; what was not as required"""
+
+
+def statuses(outputs: Outputs) -> set[int]:
+    """Status of every estimate."""
+    return {output.status for output in outputs if isinstance(output, records.FrictionEstimate)}
+
+
+def unless(holds: object, words: str) -> list[str]:
+    """The complaint, unless it holds."""
+    return [] if holds else [words]
+
+
+def recovered(place: Stage) -> list[str]:
+    """Good samples for a while; what is not as if nothing had been."""
+    place.run(AFTER)
+    outputs = place.run(AFTER)
+    forces = [output for output in outputs if isinstance(output, FeedForward)]
+    wrong = unless(statuses(outputs) == {0}, f'after it: statuses {statuses(outputs)}')
+    return wrong + unless(forces and not forces[-1].limited, f'after it: feed-forward {forces[-1:]}')
+
+
+def message(place: Stage) -> str:
+    """Message of the newest diagnostics of the estimate."""
+    return str(place.estimator.diagnostics()['estimate'].message)
+
+
+# --- graph ---
+
+
+def topic_comes_late(chance: random.Random, folder: Path) -> list[str]:
+    """The pressure has no publisher at first."""
+    del chance, folder
+    with stage() as place:
+        place.restart()
+        place.driver.destroy_publisher(place.driver.inputs.pop('cylinder_pressure'))
+        early = place.run(30, lambda tick, _: {name: tick[name] for name in tick if name != 'cylinder_pressure'})
+        place.driver.inputs['cylinder_pressure'] = place.driver.create_publisher(
+            CylinderPressure, 'cylinder_pressure', QoSProfile(depth=100)
+        )
+        place.connect()
+        wrong = unless(statuses(early) == {Status.PRESSURE_MISSING}, f'before: {statuses(early)}')
+        estimates = [o for o in early if isinstance(o, records.FrictionEstimate)]
+        wrong += unless({e.state for e in estimates} == set(UNKNOWN), 'before: a state without pressure')
+        return wrong + recovered(place)
+
+
+@contextmanager
+def intruder(place: Stage, name: str = 'intruder') -> Iterator[Node]:
+    """A node of another process, as far as the middleware can tell."""
+    context = Context()
+    rclpy.init(context=context, domain_id=place.context.get_domain_id())
+    node = Node(name, context=context)
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def second_publisher(chance: random.Random, folder: Path, *, refuse: bool = False) -> list[str]:
+    """Another node publishes an input."""
+    del folder
+    topic, kind = chance.choice([('rod_velocity', RodVelocity), ('cylinder_pressure', CylinderPressure)])
+    words = f'/{topic} has several publishers: /driver, /intruder'
+    with stage({'refuse_second_publisher': refuse}) as place:
+        before = place.run(60)
+        with intruder(place) as other:
+            other.create_publisher(kind, topic, 10)
+            wrong = unless(place.spin_until(lambda: words in message(place)), f'not named: {message(place)}')
+            place.level()
+            during = place.run(60)
+            level = place.level()
+        wrong += unless(place.spin_until(lambda: 'several' not in message(place)), 'still there when it is gone')
+        forces = [output for output in during if isinstance(output, FeedForward)]
+        if refuse:
+            wrong += unless(statuses(during) == {Status.INPUT_REFUSED}, f'{statuses(during)} while refused')
+            wrong += unless(forces[-1].force == 0.0, f'still {forces[-1].force} N') + unless(level == 'ERROR', level)
+        else:
+            wrong += unless(statuses(during) == {0}, f'{statuses(during)}') + unless(level == 'WARN', level)
+        after = place.run(1)
+        return wrong + complaints_at_any_time([*before, *during, *after]) + recovered(place)
+
+
+def second_publisher_refused(chance: random.Random, folder: Path) -> list[str]:
+    """The same, with ``refuse_second_publisher``."""
+    return second_publisher(chance, folder, refuse=True)
+
+
+def heard_log(place: Stage) -> list[str]:
+    """What is logged from now on."""
+    lines: list[str] = []
+    place.driver.create_subscription(Log, '/rosout', lambda log: lines.append(log.msg), 100)
+    place.spin(0.2)
+    return lines
+
+
+def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
+    """A publisher that offers best effort only, a subscriber that wants what was never kept, another type."""
+    del chance, folder
+    with stage(autostart=False) as place:
+        place.driver.destroy_publisher(place.driver.inputs['rod_velocity'])
+        place.driver.inputs['rod_velocity'] = place.driver.create_publisher(
+            RodVelocity, 'rod_velocity', qos_profile_sensor_data
+        )
+        lines = heard_log(place)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        if not place.estimator.autostart():
+            return ['does not start']
+        with intruder(place, 'logger') as other, intruder(place, 'odd_driver') as odd:
+            other.create_subscription(FrictionEstimate, 'friction_estimate', lambda _: None, latched)
+            odd.create_publisher(Float64, 'rod_position', 10)
+            place.driver.destroy_publisher(place.driver.inputs.pop('rod_position'))
+            wanted = ('/driver offers best effort only: taken as such', '/logger wants incompatible quality of service')
+            wrong = []
+            for words in wanted:
+                said = place.spin_until(lambda words=words: any(words in line for line in lines))
+                wrong += unless(said, f'not said: {words}')
+            unheard = '/odd_driver publishes std_msgs/msg/Float64'
+            wrong += unless(place.spin_until(lambda: unheard in message(place)), f'not said: {unheard}')
+        place.connect()
+        return wrong + recovered(place)
+
+
+def second_estimator(chance: random.Random, folder: Path) -> list[str]:
+    """Another estimator with the same name."""
+    del chance, folder
+    with stage() as place:
+        context = Context()
+        rclpy.init(context=context, domain_id=place.context.get_domain_id())
+        twin = FrictionEstimator(context=context, parameter_overrides=[Parameter('autostart', value=True)])
+        words = '/friction_estimate has several publishers: /friction_estimator, /friction_estimator'
+        try:
+            wrong = unless(twin.autostart(), 'the second one does not start')
+            wrong += unless(place.spin_until(lambda: words in message(place)), f'not named: {message(place)}')
+            during = place.run(30)
+        finally:
+            twin.finish()
+            twin.destroy_node()
+            rclpy.try_shutdown(context=context)
+        wrong += unless(statuses(during) == {0}, f'{statuses(during)}')
+        gone = place.spin_until(lambda: 'several' not in message(place), 25.0)
+        return wrong + unless(gone, 'still there when it is gone') + recovered(place)
+
+
+def parameters_change(chance: random.Random, folder: Path) -> list[str]:
+    """Settings change every few samples, some to nonsense."""
+    recording = {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
+    with stage(recording) as place:
+        outputs = place.run(60)
+        wrong = []
+        for _ in range(25):
+            name, value, sense = chance.choice(
+                [
+                    ('feedforward.coulomb_scale', chance.uniform(0.0, 1.5), True),
+                    ('feedforward.smoothing_velocity', chance.uniform(1e-4, 0.5), True),
+                    ('feedforward.force_limit', chance.uniform(0.0, 60.0), True),
+                    ('feedforward.lead_time', chance.uniform(0.0, 0.1), True),
+                    ('slip_velocity', chance.uniform(2e-3, 0.2), True),
+                    ('use_stiction', chance.random() < 0.5, True),
+                    ('feedforward.coulomb_scale', float('nan'), False),
+                    ('stick_velocity', 5.0, False),
+                    ('seals', ['nothing'], False),
+                    ('pressure_timeout', 'long', False),
+                ]
+            )
+            (result,) = place.estimator.set_parameters([Parameter(name, value=value)])
+            wrong += unless(result.successful == sense, f'{name} = {value}: {result}')
+            outputs += place.run(chance.randrange(1, 8))
+        wrong += complaints_at_any_time(outputs) + unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+        place.estimator.finish()
+    return wrong + verified(folder / 'bag')
+
+
+LEGAL = {
+    ('unconfigured', Transition.TRANSITION_CONFIGURE): 'inactive',
+    ('inactive', Transition.TRANSITION_CLEANUP): 'unconfigured',
+    ('inactive', Transition.TRANSITION_ACTIVATE): 'active',
+    ('active', Transition.TRANSITION_DEACTIVATE): 'inactive',
+}
+
+
+def lifecycle_in_any_order(chance: random.Random, folder: Path) -> list[str]:
+    """Transitions by service, legal or not, repeated, while inputs come."""
+    del folder
+    with stage() as place:
+        client = place.driver.create_client(ChangeState, 'friction_estimator/change_state')
+        place.spin_until(client.service_is_ready)
+        state, wrong = 'active', []
+
+        def change(number: int) -> bool:
+            for _ in range(chance.randrange(4)):
+                place.now += MS
+                for topic, messages in good(place.now).items():
+                    for one in messages:
+                        place.driver.inputs[topic].publish(encoded(one))
+            future = client.call_async(ChangeState.Request(transition=Transition(id=number)))
+            return place.spin_until(future.done) and future.result().success
+
+        for _ in range(20):
+            number = chance.choice([number for _, number in LEGAL])
+            succeeded = change(number)
+            wrong += unless(succeeded == ((state, number) in LEGAL), f'transition {number} while {state}: {succeeded}')
+            state = LEGAL.get((state, number), state)
+        for at, number in (
+            ('unconfigured', Transition.TRANSITION_CONFIGURE),
+            ('inactive', Transition.TRANSITION_ACTIVATE),
+        ):
+            if state == at:
+                wrong += unless(change(number), f'transition {number} at the end')
+                state = LEGAL[at, number]
+        place.connect()
+        return wrong + recovered(place)
+
+
+def simulated_time_is_reset(chance: random.Random, folder: Path) -> list[str]:
+    """``/clock`` goes back to 0 and on from there."""
+    del chance
+    recording = {'record': True, 'record_directory': str(folder), 'record_name': 'bag', 'use_sim_time': True}
+    with stage(recording) as place:
+        clock = place.driver.create_publisher(Clock, '/clock', 10)
+
+        def tick(ticks: int) -> Outputs:
+            outputs: Outputs = []
+            for _ in range(ticks):
+                now = Clock()
+                now.clock.sec, now.clock.nanosec = divmod(place.now + MS, 10**9)
+                clock.publish(now)
+                outputs += place.run(1)
+            return outputs
+
+        before = tick(60)
+        place.now = 0
+        after = tick(60)
+        marked = [o.status for o in after if isinstance(o, records.FrictionEstimate)]
+        wrong = unless(marked == [Status.STAMP_NOT_INCREASING] + [0] * 59, f'{marked[:5]}')
+        wrong += complaints_at_any_time([*before, *after]) + recovered(place)
+        place.estimator.finish()
+    return wrong + verified(folder / 'bag')
+
+
+def fifty_more_topics(chance: random.Random, folder: Path) -> list[str]:
+    """Fifty publishers of others, all of them busy."""
+    del chance, folder
+    with stage() as place, intruder(place, 'crowd') as other:
+        publishers = [other.create_publisher(Float64, f'other_{number}', 10) for number in range(50)]
+        place.spin(0.3)
+
+        def busy(tick: dict[str, Any], number: int) -> dict[str, Any]:
+            for publisher in publishers[number % 5 :: 5]:
+                publisher.publish(Float64())
+            return tick
+
+        outputs = place.run(200, busy)
+        answered = sum(isinstance(output, records.FrictionEstimate) for output in outputs)
+        return unless(answered == 200, f'{answered} of 200') + unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+
+
+# --- disk ---
+
+
+def slow_disk(chance: random.Random, folder: Path) -> list[str]:
+    """Each write of the recorder blocks for a second, once."""
+    recording = {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
+    mcap_output.os = disk = StallingDisk(1.0, chance.uniform(0.0, 0.5))
+    try:
+        with stage(recording) as place:
+            outputs, slowest = [], 0.0
+            while not disk.stalls or slowest == 0.0:
+                started = time.monotonic()
+                outputs += place.run(10)
+                slowest = max(slowest, time.monotonic() - started) if disk.stalls else 0.0
+            outputs += place.run(100)
+            wrong = unless(statuses(outputs) <= {0}, f'{statuses(outputs)}')
+            wrong += unless(slowest < 0.7, f'ten estimates took {slowest:.2f} s')  # they would wait for 1 s
+            place.estimator.finish()
+    finally:
+        mcap_output.os = os
+    return wrong + verified(folder / 'bag')
+
+
+def directory_removed(chance: random.Random, folder: Path) -> list[str]:
+    """The folder of the bag is removed while it is written."""
+    recording = {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
+    with stage(recording) as place:
+        place.run(chance.randrange(20, 60))
+        place.spin(0.05)
+        shutil.rmtree(folder / 'bag')
+        said = place.estimator.diagnostics
+        deadline = time.monotonic() + PATIENCE
+        while said()['recorder'].level != b'\x02' and time.monotonic() < deadline:
+            place.run(10)
+        words = said()['recorder'].message
+        return unless('recording stopped' in words, f'recorder: {words}') + recovered(place)
+
+
+def verified(bag: Path) -> list[str]:
+    """What a replay of a bag finds wrong."""
+    verdict = replay(bag)
+    return unless(verdict.identical, f'{bag.name}: {verdict.first_difference or "no estimate in it"}')
+
+
+# --- the process ---
+
+
+class Outside:
+    """The estimator in a process of its own, and a driver here."""
+
+    def __init__(self, process: subprocess.Popen[bytes], log: Path, domain: int) -> None:
+        self.process, self.log = process, log
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.driver = Driver(context=self.context)
+        self.recorder: list[str] = []
+        self.values: dict[str, str] = {}
+        self.driver.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.driver)
+        self.now = time.time_ns()
+        self.sent = 0
+
+    def _on_diagnostics(self, array: DiagnosticArray) -> None:
+        for status in array.status:
+            if status.name.endswith(': recorder'):
+                self.recorder.append(status.message)
+            else:
+                self.values = {value.key: value.value for value in status.values}
+
+    def spin_until(self, condition: Callable[[], object], patience: float = PATIENCE) -> bool:
+        """Spin until it holds; False if it does not within ``patience`` [s]."""
+        deadline = time.monotonic() + patience
+        while not condition():
+            if time.monotonic() > deadline:
+                return False
+            self.executor.spin_once(timeout_sec=0.002)
+        return True
+
+    def connect(self) -> None:
+        """Spin until the estimator hears the driver.
+
+        Raises:
+            RuntimeError: It does not.
+        """
+        inputs = self.driver.inputs.values()
+        if not self.spin_until(lambda: all(p.get_subscription_count() for p in inputs) and self.values):
+            raise RuntimeError(f'no estimator: {self.log.read_text()}')
+        self.spin_until(lambda: False, 0.2)
+
+    def send(self, seconds: float, rate: float = 1000.0) -> None:
+        """Send inputs at a rate [Hz], whether they are answered or not."""
+        start = time.monotonic()
+        for number in range(round(seconds * rate)):
+            self.spin_until(lambda due=start + number / rate: time.monotonic() >= due)
+            self.now += round(1e9 / rate)
+            for topic, messages in good(self.now).items():
+                for one in messages:
+                    self.driver.inputs[topic].publish(encoded(one))
+            self.sent += 1
+
+    def complaints(self) -> list[str]:
+        """Whether it still answers well, and what it had to say."""
+        before = len(self.driver.outputs)
+        self.send(0.5)
+        self.spin_until(lambda: False, 0.1)
+        seen = self.driver.outputs[before:]
+        wrong = unless(seen and max(statuses(seen[-20:])) == 0, f'at the end: {statuses(seen[-20:])}')
+        return wrong + complaints_at_any_time(self.driver.outputs) + self.raised()
+
+    def raised(self) -> list[str]:
+        """Exceptions that nobody handled."""
+        return unless('Traceback' not in self.log.read_text(), self.log.read_text()[-300:])
+
+
+@contextmanager
+def outside(folder: Path, directory: str = '', prefix: tuple[str, ...] = ()) -> Iterator[Outside]:
+    """Run the estimator, recording to ``bag`` in a folder, behind a command that prepares its file system."""
+    domain, log = free_domain(), folder / 'log'
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    values = {'record': 'true', 'record_directory': directory or str(folder), 'record_name': 'bag'}
+    parameters = [f'-p {name}:={value}' for name, value in {**values, **SETTINGS}.items()]
+    command = [*prefix, sys.executable, '-m', 'seal_friction_ros.nodes.friction_estimator', '--ros-args']
+    command += ' '.join(parameters).split()
+    with log.open('wb') as output:
+        process = subprocess.Popen(command, env=graph_environment(domain), stdout=output, stderr=output)
+        made = Outside(process, log, domain)
+        try:
+            made.connect()
+            yield made
+        finally:
+            made.driver.destroy_node()
+            rclpy.try_shutdown(context=made.context)
+            if process.poll() is None:
+                process.send_signal(signal.SIGCONT)
+                process.terminate()
+                try:
+                    process.wait(PATIENCE)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.wait()
+
+
+def ends_by(number: signal.Signals, chance: random.Random, folder: Path) -> list[str]:
+    """Told to end while inputs come."""
+    with outside(folder) as place:
+        place.send(chance.uniform(0.2, 1.2))
+        place.process.send_signal(number)
+        place.send(0.1)
+        code = place.process.wait(PATIENCE)
+        wrong = unless(code == 0, f'exit code {code}') + place.raised() + complaints_at_any_time(place.driver.outputs)
+    return wrong + verified(folder / 'bag')
+
+
+def interrupted(chance: random.Random, folder: Path) -> list[str]:
+    """SIGINT."""
+    return ends_by(signal.SIGINT, chance, folder)
+
+
+def terminated(chance: random.Random, folder: Path) -> list[str]:
+    """SIGTERM."""
+    return ends_by(signal.SIGTERM, chance, folder)
+
+
+def killed(chance: random.Random, folder: Path) -> list[str]:
+    """SIGKILL."""
+    with outside(folder) as place:
+        place.send(chance.uniform(1.2, 2.5))
+        place.process.kill()
+        at = time.time_ns()
+        place.process.wait()
+        wrong = complaints_at_any_time(place.driver.outputs)
+    found = recover(folder / 'bag')
+    lost = (at - found.last_ns) * 1e-9
+    return wrong + unless(lost < 1.0, f'{lost:.2f} s lost') + verified(Path(found.out))
+
+
+def stopped_and_continued(chance: random.Random, folder: Path) -> list[str]:
+    """SIGSTOP, SIGCONT, while inputs come."""
+    with outside(folder) as place:
+        place.send(0.3)
+        place.process.send_signal(signal.SIGSTOP)
+        place.send(chance.uniform(0.3, 1.0))
+        place.process.send_signal(signal.SIGCONT)
+        wrong = place.complaints() + accounted(place)
+        place.process.terminate()
+        place.process.wait(PATIENCE)
+    return wrong + verified(folder / 'bag')
+
+
+def accounted(place: Outside, *, exactly: bool = True) -> list[str]:
+    """Whether every velocity sample is answered or reported as missing; at a changing rate, whether it is reported."""
+    before = place.values
+    place.spin_until(lambda: place.values is not before)
+    before = place.values
+    place.spin_until(lambda: place.values is not before)
+    received, missing = (int(place.values[f'rod_velocity {what}']) for what in ('received', 'missing'))
+    answered = sum(isinstance(output, records.FrictionEstimate) for output in place.driver.outputs)
+    whole = received + missing == place.sent if exactly else missing or received == place.sent
+    wrong = unless(whole, f'{received} received, {missing} missing of {place.sent}')
+    return wrong + unless(answered == received, f'{answered} answers to {received}')
+
+
+def burst(chance: random.Random, folder: Path) -> list[str]:
+    """10 kHz on all topics for a moment, on a node made for 1 kHz."""
+    with outside(folder) as place:
+        place.send(0.2)
+        place.send(chance.uniform(0.05, 0.3), 10_000.0)
+        place.now += MS
+        wrong = place.complaints()
+        wrong += accounted(place, exactly=False)
+        place.process.terminate()
+        place.process.wait(PATIENCE)
+    return wrong + verified(folder / 'bag')
+
+
+def on_a_disk(folder: Path, options: str, words: str) -> list[str]:
+    """Record to a disk mounted for it; the recorder has to say ``words``."""
+    if subprocess.run([*OWN_MOUNTS, 'true'], check=False, capture_output=True).returncode:
+        return ['needs a user namespace to mount a small disk in']
+    small = folder / 'disk'
+    small.mkdir()
+    mount = f'mount -t tmpfs -o {options} none "$0" && exec "$@"'
+    with outside(folder, str(small), (*OWN_MOUNTS, 'sh', '-c', mount, str(small))) as place:
+        deadline = time.monotonic() + PATIENCE
+        while not any(words in said for said in place.recorder) and time.monotonic() < deadline:
+            place.send(0.1)
+        wrong = unless(any(words in said for said in place.recorder), f'recorder: {place.recorder[-1:]}')
+        wrong += place.complaints()
+        bag = Path(f'/proc/{place.process.pid}/root{small}/bag')
+        if bag.exists():
+            shutil.copytree(bag, folder / 'copy')
+    if (folder / 'copy').exists():
+        wrong += unless(sum(1 for _ in read_messages(folder / 'copy')), 'nothing in the bag')
+        wrong += verified(folder / 'copy')
+    return wrong
+
+
+def disk_full(chance: random.Random, folder: Path) -> list[str]:
+    """A disk with little room."""
+    return on_a_disk(folder, f'size={chance.randrange(150, 400)}k', 'No space left on device')
+
+
+def read_only(chance: random.Random, folder: Path) -> list[str]:
+    """A disk that takes nothing."""
+    del chance
+    return on_a_disk(folder, 'ro', 'Read-only file system')
+
+
+TRIALS = (
+    Trial('an input has no publisher at first', 'PRESSURE_MISSING and UNKNOWN, then as usual', topic_comes_late),
+    Trial('an input has a second publisher', 'named, WARN; estimates as usual', second_publisher),
+    Trial(
+        'an input has a second publisher, refused',
+        'named, ERROR, INPUT_REFUSED, feed-forward fades; as usual once it is gone',
+        second_publisher_refused,
+    ),
+    Trial(
+        'incompatible quality of service or type',
+        'said by name of the node; best effort is taken',
+        incompatible_quality,
+    ),
+    Trial('a second estimator of the same name', 'named, WARN; estimates as usual', second_estimator),
+    Trial('parameters change in motion', 'nonsense refused, no leap, the recording verifies', parameters_change),
+    Trial('lifecycle transitions in any order', 'legal ones succeed, others are refused', lifecycle_in_any_order),
+    Trial(
+        'simulated time is reset',
+        'the first sample marked, then as usual; the recording verifies',
+        simulated_time_is_reset,
+    ),
+    Trial('50 more topics on the graph', 'every sample answered', fifty_more_topics),
+    Trial(
+        '10 kHz on a node made for 1 kHz',
+        'every sample that is taken answered, missing ones reported; the recording verifies',
+        burst,
+    ),
+    Trial('SIGINT', 'exit code 0, the recording verifies', interrupted),
+    Trial('SIGTERM', 'exit code 0, the recording verifies', terminated),
+    Trial('SIGKILL', 'the recording is recovered up to 1 s before, and verifies', killed),
+    Trial('SIGSTOP and SIGCONT', 'goes on; every sample answered or reported missing', stopped_and_continued),
+    Trial('disk full', 'said, estimates go on, the bag is valid and verifies', disk_full),
+    Trial('disk read-only', 'said, estimates go on', read_only),
+    Trial('folder of the bag removed', 'said, estimates go on', directory_removed),
+    Trial('a disk that stalls', 'no estimate waits, nothing is lost, the recording verifies', slow_disk),
+)
+
+
+def attempt(trial: Trial, seed: int) -> list[str]:
+    """One try; an exception is a complaint, too."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            return trial.attempt(random.Random(seed), Path(folder))  # noqa: S311  no secret depends on it
+        except Exception:  # noqa: BLE001  whatever it is, it is what happened
+            return [traceback.format_exc(limit=-3)]
+
+
+def main() -> int:
+    """Try every fault, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--times', type=int, default=20, help='how often each fault is tried')
+    parser.add_argument('--only', default='', help='only faults with these words in their name')
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--json', action='store_true')
+    arguments = parser.parse_args()
+    results, said = {}, Console(stderr=True)
+    with stage() as place:
+        for row in track([r for r in SIGNAL_ROWS if arguments.only in r.fault], 'signals', console=said):
+            happened = [try_row(place, row) for _ in range(arguments.times)]
+            required = f'{row.status or "no bit"}; feed-forward {row.feedforward}; {row.level}'
+            results[row.fault] = (required, happened)
+    for trial in track([t for t in TRIALS if arguments.only in t.fault], 'graph, process, disk', console=said):
+        happened = [attempt(trial, arguments.seed + number) for number in range(arguments.times)]
+        results[trial.fault] = (trial.required, happened)
+    if arguments.json:
+        print(json.dumps({fault: happened for fault, (_, happened) in results.items()}))
+    else:
+        Console(width=200).print(_table(results))
+    return int(any(wrong for _, happened in results.values() for wrong in happened))
+
+
+def _table(results: dict[str, tuple[str, list[list[str]]]]) -> Table:
+    table = Table('fault', 'tried', 'required', 'happened', title='Fault campaign')
+    for fault, (required, happened) in results.items():
+        bad = [words for wrong in happened for words in wrong[:1]]
+        said = 'as required' if not bad else f'{len(bad)} not: {bad[0]}'
+        table.add_row(fault, str(len(happened)), required, said)
+    return table
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,35 @@
+"""Every row of docs/degradation.md, tried once on the live node; ``bench/faults.py`` tries them twenty times."""
+
+import random
+from collections.abc import Iterator
+
+import pytest
+from fault_rows import SIGNAL_ROWS, Row
+from fault_stage import Stage, stage, try_row
+from faults import TRIALS, Trial
+
+
+@pytest.fixture(scope='module')
+def place() -> Iterator[Stage]:
+    with stage() as made:
+        yield made
+
+
+@pytest.mark.parametrize('row', SIGNAL_ROWS, ids=lambda row: row.fault)
+def test_a_signal_that_fails_does_what_the_table_says_and_comes_back(place: Stage, row: Row):
+    assert try_row(place, row) == []
+
+
+@pytest.mark.parametrize('trial', TRIALS, ids=lambda trial: trial.fault)
+def test_graph_process_and_disk_do_what_the_table_says(trial: Trial, tmp_path):
+    assert trial.attempt(random.Random(7), tmp_path) == []
+
+
+def test_a_row_that_requires_what_does_not_happen_fails(place: Stage):
+    stops = SIGNAL_ROWS[0]
+    for wrong in (
+        Row('', stops.spoil, 'FORCE_STALE', feedforward='fades'),
+        Row('', stops.spoil, 'PRESSURE_STALE', feedforward='as usual'),
+        Row('', stops.spoil, 'PRESSURE_STALE', feedforward='fades', level='OK'),
+    ):
+        assert len(try_row(place, wrong)) == 1
