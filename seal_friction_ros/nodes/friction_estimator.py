@@ -25,6 +25,7 @@ from seal_friction_ros.nodes.parameters import Group, InputOptions, RecordingOpt
 from seal_friction_ros.nodes.publishers import (
     full_name,
     incompatibility,
+    is_named,
     offers_best_effort_only,
     publishers,
     why_unheard,
@@ -52,6 +53,7 @@ class FrictionEstimator(ManagedNode):
     def __init__(self, **kwargs: Any) -> None:
         self._said: dict[str, str] = {}
         self._deaf_to: set[str] = set()
+        self._unnamed: set[str] = set()
         self._recording = Recording()
         self._configuration: Configuration | None = None
         self._inputs: dict[str, Any] = {}
@@ -274,6 +276,9 @@ class FrictionEstimator(ManagedNode):
             topic, wanted = self._topics[name], self._inputs[name].qos_profile
             for publisher in publishers(self, topic):
                 if offers_best_effort_only(publisher) and wanted.reliability == ReliabilityPolicy.RELIABLE:
+                    if not is_named(publisher) and name not in self._unnamed:
+                        self._unnamed.add(name)  # it may have a name by the next time
+                        break
                     self.get_logger().warning(f'{topic}: {full_name(publisher)} offers best effort only: taken as such')
                     self._subscribe(name, qos.best_effort(qos.STREAM))
                     break

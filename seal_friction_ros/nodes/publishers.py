@@ -12,9 +12,14 @@ def publishers(node: Node, topic: str) -> list[TopicEndpointInfo]:
 
 def full_name(endpoint: TopicEndpointInfo) -> str:
     """Name of the node that publishes or subscribes, with its namespace."""
-    if endpoint.node_name == '_NODE_NAME_UNKNOWN_':  # discovery tells of the node after its topics
-        return 'a node whose name is not known yet'
+    if not is_named(endpoint):
+        return 'a node whose name is not known'
     return f'{endpoint.node_namespace}/{endpoint.node_name}'.replace('//', '/')
+
+
+def is_named(endpoint: TopicEndpointInfo) -> bool:
+    """Whether the name of the node is known: discovery tells of it after its topics."""
+    return bool(endpoint.node_name != '_NODE_NAME_UNKNOWN_')
 
 
 def offers_best_effort_only(publisher: TopicEndpointInfo) -> bool:
