@@ -55,8 +55,8 @@ class Numerics:
 class OringCase:
     """A ring in its gland.
 
-    Friction has the sign of the force on the ring, positive downstream: where the rod slides upstream, or holds back a
-    ring that is being pressed against the wall, it is negative.
+    ``wall_friction`` holds the ring back, at rod and gland alike, as where rising pressure has pushed it towards the wall;
+    without pressure there is none. The known cases have none at all: it is there to show what it would change.
 
     Raises:
         ValueError: A number is out of bounds, the ring is not squeezed, or its rubber does not fit in the gland.
@@ -67,11 +67,8 @@ class OringCase:
     groove: Groove
     rubber: Rubber
     numerics: Numerics = Numerics()  # noqa: RUF009  (frozen)
-    rod_friction: float = parameter(
-        0.0, unit='1', lower=-1.0, upper=1.0, description='Axial traction of the inner wall over its contact stress.'
-    )
-    gland_friction: float = parameter(
-        0.0, unit='1', lower=-1.0, upper=1.0, description='Axial traction of the outer wall over its contact stress.'
+    wall_friction: float = parameter(
+        0.0, unit='1', lower=0.0, upper=0.5, description='Traction of rod and gland on the ring over contact stress.'
     )
 
     def __post_init__(self) -> None:

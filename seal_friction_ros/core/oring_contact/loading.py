@@ -8,6 +8,7 @@ import numpy as np
 
 from seal_friction_ros.core.oring_contact.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.oring_contact.case import OringCase, check_pressures
+from seal_friction_ros.core.oring_contact.continuation import follow
 from seal_friction_ros.core.oring_contact.equilibrium import (
     Assembly,
     Model,
@@ -30,10 +31,9 @@ from seal_friction_ros.core.oring_contact.surroundings import (
 )
 from seal_friction_ros.core.seal import projected_area
 
-_SOFTER = (100.0, 10.0, 1.0)  # walls while the ring is squeezed: softer at first
+_SOFTER = 100.0  # walls while the ring is squeezed: their penalty is this much smaller
+_SQUEEZE_STRIDE, _STIFFEN_STRIDE, _FRICTION_STRIDE = 1.0, 0.5, 0.1  # parts of their ways to try first
 _SEATING = 1e-3  # depth of the ring in the wall when it is seated, over d
-_EASY, _GROW, _SHRINK = 6, 1.6, 0.5  # Newton steps of an easy load step; how the next one changes
-_SMALLEST = 1e-4  # load step over E
 
 
 class Loaded(NamedTuple):
@@ -45,15 +45,6 @@ class Loaded(NamedTuple):
     state: State
     newton_steps: int
     """since the last pressure that was asked for"""
-
-
-class _March(NamedTuple):
-    """Two load steps in a row, and how far the next one goes."""
-
-    before: Loaded
-    now: Loaded
-    rise: float
-    """[Pa]"""
 
 
 def model_of(case: OringCase) -> Model:
@@ -74,46 +65,60 @@ def loaded_states(case: OringCase, model: Model, pressures: tuple[float, ...]) -
         NotConverged: No equilibrium was found.
     """
     check_pressures(case, pressures)
-    squeezed = squeeze(case, model)
+    now = squeeze(case, model)
     if pressures[0] == 0.0:
-        yield squeezed
-        squeezed, pressures = squeezed._replace(newton_steps=0), pressures[1:]
+        yield now
+        now, pressures = now._replace(newton_steps=0), pressures[1:]
     if not pressures:
         return
     free = make_assembly(model)
-    seated = seat(case, model, free, squeezed)
-    march = _March(seated, seated, seated.pressure)
+    now = seat(case, model, free, now)
+    rise = now.pressure
     for pressure in pressures:
-        march = _raised(case, model, free, march, pressure)
-        _check_sealed(case, model, march.now)
-        yield march.now
-        march = march._replace(now=march.now._replace(newton_steps=0))
+        now, rise = _raised(case, model, free, now, pressure, rise)
+        loaded = _held_back(case, model, free, now)
+        _check_sealed(case, model, loaded)
+        yield loaded
+        now = now._replace(newton_steps=0)
 
 
 def squeeze(case: OringCase, model: Model) -> Loaded:
     """The ring squeezed between rod and gland, held at one node along the axis.
 
+    The walls come in from where they just touch the free ring, soft at first, and are stiffened when they are in place.
+
     Raises:
-        ValueError: It is longer than the groove is wide.
+        ValueError: The squeezed ring is longer than the groove is wide.
         NotConverged: No equilibrium was found.
     """
-    held = make_assembly(model, _held(model))
-    state = at_rest(model, _fitted(case, model))
-    surroundings = _around(case, model)
-    total = 0
-    for softer in _SOFTER:
-        try:
-            state, steps = solve(model, held, surroundings._replace(penalty=surroundings.penalty / softer), state)
-        except NotConverged as error:
-            raise NotConverged(f'case {case.name}: the squeezed ring finds no equilibrium: {error}') from None
-        total += steps
-    length = float(np.ptp(outline(model, state)[:, 1]))
+    assembly, walls = make_assembly(model, _held(model)), _walls(case, model)
+    inner = case.geometry.ring_inner_diameter / 2.0
+    rod_way = walls.rod_radius - inner
+    gland_way = walls.gland_radius - inner - case.geometry.section_diameter
+
+    def closing(share: float, _: State) -> Surroundings:
+        left = 1.0 - share
+        rod, gland = walls.rod_radius - left * rod_way, walls.gland_radius - left * gland_way
+        return walls._replace(rod_radius=rod, gland_radius=gland, penalty=walls.penalty / _SOFTER)
+
+    def drawn(state: State, done: float, wanted: float) -> State:
+        return _drawn_along(model, state, closing(done, state), closing(wanted, state))
+
+    def stiffening(share: float, _: State) -> Surroundings:
+        return walls._replace(penalty=walls.penalty * _SOFTER ** (share - 1.0))
+
+    try:
+        closed = follow(model, assembly, closing, at_rest(model), _SQUEEZE_STRIDE, drawn)
+        reached = follow(model, assembly, stiffening, closed.state, _STIFFEN_STRIDE)
+    except NotConverged as error:
+        raise NotConverged(f'case {case.name}: the squeezed ring finds no equilibrium: {error}') from None
+    length = float(np.ptp(outline(model, reached.state)[:, 1]))
     if length >= case.groove.width:
         raise ValueError(
-            f'case {case.name}: overfilled gland: the squeezed ring is {length:.6g} m long, more than groove.width = '
+            f'case {case.name}: overfilled gland: the squeezed ring is {length:.6g} m long, groove.width = '
             f'{case.groove.width} m'
         )
-    return Loaded(0.0, surroundings, state, total)
+    return Loaded(0.0, walls, reached.state, closed.newton_steps + reached.newton_steps)
 
 
 def seat(case: OringCase, model: Model, free: Assembly, squeezed: Loaded) -> Loaded:
@@ -139,46 +144,6 @@ def seat(case: OringCase, model: Model, free: Assembly, squeezed: Loaded) -> Loa
     return Loaded(pressure, surroundings, state, squeezed.newton_steps + steps + more)
 
 
-def _held(model: Model) -> tuple[int]:
-    """Axial displacement of one node in the middle, which carries no load while the ring is squeezed evenly."""
-    return (2 * int(np.argmin(np.linalg.norm(model.mesh.nodes - model.mesh.nodes.mean(axis=0), axis=1))) + 1,)
-
-
-def _raised(case: OringCase, model: Model, free: Assembly, march: _March, target: float) -> _March:
-    """March to a pressure in steps that grow while they are easy and shrink where they fail."""
-    before, now, rise = march
-    if target < now.pressure:  # below the one it was seated with
-        return _March(now, _step(model, free, now, now, target), rise)
-    while now.pressure < target:
-        wanted = now.pressure + rise
-        wanted = target if wanted > target - 0.1 * rise else wanted
-        try:
-            after = _step(model, free, before, now, wanted)
-        except NotConverged as error:
-            rise = _SHRINK * (wanted - now.pressure)
-            if rise < _SMALLEST * case.rubber.elastic_modulus:
-                raise NotConverged(f'case {case.name}: no equilibrium at {wanted:.6g} Pa: {error}') from None
-            before = now  # next time no guess, but a start from where it is
-            continue
-        if after.newton_steps - now.newton_steps <= _EASY:
-            rise = max(rise, _GROW * (wanted - now.pressure))
-        before, now = now, after
-    return _March(before, now, rise)
-
-
-def _step(model: Model, free: Assembly, before: Loaded, now: Loaded, pressure: float) -> Loaded:
-    """One load step, from a guess that goes on as the last one went."""
-    wetted = wetted_nodes(now.surroundings, outline(model, now.state))
-    surroundings = now.surroundings._replace(pressure=pressure, wetted=wetted)
-    start = now.state
-    if before.pressure < now.pressure:
-        ahead = (pressure - now.pressure) / (now.pressure - before.pressure)
-        change = now.state.displacement - before.state.displacement
-        start = now.state._replace(displacement=now.state.displacement + ahead * change)
-    state, steps = solve(model, free, surroundings, start)
-    return Loaded(pressure, surroundings, state, now.newton_steps + steps)
-
-
 def wetted_nodes(surroundings: Surroundings, position: FloatArray) -> BoolArray:
     """Nodes of the outline between the highest contact stresses on rod and gland, on the upstream side, shape (s,)."""
     stresses = wall_stresses(surroundings, position)
@@ -187,17 +152,61 @@ def wetted_nodes(surroundings: Surroundings, position: FloatArray) -> BoolArray:
     return wetted
 
 
+def _held(model: Model) -> tuple[int]:
+    """Axial displacement of one node in the middle, which carries no load while the ring is squeezed evenly."""
+    return (2 * int(np.argmin(np.linalg.norm(model.mesh.nodes - model.mesh.nodes.mean(axis=0), axis=1))) + 1,)
+
+
+def _raised(
+    case: OringCase, model: Model, free: Assembly, now: Loaded, target: float, rise: float
+) -> tuple[Loaded, float]:
+    """The ring under another pressure, and the rise of pressure [Pa] that is good for the next step."""
+
+    def rising(share: float, state: State) -> Surroundings:
+        wetted = wetted_nodes(now.surroundings, outline(model, state))
+        return now.surroundings._replace(pressure=now.pressure + share * (target - now.pressure), wetted=wetted)
+
+    way = abs(target - now.pressure)
+    try:
+        reached = follow(model, free, rising, now.state, min(rise / way, 1.0))
+    except NotConverged as error:
+        raise NotConverged(
+            f'case {case.name}: no equilibrium on the way from {now.pressure:.6g} to {target:.6g} Pa: {error}'
+        ) from None
+    newton_steps = now.newton_steps + reached.newton_steps
+    return Loaded(target, reached.surroundings, reached.state, newton_steps), reached.stride * way
+
+
+def _held_back(case: OringCase, model: Model, free: Assembly, loaded: Loaded) -> Loaded:
+    """Add the friction of rod and gland to a ring that is under pressure."""
+    if case.wall_friction == 0.0:
+        return loaded
+
+    def rubbing(share: float, _: State) -> Surroundings:
+        return loaded.surroundings._replace(friction=share * case.wall_friction)
+
+    try:
+        reached = follow(model, free, rubbing, loaded.state, _FRICTION_STRIDE)
+    except NotConverged as error:
+        raise NotConverged(
+            f'case {case.name}: no equilibrium at {loaded.pressure:.6g} Pa with wall_friction = {case.wall_friction}: '
+            f'{error}'
+        ) from None
+    return Loaded(loaded.pressure, reached.surroundings, reached.state, loaded.newton_steps + reached.newton_steps)
+
+
 def _check_sealed(case: OringCase, model: Model, now: Loaded) -> None:
-    highest = wall_stresses(now.surroundings, outline(model, now.state))[:, : GLAND + 1].max(axis=0)
-    for name, stress in zip(('rod', 'gland'), highest, strict=True):
-        if stress <= now.pressure:
+    highest = wall_stresses(now.surroundings, outline(model, now.state)).max(axis=0)
+    for name, wall in (('rod', ROD), ('gland', GLAND)):
+        if highest[wall] <= now.pressure:
             raise ValueError(
-                f'case {case.name}: at {now.pressure:.6g} Pa the fluid passes the ring at the {name}: the contact stress '
-                f'reaches {stress:.6g} Pa only'
+                f'case {case.name}: at {now.pressure:.6g} Pa the fluid passes the ring at the {name}: the contact '
+                f'stress there reaches {highest[wall]:.6g} Pa only'
             )
 
 
-def _around(case: OringCase, model: Model) -> Surroundings:
+def _walls(case: OringCase, model: Model) -> Surroundings:
+    """Rod and gland in place, no fluid, no downstream wall."""
     geometry, elastic_modulus = case.geometry, case.rubber.elastic_modulus
     return Surroundings(
         rod_radius=geometry.rod_diameter / 2.0,
@@ -207,19 +216,13 @@ def _around(case: OringCase, model: Model) -> Surroundings:
         wetted=np.zeros(len(model.mesh.surface), dtype=bool),
         penalty=case.numerics.penalty * elastic_modulus / geometry.section_diameter,
         transition=case.numerics.transition * elastic_modulus,
-        rod_friction=case.rod_friction,
-        gland_friction=case.gland_friction,
     )
 
 
-def _fitted(case: OringCase, model: Model) -> FloatArray:
-    """Displacements to start the squeeze from: the free ring drawn straight into the gap, its volume kept."""
-    geometry = case.geometry
-    gap = (geometry.gland_diameter - geometry.rod_diameter) / 2.0
-    r, z = model.mesh.nodes.T
-    thinner = gap / geometry.section_diameter
-    wider = (geometry.rod_diameter + gap) / (geometry.ring_inner_diameter + geometry.section_diameter)
-    inner = geometry.rod_diameter / 2.0
-    fitted = np.stack((inner + (r - geometry.ring_inner_diameter / 2.0) * thinner, z / (thinner * wider)), axis=1)
-    displacement: FloatArray = (fitted - model.mesh.nodes).ravel()
-    return displacement
+def _drawn_along(model: Model, state: State, before: Surroundings, after: Surroundings) -> State:
+    """A guess for moved walls: the ring drawn straight along with them, its volume kept as far as that goes."""
+    r, z = (model.mesh.nodes + state.displacement.reshape(-1, 2)).T
+    thinner = (after.gland_radius - after.rod_radius) / (before.gland_radius - before.rod_radius)
+    wider = (after.gland_radius + after.rod_radius) / (before.gland_radius + before.rod_radius)
+    drawn = np.stack((after.rod_radius + (r - before.rod_radius) * thinner, z / (thinner * wider)), axis=1)
+    return state._replace(displacement=(drawn - model.mesh.nodes).ravel())

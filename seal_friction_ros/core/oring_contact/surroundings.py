@@ -45,10 +45,8 @@ class Surroundings(NamedTuple):
     """kappa [Pa/m]"""
     transition: float
     """delta [Pa]"""
-    rod_friction: float = 0.0
-    """axial traction of the rod on the ring over their contact stress [-], positive downstream"""
-    gland_friction: float = 0.0
-    """the same of the gland"""
+    friction: float = 0.0
+    """axial traction of rod and gland on the ring, upstream, over their share of q [-]"""
 
 
 class SurfacePressure(NamedTuple):
@@ -106,17 +104,17 @@ def surface_forces(surroundings: Surroundings, position: FloatArray) -> SurfaceF
     by_node = radius[:, None, None] * normal[:, :, None] * total_rows[:, None, :]
     by_node[:, :, 0] += total[:, None] * normal
     by_normal = (radius * total)[:, None, None] * np.eye(2)
-    for wall, friction in ((ROD, surroundings.rod_friction), (GLAND, surroundings.gland_friction)):
-        if friction:  # axial traction mu w q on the length of n; the balance takes minus the force
-            share = shares[:, 1 + wall]
-            stress = -friction * share * total
-            share_rows = share[:, None] * (walls[wall] - total_rows) / surroundings.transition
-            stress_rows = -friction * (share_rows * total[:, None] + share[:, None] * total_rows)
-            length = np.linalg.norm(normal, axis=1)
-            force[:, 1] += radius * stress * length
-            by_node[:, 1, :] += (radius * length)[:, None] * stress_rows
-            by_node[:, 1, 0] += stress * length
-            by_normal[:, 1, :] += (radius * stress / length)[:, None] * normal
+    if surroundings.friction:  # traction -mu w q along z on the length of n; the balance takes minus the force
+        share = shares[:, 1 + ROD] + shares[:, 1 + GLAND]
+        stress = surroundings.friction * share * total
+        leaning = shares[:, [1 + ROD, 1 + GLAND]] @ walls[[ROD, GLAND]]
+        share_rows = (leaning - share[:, None] * total_rows) / surroundings.transition
+        stress_rows = surroundings.friction * (share_rows * total[:, None] + share[:, None] * total_rows)
+        length = np.linalg.norm(normal, axis=1)
+        force[:, 1] += radius * stress * length
+        by_node[:, 1, :] += (radius * length)[:, None] * stress_rows
+        by_node[:, 1, 0] += stress * length
+        by_normal[:, 1, :] += (radius * stress / length)[:, None] * normal
     by_neighbour = 0.5 * by_normal @ _TURN
     stiffness = np.concatenate((-by_neighbour, by_node, by_neighbour), axis=2)
     return SurfaceForces(2.0 * np.pi * force, 2.0 * np.pi * stiffness)
