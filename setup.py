@@ -22,6 +22,7 @@ setup(
         shared('config', '*.yaml'),
         shared('config/seals', '*.yaml'),
         shared('config/rigs', '*.yaml'),
+        shared('config/oring', '*.yaml'),
         shared('data/thesis', '*.csv'),
     ],
     package_data={NAME: ['py.typed']},

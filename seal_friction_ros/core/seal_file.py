@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from seal_friction_ros.core.coulomb import CoulombLaw, MountedSeal, PhysicsBased, PriorArtChart, Seal, Uncertainty
-from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction_coefficient import CoefficientTable, FrictionCoefficientLaw, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.validated import from_mapping, plain
@@ -58,7 +58,7 @@ def parse_seal(document: Any) -> Seal:
         law = PhysicsBased(
             geometry,
             _law(document, 'normal_force', NORMAL_FORCE_LAWS, where),
-            _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where),
+            parse_friction_coefficient(document, where),
         )
     else:
         law = from_mapping(PriorArtChart, document.get('chart'), f'{where}: chart', geometry=geometry)
@@ -66,6 +66,16 @@ def parse_seal(document: Any) -> Seal:
     pressure_min, pressure_max = _range(document, where)
     numbers = {'pressure_min': pressure_min, 'pressure_max': pressure_max, 'stiction': document.get('stiction', 0.0)}
     return from_mapping(Seal, numbers, where, name=name, coulomb_law=law, uncertainty=uncertainty)
+
+
+def parse_friction_coefficient(document: Mapping[str, Any], where: str) -> FrictionCoefficientLaw:
+    """Law under ``friction_coefficient`` of a document; ``where`` says what the document is, for the error message.
+
+    Raises:
+        ValueError: There is none, or it makes no sense.
+    """
+    law: FrictionCoefficientLaw = _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where)
+    return law
 
 
 def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:

@@ -85,6 +85,21 @@ def _charts(arguments: argparse.Namespace) -> int:
     return _tell(arguments, write_seal_charts(path, arguments.out), f'{arguments.out}: written')
 
 
+def _oring(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.files import config_path
+    from seal_friction_ros.offline.oring import check_new, compute_case, write_seal_file
+    from seal_friction_ros.offline.oring_report import numbers_text, write_oring_report
+
+    if arguments.out:
+        check_new(arguments.out)
+    computed = compute_case(config_path('oring', arguments.case), arguments.pressures)
+    if arguments.out:
+        write_seal_file(computed, arguments.out)
+    if arguments.report:
+        write_oring_report(computed, arguments.report)
+    return _tell(arguments, computed.summary, numbers_text(computed))
+
+
 def _counts(counts: dict[str, int]) -> Iterable[str]:
     return [f'{name} {count}' for name, count in counts.items()]
 
@@ -159,6 +174,20 @@ def make_parser() -> argparse.ArgumentParser:
     report.add_argument('--namespace', default='', help='look only at topics below it')
     charts = _add(commands, 'charts', _charts, 'a page with the curves of a seal file, PNG and SVG beside it')
     charts.add_argument('seal', help='seal file: a path, or the name of one in config/seals')
+    oring = _add(commands, 'oring', _oring, 'contact stress and normal force of an O-ring, by finite elements')
+    oring.add_argument('case', metavar='CASE', help='case file: a path, or the name of one in config/oring')
+    oring.add_argument(
+        '--pressures',
+        type=float,
+        nargs='+',
+        default=(),
+        metavar='PA',
+        help='gauge pressures, instead of those in the file',
+    )
+    oring.add_argument('--out', type=Path, metavar='SEAL.yaml', help='write a seal file; must not exist')
+    oring.add_argument(
+        '--report', type=Path, metavar='FILE.html', help='write a page with figures, PNG and SVG beside it'
+    )
     for page in (report, charts):
         page.add_argument('--out', type=Path, required=True, metavar='FILE.html')
     return parser

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.material import Rubber
@@ -55,8 +56,8 @@ class Numerics:
 class OringCase:
     """A ring in its gland.
 
-    ``wall_friction`` holds the ring back, at rod and gland alike, as where rising pressure has pushed it towards the wall;
-    without pressure there is none. The known cases have none at all: it is there to show what it would change.
+    ``wall_friction`` holds the ring back, at rod and gland alike, as where rising pressure has pushed it towards the
+    wall; without pressure there is none. The known cases have none at all: it is there to show what it would change.
 
     Raises:
         ValueError: A number is out of bounds, the ring is not squeezed, or its rubber does not fit in the gland.
@@ -66,7 +67,7 @@ class OringCase:
     geometry: SealGeometry
     groove: Groove
     rubber: Rubber
-    numerics: Numerics = Numerics()  # noqa: RUF009  (frozen)
+    numerics: Numerics = Numerics()
     wall_friction: float = parameter(
         0.0, unit='1', lower=0.0, upper=0.5, description='Traction of rod and gland on the ring over contact stress.'
     )
@@ -123,11 +124,11 @@ def check_pressures(case: OringCase, pressures: tuple[float, ...]) -> None:
     for pressure in pressures:
         if not (math.isfinite(pressure) and pressure >= 0.0):
             raise ValueError(f'case {case.name}: pressure {pressure} Pa is not a gauge pressure of 0 or more')
-    if any(high <= low for low, high in zip(pressures, pressures[1:], strict=False)):
+    if any(high <= low for low, high in pairwise(pressures)):
         raise ValueError(f'case {case.name}: pressures {list(pressures)} Pa do not increase')
     limit = extrusion_pressure(case.groove.diametral_clearance, case.rubber.elastic_modulus)
     if pressures[-1] > limit:
         raise ValueError(
-            f'case {case.name}: a pressure of {pressures[-1]:.6g} Pa extrudes the ring through a diametral clearance of '
-            f'{case.groove.diametral_clearance} m: up to {limit:.3g} Pa without a back-up ring'
+            f'case {case.name}: a pressure of {pressures[-1]:.6g} Pa extrudes the ring through a diametral clearance '
+            f'of {case.groove.diametral_clearance} m: up to {limit:.3g} Pa without a back-up ring'
         )

@@ -114,5 +114,6 @@ def strain_energy(elements: Elements, rubber: Rubber, gradient: FloatArray) -> f
 
 def volume_ratios(elements: Elements, gradient: FloatArray) -> FloatArray:
     """Theta of each element [-], shape (e,)."""
-    volume: FloatArray = (elements.weights * volume_response(gradient).energy).sum(axis=1)
-    return volume / elements.weights.sum(axis=1)
+    volume = (elements.weights * volume_response(gradient).energy).sum(axis=1)
+    ratio: FloatArray = volume / elements.weights.sum(axis=1)
+    return ratio

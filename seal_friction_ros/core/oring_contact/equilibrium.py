@@ -18,8 +18,8 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.mesh import Mesh
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings, outline_freedoms, surface_forces
 
-TOLERANCE = 1e-8
-"""Largest force out of balance at a node as a share of E d^2 (own choice)."""
+TOLERANCE = 1e-9
+"""Largest force out of balance at a node as a share of 2 pi R E d (own choice)."""
 MAX_ITERATIONS = 25
 """Newton steps before giving up (own choice: good load steps take 3 to 8)."""
 _SHORTEST_STEP = 1.0 / 64.0  # of Newton's, before a fold is taken for final
@@ -37,7 +37,7 @@ class Model(NamedTuple):
     elements: Elements
     rubber: Rubber
     force_scale: float
-    """E d^2 [N]: forces out of balance are small against it"""
+    """2 pi R E d, R the radius of the ring [N]: forces out of balance are small against it"""
     guide: tuple[int, int]
     """nodes between which the guide against rolling acts, side by side over r"""
     guide_stiffness: float
@@ -93,9 +93,8 @@ def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float
     center = mesh.nodes.mean(axis=0)
     quarter = np.array([section_diameter / 4.0, 0.0])
     inner, outer = (int(np.argmin(np.linalg.norm(mesh.nodes - center - side * quarter, axis=1))) for side in (-1, 1))
-    scale = rubber.elastic_modulus * section_diameter**2
-    stiffness = guide * 2.0 * np.pi * center[0] * rubber.elastic_modulus
-    return Model(mesh, make_elements(mesh), rubber, scale, (inner, outer), float(stiffness))
+    per_length = float(2.0 * np.pi * center[0] * rubber.elastic_modulus)
+    return Model(mesh, make_elements(mesh), rubber, per_length * section_diameter, (inner, outer), guide * per_length)
 
 
 def at_rest(model: Model, displacement: FloatArray | None = None) -> State:
@@ -136,7 +135,8 @@ def balance(model: Model, surroundings: Surroundings, state: State) -> Balance |
         return None
     inner = element_forces(model.elements, model.rubber, gradient, state.tension)
     outer = surface_forces(surroundings, outline(model, state))
-    residual = np.bincount(model.elements.freedoms.ravel(), inner.force.ravel(), len(state.displacement))
+    count = len(state.displacement)
+    residual: FloatArray = np.bincount(model.elements.freedoms.ravel(), inner.force.ravel(), count).astype(float)
     residual.reshape(-1, 2)[model.mesh.surface] += outer.force
     low, high = (2 * node + 1 for node in model.guide)
     pull = model.guide_stiffness * (state.displacement[high] - state.displacement[low])
@@ -179,7 +179,7 @@ def solve(model: Model, assembly: Assembly, surroundings: Surroundings, start: S
         except RuntimeError as error:
             raise NotConverged(f'the stiffness is singular: {error}') from None
         state, now = _take(model, surroundings, state, now, assembly.free, factors.solve(residual))
-    raise NotConverged(f'{imbalance:.1e} E d^2 out of balance after {MAX_ITERATIONS} Newton steps')
+    raise NotConverged(f'{imbalance:.1e} 2 pi R E d out of balance after {MAX_ITERATIONS} Newton steps')
 
 
 def _take(

@@ -17,8 +17,8 @@ def extrusion_pressure(diametral_clearance: float, elastic_modulus: float) -> fl
     """Highest pressure [Pa, gauge] without a back-up ring.
 
     A straight line of log pressure over clearance between the values of the table, continued beyond its ends, and
-    between the hardnesses of the table; a softer rubber counts as 70 Shore A less in proportion to its modulus, a harder
-    one than 90 as 90.
+    between the hardnesses of the table; a softer rubber counts as 70 Shore A less in proportion to its modulus, one
+    harder than 90 as 90.
 
     Args:
         diametral_clearance: Difference of the diameters between which the ring could creep [m].
@@ -33,7 +33,7 @@ def extrusion_pressure(diametral_clearance: float, elastic_modulus: float) -> fl
         return soft * elastic_modulus / at_70
     hard = _limit(_CLEARANCES[90.0], diametral_clearance)
     share = (min(hardness_of_elastic_modulus(elastic_modulus), 90.0) - 70.0) / 20.0
-    return soft ** (1.0 - share) * hard**share
+    return math.exp((1.0 - share) * math.log(soft) + share * math.log(hard))
 
 
 def _limit(clearances: tuple[float, ...], clearance: float) -> float:

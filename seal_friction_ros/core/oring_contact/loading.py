@@ -33,6 +33,7 @@ from seal_friction_ros.core.seal import projected_area
 
 _SOFTER = 100.0  # walls while the ring is squeezed: their penalty is this much smaller
 _SQUEEZE_STRIDE, _STIFFEN_STRIDE, _FRICTION_STRIDE = 1.0, 0.5, 0.1  # parts of their ways to try first
+_DRY = 0.1  # transition without fluid, where there is nothing to tell contact from, over that with it
 _SEATING = 1e-3  # depth of the ring in the wall when it is seated, over d
 
 
@@ -131,7 +132,10 @@ def seat(case: OringCase, model: Model, free: Assembly, squeezed: Loaded) -> Loa
         NotConverged: No equilibrium was found.
     """
     top = float(outline(model, squeezed.state)[:, 1].max())
-    wall = squeezed.surroundings._replace(wall_position=top - _SEATING * case.geometry.section_diameter)
+    wall = squeezed.surroundings._replace(
+        wall_position=top - _SEATING * case.geometry.section_diameter,
+        transition=case.numerics.transition * case.rubber.elastic_modulus,
+    )
     try:
         state, steps = solve(model, make_assembly(model, _held(model)), wall, squeezed.state)
         position = outline(model, state)
@@ -215,7 +219,7 @@ def _walls(case: OringCase, model: Model) -> Surroundings:
         pressure=0.0,
         wetted=np.zeros(len(model.mesh.surface), dtype=bool),
         penalty=case.numerics.penalty * elastic_modulus / geometry.section_diameter,
-        transition=case.numerics.transition * elastic_modulus,
+        transition=_DRY * case.numerics.transition * elastic_modulus,
     )
 
 

@@ -149,8 +149,9 @@ def volume_response(gradient: FloatArray) -> Response:
 
 
 def _cofactor(plane: FloatArray) -> FloatArray:
-    """d D / d F of (rr, rz, zr, zz), shape (..., 4)."""
-    return plane[..., ::-1] * np.array([1.0, -1.0, -1.0, 1.0])
+    """Derivative of D by F, of (rr, rz, zr, zz), shape (..., 4)."""
+    cofactor: FloatArray = plane[..., ::-1] * np.array([1.0, -1.0, -1.0, 1.0])
+    return cofactor
 
 
 def von_mises_stress(rubber: Rubber, gradient: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """Mesh of the ring section: an O-grid of quadrilaterals, a square core inside layers that follow the circle."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ ROUNDING = 0.4
 LAYER_RATIO = 0.5
 """Thickness of the outermost layer as a share of the innermost one (own choice: the contact is at the surface)."""
 CROWDING = 0.4
-"""Share by which edges in the middle of the sides are shorter than even ones (own choice: the fluid's edge is there)."""
+"""Share by which edges in the middle of sides are shorter than even ones (own choice: the fluid's edge is there)."""
 AXIAL_SHARE = 0.6
 """Edges facing the wall over those facing the rod (own choice: what is to be known precisely is at rod and gland)."""
 
@@ -54,7 +55,7 @@ def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
     for layer, fraction in enumerate(share / share[-1]):
         nodes.append((1.0 - fraction) * position[around] + fraction * circle)
         rows.append(len(position) + layer * len(around) + np.arange(len(around)))
-    blocks = [_quadrilaterals(index), *(_ring(a, b) for a, b in zip(rows[:-1], rows[1:], strict=True))]
+    blocks = [_quadrilaterals(index), *(_ring(a, b) for a, b in pairwise(rows))]
     center = np.array([center_radius, 0.0])
     return Mesh(center + section_diameter / 2.0 * np.concatenate(nodes), np.concatenate(blocks), rows[-1])
 

@@ -138,8 +138,8 @@ def _contact(loaded: Loaded, position: FloatArray, wall: int) -> Contact:
 def _edge(where: FloatArray, above: FloatArray) -> float:
     """Where contact begins, just outside the first node in it [m].
 
-    Near its edge a contact stress rises, from the fluid's pressure on, with the root of the distance [Johnson1985]_: its
-    square is carried on in a straight line, by one spacing of the nodes at most.
+    Near its edge a contact stress rises, from the fluid's pressure on, with the root of the distance [Johnson1985]_:
+    its square is carried on in a straight line, by one spacing of the nodes at most.
     """
     if len(where) < 2:
         return float(where[0])

@@ -4,15 +4,16 @@ r"""What presses on the ring from outside: rigid walls and fluid, as one pressur
     \mathrm{smax}(a_i) = \delta \ln \sum_i e^{a_i / \delta}
 
 g is how deep a point of the surface is inside a wall, kappa the penalty stiffness, and p the fluid pressure on the
-upstream side, 0 on the other. So fluid enters wherever the contact stress falls below its pressure. A hard maximum makes
-Newton's method jump to and fro, and lets the edge of the fluid move by whole nodes; the smooth one differs from it within
-a few delta. What the walls take is q less the fluid's share of p, the contact stress; share is the derivative of smax:
+upstream side, 0 on the other. So fluid enters wherever the contact stress falls below its pressure. A hard maximum
+makes Newton's method jump to and fro, and lets the edge of the fluid move by whole nodes; the smooth one differs from
+it within a few delta. What the walls take is q less the fluid's share of p: the contact stress. A share is the
+derivative of smax:
 
 .. math:: \sigma = q - w_p\,p, \quad w_i = e^{(a_i - q) / \delta}
 
-The pressure acts along the normal of the deformed surface and on its deformed area (a follower load), so the axial forces
-of fluid and wall balance by themselves. It is sampled at the nodes, each standing for the surface halfway to its two
-neighbours: samples inside the edges would ask for more contact conditions than there are nodes to meet them.
+The pressure acts along the normal of the deformed surface and on its deformed area (a follower load), so the axial
+forces of fluid and wall balance by themselves. It is sampled at the nodes, each standing for the surface halfway to its
+two neighbours: samples inside the edges would ask for more contact conditions than there are nodes to meet them.
 
 All of it is our own choice.
 """
@@ -89,7 +90,7 @@ def wall_stresses(surroundings: Surroundings, position: FloatArray) -> FloatArra
 
 
 def node_areas(position: FloatArray) -> FloatArray:
-    """Outward normal of the surface that each node of the outline stands for, as long as its area [m^2], shape (s, 2)."""
+    """Outward normal of the surface that each node stands for, as long as its area [m^2], shape (s, 2)."""
     return 2.0 * np.pi * position[:, :1] * _normals(position)
 
 
@@ -128,4 +129,5 @@ def outline_freedoms(surface: IntArray) -> IntArray:
 
 def _normals(position: FloatArray) -> FloatArray:
     tangent = 0.5 * (np.roll(position, -1, axis=0) - np.roll(position, 1, axis=0))
-    return tangent @ _TURN.T
+    normal: FloatArray = tangent @ _TURN.T
+    return normal
