@@ -13,6 +13,9 @@ from seal_friction_ros.core.coulomb import PriorArtChart, Uncertainty
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
+from seal_friction_ros.core.oring_contact.case_file import Measured
+from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.nodes.parameters import NodeOptions
@@ -29,6 +32,11 @@ RECORDS = (
     CoefficientTable,
     PriorArtChart,
     Uncertainty,
+    Groove,
+    Rubber,
+    Numerics,
+    OringCase,
+    Measured,
 )
 
 

@@ -29,7 +29,9 @@ class Groove:
 
 @dataclass(frozen=True)
 class Numerics:
-    """How finely it is computed; the defaults converge the normal force to 1 %.
+    """How finely it is computed. Defaults of ``lines`` and ``penalty`` converge the normal force to 1 %.
+
+    ``transition`` is a choice: a sharp one gives some 3 % more normal force under pressure, see docs/oring.md.
 
     Raises:
         ValueError: A number is out of bounds.
@@ -69,7 +71,7 @@ class OringCase:
     rubber: Rubber
     numerics: Numerics = Numerics()
     wall_friction: float = parameter(
-        0.0, unit='1', lower=0.0, upper=0.5, description='Traction of rod and gland on the ring over contact stress.'
+        0.0, unit='1', lower=0.0, upper=0.1, description='Traction of rod and gland on the ring over contact stress.'
     )
 
     def __post_init__(self) -> None:
