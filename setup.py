@@ -21,6 +21,8 @@ setup(
         ('share/' + NAME, ['package.xml']),
         shared('config', '*.yaml'),
         shared('config/seals', '*.yaml'),
+        shared('config/programs', '*.yaml'),
+        shared('config/security', '*.xml'),
         shared('config/rigs', '*.yaml'),
         shared('config/oring', '*.yaml'),
         shared('data/thesis', '*.csv'),
@@ -36,6 +38,7 @@ setup(
         'console_scripts': [
             'seal_friction = seal_friction_ros.offline.cli:run_and_exit',
             'friction_estimator = seal_friction_ros.nodes.friction_estimator:main',
+            'servo_simulator = seal_friction_ros.nodes.servo_simulator:main',
             'bag_player = seal_friction_ros.nodes.bag_player:main',
         ],
     },

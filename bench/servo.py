@@ -9,12 +9,9 @@ import argparse
 import json
 import time
 
-from seal_friction_ros.core.compiled import COMPILED
-from seal_friction_ros.core.configuration import SealSelection
-from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.reference import Sine
 from seal_friction_ros.core.servo import ServoParameters, init, simulate, step
-from seal_friction_ros.files import load_configuration
+from seal_friction_ros.files import default_configuration
 
 INNER_STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)  # [s]
 PERIOD = 1e-3  # [s]
@@ -43,16 +40,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--json', action='store_true', help='print JSON')
     arguments = parser.parse_args()
-    seals = load_configuration(SealSelection(), EstimatorSettings()).parameters().seals
+    seals = default_configuration().parameters().estimator.seals
     rows = []
     for inner_step in INNER_STEPS:
         servo = ServoParameters(seals=seals, inner_step=inner_step, control_period=PERIOD)
-        by_step, by_simulate = factors(servo, 5.0 if COMPILED else 0.5)
+        by_step, by_simulate = factors(servo, 5.0)
         rows.append({'inner_step': inner_step, 'step': by_step, 'simulate': by_simulate})
     if arguments.json:
-        print(json.dumps({'compiled': COMPILED, 'control_period': PERIOD, 'rows': rows}))
+        print(json.dumps({'control_period': PERIOD, 'rows': rows}))
         return
-    print(f'{"compiled (numba)" if COMPILED else "plain Python"}, sample {PERIOD * 1e3:g} ms; times real time')
+    print(f'sample {PERIOD * 1e3:g} ms; times real time')
     print(f'{"inner step":>12} {"step":>9} {"simulate":>9}')
     for row in rows:
         print(f'{row["inner_step"] * 1e6:>9.0f} us {row["step"]:>9.1f} {row["simulate"]:>9.1f}')

@@ -15,12 +15,11 @@ from rich.table import Table
 from rich.text import Text
 
 from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import SealSelection
-from seal_friction_ros.core.estimator import EstimatorSettings, init, step
-from seal_friction_ros.core.held_inputs import HeldInputs
-from seal_friction_ros.core.records import Force, Pressure
-from seal_friction_ros.core.wire import Velocity
-from seal_friction_ros.files import load_configuration
+from seal_friction_ros.core.estimator import step
+from seal_friction_ros.core.pipeline import encoded, init, receive
+from seal_friction_ros.core.records import Force, Pressure, RodSample
+from seal_friction_ros.core.wire import ServoReference, Velocity
+from seal_friction_ros.files import default_configuration
 
 CALLS = 2000
 BATCHES = 15
@@ -28,20 +27,24 @@ BATCHES = 15
 
 def stages() -> dict[str, Callable[[], object]]:
     """Each stage of the live path but ROS's own, as a function without arguments."""
-    parameters = load_configuration(SealSelection(), EstimatorSettings()).parameters()
-    state = init(parameters)
-    held = HeldInputs(Pressure(1, 3e6, 1e6), Force(1, 20.0))
-    sample = held.rod_sample(1, 0.1)
-    _, estimate = step(parameters, state, sample)
-    velocity_bytes = wire.encode_velocity(Velocity(1, 0.1, b'rod'))
-    pressure_bytes = wire.encode_pressure(Pressure(1, 3e6, 1e6), b'rod')
+    parameters = default_configuration().parameters()
+    pressure, force, velocity = Pressure(1, 3e6, 1e6), Force(1, 20.0), Velocity(1, 0.1, b'rod')
+    sample = RodSample(1, 0.1, pressure, force)
+    alone = init(parameters)._replace(pressure=pressure, force=force)
+    guided = alone._replace(reference=ServoReference(1, 0.0, 0.1, 0.0))
+    _, answer = receive(parameters, alone, velocity)
+    _, both = receive(parameters, guided, velocity)
+    velocity_bytes, pressure_bytes = wire.encode_velocity(velocity), wire.encode_pressure(pressure, b'rod')
     return {
         'bare call': lambda: None,
         'decode pressure': lambda: wire.decode_pressure(pressure_bytes),
         'decode velocity': lambda: wire.decode_velocity(velocity_bytes),
-        'hold and sample': lambda: held.rod_sample(1, 0.1),
-        'step': lambda: step(parameters, state, sample),
-        'encode estimate': lambda: wire.encode_estimate(estimate, b'rod'),
+        'receive pressure': lambda: receive(parameters, alone, pressure),
+        'estimator step': lambda: step(parameters.estimator, alone.estimator, sample),
+        'receive velocity': lambda: receive(parameters, alone, velocity),
+        'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity),
+        'encode estimate': lambda: [*encoded(answer)],
+        'encode estimate and feed-forward': lambda: [*encoded(both)],
     }
 
 

@@ -4,11 +4,10 @@ import math
 from pathlib import Path
 
 from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import Configuration, SealSelection, Snapshot, snapshot_text
-from seal_friction_ros.core.estimator import EstimatorSettings, init
-from seal_friction_ros.core.held_inputs import HeldInputs
+from seal_friction_ros.core.configuration import Configuration, SealSelection, first_snapshot, snapshot_text
+from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.records import Force, Pressure
-from seal_friction_ros.core.wire import Velocity
+from seal_friction_ros.core.wire import Position, ServoReference, Velocity
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline import bag as b
 
@@ -19,8 +18,7 @@ def write_inputs(path: Path, samples: int = 300, configuration: Configuration | 
     """A rod that goes to and fro at changing pressure, with rests, and a few inputs that are missing or not finite."""
     with b.BagWriter(path) as writer:
         if configuration is not None:
-            snapshot = Snapshot(configuration, init(configuration.parameters()), HeldInputs())
-            data = wire.encode_text(snapshot_text(snapshot))
+            data = wire.encode_text(snapshot_text(first_snapshot(configuration)))
             writer.write(b.CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, 0, data)
         for i in range(samples):
             stamp = 1_000_000_000 + i * STEP
@@ -30,6 +28,11 @@ def write_inputs(path: Path, samples: int = 300, configuration: Configuration | 
                 writer.write(b.PRESSURE_TOPIC, wire.PRESSURE_TYPE, stamp, wire.encode_pressure(pressure, b'rod'))
             force = Force(stamp, 60.0 * math.sin(i / 20 + 0.3))
             writer.write(b.FORCE_TOPIC, wire.FORCE_TYPE, stamp, wire.encode_force(force, b'rod'))
+            if 100 <= i < 200:
+                reference = ServoReference(stamp, 0.001 * i, velocity, 0.0, b'rod')
+                writer.write(b.REFERENCE_TOPIC, wire.REFERENCE_TYPE, stamp, wire.encode_reference(reference))
+            position = wire.encode_position(Position(stamp, 0.001 * i), b'rod')
+            writer.write(b.POSITION_TOPIC, wire.POSITION_TYPE, stamp, position)
             data = wire.encode_velocity(Velocity(stamp, velocity, b'rod'))
             writer.write(b.VELOCITY_TOPIC, wire.VELOCITY_TYPE, stamp, data)
     return path

@@ -11,6 +11,7 @@ import make_docs
 import pytest
 
 from seal_friction_ros.nodes.processes import free_domain, graph_environment
+from seal_friction_ros.offline.replay import replay
 
 ROOT = Path(__file__).parents[1]
 
@@ -76,6 +77,33 @@ def test_the_node_runs_as_the_readme_says_and_records(checkout: Path):
         _, errors = process.communicate(timeout=20.0)
     assert process.returncode == 0
     assert 'estimating' in errors
+
+
+def test_the_servo_on_the_desk_runs_as_the_readme_says_and_gets_its_feed_forward(checkout: Path):
+    environment = graph_environment(free_domain())
+    logs = [checkout / f'build/desk_{i}.log' for i in range(2)]
+    processes = []
+    try:
+        for command, log in zip(commands(' desk'), logs, strict=True):
+            words = (
+                command.replace('.venv/bin', str(ROOT / '.venv' / 'bin')).replace('build/bags', 'build/desk').split()
+            )
+            with log.open('w') as said:
+                processes.append(subprocess.Popen(words, cwd=checkout, env=environment, stderr=said))
+        deadline = time.monotonic() + 60.0
+        while 'simulating' not in logs[0].read_text():  # it compiles first
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        time.sleep(5.0)
+    finally:
+        for process in processes:
+            process.terminate()
+        codes = [process.wait(20.0) for process in processes]
+    assert codes == [0, 0]
+    (bag,) = (path.parent for path in checkout.glob('build/desk/*/metadata.yaml'))
+    verdict = replay(bag)
+    assert verdict.identical
+    assert verdict.recorded_feedforwards > 500
 
 
 def test_the_workspace_builds_and_runs_as_the_readme_says(checkout: Path):

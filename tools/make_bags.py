@@ -16,11 +16,13 @@ import yaml
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.records import Force, Pressure
-from seal_friction_ros.core.wire import Velocity
+from seal_friction_ros.core.wire import Position, ServoReference, Velocity
 from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.offline.bag import (
     FORCE_TOPIC,
+    POSITION_TOPIC,
     PRESSURE_TOPIC,
+    REFERENCE_TOPIC,
     VELOCITY_TOPIC,
     BagMessage,
     BagWriter,
@@ -44,7 +46,7 @@ def pull_test(folder: Path) -> Iterable[BagMessage]:
 
 
 def faults(folder: Path) -> Iterable[BagMessage]:
-    """A rod that goes to and fro while every fault that has a status bit comes and goes."""
+    """A rod that goes to and fro while every fault with a bit, of estimate or feed-forward, comes and goes."""
     del folder
     for i in range(600):
         stamp = SECOND + i * STEP
@@ -59,9 +61,16 @@ def faults(folder: Path) -> Iterable[BagMessage]:
         if i >= 8 and not 400 <= i < 430:
             force = Force(stamp, forces.get(i, 60.0 * math.sin(i / 30 + 0.3)))
             yield BagMessage(FORCE_TOPIC, wire.FORCE_TYPE, stamp, wire.encode_force(force, b'rod'))
-        late = stamp - 5 * STEP if i == 500 else stamp
-        data = wire.encode_velocity(Velocity(late, velocities.get(i, velocity), b'rod'))
-        yield BagMessage(VELOCITY_TOPIC, wire.VELOCITY_TYPE, stamp, data)
+        if i >= 20 and not 450 <= i < 480:
+            wanted = {230: math.nan, 240: math.inf}.get(i, velocity)
+            reference = ServoReference(stamp, 0.01 * math.sin(i / 30), wanted, 0.0, b'rod')
+            yield BagMessage(REFERENCE_TOPIC, wire.REFERENCE_TYPE, stamp, wire.encode_reference(reference))
+        position = wire.encode_position(Position(stamp, 0.01 * math.sin(i / 30 - 0.01)), b'rod')
+        yield BagMessage(POSITION_TOPIC, wire.POSITION_TYPE, stamp, position)
+        if not 530 <= i < 560:
+            late = stamp - 5 * STEP if i == 500 else stamp
+            data = wire.encode_velocity(Velocity(late, velocities.get(i, velocity), b'rod'))
+            yield BagMessage(VELOCITY_TOPIC, wire.VELOCITY_TYPE, stamp, data)
 
 
 def main() -> int:

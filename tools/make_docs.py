@@ -9,34 +9,64 @@ import sys
 from pathlib import Path
 
 from seal_friction_ros.core.configuration import SealSelection
-from seal_friction_ros.core.coulomb import PriorArtChart, Uncertainty
+from seal_friction_ros.core.coulomb import ConstantCoulomb, PressurePowerLaw, PriorArtChart, Uncertainty, VelocityTerms
 from seal_friction_ros.core.estimator import EstimatorSettings
+from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
 from seal_friction_ros.core.oring_contact.case_file import Measured
 from seal_friction_ros.core.oring_contact.material import Rubber
+from seal_friction_ros.core.reference import Chirp, PullTest, Sine, Step, Trapezoid
 from seal_friction_ros.core.seal import SealGeometry
+from seal_friction_ros.core.sensors import SensorSettings
+from seal_friction_ros.core.servo_controller import ServoController
+from seal_friction_ros.core.servo_plant import Cylinder, Load, ServoValve
+from seal_friction_ros.core.signal_preparation import SavitzkyGolay, Sliding
+from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
+from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
 from seal_friction_ros.core.validated import meanings
-from seal_friction_ros.nodes.parameters import NodeOptions
+from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
+from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
 
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
     SealSelection,
     EstimatorSettings,
-    NodeOptions,
+    FeedForwardSettings,
+    TuningSettings,
+    MatchSettings,
+    StartOptions,
+    SimulatorSettings,
+    SensorSettings,
+    ServoValve,
+    Cylinder,
+    Load,
+    ServoController,
+    Sine,
+    Step,
+    Trapezoid,
+    Chirp,
+    PullTest,
+    RecordingOptions,
     SealGeometry,
     AreaDeformationGain,
     NormalForceTable,
     PowerLaw,
     CoefficientTable,
     PriorArtChart,
+    PressurePowerLaw,
+    ConstantCoulomb,
+    VelocityTerms,
     Uncertainty,
     Groove,
     Rubber,
     Numerics,
     OringCase,
     Measured,
+    SavitzkyGolay,
+    Sliding,
+    SpoolEvaluation,
 )
 
 

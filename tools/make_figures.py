@@ -12,6 +12,7 @@ from seal_friction_ros.offline.oring_report import write_oring_report
 from seal_friction_ros.offline.replay import replay
 from seal_friction_ros.offline.report import write_report
 from seal_friction_ros.offline.seal_charts import write_seal_charts
+from seal_friction_ros.offline.servo_charts import write_servo_charts
 
 FIGURES = Path(__file__).parents[1] / 'docs' / 'figures'
 
@@ -25,6 +26,7 @@ def main() -> int:
         write_report(folder / 'pull_test', folder / 'report.html')
         write_seal_charts(config_path('seals', 'ms28775_114'), folder / 'seal.html')
         write_oring_report(compute_case(config_path('oring', 'ms28775_114')), folder / 'oring.html')
+        write_servo_charts(folder / 'servo.html')
         FIGURES.mkdir(parents=True, exist_ok=True)
         for source, target in {
             'report_figures/live_estimate.png': 'live_estimate.png',
@@ -32,6 +34,7 @@ def main() -> int:
             'seal_figures/fig23_states_2_and_3.png': 'friction_states.png',
             'oring_figures/contact_stress_profiles.png': 'oring_contact_stress.png',
             'oring_figures/deformed_shape.png': 'oring_shape.png',
+            'servo_figures/fig25_servo_with_and_without_friction.png': 'fig25_servo_with_and_without_friction.png',
         }.items():
             shutil.copy(folder / source, FIGURES / target)
     return 0

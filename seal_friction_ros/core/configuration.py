@@ -6,15 +6,19 @@ So a bag carries what is needed to replay it, also when parameters changed on th
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings, EstimatorState
-from seal_friction_ros.core.held_inputs import HeldInputs
-from seal_friction_ros.core.records import Force, Pressure
+from seal_friction_ros.core.feedforward import FeedForwardSettings, FeedForwardState
+from seal_friction_ros.core.pipeline import PipelineParameters, PipelineState, init
+from seal_friction_ros.core.records import Force, FrictionEstimate, FrictionState, Pressure
 from seal_friction_ros.core.seal_file import mount_seals
 from seal_friction_ros.core.validated import check, from_mapping, parameter
+from seal_friction_ros.core.wire import ServoReference
+
+Record = TypeVar('Record')
 
 
 @dataclass(frozen=True)
@@ -58,38 +62,55 @@ class Configuration:
     selection: SealSelection
     seal_documents: tuple[Mapping[str, Any], ...]
     settings: EstimatorSettings
+    feedforward: FeedForwardSettings
 
-    def parameters(self) -> EstimatorParameters:
-        """Parameters of the estimator.
+    def parameters(self) -> PipelineParameters:
+        """Parameters of estimate and feed-forward.
 
         Raises:
             ValueError: A seal document makes no sense.
         """
-        return EstimatorParameters(self.settings, mount_seals(self.seal_documents, self.selection.seal_chambers))
+        seals = mount_seals(self.seal_documents, self.selection.seal_chambers)
+        return PipelineParameters(EstimatorParameters(self.settings, seals), self.feedforward)
 
 
 class Snapshot(NamedTuple):
-    """All that the next estimate depends on besides the inputs to come."""
+    """All that the next answer depends on besides the messages to come."""
 
     configuration: Configuration
-    state: EstimatorState
-    held: HeldInputs
+    state: PipelineState
+
+
+def first_snapshot(configuration: Configuration) -> Snapshot:
+    """Snapshot before the first message."""
+    return Snapshot(configuration, init(configuration.parameters()))
 
 
 def snapshot_text(snapshot: Snapshot) -> str:
     """Snapshot as JSON; equal ones give equal text. Measured values are hexadecimal, so also NaN and infinity pass."""
-    configuration, state, held = snapshot
+    configuration, state = snapshot
+    estimator, feedforward = state.estimator, state.feedforward
     document = {
         'selection': dataclasses.asdict(configuration.selection),
         'seal_documents': configuration.seal_documents,
         'settings': dataclasses.asdict(configuration.settings),
+        'feedforward': dataclasses.asdict(configuration.feedforward),
         'state': {
-            'stamp': state.stamp,
-            'at_rest': state.at_rest,
-            'pressure': _stamped_text(state.pressure),
-            'force': _stamped_text(state.force),
+            'estimator': {
+                'stamp': estimator.stamp,
+                'at_rest': estimator.at_rest,
+                'pressure': _text(estimator.pressure),
+                'force': _text(estimator.force),
+            },
+            'feedforward': {
+                'stamp': feedforward.stamp,
+                'values': _text((feedforward.force, feedforward.fade, feedforward.velocity)),
+                'estimate': _text(feedforward.estimate),
+            },
+            'pressure': _text(state.pressure),
+            'force': _text(state.force),
+            'reference': _text(state.reference[:4] if state.reference is not None else None),
         },
-        'held': {'pressure': _stamped_text(held.pressure), 'force': _stamped_text(held.force)},
     }
     return json.dumps(document, sort_keys=True, allow_nan=False)
 
@@ -106,25 +127,53 @@ def parse_snapshot(text: str) -> Snapshot:
             from_mapping(SealSelection, document['selection'], 'configuration: selection'),
             tuple(document['seal_documents']),
             from_mapping(EstimatorSettings, document['settings'], 'configuration: settings'),
+            from_mapping(FeedForwardSettings, document['feedforward'], 'configuration: feedforward'),
         )
-        state, held = document['state'], document['held']
-        stamp = None if state['stamp'] is None else int(state['stamp'])
-        usable = _parse_pressure(state['pressure']), _parse_force(state['force'])
-        if not all(math.isfinite(x) for sample in usable if sample is not None for x in sample[1:]):
-            raise ValueError('configuration: a pressure or force sum in use is not finite')
-        newest = _parse_pressure(held['pressure']), _parse_force(held['force'])
-        return Snapshot(configuration, EstimatorState(stamp, bool(state['at_rest']), *usable), HeldInputs(*newest))
+        state = document['state']
+        newest = (
+            _parse(Pressure, state['pressure']),
+            _parse(Force, state['force']),
+            _parse(ServoReference, state['reference']),
+        )
+        parsed = PipelineState(_parse_estimator(state['estimator']), _parse_feedforward(state['feedforward']), *newest)
+        return Snapshot(configuration, parsed)
     except (TypeError, LookupError, OverflowError, RecursionError) as error:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
 
-def _stamped_text(sample: Pressure | Force | None) -> list[int | str] | None:
-    return None if sample is None else [sample.stamp, *(float(value).hex() for value in sample[1:])]
+def _parse_estimator(state: Any) -> EstimatorState:
+    usable = _parse(Pressure, state['pressure']), _parse(Force, state['force'])
+    _check_finite(*usable)
+    return EstimatorState(_parse_stamp(state['stamp']), bool(state['at_rest']), *usable)
 
 
-def _parse_pressure(values: Any) -> Pressure | None:
-    return None if values is None else Pressure(int(values[0]), float.fromhex(values[1]), float.fromhex(values[2]))
+def _parse_feedforward(state: Any) -> FeedForwardState:
+    force, fade, velocity = map(float.fromhex, state['values'])
+    estimate = _parse(FrictionEstimate, state['estimate'])
+    if estimate is not None:
+        kind = FrictionState(int(estimate.state))
+        estimate = estimate._replace(state=kind, direction=int(estimate.direction), status=int(estimate.status))
+    _check_finite((0, force, fade, velocity), estimate)
+    return FeedForwardState(_parse_stamp(state['stamp']), force, fade, estimate, velocity)
 
 
-def _parse_force(values: Any) -> Force | None:
-    return None if values is None else Force(int(values[0]), float.fromhex(values[1]))
+def _check_finite(*samples: tuple[float, ...] | None) -> None:
+    if not all(math.isfinite(value) for sample in samples if sample is not None for value in sample):
+        raise ValueError('configuration: a number in the state is not finite')
+
+
+def _parse_stamp(stamp: Any) -> int | None:
+    return None if stamp is None else int(stamp)
+
+
+def _text(values: tuple[float, ...] | None) -> list[int | str] | None:
+    """Whole numbers as they are, others as hexadecimal text."""
+    return None if values is None else [int(v) if isinstance(v, int) else float(v).hex() for v in values]
+
+
+def _parse(record_type: Callable[..., Record], values: Any) -> Record | None:
+    """Named tuple from what `_text` made of it."""
+    if values is None:
+        return None
+    stamp, *rest = values
+    return record_type(int(stamp), *(float.fromhex(value) if isinstance(value, str) else int(value) for value in rest))

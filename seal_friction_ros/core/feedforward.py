@@ -3,9 +3,10 @@ r"""Estimate and reference velocity -> the force that cancels the seal friction 
 ``state = init(settings)``, then ``state, feedforward = step(settings, state, stamp, estimate, motion)``.
 
 .. math::
-    F = \tanh(v / w)\,[s_C f_c + s_S (f_b - f_c)\, e^{-|v / v_S|^\delta}] + s_V \sigma v
+    F = \tanh(v / w)\,[s_C f_c + s_S (f_b - f_c)\, e^{-|v / v_S|^\delta} + s_V f_v] + s_V \sigma v
 
-with v the reference velocity, seen ``lead_time`` ahead. It comes from the reference and not from the rod, so it closes
+with v the reference velocity, seen ``lead_time`` ahead, and f_v what the seals add at it by the velocity terms of their
+seal files (viscous, Stribeck, direction). It comes from the reference and not from the rod, so it closes
 no loop: too large a force makes an error, but no limit cycle. Scales below 1 leave some friction to the controller,
 which a wrong model needs. tanh is smooth through zero here, where it shapes a command; the friction itself
 is never smoothed.
@@ -23,6 +24,7 @@ from seal_friction_ros.core.records import FrictionEstimate, FrictionState, Stat
 from seal_friction_ros.core.validated import check, parameter
 
 FASTEST = 100.0  # [m/s] no rod is faster
+LONGEST_STEP = 0.02  # [s] after a longer gap, or a stamp that leaps, fade and slew go on as if this time had passed
 
 
 class Limited(IntFlag):
@@ -81,8 +83,15 @@ class FeedForwardSettings:
     estimate_timeout: float = parameter(
         0.1, unit='s', lower=1e-4, upper=60.0, description='An estimate older than this is not used.'
     )
+    reference_timeout: float = parameter(
+        0.1, unit='s', lower=1e-4, upper=60.0, description='A reference older than this is not used.'
+    )
     fade_time: float = parameter(
-        0.2, unit='s', lower=1e-4, upper=60.0, description='Time to fade out without a usable estimate, and back in.'
+        0.2,
+        unit='s',
+        lower=1e-4,
+        upper=60.0,
+        description='Time to fade out without a usable estimate or reference, and back in.',
     )
 
     def __post_init__(self) -> None:
@@ -98,6 +107,10 @@ class Motion(NamedTuple):
     """[m/s^2] for ``lead_time``; 0 if it is not known"""
     measured_velocity: float = 0.0
     """[m/s]"""
+    reference_age: float = 0.0
+    """[s] how long ago the reference was for"""
+    velocity_friction: float = 0.0
+    """[N] f_v, at `wanted_velocity`"""
 
 
 class FeedForwardState(NamedTuple):
@@ -111,6 +124,8 @@ class FeedForwardState(NamedTuple):
     """[-] 0: faded out, 1: not faded"""
     estimate: FrictionEstimate | None
     """last usable estimate"""
+    velocity: float
+    """[m/s] last usable velocity"""
 
 
 class FeedForward(NamedTuple):
@@ -129,7 +144,7 @@ class FeedForward(NamedTuple):
 def init(settings: FeedForwardSettings) -> FeedForwardState:
     """Before the first estimate: faded out."""
     del settings
-    return FeedForwardState(None, 0.0, 0.0, None)
+    return FeedForwardState(None, 0.0, 0.0, None, 0.0)
 
 
 def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
@@ -142,11 +157,14 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
     return not settings.use_measured_velocity or estimate.state != FrictionState.UNKNOWN
 
 
-def compensation(settings: FeedForwardSettings, estimate: FrictionEstimate, velocity: float) -> float:
-    """Force [N] for a velocity [m/s], before fade and limits: the equation at the head of this file."""
+def compensation(
+    settings: FeedForwardSettings, estimate: FrictionEstimate, velocity: float, velocity_friction: float = 0.0
+) -> float:
+    """Force [N] for a velocity [m/s] and f_v [N], before fade and limits: the equation at the head of this file."""
     stribeck = math.exp(-(abs(velocity / settings.stribeck_velocity) ** settings.stribeck_exponent))
     stiction = estimate.breakaway_force - estimate.coulomb_friction
     coulomb = settings.coulomb_scale * estimate.coulomb_friction + settings.stribeck_scale * stiction * stribeck
+    coulomb += settings.viscous_scale * velocity_friction
     viscous = settings.viscous_scale * settings.viscous_friction * velocity
     return math.tanh(velocity / settings.smoothing_velocity) * coulomb + viscous
 
@@ -160,27 +178,30 @@ def step(
 ) -> tuple[FeedForwardState, FeedForward]:
     """Feed-forward at one moment.
 
-    Without a usable estimate the last usable one is faded out over ``fade_time``; with one, the force fades in again.
-    Fade, then clamp, then slew: so the rate is bounded whatever happens.
+    Without a usable estimate and a usable velocity the last usable ones are faded out over ``fade_time``; with them the
+    force fades in again. Fade, then clamp, then slew: so the rate is bounded whatever happens.
 
     Args:
         settings: Settings.
         state: From `init` or the step before.
         stamp: Now [ns].
         estimate: Newest estimate; None while there is none.
-        motion: Reference and measured motion. What is not finite counts as standing still.
+        motion: Reference and measured motion. A velocity that is not finite is not usable.
     """
-    elapsed = 0.0 if state.stamp is None else max((stamp - state.stamp) * 1e-9, 0.0)
+    elapsed = 0.0 if state.stamp is None else min(max((stamp - state.stamp) * 1e-9, 0.0), LONGEST_STEP)
     good, valid = state.estimate, False
     if estimate is not None and usable(settings, estimate):
         good = estimate
         valid = abs(stamp - estimate.stamp) * 1e-9 <= settings.estimate_timeout
+    velocity = wanted_velocity(settings, motion)
+    if velocity is None:
+        velocity, valid = state.velocity, False
     change = elapsed / settings.fade_time
     first = valid and state.estimate is None and state.stamp is None
     fade = 1.0 if first else min(max(state.fade + (change if valid else -change), 0.0), 1.0)
 
     limited = int(Limited.FADE) if fade < 1.0 or not valid else 0
-    wanted = 0.0 if good is None else fade * compensation(settings, good, _velocity(settings, motion))
+    wanted = 0.0 if good is None else fade * compensation(settings, good, velocity, motion.velocity_friction)
     clamped = min(max(wanted, -settings.force_limit), settings.force_limit)
     if clamped != wanted:
         limited |= int(Limited.CLAMP)
@@ -188,12 +209,16 @@ def step(
     force = min(max(clamped, state.force - most), state.force + most)
     if force != clamped:
         limited |= int(Limited.SLEW)
-    return FeedForwardState(stamp, force, fade, good), FeedForward(stamp, force, settings.coulomb_scale * fade, limited)
+    feedforward = FeedForward(stamp, force, settings.coulomb_scale * fade, limited)
+    return FeedForwardState(stamp, force, fade, good, velocity), feedforward
 
 
-def _velocity(settings: FeedForwardSettings, motion: Motion) -> float:
+def wanted_velocity(settings: FeedForwardSettings, motion: Motion) -> float | None:
+    """Velocity v [m/s] of the equation; None if it is not usable."""
     if settings.use_measured_velocity:
         velocity = motion.measured_velocity
+    elif abs(motion.reference_age) > settings.reference_timeout:
+        return None
     else:
         velocity = motion.reference_velocity + settings.lead_time * motion.reference_acceleration
-    return min(max(velocity, -FASTEST), FASTEST) if math.isfinite(velocity) else 0.0
+    return min(max(velocity, -FASTEST), FASTEST) if math.isfinite(velocity) else None

@@ -12,14 +12,30 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from seal_friction_ros.core.feedforward import FeedForward
 from seal_friction_ros.core.records import Force, FrictionEstimate, FrictionState, Pressure
 
 PACKAGE = 'seal_friction_msgs'
 PRESSURE_TYPE = f'{PACKAGE}/msg/CylinderPressure'
 VELOCITY_TYPE = f'{PACKAGE}/msg/RodVelocity'
 FORCE_TYPE = f'{PACKAGE}/msg/ForceSum'
+POSITION_TYPE = f'{PACKAGE}/msg/RodPosition'
+REFERENCE_TYPE = f'{PACKAGE}/msg/ServoReference'
 ESTIMATE_TYPE = f'{PACKAGE}/msg/FrictionEstimate'
+FEEDFORWARD_TYPE = f'{PACKAGE}/msg/FrictionFeedForward'
 CONFIGURATION_TYPE = f'{PACKAGE}/msg/EstimatorConfiguration'
+
+INPUTS: dict[str, str] = {
+    'cylinder_pressure': PRESSURE_TYPE,
+    'force_sum': FORCE_TYPE,
+    'servo_reference': REFERENCE_TYPE,
+    'rod_position': POSITION_TYPE,
+    'rod_velocity': VELOCITY_TYPE,
+}
+"""Topic that the estimator takes -> message type. The position is only recorded."""
+
+OUTPUTS: dict[str, str] = {'friction_estimate': ESTIMATE_TYPE, 'friction_feedforward': FEEDFORWARD_TYPE}
+"""Topic that the estimator publishes -> message type."""
 
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little endian, no options
 _FIRST_HEADER_PART = struct.Struct('<4siII')
@@ -35,6 +51,29 @@ class Velocity(NamedTuple):
     velocity: float
     """[m/s]"""
     frame_id: bytes
+
+
+class ServoReference(NamedTuple):
+    """Where the rod shall be at one moment, and the frame it names."""
+
+    stamp: int
+    """[ns]"""
+    position: float
+    """[m]"""
+    velocity: float
+    """[m/s]"""
+    acceleration: float
+    """[m/s^2] 0.0 if it is not known"""
+    frame_id: bytes = b''
+
+
+class Position(NamedTuple):
+    """One rod-position sample."""
+
+    stamp: int
+    """[ns]"""
+    position: float
+    """[m]"""
 
 
 @lru_cache(maxsize=64)
@@ -107,6 +146,29 @@ def decode_velocity(data: bytes) -> Velocity:
     return Velocity(stamp, velocity, frame_id)
 
 
+def encode_position(position: Position, frame_id: bytes = b'') -> bytes:
+    """RodPosition as bytes."""
+    return _encode(position.stamp, frame_id, 'd', position.position)
+
+
+def decode_position(data: bytes) -> Position:
+    """RodPosition from bytes."""
+    stamp, _, (position,) = _decode(data, 'd')
+    return Position(stamp, position)
+
+
+def encode_reference(reference: ServoReference) -> bytes:
+    """ServoReference as bytes."""
+    stamp, position, velocity, acceleration, frame_id = reference
+    return _encode(stamp, frame_id, 'ddd', position, velocity, acceleration)
+
+
+def decode_reference(data: bytes) -> ServoReference:
+    """ServoReference from bytes."""
+    stamp, frame_id, values = _decode(data, 'ddd')
+    return ServoReference(stamp, values[0], values[1], values[2], frame_id)
+
+
 def encode_estimate(estimate: FrictionEstimate, frame_id: bytes = b'') -> bytes:
     """FrictionEstimate as bytes."""
     stamp, coulomb, std, breakaway, friction, state, direction, status, input_age = estimate
@@ -121,6 +183,18 @@ def decode_estimate(data: bytes) -> FrictionEstimate:
     return FrictionEstimate(
         stamp, coulomb, std, breakaway, friction, FrictionState(state), direction, status, input_age
     )
+
+
+def encode_feedforward(feedforward: FeedForward, frame_id: bytes = b'') -> bytes:
+    """FrictionFeedForward as bytes."""
+    stamp, force, scale, limited = feedforward
+    return _encode(stamp, frame_id, 'ddI', force, scale, limited)
+
+
+def decode_feedforward(data: bytes) -> FeedForward:
+    """FrictionFeedForward from bytes."""
+    stamp, _, (force, scale, limited) = _decode(data, 'ddI')
+    return FeedForward(stamp, force, scale, limited)
 
 
 def encode_text(text: str) -> bytes:
@@ -143,7 +217,10 @@ DECODERS: dict[str, Callable[[bytes], Any]] = {
     PRESSURE_TYPE: decode_pressure,
     FORCE_TYPE: decode_force,
     VELOCITY_TYPE: decode_velocity,
+    POSITION_TYPE: decode_position,
+    REFERENCE_TYPE: decode_reference,
     ESTIMATE_TYPE: decode_estimate,
+    FEEDFORWARD_TYPE: decode_feedforward,
     CONFIGURATION_TYPE: decode_text,
 }
 """Message type -> decoder."""

@@ -14,18 +14,14 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
-from seal_friction_msgs.msg import CylinderPressure, ForceSum, FrictionEstimate, RodVelocity
+from seal_friction_msgs.msg import FrictionEstimate
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.live_statistics import latency_values
+from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bag import BagError, BagMessage, read_messages
 
-_TOPICS = {
-    wire.PRESSURE_TYPE: (CylinderPressure, 'cylinder_pressure'),
-    wire.FORCE_TYPE: (ForceSum, 'force_sum'),
-    wire.VELOCITY_TYPE: (RodVelocity, 'rod_velocity'),
-}
 _UNANSWERED = 20  # [samples] so many velocities may be under way: well below the depth of the queues
 _PATIENCE = 5.0  # [s] to wait for the answer to a sample before giving up
 
@@ -36,8 +32,8 @@ class BagPlayer(Node):
     def __init__(self) -> None:
         super().__init__('bag_player')
         self._publishers_of = {
-            type_name: self.create_publisher(message_type, topic, qos.STREAM)
-            for type_name, (message_type, topic) in _TOPICS.items()
+            type_name: self.create_publisher(message_class(type_name), topic, qos.STREAM)
+            for topic, type_name in wire.INPUTS.items()
         }
         self._connected = False
         self.sent: list[int] = []
@@ -106,8 +102,9 @@ def play(player: BagPlayer, bag: Path, rate: float) -> dict[str, str]:
     """
     start = time.monotonic()
     first: int | None = None
+    played = set(wire.INPUTS.values())
     for message in read_messages(bag):
-        if message.type_name not in _TOPICS:
+        if message.type_name not in played:
             continue
         first = message.log_time if first is None else first
         due = start + (message.log_time - first) * 1e-9 / rate if rate else 0.0
@@ -127,7 +124,7 @@ def _await(player: BagPlayer, bag: Path, unanswered: int) -> None:
 def main() -> int:
     """Run ``bag_player BAG [--rate R] [--wait S]``; figures of the run as JSON on stdout."""
     parser = argparse.ArgumentParser(prog='bag_player', description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('bag', type=Path, help='bag to play; only pressure, velocity and force sum are')
+    parser.add_argument('bag', type=Path, help='bag to play; only the inputs of the estimator are')
     parser.add_argument('--rate', type=float, default=1.0, help='times the pace of the bag; 0: as fast as answered')
     parser.add_argument('--wait', type=float, default=10.0, help='how long to wait for an estimator [s]')
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])

@@ -1,12 +1,17 @@
 """How the nodes of this package are spun and how they stop."""
 
+import gc
+import signal
+import socket
 import sys
+import threading
 from collections.abc import Callable
 from typing import TypeVar
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 try:
@@ -16,14 +21,15 @@ except ImportError:  # ROS 2 Jazzy
 
 AnyNode = TypeVar('AnyNode', bound=Node)
 _LONG = 86400.0  # [s] a wait without end overflows the clock of the events executor and dispatches nothing
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def spin(node: Node) -> None:
-    """Spin until the context is shut down, by the events executor where there is one: a third of the processor time."""
+def spin(node: Node, stopped: Future) -> None:
+    """Spin until ``stopped`` is done, by the events executor where there is one: a third of the processor time."""
     executor = EventsExecutor() if EventsExecutor is not None else SingleThreadedExecutor()
     executor.add_node(node)
-    while rclpy.ok():
-        executor.spin_until_future_complete(Future(), timeout_sec=_LONG)
+    while rclpy.ok() and not stopped.done():
+        executor.spin_until_future_complete(stopped, timeout_sec=_LONG)
 
 
 def run(
@@ -32,7 +38,7 @@ def run(
     stop: Callable[[AnyNode], None],
     args: list[str] | None = None,
 ) -> int:
-    """Make a node, start it, spin it, and on SIGINT or SIGTERM stop it in order.
+    """Make a node, start it, spin it, and on SIGINT or SIGTERM stop it in order, between two callbacks.
 
     Args:
         make_node: Makes the node; a ValueError it raises ends the process with one line.
@@ -43,24 +49,36 @@ def run(
     Returns:
         Exit code: 0, or 2 for a node that could not start.
     """
+    # A thread waits for the signals. ROS's own handler would take the graph away from under a callback that publishes;
+    # Python's own would wait for the executor to come back from C++.
+    said, heard = socket.socketpair()
+    said.setblocking(False)
+    signal.set_wakeup_fd(said.fileno())
+    for number in _SIGNALS:
+        signal.signal(number, lambda *_: None)
     try:
-        rclpy.init(args=args)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
     except (ValueError, RuntimeError) as error:  # RCLError, of a parameter file for example, is a RuntimeError
         print(f'not started: {" ".join(str(error).split())}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
-    except KeyboardInterrupt:
-        rclpy.try_shutdown()
-        return 0
+    stopped = Future()
+    threading.Thread(target=_await_signal, args=(heard, stopped), daemon=True).start()
     try:
         if not start(node):
-            return 2 if rclpy.ok() else 0  # not ok: stopped by a signal while it started
-        spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
+            return 2
+        gc.freeze()  # what lives until the end is not looked through again: with numba 60 ms each time
+        spin(node, stopped)
+    except ExternalShutdownException:
         pass
     finally:
         stop(node)
         node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _await_signal(heard: socket.socket, stopped: Future) -> None:
+    heard.recv(1)
+    stopped.set_result(None)

@@ -5,9 +5,9 @@ from collections import Counter
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from seal_friction_ros.core import wire
+from seal_friction_ros.core.feedforward import FeedForward, Limited
 from seal_friction_ros.core.records import FrictionEstimate, Status
-
-INPUT_NAMES = ('cylinder_pressure', 'rod_velocity', 'force_sum')
 
 
 class LiveStatistics:
@@ -17,6 +17,8 @@ class LiveStatistics:
         self._received: Counter[str] = Counter()
         self._malformed: Counter[str] = Counter()
         self._by_status: Counter[int] = Counter()
+        self._feedforwards_by_limit: Counter[int] = Counter()
+        self._feedforward_force = 0.0
         self._input_age = -1.0
         self._start_interval()
 
@@ -41,10 +43,15 @@ class LiveStatistics:
         self._latencies.append(latency)
         self._input_age = estimate.input_age
 
+    def on_feedforward(self, feedforward: FeedForward) -> None:
+        """Count one feed-forward."""
+        self._feedforwards_by_limit[feedforward.limited] += 1
+        self._feedforward_force = feedforward.force
+
     @property
     def silent_inputs(self) -> list[str]:
         """Inputs of which nothing has come since activation."""
-        return [name for name in INPUT_NAMES if not self._received[name]]
+        return [name for name in wire.INPUTS if not self._received[name]]
 
     def report(self, active: bool, publishers: dict[str, int]) -> DiagnosticStatus:
         """State of the estimate since the last report; starts the next interval.
@@ -55,7 +62,7 @@ class LiveStatistics:
         """
         seconds = max(time.monotonic() - self._started, 1e-3)
         values: dict[str, str] = {}
-        for name in INPUT_NAMES:
+        for name in wire.INPUTS:
             recent = self._received[name] - self._received_before[name]
             values[f'{name} publishers'] = str(publishers[name])
             values[f'{name} rate [Hz]'] = f'{recent / seconds:.1f}'
@@ -66,6 +73,11 @@ class LiveStatistics:
         values['estimates all good'] = str(self._by_status[0])
         for bit in Status:
             values[f'estimates {bit.name}'] = str(sum(n for status, n in self._by_status.items() if status & bit))
+        values['feed-forwards'] = str(self._feedforwards_by_limit.total())
+        for limit in Limited:
+            count = sum(n for limited, n in self._feedforwards_by_limit.items() if limited & limit)
+            values[f'feed-forwards {limit.name}'] = str(count)
+        values['feed-forward [N]'] = f'{self._feedforward_force:.3f}'
         values['input age [s]'] = f'{self._input_age:.4f}'
         values |= latency_values(self._latencies)
         status = DiagnosticStatus(level=DiagnosticStatus.OK, message='estimating')

@@ -9,6 +9,9 @@ STREAM = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durabilit
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Configuration: whoever comes late still gets the last one."""
 
+CLOCK = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+"""Simulated time."""
+
 
 def overridable() -> QoSOverridingOptions:
     """Let ``qos_overrides.<topic>.<publisher or subscription>.<policy>`` change history, depth and reliability."""

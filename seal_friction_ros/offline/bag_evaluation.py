@@ -20,16 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core.configuration import parse_snapshot
-from seal_friction_ros.core.held_inputs import HeldInputs
 from seal_friction_ros.core.records import FrictionEstimate, FrictionState, Status
-from seal_friction_ros.core.wire import (
-    DECODERS,
-    decode_estimate,
-    decode_force,
-    decode_pressure,
-    decode_text,
-    decode_velocity,
-)
+from seal_friction_ros.core.wire import DECODERS, Velocity
 from seal_friction_ros.offline.bag import BagError, BagMessage, bag_topics, read_messages
 from seal_friction_ros.offline.progress import progress
 from seal_friction_ros.offline.replay import Topics, find_topics
@@ -48,7 +40,8 @@ BAND_95 = 1.96  # standard deviations on each side that hold 95 % of a normal di
 
 _MAX_PENDING = 10_000  # velocity samples that may wait for their estimate; more were never answered
 _ABSURD = 1e15  # [SI] no pressure, force or speed is as large; a comparison with it drops NaN and infinity too
-_COLUMNS = ('velocity', 'pressure_a', 'pressure_b', 'force_sum', *FrictionEstimate._fields[1:])
+_INPUTS = ('velocity', 'pressure_a', 'pressure_b', 'force_sum', 'position', 'reference')
+_COLUMNS = (*_INPUTS, *FrictionEstimate._fields[1:], 'feedforward_force')
 _INTEGERS = {'state', 'direction', 'status'}
 _HARMLESS = int(Status.OUTSIDE_IDENTIFIED_RANGE)  # the inputs are good, only the law is stretched
 
@@ -68,6 +61,8 @@ class RecordedRun:
     """frame names of the velocity samples"""
     configurations: tuple[tuple[float, str], ...]
     """time [s] and JSON text of each change of configuration"""
+    configuration_rows: tuple[int, ...]
+    """estimates before each of them, in the order of the bag"""
     chambers: tuple[str, ...]
     """chamber of each seal"""
     start: int
@@ -82,6 +77,10 @@ class RecordedRun:
     """[Pa, gauge]"""
     force_sum: FloatArray
     """[N]"""
+    position: FloatArray
+    """[m]"""
+    reference: FloatArray
+    """[m] position asked for"""
     coulomb_friction: FloatArray
     """[N]"""
     coulomb_friction_std: FloatArray
@@ -95,6 +94,8 @@ class RecordedRun:
     status: IntArray
     input_age: FloatArray
     """[s]"""
+    feedforward_force: FloatArray
+    """[N] that went out with the estimate; NaN where none did"""
 
     @cached_property
     def pressure(self) -> FloatArray:
@@ -230,10 +231,10 @@ class _Collector:
         self.stamps = array('q')
         self._topics = topics
         self._rows = array('d')
-        self._held = HeldInputs()
-        self._pending: dict[int, tuple[float, float, float, float]] = {}
+        self._held = dict.fromkeys(_INPUTS, math.nan)
+        self._pending: dict[int, tuple[float, ...]] = {}
         self._frames: dict[bytes, None] = {}
-        self._configurations: list[tuple[int, str]] = []
+        self._configurations: list[tuple[int, int, str]] = []
 
     def take(self, message: BagMessage) -> None:
         """Take one message in; a damaged one is an error that names it."""
@@ -243,32 +244,35 @@ class _Collector:
             raise BagError(f'message on {message.topic} at {message.log_time} ns: {error}') from None
 
     def _take(self, message: BagMessage) -> None:
-        topic, topics = message.topic, self._topics
+        topic, topics, held = message.topic, self._topics, self._held
+        record = DECODERS[message.type_name](message.data)
         if topic == topics.velocity:
-            self._take_velocity(message.data)
+            self._take_velocity(record)
         elif topic == topics.pressure:
-            self._held = self._held._replace(pressure=decode_pressure(message.data))
+            held['pressure_a'], held['pressure_b'] = record.chamber_a, record.chamber_b
         elif topic == topics.force:
-            self._held = self._held._replace(force=decode_force(message.data))
+            held['force_sum'] = record.force
+        elif topic == topics.position:
+            held['position'] = record.position
+        elif topic == topics.reference:
+            held['reference'] = record.position
         elif topic == topics.estimate:
-            self._take_estimate(decode_estimate(message.data))
+            self.stamps.append(record.stamp)
+            self._rows.extend(self._pending.pop(record.stamp, (math.nan,) * len(_INPUTS)))
+            self._rows.extend((*record[1:], math.nan))
+        elif topic == topics.feedforward:
+            if self.stamps and self.stamps[-1] == record.stamp:
+                self._rows[-1] = record.force
         else:
-            self._configurations.append((message.log_time, decode_text(message.data)))
+            self._configurations.append((message.log_time, len(self.stamps), record))
 
-    def _take_velocity(self, data: bytes) -> None:
-        sample = decode_velocity(data)
-        pressure, force = self._held
-        a, b = (math.nan, math.nan) if pressure is None else (pressure.chamber_a, pressure.chamber_b)
-        self._pending[sample.stamp] = (sample.velocity, a, b, math.nan if force is None else force.force)
+    def _take_velocity(self, sample: Velocity) -> None:
+        self._held['velocity'] = sample.velocity
+        self._pending[sample.stamp] = tuple(self._held.values())
         if len(self._pending) > _MAX_PENDING:
             del self._pending[next(iter(self._pending))]
         if len(self._frames) < 10:
             self._frames[sample.frame_id] = None
-
-    def _take_estimate(self, estimate: FrictionEstimate) -> None:
-        self.stamps.append(estimate.stamp)
-        self._rows.extend(self._pending.pop(estimate.stamp, (math.nan,) * 4))
-        self._rows.extend(estimate[1:])
 
     def run(self, name: str, counts: dict[str, tuple[str, int]]) -> RecordedRun:
         """Arrays of all that was taken in; what cannot be a measurement is NaN."""
@@ -276,18 +280,19 @@ class _Collector:
         columns = np.frombuffer(self._rows, dtype=np.float64).reshape(len(stamps), len(_COLUMNS)).T.copy()
         values: dict[str, Any] = dict(zip(_COLUMNS, columns, strict=True))
         values.update({name: values[name].astype(np.int64) for name in _INTEGERS})
-        for column in ('velocity', 'pressure_a', 'pressure_b', 'force_sum'):
+        for column in _INPUTS:
             values[column][~(np.abs(values[column]) < _ABSURD)] = math.nan  # a fault: nothing to evaluate or to draw
         refused = (values['status'] & int(Status.VELOCITY_OUT_OF_RANGE)) != 0
         values['velocity'][refused] = math.nan
         start = int(stamps[0])
         # A configuration has no stamp of its own: it counts from when it was recorded.
-        changes = tuple((round((t - start) * 1e-9, 6), text) for t, text in self._configurations)
+        changes = tuple((round((t - start) * 1e-9, 6), text) for t, _, text in self._configurations)
         return RecordedRun(
             name=name,
             topics=counts,
             frames=tuple(frame.decode(errors='replace') for frame in self._frames),
             configurations=changes,
+            configuration_rows=tuple(row for _, row, _ in self._configurations),
             chambers=_chambers(changes),
             start=start,
             time=np.asarray((stamps - start) * 1e-9, dtype=np.float64),
@@ -400,7 +405,7 @@ def _steady_stroke(run: RecordedRun, usable: BoolArray, direction: int, index: I
         direction,
         pressure=float(run.pressure[steady].mean()),
         force_sum=float(run.force_sum[steady].mean()),
-        estimated=float(run.coulomb_friction[steady].mean()),
+        estimated=float((direction * run.friction_force[steady]).mean()),  # Coulomb, and what the velocity adds
         std=float(run.coulomb_friction_std[steady].mean()),
         samples=len(steady),
         first=int(index[0]),

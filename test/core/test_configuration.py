@@ -1,5 +1,6 @@
 """The snapshot in a bag: it comes back as it was, and equal ones are equal text."""
 
+import dataclasses
 import json
 import math
 import struct
@@ -17,32 +18,52 @@ from seal_friction_ros.core.configuration import (
     parse_snapshot,
     snapshot_text,
 )
-from seal_friction_ros.core.estimator import EstimatorSettings, EstimatorState, init, step
-from seal_friction_ros.core.held_inputs import HeldInputs
-from seal_friction_ros.core.records import Force, Pressure
+from seal_friction_ros.core.estimator import EstimatorSettings, EstimatorState
+from seal_friction_ros.core.feedforward import FeedForwardSettings, FeedForwardState
+from seal_friction_ros.core.pipeline import PipelineState, init, receive
+from seal_friction_ros.core.records import Force, FrictionEstimate, FrictionState, Pressure
+from seal_friction_ros.core.wire import ServoReference, Velocity
 from seal_friction_ros.files import load_configuration, read_yaml
 
 SEALS = Path(__file__).parents[2] / 'config' / 'seals'
 CONFIGURATION = load_configuration(SealSelection(), EstimatorSettings())
+ESTIMATE = FrictionEstimate(5, 40.0, 1.5, 50.0, -40.0, FrictionState.SLIDING, -1, 0, 0.001)
 SNAPSHOT = Snapshot(
     CONFIGURATION,
-    EstimatorState(5, True, Pressure(3, 1e6, 2e6), Force(4, -3.5)),
-    HeldInputs(Pressure(3, math.nan, -0.0), None),
+    PipelineState(
+        EstimatorState(5, True, Pressure(3, 1e6, 2e6), Force(4, -3.5)),
+        FeedForwardState(5, 12.5, 0.75, ESTIMATE, -0.02),
+        Pressure(3, math.nan, -0.0),
+        None,
+        ServoReference(4, 0.01, -0.02, math.inf),
+    ),
 )
 
 stamps = st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1)
 usable = st.floats(allow_nan=False, allow_infinity=False)
-states = st.builds(
-    EstimatorState,
-    st.none() | stamps,
-    st.booleans(),
-    st.none() | st.builds(Pressure, stamps, usable, usable),
-    st.none() | st.builds(Force, stamps, usable),
+anything = st.floats()
+estimates = st.builds(
+    FrictionEstimate,
+    stamps,
+    *[usable] * 4,
+    st.sampled_from(FrictionState),
+    st.integers(-1, 1),
+    st.integers(0, 4095),
+    usable,
 )
-held_inputs = st.builds(
-    HeldInputs,
-    st.none() | st.builds(Pressure, stamps, st.floats(), st.floats()),
-    st.none() | st.builds(Force, stamps, st.floats()),
+states = st.builds(
+    PipelineState,
+    st.builds(
+        EstimatorState,
+        st.none() | stamps,
+        st.booleans(),
+        st.none() | st.builds(Pressure, stamps, usable, usable),
+        st.none() | st.builds(Force, stamps, usable),
+    ),
+    st.builds(FeedForwardState, st.none() | stamps, usable, usable, st.none() | estimates, usable),
+    st.none() | st.builds(Pressure, stamps, anything, anything),
+    st.none() | st.builds(Force, stamps, anything),
+    st.none() | st.builds(ServoReference, stamps, anything, anything, anything, st.just(b'')),
 )
 
 
@@ -60,33 +81,35 @@ def with_part(path: str, value) -> str:
     return json.dumps(document)
 
 
-def bits(sample) -> tuple:
-    """A sample bit by bit; every NaN counts alike, since nothing computes with its payload."""
-    return tuple(
-        struct.pack('<d', math.nan if math.isnan(x) else x) if isinstance(x, float) else x for x in sample or ()
-    )
+def bits(value):
+    """A state bit by bit; every NaN counts alike, since nothing computes with its payload."""
+    if isinstance(value, tuple):
+        return [type(value), *(bits(item) for item in value)]
+    return struct.pack('<d', math.nan if math.isnan(value) else value) if isinstance(value, float) else value
 
 
-@given(states, held_inputs)
-def test_a_snapshot_comes_back_to_the_bit_nan_included(state, held):
-    back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state, held)))
+@given(states)
+def test_a_snapshot_comes_back_to_the_bit_nan_included(state):
+    back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state)))
     assert back.configuration.parameters() == CONFIGURATION.parameters()
     assert back.configuration.selection == CONFIGURATION.selection
-    assert back.state == state
-    assert [bits(x) for x in back.state[2:]] == [bits(x) for x in state[2:]]
-    assert [bits(x) for x in back.held] == [bits(x) for x in held]
+    assert bits(back.state) == bits(state)
 
 
-@given(states, held_inputs)
-def test_the_text_is_a_fixed_point(state, held):
-    text = snapshot_text(Snapshot(CONFIGURATION, state, held))
+@given(states)
+def test_the_text_is_a_fixed_point(state):
+    text = snapshot_text(Snapshot(CONFIGURATION, state))
     assert snapshot_text(parse_snapshot(text)) == text
 
 
-@given(st.builds(EstimatorSettings, use_stiction=st.booleans(), pressure_timeout=st.floats(1e-4, 60.0)))
-def test_settings_come_back_exactly(settings):
-    snapshot = SNAPSHOT._replace(configuration=Configuration(SealSelection(), CONFIGURATION.seal_documents, settings))
-    assert parse_snapshot(snapshot_text(snapshot)).configuration.settings == settings
+@given(
+    st.builds(EstimatorSettings, use_stiction=st.booleans(), pressure_timeout=st.floats(1e-4, 60.0)),
+    st.builds(FeedForwardSettings, use_measured_velocity=st.booleans(), coulomb_scale=st.floats(0.0, 2.0)),
+)
+def test_settings_come_back_exactly(settings, feedforward):
+    configuration = Configuration(SealSelection(), CONFIGURATION.seal_documents, settings, feedforward)
+    back = parse_snapshot(snapshot_text(SNAPSHOT._replace(configuration=configuration))).configuration
+    assert (back.settings, back.feedforward) == (settings, feedforward)
 
 
 def test_the_order_of_a_file_does_not_matter_to_the_text():
@@ -94,7 +117,7 @@ def test_the_order_of_a_file_does_not_matter_to_the_text():
         return {k: backwards(part[k]) for k in reversed(part)} if isinstance(part, dict) else part
 
     turned = tuple(backwards(document) for document in CONFIGURATION.seal_documents)
-    again = SNAPSHOT._replace(configuration=Configuration(SealSelection(), turned, EstimatorSettings()))
+    again = SNAPSHOT._replace(configuration=dataclasses.replace(CONFIGURATION, seal_documents=turned))
     assert [list(a) for a in turned] != [list(b) for b in CONFIGURATION.seal_documents]
     assert snapshot_text(again) == snapshot_text(SNAPSHOT)
 
@@ -110,11 +133,14 @@ def test_every_shipped_seal_survives_the_text_and_the_wire(path):
 
 def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
     parameters = CONFIGURATION.parameters()
-    held = HeldInputs(Pressure(0, 3e6, 3e6), Force(0, 12.0))
-    state, _ = step(parameters, init(parameters), held.rod_sample(1, 5e-4))
-    back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state, held)))
-    straight = step(parameters, state, held.rod_sample(2, 1.5e-3))
-    taken_up = step(back.configuration.parameters(), back.state, back.held.rod_sample(2, 1.5e-3))
+    before = [Pressure(0, 3e6, 3e6), Force(0, 12.0), ServoReference(0, 0.0, 0.02, 0.0), Velocity(1, 5e-4, b'')]
+    state = init(parameters)
+    for message in before:
+        state, _ = receive(parameters, state, message)
+    back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state)))
+    straight = receive(parameters, state, Velocity(2000, 1.5e-3, b'rod'))
+    taken_up = receive(back.configuration.parameters(), back.state, Velocity(2000, 1.5e-3, b'rod'))
+    assert straight[1].feedforward.force > 0.0
     assert taken_up == straight
 
 
@@ -130,13 +156,14 @@ def test_what_is_no_snapshot_is_refused_with_a_value_error(text):
         ('selection', ..., "not the JSON of a snapshot: KeyError: 'selection'"),
         ('settings', ..., "KeyError: 'settings'"),
         ('state', ..., "KeyError: 'state'"),
-        ('held', ..., "KeyError: 'held'"),
+        ('feedforward', ..., "KeyError: 'feedforward'"),
+        ('state.reference', ..., "KeyError: 'reference'"),
         ('seal_documents', 5, 'not the JSON of a snapshot: TypeError'),
         ('state', [], 'not the JSON of a snapshot: TypeError'),
-        ('state.pressure', [1], 'not the JSON of a snapshot: IndexError'),
-        ('state.pressure', [1, 2.0, 3.0], 'not the JSON of a snapshot: TypeError'),
-        ('held.force', [1, 'x'], 'hexadecimal'),
-        ('held.force', ['x', '0x1p0'], 'invalid literal'),
+        ('state.pressure', [1], 'not the JSON of a snapshot: TypeError'),
+        ('state.pressure', [1, [], 3.0], 'not the JSON of a snapshot: TypeError'),
+        ('state.force', [1, 'x'], 'hexadecimal'),
+        ('state.force', ['x', '0x1p0'], 'invalid literal'),
         ('selection.seals', 'ms28775_114', "configuration: selection.seals = 'ms28775_114' is not a list"),
         ('selection.seal_chambers', ['a'], 'has 1 entries but there are 2 seals'),
         ('settings.stick_velocity', -1.0, 'stick_velocity = -1.0 m/s is below its lower bound'),
@@ -165,8 +192,8 @@ def test_a_selection_that_makes_no_sense_is_refused(change, complaint):
     'text',
     [
         pytest.param('[' * 100_000, id='deep nesting'),
-        pytest.param(with_part('held.force', [1, '0x1p+5000']), id='force beyond every float'),
-        pytest.param(with_part('held.force', [math.inf, '0x1p0']), id='stamp infinite'),
+        pytest.param(with_part('state.force', [1, '0x1p+5000']), id='force beyond every float'),
+        pytest.param(with_part('state.force', [math.inf, '0x1p0']), id='stamp infinite'),
         pytest.param(with_part('settings.stick_velocity', 10**400), id='setting beyond every float'),
     ],
 )
@@ -175,8 +202,15 @@ def test_a_hostile_snapshot_is_refused_with_a_value_error(text):
         parse_snapshot(text)
 
 
-@pytest.mark.parametrize('path', ['state.pressure', 'state.force'])
-def test_a_value_in_use_that_is_not_finite_is_refused(path):
-    values = [1, 'nan', 'nan'] if path == 'state.pressure' else [1, 'nan']
+@pytest.mark.parametrize(
+    ('path', 'values'),
+    [
+        ('state.estimator.pressure', [1, 'nan', 'nan']),
+        ('state.estimator.force', [1, 'nan']),
+        ('state.feedforward.values', ['nan', '0x1p0', '0x1p0']),
+        ('state.feedforward.estimate', [1, 'inf', *['0x1p0'] * 3, 1, 1, 0, '0x1p0']),
+    ],
+)
+def test_a_value_in_use_that_is_not_finite_is_refused(path, values):
     with pytest.raises(ValueError):
         parse_snapshot(with_part(path, values))

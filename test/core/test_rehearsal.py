@@ -7,40 +7,29 @@ import pytest
 import yaml
 
 from seal_friction_ros.core.coulomb import MountedSeal, actuator_friction
+from seal_friction_ros.core.pull_rig import init_pull_rig, pull_rig, step_pull_rig
 from seal_friction_ros.core.reference import PullTest, spool_cycles
 from seal_friction_ros.core.seal_file import parse_seal
-from seal_friction_ros.core.servo import ServoParameters, advance, init, outputs, step
-from seal_friction_ros.core.servo_controller import ServoController
-from seal_friction_ros.core.servo_plant import Cylinder, ServoValve
-from seal_friction_ros.core.units import LBF, PSI
+from seal_friction_ros.core.servo import ServoParameters, init, outputs, step
+from seal_friction_ros.core.units import LBF
 
 SEAL = parse_seal(yaml.safe_load((Path(__file__).parents[2] / 'config/seals/ms28775_114.yaml').read_text()))
 SEALS = (MountedSeal(SEAL, 'a'), MountedSeal(SEAL, 'b'))
 PLAN = PullTest(repetitions=1, rest_time=0.1, pull_time=1.5, carriage_speed=0.01)
-SLOW = ServoController(force_bandwidth=50.0, position_gain=1e3)  # not used: the spool stands open
-
-
-def rig(pressure):
-    """Both ports on one line at the test's pressure."""
-    valve = ServoValve(supply_pressure=pressure, return_pressure=pressure, rated_flow=2.5e-4)  # wide: little drag
-    cylinder = Cylinder(dead_volume=2e-5)  # with its hoses
-    return ServoParameters(
-        valve=valve, cylinder=cylinder, seals=SEALS, inner_step=2e-4, control_period=1e-3, controller=SLOW
-    )
+RIG = pull_rig(PLAN, SEALS, 1e-3)
 
 
 @pytest.mark.parametrize('test', [0, 5, 10])
 def test_pull_test_reads_the_friction_of_the_seals(test):
-    start = test * (PLAN.rest_time + 2 * PLAN.pull_time)
-    pressure = PLAN.at(start).pressure
-    servo = rig(pressure)
-    plant, readings = init(servo).plant, []
-    for i in range(round((PLAN.rest_time + 2 * PLAN.pull_time) / servo.control_period)):
-        command = PLAN.at(start + i * servo.control_period)
-        force = PLAN.force(command, plant.position)
-        plant = advance(servo, plant, 1.0, force)
-        readings.append((command.direction, force, plant.velocity))
-    direction, force, velocity = np.array(readings).T
+    block = PLAN.rest_time + 2 * PLAN.pull_time
+    state, readings = init_pull_rig(RIG), []
+    for i in range(round(block * 1000)):
+        time = test * block + (i + 0.5) * 1e-3
+        command = PLAN.at(time)
+        state, out = step_pull_rig(RIG, state, time)
+        readings.append((command.direction, PLAN.force(command, out.position), out.velocity, out.force_sum))
+    direction, force, velocity, force_sum = np.array(readings).T
+    pressure = PLAN.at(test * block).pressure
     expected = actuator_friction(SEALS, pressure, pressure)
     static = expected.coulomb_friction + expected.stiction
     assert force[np.flatnonzero(velocity)[0]] == pytest.approx(static, abs=0.11)  # the scale gains 0.1 N a sample
@@ -48,10 +37,12 @@ def test_pull_test_reads_the_friction_of_the_seals(test):
     # On the soft scale the rod sticks and slips, so the mean reading lies between running and breakaway force.
     running = force[direction == 1][-500:].mean()
     assert expected.coulomb_friction - 0.1 < running < static
+    # The force sum knows of the drag of the ports too: at rest it is what the scale pulls.
+    assert force_sum[np.flatnonzero(velocity)[0] - 1] == pytest.approx(static, abs=0.3)
 
 
 def test_pull_test_at_1000_psi_is_near_the_thesis_reading():
-    servo = rig(1000.0 * PSI)
+    servo = RIG.servos[-1]
     friction = outputs(servo, init(servo).plant)
     assert friction.coulomb_friction / LBF == pytest.approx(13.33, rel=0.05)
     assert friction.breakaway_force / LBF == pytest.approx(13.33 + 1.11, rel=0.05)

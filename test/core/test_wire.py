@@ -12,6 +12,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from seal_friction_msgs import msg as messages
 
 from seal_friction_ros.core import wire
+from seal_friction_ros.core.feedforward import FeedForward
 from seal_friction_ros.core.records import Force, FrictionEstimate, FrictionState, Pressure, Status
 
 DEFINITIONS = Path(__file__).parents[2] / 'msg_defs' / 'msg'
@@ -25,6 +26,17 @@ SAMPLES = {
         {'velocity': 0.0625},
         wire.Velocity(STAMP, 0.0625, b''),
         lambda record, frame: wire.encode_velocity(record._replace(frame_id=frame)),
+    ),
+    wire.POSITION_TYPE: ({'position': -0.0125}, wire.Position(STAMP, -0.0125), wire.encode_position),
+    wire.REFERENCE_TYPE: (
+        {'position': 0.01, 'velocity': -0.02, 'acceleration': 0.3},
+        wire.ServoReference(STAMP, 0.01, -0.02, 0.3),
+        lambda record, frame: wire.encode_reference(record._replace(frame_id=frame)),
+    ),
+    wire.FEEDFORWARD_TYPE: (
+        {'force': -33.5, 'scale': 0.75, 'limited': 5},
+        FeedForward(STAMP, -33.5, 0.75, 5),
+        wire.encode_feedforward,
     ),
     wire.ESTIMATE_TYPE: (
         {
@@ -70,7 +82,7 @@ def encode(type_name: str, frame: bytes = b'') -> bytes:
 
 def decoded(type_name: str, frame: bytes):
     record = SAMPLES[type_name][1]
-    return record._replace(frame_id=frame) if type_name == wire.VELOCITY_TYPE else record
+    return record._replace(frame_id=frame) if type_name in (wire.VELOCITY_TYPE, wire.REFERENCE_TYPE) else record
 
 
 # --- the same bytes as others ---
@@ -111,6 +123,9 @@ def test_padding_is_zero(type_name):
         wire.PRESSURE_TYPE: Pressure(stamp, ones, ones),
         wire.FORCE_TYPE: Force(stamp, ones),
         wire.VELOCITY_TYPE: wire.Velocity(stamp, ones, b''),
+        wire.POSITION_TYPE: wire.Position(stamp, ones),
+        wire.REFERENCE_TYPE: wire.ServoReference(stamp, ones, ones, ones),
+        wire.FEEDFORWARD_TYPE: FeedForward(stamp, ones, ones, 0x01010101),
         wire.ESTIMATE_TYPE: FrictionEstimate(stamp, *[ones] * 4, FrictionState.SLIDING, 1, 0x01010101, ones),
     }
     for length in range(41):

@@ -15,11 +15,13 @@ from rclpy.qos import ReliabilityPolicy, qos_profile_sensor_data
 from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.configuration import SealSelection
 from seal_friction_ros.core.coulomb import actuator_friction
 from seal_friction_ros.core.estimator import EstimatorSettings
-from seal_friction_ros.files import load_configuration
+from seal_friction_ros.core.feedforward import FeedForwardSettings
+from seal_friction_ros.core.validated import meanings
+from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
 from seal_friction_ros.offline.bag import bag_topics
 from seal_friction_ros.offline.replay import replay
 
@@ -39,9 +41,7 @@ def test_each_velocity_sample_is_answered_by_an_estimate_with_its_header():
     with graph() as g:
         g.connect()
         estimate = g.estimate(5 * SECOND + 7, 0.1, pressure=2e6)
-        friction = actuator_friction(
-            load_configuration(SealSelection(), EstimatorSettings()).parameters().seals, 2e6, 2e6
-        )
+        friction = actuator_friction(default_configuration().parameters().estimator.seals, 2e6, 2e6)
         assert (estimate.header.stamp.sec, estimate.header.stamp.nanosec, estimate.header.frame_id) == (5, 7, 'rod')
         assert estimate.coulomb_friction == estimate.friction_force == friction.coulomb_friction
         assert estimate.coulomb_friction_std == friction.coulomb_friction_std
@@ -221,7 +221,8 @@ def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_pat
             g.estimate(SECOND + i * 10**6, 0.0015, force=math.nan if i == 7 else 3.0)
         assert g.call(Trigger, 'friction_estimator/stop_recording', Trigger.Request()).success
         assert not g.call(Trigger, 'friction_estimator/stop_recording', Trigger.Request()).success
-        assert replay(Path(started.message)).identical
+        g.estimator.finish()
+    assert replay(Path(started.message)).identical
 
 
 def test_a_parameter_change_amid_a_recording_replays_to_the_byte(tmp_path: Path):
@@ -275,6 +276,7 @@ def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_
 def test_the_node_has_no_arithmetic_parameter_of_its_own():
     with graph() as g:
         declared = {name for name in g.estimator._parameters if not name.startswith(('qos_overrides', 'use_sim_time'))}
-        known = {'autostart', 'record', 'record_directory', 'record_name', 'seals', 'seal_chambers'}
-        assert declared - known - {'start_type_description_service'} == set(EstimatorSettings.__dataclass_fields__)
+        known = {'seals', 'seal_chambers', *meanings(StartOptions), *meanings(RecordingOptions)}
+        settings = {*meanings(EstimatorSettings), *(f'feedforward.{name}' for name in meanings(FeedForwardSettings))}
+        assert declared - known - {'start_type_description_service'} == settings
         assert isinstance(g.estimator, FrictionEstimator)

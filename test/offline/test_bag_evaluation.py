@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import SealSelection, Snapshot, snapshot_text
+from seal_friction_ros.core.configuration import SealSelection, first_snapshot, snapshot_text
 from seal_friction_ros.core.coulomb import actuator_friction
-from seal_friction_ros.core.estimator import EstimatorSettings, init
-from seal_friction_ros.core.held_inputs import HeldInputs
+from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline import bag as bags
@@ -31,7 +30,7 @@ RATE = 200  # [Hz]
 OFFSET = 4.0  # [N] of the force sum
 LEVELS = (1e5, 2.5e6, 6e6)  # [Pa]
 CONFIGURATION = load_configuration(SealSelection(), EstimatorSettings())
-SEALS = CONFIGURATION.parameters().seals
+SEALS = CONFIGURATION.parameters().estimator.seals
 
 
 def strokes(directions=(1, -1), speed=0.02, rest=0.5, slide=1.0, error=1.0):
@@ -53,7 +52,7 @@ def strokes(directions=(1, -1), speed=0.02, rest=0.5, slide=1.0, error=1.0):
 def make_bag(folder: Path, rows, estimates=True) -> Path:
     inputs = folder / 'inputs'
     with BagWriter(inputs) as writer:
-        text = wire.encode_text(snapshot_text(Snapshot(CONFIGURATION, init(CONFIGURATION.parameters()), HeldInputs())))
+        text = wire.encode_text(snapshot_text(first_snapshot(CONFIGURATION)))
         writer.write(bags.CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, START, text)
         for i, (velocity, pressure, force) in enumerate(rows):
             stamp = START + i * 1_000_000_000 // RATE

@@ -1,0 +1,124 @@
+"""The path of every message: what comes in, what is kept of it, what goes out. The same for the node and for replay.
+
+``state = init(parameters)``, then ``state, answer = receive(parameters, state, message)`` for every message, in the
+order of receipt. A velocity sample makes an estimate with the pressure and force sum that came last, and, once there
+has been a reference, a feed-forward. While velocity samples fail to come, references make the feed-forward, so that it
+fades out instead of standing still.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from seal_friction_ros.core import estimator, feedforward, wire
+from seal_friction_ros.core.coulomb import actuator_friction
+from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorState
+from seal_friction_ros.core.feedforward import FeedForward, FeedForwardSettings, FeedForwardState, Motion
+from seal_friction_ros.core.records import Force, FrictionEstimate, Pressure, RodSample
+from seal_friction_ros.core.wire import Position, ServoReference, Velocity
+
+Input = Pressure | Force | ServoReference | Position | Velocity
+"""A message that comes in."""
+
+
+class PipelineParameters(NamedTuple):
+    """All that is known beforehand."""
+
+    estimator: EstimatorParameters
+    feedforward: FeedForwardSettings
+
+
+class PipelineState(NamedTuple):
+    """What one message leaves for the next; the newest inputs are None before the first."""
+
+    estimator: EstimatorState
+    feedforward: FeedForwardState
+    pressure: Pressure | None = None
+    force: Force | None = None
+    reference: ServoReference | None = None
+
+
+class Answer(NamedTuple):
+    """What a message makes come out."""
+
+    estimate: FrictionEstimate | None
+    feedforward: FeedForward | None
+    frame_id: bytes
+    """frame of the message that is answered"""
+
+
+NOTHING = Answer(None, None, b'')
+
+
+def init(parameters: PipelineParameters) -> PipelineState:
+    """State before the first message."""
+    return PipelineState(estimator.init(parameters.estimator), feedforward.init(parameters.feedforward))
+
+
+def receive(parameters: PipelineParameters, state: PipelineState, message: Input) -> tuple[PipelineState, Answer]:
+    """Take one message.
+
+    Args:
+        parameters: Settings and seals.
+        state: From `init` or the message before.
+        message: As `wire` decodes it; its values may be anything.
+
+    Returns:
+        The next state and what goes out, every number of which is finite.
+    """
+    if isinstance(message, Velocity):
+        return _on_velocity(parameters, state, message)
+    if isinstance(message, Pressure):
+        return state._replace(pressure=message), NOTHING
+    if isinstance(message, Force):
+        return state._replace(force=message), NOTHING
+    if isinstance(message, Position):  # nothing depends on it; it is kept in bags to show how the servo tracks
+        return state, NOTHING
+    state = state._replace(reference=message._replace(frame_id=b''))
+    last = state.estimator.stamp
+    if last is not None and abs(message.stamp - last) * 1e-9 <= parameters.feedforward.estimate_timeout:
+        return state, NOTHING
+    motion = Motion(message.velocity, message.acceleration)
+    fading, force = feedforward.step(parameters.feedforward, state.feedforward, message.stamp, None, motion)
+    return state._replace(feedforward=fading), Answer(None, force, message.frame_id)
+
+
+def _on_velocity(
+    parameters: PipelineParameters, state: PipelineState, velocity: Velocity
+) -> tuple[PipelineState, Answer]:
+    stamp, measured, frame_id = velocity
+    _, force_state, pressure, force, reference = state
+    sample = RodSample(stamp, measured, pressure, force)
+    estimator_state, estimate = estimator.step(parameters.estimator, state.estimator, sample)
+    compensation = None
+    if reference is not None or parameters.feedforward.use_measured_velocity:
+        motion = _motion(reference, stamp, measured)
+        motion = _with_velocity_friction(parameters, motion, estimator_state.pressure)
+        force_state, compensation = feedforward.step(parameters.feedforward, force_state, stamp, estimate, motion)
+    answer = Answer(estimate, compensation, frame_id)
+    return PipelineState(estimator_state, force_state, pressure, force, reference), answer
+
+
+def _motion(reference: ServoReference | None, stamp: int, measured: float) -> Motion:
+    if reference is None:
+        return Motion(0.0, 0.0, measured, math.inf)
+    return Motion(reference.velocity, reference.acceleration, measured, (stamp - reference.stamp) * 1e-9)
+
+
+def _with_velocity_friction(parameters: PipelineParameters, motion: Motion, pressure: Pressure | None) -> Motion:
+    seals = parameters.estimator.seals
+    if pressure is None or not any(mounted.seal.velocity_terms for mounted in seals):
+        return motion
+    velocity = feedforward.wanted_velocity(parameters.feedforward, motion)
+    if velocity is None:
+        return motion
+    friction = actuator_friction(seals, pressure.chamber_a, pressure.chamber_b, velocity)
+    return motion._replace(velocity_friction=friction.velocity_friction)
+
+
+def encoded(answer: Answer) -> Iterator[tuple[str, bytes]]:
+    """Messages of an answer: message type and bytes, in the order they are published."""
+    if answer.estimate is not None:
+        yield wire.ESTIMATE_TYPE, wire.encode_estimate(answer.estimate, answer.frame_id)
+    if answer.feedforward is not None:
+        yield wire.FEEDFORWARD_TYPE, wire.encode_feedforward(answer.feedforward, answer.frame_id)

@@ -1,0 +1,266 @@
+"""The simulated servo on a real graph: what a real one would publish, closed with the estimator; bad input is named."""
+
+import itertools
+import math
+import time
+from contextlib import contextmanager
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
+from seal_friction_msgs.msg import (
+    CylinderPressure,
+    ForceSum,
+    FrictionFeedForward,
+    RodPosition,
+    RodVelocity,
+    ServoReference,
+)
+
+from seal_friction_ros.core.reference import Sine
+from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.processes import free_domain
+from seal_friction_ros.nodes.servo_simulator import ServoSimulator
+from seal_friction_ros.offline.bag_evaluation import evaluate, read_run
+from seal_friction_ros.offline.replay import replay
+
+TOPICS = {
+    'cylinder_pressure': CylinderPressure,
+    'force_sum': ForceSum,
+    'servo_reference': ServoReference,
+    'rod_position': RodPosition,
+    'rod_velocity': RodVelocity,
+}
+SLOW = {'rate': 500.0}  # [Hz] most of what is shown here needs no more
+
+
+class Listener(Node):
+    """Hears everything the simulator says, and can speak as reference and as feed-forward."""
+
+    def __init__(self, **kwargs):
+        super().__init__('listener', **kwargs)
+        self.heard = {name: [] for name in TOPICS}
+        for name, kind in TOPICS.items():
+            self.create_subscription(kind, name, self.heard[name].append, 1000)
+        self.diagnostics, self.clocks = [], []
+        self.create_subscription(DiagnosticArray, '/diagnostics', self.diagnostics.append, 10)
+        self.create_subscription(Clock, '/clock', self.clocks.append, 1000)
+        self.reference = self.create_publisher(ServoReference, 'servo_reference', 10)
+        self.feedforward = self.create_publisher(FrictionFeedForward, 'friction_feedforward', 10)
+
+    def values(self):
+        """Newest diagnostics of the simulator by key, level and message among them."""
+        for array in reversed(self.diagnostics):
+            for status in array.status:
+                if status.name.endswith(': simulator'):
+                    said = {value.key: value.value for value in status.values}
+                    return {**said, 'level': status.level, 'message': status.message}
+        return {}
+
+
+class Stage:
+    """Simulator, listener and, if asked for, estimator on a domain of their own."""
+
+    def __init__(self, context, nodes):
+        self.simulator, self.listener = nodes[0], nodes[1]
+        self._executor = SingleThreadedExecutor(context=context)
+        for node in nodes:
+            self._executor.add_node(node)
+
+    def spin_until(self, condition, timeout=15.0):
+        deadline = time.monotonic() + timeout
+        while not condition():
+            assert time.monotonic() < deadline
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def spin(self, seconds):
+        until = time.monotonic() + seconds
+        self.spin_until(lambda: time.monotonic() > until, seconds + 5.0)
+
+    def set(self, **values):
+        named = {name.replace('__', '.'): value for name, value in values.items()}
+        return self.simulator.set_parameters_atomically(parameters(named))
+
+
+def parameters(values):
+    return [Parameter(name, value=value) for name, value in values.items()]
+
+
+@contextmanager
+def stage(values=None, estimator=None, *, autostart=True):
+    context = Context()
+    rclpy.init(context=context, domain_id=free_domain())
+    nodes = [
+        ServoSimulator(context=context, parameter_overrides=parameters({**SLOW, **(values or {})})),
+        Listener(context=context),
+    ]
+    if estimator is not None:
+        nodes.append(FrictionEstimator(context=context, parameter_overrides=parameters(estimator)))
+        assert nodes[2].autostart()
+    try:
+        if autostart:
+            assert nodes[0].autostart()
+        yield Stage(context, nodes)
+    finally:
+        for node in (nodes[0], *nodes[2:]):
+            node.finish()
+        for node in nodes:
+            node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def nanoseconds(stamp):
+    return stamp.sec * 10**9 + stamp.nanosec
+
+
+def test_every_topic_comes_at_every_sample_and_the_reference_is_the_wave_asked_for():
+    with stage({'sine.amplitude': 0.002, 'sine.frequency': 3.0}) as s:
+        s.spin_until(lambda: len(s.listener.heard['rod_velocity']) > 100)
+        heard = s.listener.heard
+        assert {min(len(messages), 90) for messages in heard.values()} == {90}
+        stamps = [nanoseconds(m.header.stamp) for m in heard['servo_reference']]
+        assert {b - a for a, b in itertools.pairwise(stamps)} == {2_000_000}
+        wave = Sine(amplitude=0.002, frequency=3.0)
+        first = heard['servo_reference'][0]
+        start = next(i for i in range(1000) if wave.at(i * 2e-3).position == pytest.approx(first.position, abs=1e-15))
+        for i, message in enumerate(heard['servo_reference'][:90]):
+            wanted = wave.at((start + i) * 2e-3)
+            assert (message.position, message.velocity) == pytest.approx((wanted.position, wanted.velocity), abs=1e-12)
+        pressures = [m.chamber_a for m in heard['cylinder_pressure']]
+        assert all(0.0 < p < 7e6 for p in pressures)
+        assert len(set(pressures)) > 50
+
+
+def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_path):
+    estimator = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    with stage({'sensors.force_noise': 0.5}, estimator) as s:
+        s.spin(4.0)
+        assert abs(float(s.listener.values()['feed-forward [N]'])) > 20.0
+    verdict = replay(tmp_path / 'bag')
+    assert verdict.identical
+    assert verdict.recorded_feedforwards >= verdict.recorded_estimates > 500
+    run = read_run(tmp_path / 'bag')
+    assert evaluate(run).flagged == 0
+    assert float(abs(run.feedforward_force[200:]).max()) == pytest.approx(0.9 * run.coulomb_friction.max(), rel=0.1)
+
+
+def test_a_bad_reference_is_limited_and_named():
+    with stage({'wave': 'topic', 'reference_timeout': 10.0}) as s:
+        s.spin_until(lambda: s.listener.heard['rod_position'] and s.listener.reference.get_subscription_count())
+        for position, velocity, name in (
+            (math.nan, 0.0, 'REFERENCE_NOT_FINITE'),
+            (0.0, math.inf, 'REFERENCE_NOT_FINITE'),
+            (1.0, 0.0, 'REFERENCE_OUT_OF_STROKE'),
+            (-0.02, 0.0, 'REFERENCE_TOO_FAST'),
+        ):
+            message = ServoReference(position=position, velocity=velocity)
+            message.header.stamp = s.simulator.get_clock().now().to_msg()
+            s.listener.reference.publish(message)
+            s.spin_until(lambda name=name: name in s.listener.values().get('message', ''))
+            assert s.listener.values()['level'] == b'\x01'
+        positions = [m.position for m in s.listener.heard['rod_position']]
+        assert all(abs(p) <= 0.025 for p in positions)  # [m] end stops; references go to 24 mm
+        assert max(positions) > 0.02
+
+
+def test_a_feed_forward_that_is_old_or_no_number_counts_as_nothing():
+    with stage() as s:
+        s.spin_until(s.listener.feedforward.get_subscription_count)
+        message = FrictionFeedForward(force=1000.0)
+        message.header.stamp.sec = 5
+        s.listener.feedforward.publish(message)
+        s.spin_until(lambda: 'feed-forwards too old' in s.listener.values().get('message', ''))
+        for _ in range(100):
+            message = FrictionFeedForward(force=math.nan)
+            message.header.stamp = s.simulator.get_clock().now().to_msg()
+            s.listener.feedforward.publish(message)
+            s.spin(0.02)
+        s.spin_until(lambda: 'FEEDFORWARD_NOT_FINITE' in s.listener.values()['message'])
+        assert all(abs(m.position) < 0.002 for m in s.listener.heard['rod_position'])
+
+
+def test_the_wave_changes_while_it_runs_and_the_plant_does_not():
+    with stage() as s:
+        s.spin_until(lambda: len(s.listener.heard['servo_reference']) > 20)
+        assert s.set(wave='step', step__size=0.004).successful
+        s.spin_until(lambda: s.listener.heard['servo_reference'][-1].position == 0.004)
+        s.spin_until(lambda: abs(s.listener.heard['rod_position'][-1].position - 0.004) < 1e-3)
+        refused = s.set(load__mass=3.0)
+        assert not refused.successful
+        assert 'load.mass' in refused.reason
+        assert 'unconfigured' in refused.reason
+        assert not s.set(wave='square').successful
+        assert not s.set(wave='topic').successful
+
+
+@pytest.mark.parametrize(
+    ('values', 'reason'),
+    [
+        ({'controller__force_bandwidth': 50000.0}, 'the closed loop is unstable'),
+        ({'cylinder__bore_diameter': 0.01}, 'bore_diameter = 0.01 m is not above rod_diameter'),
+        ({'valve__return_pressure': 9e6}, 'supply_pressure'),
+        ({'inner_step': 0.01, 'rate': 100.0}, 'too long'),
+        ({'time_factor': 5.0}, 'publish_clock'),
+    ],
+)
+def test_a_plant_without_sense_is_refused_with_the_reason(values, reason):
+    with stage(autostart=False) as s:
+        refused = s.set(**values)
+        assert not refused.successful
+        assert reason in refused.reason
+
+
+def test_a_plant_without_sense_from_the_start_stays_unconfigured():
+    with stage({'controller.force_bandwidth': 50000.0}, autostart=False) as s:
+        assert s.simulator.trigger_configure() != TransitionCallbackReturn.SUCCESS
+        assert not s.simulator.configured
+        assert not s.simulator.autostart()
+
+
+def test_time_runs_faster_with_a_clock_for_the_others():
+    with stage({'publish_clock': True, 'time_factor': 5.0}) as s:
+        s.spin_until(lambda: len(s.listener.clocks) > 50)
+        first, began = nanoseconds(s.listener.clocks[0].clock), time.monotonic()
+        assert first < 10**9  # from 0 s
+        s.spin(1.0)
+        passed = (nanoseconds(s.listener.clocks[-1].clock) - first) * 1e-9
+        assert passed > 2.0 * (time.monotonic() - began)
+        assert nanoseconds(s.listener.heard['rod_velocity'][-1].header.stamp) * 1e-9 == pytest.approx(passed, abs=1.0)
+
+
+def test_sensors_of_the_same_seed_say_the_same_and_a_delay_keeps_the_stamp_of_the_measurement():
+    values = {'sensors.velocity_noise': 1e-3, 'sensors.seed': 5, 'sensors.drop_out': 0.2}
+    velocities = []
+    for delay in (0.0, 0.1):
+        with stage({**values, 'sensors.delay': delay}) as s:
+            s.spin_until(lambda s=s: len(s.listener.heard['rod_velocity']) > 100)
+            heard = s.listener.heard
+            first = nanoseconds(heard['servo_reference'][0].header.stamp)
+            late = nanoseconds(heard['servo_reference'][-1].header.stamp) - nanoseconds(
+                heard['rod_velocity'][-1].header.stamp
+            )
+            assert late * 1e-9 == pytest.approx(delay, abs=0.03)
+            velocities.append({m.velocity for m in heard['rod_velocity'][:100]})
+            assert first
+    assert len(velocities[0] & velocities[1]) > 50
+
+
+def test_deactivated_it_is_silent_and_starts_again_from_the_beginning():
+    with stage() as s:
+        s.spin_until(lambda: len(s.listener.heard['rod_velocity']) > 20)
+        s.simulator.trigger_deactivate()
+        s.spin(0.3)
+        count = len(s.listener.heard['rod_velocity'])
+        s.spin(0.3)
+        assert len(s.listener.heard['rod_velocity']) == count
+        s.simulator.trigger_activate()
+        s.spin_until(lambda: len(s.listener.heard['rod_velocity']) > count + 20)
+        s.simulator.trigger_deactivate()
+        s.simulator.trigger_cleanup()
+        assert s.simulator.autostart()
