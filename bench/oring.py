@@ -1,27 +1,44 @@
-"""What the finite-element O-ring costs and how it converges: ``python bench/oring.py [--json] [--lines 17 25 33]``.
+"""How exact the finite-element O-ring is and what it costs: ``bench/oring.py [TABLE ...] [--lines N ...] [--json]``.
 
-The case of the first tables is the thesis's ring, calibrated, at its five pressures; each changes one number of
-`Numerics` and keeps the others. The last table is what the blind case would give with another section, modulus, ring or
-friction. Normal forces are in N. Times are of one core, of this process only.
+Tables, all of them by default:
+
+- ``hertz``: force and peak of a cylinder between two plates over those of Hertz [%], peak over that of its own force;
+- ``lines``, ``penalty``, ``transition``: the thesis's ring, calibrated, at its five pressures, one number of `Numerics`
+  changed and the others kept; normal forces in N;
+- ``thesis``: calibrated and blind case beside Appendix B [%], axial force over pressure times area, volume lost;
+- ``variants``: what the blind case gives with another section, modulus, ring or friction;
+- ``friction``: friction of one seal from geometry alone beside the measured one, thesis's seals and Delft O-ring.
+
+Times are of one core, of this process only.
 """
 
 import argparse
 import dataclasses
 import json
+import math
 import sys
 import time
+from collections.abc import Callable
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from seal_friction_ros.core.oring_contact.case import Numerics, OringCase
+from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
 from seal_friction_ros.core.oring_contact.case_file import parse_case
-from seal_friction_ros.core.oring_contact.loading import model_of
-from seal_friction_ros.core.oring_contact.results import contact_results
-from seal_friction_ros.core.units import INCH, LBF, PSI
+from seal_friction_ros.core.oring_contact.hertz import cylinder_between_plates
+from seal_friction_ros.core.oring_contact.loading import model_of, squeeze
+from seal_friction_ros.core.oring_contact.material import Rubber
+from seal_friction_ros.core.oring_contact.results import contact_results, evaluate
+from seal_friction_ros.core.seal import SealGeometry, projected_area
+from seal_friction_ros.core.units import BAR, INCH, LBF, PSI
 from seal_friction_ros.files import config_path, read_yaml
+from seal_friction_ros.offline.oring import compute_case
+from seal_friction_ros.offline.oring_report import friction_deviation, thesis_case
 
+Rows = list[dict[str, float | str]]
+SQUEEZES = (0.02, 0.04, 0.06, 0.08)
+HERTZ_LINES = (33, 65)
 LINES = (13, 17, 25, 33, 41, 49)
 PENALTIES = (200.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 TRANSITIONS = (0.01, 0.02, 0.05, 0.1)
@@ -46,7 +63,88 @@ def measure(numerics: Numerics) -> dict[str, float]:
     return figures
 
 
-def sensitivities() -> list[dict[str, float | str]]:
+def hertz() -> Rows:
+    """A ring of 2 mm with a radius so large (1 m) that rod and gland are plates."""
+    diameter, inner, rubber = 2e-3, 2.0, Rubber(5e6)
+    rows: Rows = []
+    for lines in HERTZ_LINES:
+        for share in SQUEEZES:
+            depth = share * diameter
+            geometry = SealGeometry(diameter, inner, inner + depth, inner + 2.0 * diameter - depth)
+            numerics = Numerics(lines=lines)
+            case = OringCase(name='plates', geometry=geometry, groove=Groove(5e-3), rubber=rubber, numerics=numerics)
+            model = model_of(case)
+            contact = evaluate(model, squeeze(case, model)).rod
+            expected = cylinder_between_plates(share, diameter, rubber.elastic_modulus / 0.75)
+            force = contact.force / (math.pi * geometry.rod_diameter)
+            peak_of_force = expected.peak_stress * math.sqrt(force / expected.force_per_length)
+            rows.append(
+                {
+                    'lines': lines,
+                    'squeeze [%]': 100.0 * share,
+                    'force off [%]': 100.0 * (force / expected.force_per_length - 1.0),
+                    'peak off [%]': 100.0 * (contact.peak_stress / expected.peak_stress - 1.0),
+                    'peak off that of the force [%]': 100.0 * (contact.peak_stress / peak_of_force - 1.0),
+                }
+            )
+    return rows
+
+
+def thesis() -> Rows:
+    """Both cases of the thesis's ring beside Appendix B."""
+    rows: Rows = []
+    for name in ('ms28775_114', 'ms28775_114_blind'):
+        computed = compute_case(config_path('oring', name))
+        area = projected_area(computed.file.case.geometry)
+        for result in computed.results:
+            its = thesis_case(computed, result)
+            if its is None:
+                raise ValueError(f'{name}: Appendix B has no {result.pressure / PSI:.0f} psi')
+            push = result.pressure * area
+            rows.append(
+                {
+                    'case': name,
+                    'psi': round(result.pressure / PSI),
+                    'F_n [lbf]': result.rod.force / LBF,
+                    'its [lbf]': its.normal_force / LBF,
+                    'F_n off [%]': 100.0 * (result.rod.force / its.normal_force - 1.0),
+                    'peak off [%]': 100.0 * (result.rod.peak_stress / its.peak_stress - 1.0),
+                    'width off [%]': 100.0 * (result.rod.width / its.width - 1.0),
+                    'axial off [%]': 100.0 * (result.axial_force / push - 1.0) if push else '-',
+                    'volume lost [%]': 100.0 * (1.0 - result.volume_ratio),
+                    'slope': computed.summary.area_deformation_gain or '-',
+                }
+            )
+    return rows
+
+
+def friction() -> Rows:
+    """Friction of one seal from geometry alone beside the measured one."""
+    rows: Rows = []
+    for name in ('ms28775_114', 'ms28775_114_blind', 'delft_o_ring'):
+        computed = compute_case(config_path('oring', name))
+        measured = computed.file.measured
+        if measured is None:
+            raise ValueError(f'{name}: nothing measured')
+        off = friction_deviation(computed, measured)
+        for pressure, force, percent in zip(measured.pressures, measured.frictions, off, strict=True):
+            each = force / measured.seals
+            rows.append(
+                {
+                    'case': name,
+                    'bar': pressure / BAR,
+                    'psi': round(pressure / PSI),
+                    'measured [N]': each,
+                    'from geometry [N]': each * (1.0 + percent / 100.0),
+                    'measured [lbf]': each / LBF,
+                    'from geometry [lbf]': each * (1.0 + percent / 100.0) / LBF,
+                    'off [%]': float(percent),
+                }
+            )
+    return rows
+
+
+def sensitivities() -> Rows:
     """Normal force of the blind case and of its variants [N] at 0, 500 and 1000 psi, and over Appendix B [%]."""
     case = parse_case(read_yaml(config_path('oring', 'ms28775_114_blind'))).case
     geometry = case.geometry
@@ -71,7 +169,7 @@ def sensitivities() -> list[dict[str, float | str]]:
             wall_friction=0.05,
         ),
     }
-    rows: list[dict[str, float | str]] = []
+    rows: Rows = []
     for name, variant in variants.items():
         row: dict[str, float | str] = {'variant': name}
         for result in contact_results(variant, tuple(psi * PSI for psi in APPENDIX_B)):
@@ -86,34 +184,48 @@ def _with(case: OringCase, **changes: float) -> OringCase:
     return dataclasses.replace(case, geometry=dataclasses.replace(case.geometry, **changes))
 
 
-def main() -> int:
-    """Measure every table and print it, or all of them as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--json', action='store_true')
-    parser.add_argument('--lines', type=int, nargs='+', default=LINES, help='meshes of the first table')
-    arguments = parser.parse_args()
+def converging(name: str, choices: tuple[float, ...]) -> Rows:
+    """Figures of `measure` over the choices of one number."""
     measure(Numerics(lines=9))  # first calls, not counted
-    series = {
-        'lines': [Numerics(lines=lines) for lines in arguments.lines],
-        'penalty': [Numerics(penalty=penalty) for penalty in PENALTIES],
-        'transition': [Numerics(transition=transition) for transition in TRANSITIONS],
+    return [{name: choice, **measure(dataclasses.replace(Numerics(), **{name: choice}))} for choice in choices]
+
+
+def main() -> int:
+    """Measure the tables that are asked for and print them, or all of them as one JSON object."""
+    makers: dict[str, Callable[[], Rows]] = {
+        'hertz': hertz,
+        'lines': lambda: converging('lines', tuple(arguments.lines)),
+        'penalty': lambda: converging('penalty', PENALTIES),
+        'transition': lambda: converging('transition', TRANSITIONS),
+        'thesis': thesis,
+        'variants': sensitivities,
+        'friction': friction,
     }
-    tables: dict[str, list[dict[str, float | str]]] = {
-        name: [{name: float(getattr(numerics, name)), **measure(numerics)} for numerics in choices]
-        for name, choices in series.items()
-    }
-    tables['variants of the blind case'] = sensitivities()
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('tables', nargs='*', metavar='TABLE', help=', '.join(makers))
+    parser.add_argument('--json', action='store_true')
+    parser.add_argument('--lines', type=int, nargs='+', default=LINES, help='meshes of the table lines')
+    arguments = parser.parse_args()
+    unknown = [name for name in arguments.tables if name not in makers]
+    if unknown:
+        parser.error(f'there is no table {unknown[0]}: there are {", ".join(makers)}')
+    made = {}
+    for name in arguments.tables or makers:
+        made[name] = makers[name]()
+        if not arguments.json:
+            _print(name, made[name])
     if arguments.json:
-        print(json.dumps(tables))
-        return 0
-    for name, rows in tables.items():
-        table = Table(title=f'ms28775_114 over {name}')
-        for heading in rows[0]:
-            table.add_column(Text(heading), justify='right')
-        for row in rows:
-            table.add_row(*(_text(value) for value in row.values()))
-        Console(width=180).print(table)
+        print(json.dumps(made))
     return 0
+
+
+def _print(name: str, rows: Rows) -> None:
+    table = Table(title=name)
+    for heading in rows[0]:
+        table.add_column(Text(heading), justify='right')
+    for row in rows:
+        table.add_row(*(_text(value) for value in row.values()))
+    Console(width=180).print(table)
 
 
 def _text(value: float | str) -> str:

@@ -61,16 +61,15 @@ def compute_case(path: Path, pressures: Sequence[float] = ()) -> Computed:
     """
     try:
         file = parse_case(read_yaml(path))
-        if pressures:
-            check_pressures(file.case, tuple(pressures))
+        wanted = tuple(pressures) or file.pressures
+        check_pressures(file.case, wanted)
+        results = []
+        with progress(f'{file.case.name}: pressures', len(wanted)) as advance:
+            for result in contact_results(file.case, wanted):
+                results.append(result)
+                advance(1)
     except ValueError as error:
         raise ValueError(str(error) if str(path) in str(error) else f'{path}: {error}') from None
-    wanted = tuple(pressures) or file.pressures
-    results = []
-    with progress(f'{file.case.name}: pressures', len(wanted)) as advance:
-        for result in contact_results(file.case, wanted):
-            results.append(result)
-            advance(1)
     return Computed(file, tuple(results), _summary(file, results))
 
 

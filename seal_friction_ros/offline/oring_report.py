@@ -248,9 +248,10 @@ def walls_figure(computed: Computed) -> Plot:
     for result, colour in zip(results, colours, strict=True):
         for ax, contact in zip(axes, (result.rod, result.gland, result.wall), strict=True):
             if len(contact.position):
+                position, stress = _line(contact)
                 ax.plot(
-                    contact.position / _MM,
-                    contact.stress / _MPA,
+                    (contact.edges[0] + position) / _MM,
+                    stress / _MPA,
                     color=colour,
                     label=f'{result.pressure / BAR:.3g} bar',
                 )
@@ -267,7 +268,7 @@ def walls_figure(computed: Computed) -> Plot:
     return Plot(
         'contact_stress_walls',
         figure,
-        'Contact stress at the nodes in contact with each wall; downstream is to the right, in the last panel the axis '
+        'Contact stress along each wall; downstream is to the right, in the last panel the axis '
         'of the rod to the left.',
     )
 
@@ -308,7 +309,7 @@ def friction_figure(computed: Computed) -> Plot:
     measured = file.measured
     title = 'Friction from geometry'
     if measured:
-        off = _friction_deviation(computed, measured)
+        off = friction_deviation(computed, measured)
         inside = off[np.isfinite(off)]
         if len(inside):
             title += f': {inside.min():+.0f} to {inside.max():+.0f} % off the measured one'
@@ -341,7 +342,7 @@ def _friction(computed: Computed, pressures: FloatArray) -> FloatArray:
     return np.where(inside, [friction.law.coefficient_of_friction(force) * force for force in normal], np.nan)
 
 
-def _friction_deviation(computed: Computed, measured: Measured) -> FloatArray:
+def friction_deviation(computed: Computed, measured: Measured) -> FloatArray:
     """Computed over measured friction at the measured pressures [%]; NaN outside the computed ones."""
     each = np.array(measured.frictions) / measured.seals
     off: FloatArray = 100.0 * (_friction(computed, np.array(measured.pressures)) / each - 1.0)
@@ -454,7 +455,7 @@ def _friction_table(computed: Computed) -> Iterable[str]:
     measured = computed.file.measured
     if measured is None or not computed.summary.friction_N:
         return
-    off = _friction_deviation(computed, measured)
+    off = friction_deviation(computed, measured)
     rows = []
     for pressure, friction, deviation in zip(measured.pressures, measured.frictions, off, strict=True):
         each = friction / measured.seals

@@ -146,7 +146,7 @@ def test_progress_is_one_step_a_pressure(tmp_path: Path, monkeypatch: pytest.Mon
         ({'rubber': {'hardness': 7.0}}, 'rubber: hardness = 7.0 Shore A is outside 20 to 95'),
         ({'rubber': None}, 'rubber: give one of hardness'),
         ({'groove': None}, 'groove is not a mapping'),
-        ({'groove': {'width': 1.5e-3}}, 'overfilled gland'),
+        ({'groove': {'width': 1.5e-3}}, 'case ms28775_114_fem: OringCase.groove: overfilled gland: the rubber has'),
         (
             {'geometry': {'section_diameter': 2.6e-3}},
             'geometry lacks ring_inner_diameter, rod_diameter, gland_diameter',
@@ -167,6 +167,25 @@ def test_an_unusable_case_is_exit_code_2_and_one_line(
     assert message in said
     assert str(path) in said
     assert len(said.splitlines()) == 1
+
+
+def test_commands_and_case_file_of_the_docs_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    page = (ROOT / 'docs' / 'oring.md').read_text()
+    with_package, *own = re.findall(r'^\.venv/bin/seal_friction (oring .*?) +#', page, re.MULTILINE)
+    assert f'seal_friction {with_package}\n' in (ROOT / 'README.md').read_text()  # where all commands are run
+    assert len(own) == 2
+    monkeypatch.chdir(tmp_path)
+    (case,) = re.findall(r'```yaml\n(.*?)```', page, re.DOTALL)
+    Path('my_case.yaml').write_text(f'{case}numerics: {{lines: 9}}\n')
+    Path('build').mkdir()
+    assert [main(command.split()) for command in own] == [0, 0]
+    assert parse_seal(read_yaml(Path('build/my_seal.yaml'))).name == 'my_ring'
+
+
+def test_what_stops_a_computation_names_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    path = written(tmp_path, document(groove={'width': 2.62e-3}))  # the section fits, the squeezed one does not
+    assert main(['oring', str(path)]) == 2
+    assert f'{path}: case ms28775_114_fem: overfilled gland: the squeezed ring is' in capsys.readouterr().err
 
 
 def test_a_seal_file_that_is_there_is_not_overwritten_and_nothing_is_computed_first(

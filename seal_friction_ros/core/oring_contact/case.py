@@ -80,14 +80,14 @@ class OringCase:
         section = stretched_section_diameter(self.geometry)
         if section <= gap:
             raise ValueError(
-                f'case {self.name}: no squeeze: stretched over the rod, section_diameter = '
+                f'OringCase.geometry: no squeeze: stretched over the rod, section_diameter = '
                 f'{self.geometry.section_diameter} m becomes {section:.6g} m and the gap between rod and gland is '
                 f'{gap:.6g} m'
             )
         fill = gland_fill(self.geometry, self.groove)
         if fill >= 1.0:
             raise ValueError(
-                f'case {self.name}: overfilled gland: the rubber has {100.0 * fill:.1f} % of its volume; widen '
+                f'OringCase.groove: overfilled gland: the rubber has {100.0 * fill:.1f} % of its volume; widen '
                 f'groove.width = {self.groove.width} m'
             )
 

@@ -73,14 +73,16 @@ def loaded_states(case: OringCase, model: Model, pressures: tuple[float, ...]) -
     if not pressures:
         return
     free = make_assembly(model)
-    now = seat(case, model, free, now)
-    rise = now.pressure
+    base = seat(case, model, free, now)
+    lowest, rise = base.pressure, base.pressure
     for pressure in pressures:
-        now, rise = _raised(case, model, free, now, pressure, rise)
+        now, next_rise = _raised(case, model, free, base, pressure, rise)
         loaded = _held_back(case, model, free, now)
         _check_sealed(case, model, loaded)
         yield loaded
-        now = now._replace(newton_steps=0)
+        if pressure > lowest:  # below, the wall hardly holds the ring: no good place to start from
+            base, rise = now, next_rise
+        base = base._replace(newton_steps=0)
 
 
 def squeeze(case: OringCase, model: Model) -> Loaded:
