@@ -109,7 +109,8 @@ def _oring(arguments: argparse.Namespace) -> int:
 
     if arguments.out:
         check_new(arguments.out)
-    computed = compute_case(config_path('oring', arguments.case), arguments.pressures)
+    path = config_path('oring', arguments.case)
+    computed = compute_case(path, arguments.pressures, for_seal_file=arguments.out is not None)
     if arguments.out:
         write_seal_file(computed, arguments.out)
     if arguments.report:

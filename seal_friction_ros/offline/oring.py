@@ -7,7 +7,7 @@ from statistics import linear_regression
 from typing import NamedTuple
 
 from seal_friction_ros.core.oring_contact.case import check_pressures
-from seal_friction_ros.core.oring_contact.case_file import CaseFile, parse_case
+from seal_friction_ros.core.oring_contact.case_file import CaseFile, Friction, parse_case
 from seal_friction_ros.core.oring_contact.results import Contact, ContactResult, contact_results
 from seal_friction_ros.core.seal import projected_area
 from seal_friction_ros.core.seal_file import parse_seal
@@ -16,12 +16,21 @@ from seal_friction_ros.offline.progress import progress
 
 
 @dataclass(frozen=True)
+class Profile:
+    """Contact stress along a wall, at the nodes in contact."""
+
+    position_m: tuple[float, ...]
+    """along rod and gland, positive downstream from the middle of the free ring; for the wall the radius"""
+    stress_Pa: tuple[float, ...]  # noqa: N815  (unit symbols keep their case)
+
+
+@dataclass(frozen=True)
 class OringSummary:
     """Numbers of a case, one of each for every pressure."""
 
     case: str
     sliding_wall: str
-    pressure_Pa: tuple[float, ...]  # noqa: N815  (unit symbols keep their case)
+    pressure_Pa: tuple[float, ...]  # noqa: N815
     normal_force_N: tuple[float, ...]  # noqa: N815
     """contact stress on the wall the ring slides on, over its area"""
     axial_force_N: tuple[float, ...]  # noqa: N815
@@ -34,6 +43,10 @@ class OringSummary:
     """what that line has at no axial force; None with one pressure"""
     friction_N: tuple[float, ...] | None  # noqa: N815
     """sliding friction of one seal, if the case has a friction coefficient"""
+    rod_profile: tuple[Profile, ...]
+    gland_profile: tuple[Profile, ...]
+    wall_profile: tuple[Profile, ...]
+    """downstream wall; empty without pressure"""
 
 
 class Computed(NamedTuple):
@@ -49,20 +62,24 @@ def sliding_contact(file: CaseFile, result: ContactResult) -> Contact:
     return result.rod if file.case.geometry.sliding_wall == 'rod' else result.gland
 
 
-def compute_case(path: Path, pressures: Sequence[float] = ()) -> Computed:
+def compute_case(path: Path, pressures: Sequence[float] = (), *, for_seal_file: bool = False) -> Computed:
     """Compute a case file, with a progress bar.
 
     Args:
         path: The case file.
         pressures: Instead of those in the file [Pa, gauge], increasing.
+        for_seal_file: Refuse, before computing, what `write_seal_file` could not make a seal of.
 
     Raises:
-        ValueError: The file makes no sense, or the ring does not fit, does not seal or finds no equilibrium.
+        ValueError: The file makes no sense or is not enough for a seal file, or the ring does not fit, does not seal or
+            finds no equilibrium.
     """
     try:
         file = parse_case(read_yaml(path))
         wanted = tuple(pressures) or file.pressures
         check_pressures(file.case, wanted)
+        if for_seal_file:
+            _friction_of_seal(file, wanted)
         results = []
         with progress(f'{file.case.name}: pressures', len(wanted)) as advance:
             for result in contact_results(file.case, wanted):
@@ -90,7 +107,14 @@ def _summary(file: CaseFile, results: Sequence[ContactResult]) -> OringSummary:
         area_deformation_gain=gain,
         radial_force_N=radial,
         friction_N=tuple(law.coefficient_of_friction(force) * force for force in normal) if law else None,
+        rod_profile=tuple(_profile(result.rod) for result in results),
+        gland_profile=tuple(_profile(result.gland) for result in results),
+        wall_profile=tuple(_profile(result.wall) for result in results),
     )
+
+
+def _profile(contact: Contact) -> Profile:
+    return Profile(tuple(contact.position.tolist()), tuple(contact.stress.tolist()))
 
 
 def check_new(out: Path) -> None:
@@ -105,6 +129,14 @@ def check_new(out: Path) -> None:
         raise ValueError(f'{out}: there is no folder {out.parent}')
 
 
+def _friction_of_seal(file: CaseFile, pressures: Sequence[float]) -> Friction:
+    if file.friction is None:
+        raise ValueError(f'case {file.case.name}: a seal file needs its section friction, with a friction_coefficient')
+    if len(pressures) < 2:
+        raise ValueError(f'case {file.case.name}: a seal file needs two pressures at least')
+    return file.friction
+
+
 def write_seal_file(computed: Computed, out: Path) -> None:
     """Write a seal file whose normal force is a table of the computed pressures.
 
@@ -113,11 +145,7 @@ def write_seal_file(computed: Computed, out: Path) -> None:
             file is there already or cannot be written.
     """
     file, summary = computed.file, computed.summary
-    if file.friction is None:
-        raise ValueError(f'case {file.case.name}: a seal file needs its section friction, with a friction_coefficient')
-    if len(computed.results) < 2:
-        raise ValueError(f'case {file.case.name}: a seal file needs two pressures at least')
-    geometry, friction = file.case.geometry, file.friction
+    geometry, friction = file.case.geometry, _friction_of_seal(file, summary.pressure_Pa)
     area = projected_area(geometry)
     gain, radial = linear_regression([p * area for p in summary.pressure_Pa], summary.normal_force_N)
     source = f'{file.source} Normal force: finite elements, {file.case.numerics.lines} lines.'

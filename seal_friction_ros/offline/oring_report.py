@@ -479,8 +479,8 @@ modulus. Contact stress is what the wall bears beyond the fluid's share.</dd>
 <dt>Normal force</dt>
 <dd>Contact stress over the area of the wall the ring slides on, all around the rod (thesis, chapter 4.2).</dd>
 <dt>Axial force</dt>
-<dd>Axial component of everything that presses on the downstream side of the ring: as a check beside pressure times
-projected area.</dd>
+<dd>Axial component of everything that presses on the downstream side of the ring, less what tilted facets of the mesh
+on rod and gland add: as a check beside pressure times projected area.</dd>
 <dt>Contact width</dt>
 <dd>From the outermost nodes in contact, carried on by the root law of the edge of Hertz, one node spacing at most.</dd>
 <dt>Area deformation gain and F_rad</dt>

@@ -61,6 +61,12 @@ def test_json_has_one_number_for_every_pressure(tmp_path: Path, capsys: pytest.C
     assert set(figures) >= KEYS
     assert all(len(figures[key]) == 2 for key in KEYS)
     assert figures['pressure_Pa'] == [0.0, 5e5]
+    for result, wall in ((0, 'rod'), (0, 'gland'), (1, 'rod'), (1, 'gland'), (1, 'wall')):
+        profile = figures[f'{wall}_profile'][result]
+        assert profile['position_m'] == sorted(profile['position_m'])
+        assert len(profile['stress_Pa']) == len(profile['position_m']) > 3
+    assert max(figures['rod_profile'][1]['stress_Pa']) == figures['peak_contact_stress_Pa'][1]
+    assert figures['wall_profile'][0] == {'position_m': [], 'stress_Pa': []}
     assert figures['normal_force_N'] == sorted(figures['normal_force_N'])
     area = projected_area(parse_case(document()).case.geometry)
     assert figures['axial_force_N'][1] == pytest.approx(5e5 * area, rel=0.01)
