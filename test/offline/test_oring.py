@@ -1,7 +1,10 @@
 """The command ``oring``: a case file to numbers, a seal file and a page; what is wrong is said in one line."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -186,6 +189,21 @@ def test_commands_and_case_file_of_the_docs_work(tmp_path: Path, monkeypatch: py
     Path('build').mkdir()
     assert [main(command.split()) for command in own] == [0, 0]
     assert parse_seal(read_yaml(Path('build/my_seal.yaml'))).name == 'my_ring'
+
+
+def test_the_tables_of_the_docs_are_those_of_the_bench():
+    page = (ROOT / 'docs' / 'oring.md').read_text()
+    named = {name for names in re.findall(r'bench/oring\.py ([a-z ]+)`', page) for name in names.split()}
+    run = [sys.executable, str(ROOT / 'bench' / 'oring.py')]
+    environment = {**os.environ, 'PYTHONPATH': str(ROOT)}
+    refused = subprocess.run([*run, 'weather'], env=environment, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert named == set(refused.stderr.rpartition('there are ')[2].strip().split(', '))
+    made = subprocess.run(
+        [*run, 'lines', '--lines', '9', '--json'], env=environment, capture_output=True, text=True, check=True
+    )
+    (row,) = json.loads(made.stdout)['lines']
+    assert row['F_n at 1000 psi [N]'] == pytest.approx(419.2, rel=0.1)
 
 
 def test_what_stops_a_computation_names_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
