@@ -28,6 +28,7 @@ test:
 bench: setup
 	@$(python) bench/step.py
 	@$(python) bench/servo.py
+	@$(python) bench/oring.py lines --lines 17 25 33
 
 figures: setup
 	@$(python) tools/make_figures.py

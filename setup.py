@@ -24,6 +24,7 @@ setup(
         shared('config/programs', '*.yaml'),
         shared('config/security', '*.xml'),
         shared('config/rigs', '*.yaml'),
+        shared('config/oring', '*.yaml'),
         shared('data/thesis', '*.csv'),
     ],
     package_data={NAME: ['py.typed']},

@@ -14,6 +14,9 @@ from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
+from seal_friction_ros.core.oring_contact.case_file import Measured
+from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.reference import Chirp, PullTest, Sine, Step, Trapezoid
 from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.sensors import SensorSettings
@@ -61,6 +64,11 @@ RECORDS = (
     ConstantCoulomb,
     VelocityTerms,
     Uncertainty,
+    Groove,
+    Rubber,
+    Numerics,
+    OringCase,
+    Measured,
     SavitzkyGolay,
     Sliding,
     SpoolEvaluation,

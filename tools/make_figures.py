@@ -7,6 +7,8 @@ from pathlib import Path
 
 from seal_friction_ros.files import config_path
 from seal_friction_ros.offline.import_thesis import import_thesis
+from seal_friction_ros.offline.oring import compute_case
+from seal_friction_ros.offline.oring_report import write_oring_report
 from seal_friction_ros.offline.replay import replay
 from seal_friction_ros.offline.report import write_report
 from seal_friction_ros.offline.seal_charts import write_seal_charts
@@ -23,12 +25,15 @@ def main() -> int:
         replay(folder / 'inputs', out=folder / 'pull_test')
         write_report(folder / 'pull_test', folder / 'report.html')
         write_seal_charts(config_path('seals', 'ms28775_114'), folder / 'seal.html')
+        write_oring_report(compute_case(config_path('oring', 'ms28775_114')), folder / 'oring.html')
         write_servo_charts(folder / 'servo.html')
         FIGURES.mkdir(parents=True, exist_ok=True)
         for source, target in {
             'report_figures/live_estimate.png': 'live_estimate.png',
             'report_figures/friction_over_pressure.png': 'friction_over_pressure.png',
             'seal_figures/fig23_states_2_and_3.png': 'friction_states.png',
+            'oring_figures/contact_stress_profiles.png': 'oring_contact_stress.png',
+            'oring_figures/deformed_shape.png': 'oring_shape.png',
             'servo_figures/fig25_servo_with_and_without_friction.png': 'fig25_servo_with_and_without_friction.png',
         }.items():
             shutil.copy(folder / source, FIGURES / target)

@@ -31,7 +31,7 @@ from seal_friction_ros.core.coulomb import (
     Uncertainty,
     VelocityTerms,
 )
-from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction_coefficient import CoefficientTable, FrictionCoefficientLaw, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.validated import from_mapping, plain
@@ -101,9 +101,19 @@ def _coulomb_law(document: Mapping[str, Any], law_name: str, where: str) -> Coul
         return PhysicsBased(
             geometry,
             _law(document, 'normal_force', NORMAL_FORCE_LAWS, where),
-            _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where),
+            parse_friction_coefficient(document, where),
         )
     return from_mapping(PriorArtChart, document.get('chart'), f'{where}: chart', geometry=geometry)
+
+
+def parse_friction_coefficient(document: Mapping[str, Any], where: str) -> FrictionCoefficientLaw:
+    """Law under ``friction_coefficient`` of a document; ``where`` says what the document is, for the error message.
+
+    Raises:
+        ValueError: There is none, or it makes no sense.
+    """
+    law: FrictionCoefficientLaw = _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where)
+    return law
 
 
 def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:

@@ -67,7 +67,7 @@ def _check_number(where: str, value: Any, meaning: Meaning) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return
     what = f'{where} = {value} {meaning.unit}'
-    if not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f'{what} is not finite')
     if meaning.lower is not None and value < meaning.lower:
         raise ValueError(f'{what} is below its lower bound {meaning.lower} {meaning.unit}')

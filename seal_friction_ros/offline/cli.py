@@ -102,6 +102,22 @@ def _charts(arguments: argparse.Namespace) -> int:
     return _tell(arguments, write_seal_charts(path, arguments.out), f'{arguments.out}: written')
 
 
+def _oring(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.files import config_path
+    from seal_friction_ros.offline.oring import check_new, compute_case, write_seal_file
+    from seal_friction_ros.offline.oring_report import numbers_text, write_oring_report
+
+    if arguments.out:
+        check_new(arguments.out)
+    path = config_path('oring', arguments.case)
+    computed = compute_case(path, arguments.pressures, for_seal_file=arguments.out is not None)
+    if arguments.out:
+        write_seal_file(computed, arguments.out)
+    if arguments.report:
+        write_oring_report(computed, arguments.report)
+    return _tell(arguments, computed.summary, numbers_text(computed))
+
+
 def _tune(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.replay import chosen_configuration
     from seal_friction_ros.offline.tune import tune_bag, tune_simulator
@@ -275,6 +291,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_identify(commands)
     _add_sheet(commands)
     _add_spool(commands)
+    _add_oring(commands)
 
     recover = _add(commands, 'recover', _recover, 'a valid bag of what can be read of a damaged or unfinished one')
     recover.add_argument('bag', type=Path)
@@ -304,6 +321,23 @@ def make_parser() -> argparse.ArgumentParser:
         text = f'{where}{meaning.description}{unit}'.replace('%', '%%')
         tune.add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
     return parser
+
+
+def _add_oring(commands: Any) -> None:
+    oring = _add(commands, 'oring', _oring, 'contact stress and normal force of an O-ring, by finite elements')
+    oring.add_argument('case', metavar='CASE', help='case file: a path, or the name of one in config/oring')
+    oring.add_argument(
+        '--pressures',
+        type=float,
+        nargs='+',
+        default=(),
+        metavar='PA',
+        help='gauge pressures, instead of those in the file',
+    )
+    oring.add_argument('--out', type=Path, metavar='SEAL.yaml', help='write a seal file; must not exist')
+    oring.add_argument(
+        '--report', type=Path, metavar='FILE.html', help='write a page with figures, PNG and SVG beside it'
+    )
 
 
 def _add_identify(commands: Any) -> None:

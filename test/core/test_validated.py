@@ -105,6 +105,11 @@ def test_a_mapping_that_makes_no_sense_is_refused_in_one_line_that_names_the_fie
     assert '\n' not in str(refusal.value)
 
 
+def test_a_whole_number_beyond_any_float_is_beyond_its_bound_too():
+    with pytest.raises(ValueError, match='above its upper bound 100'):
+        make(coils=10**400)
+
+
 def test_what_is_missing_is_named():
     with pytest.raises(ValueError, match=r'^spring lacks stiffness$'):
         from_mapping(Spring, {}, 'spring')

@@ -1,0 +1,1 @@
+"""Finite-element O-ring: ring, gland, material and pressure -> contact stress, normal force and axial force."""

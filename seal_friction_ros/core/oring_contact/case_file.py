@@ -1,0 +1,165 @@
+"""The document of a case file (a mapping, as YAML gives it) -> `CaseFile`.
+
+A case file looks like this; every field is in docs/oring.md::
+
+    name: ms28775_114
+    source: where the numbers are from
+    geometry: {section_diameter: 2.62e-3, ring_inner_diameter: 15.54e-3, rod_diameter: ..., gland_diameter: ...}
+    groove: {width: 3.6e-3, diametral_clearance: 0.1e-3}
+    rubber: {hardness: 70.0}            # or elastic_modulus [Pa]; mooney_ratio, bulk_modulus
+    pressures: [0.0, 3.4e+6, 6.9e+6]    # [Pa, gauge]
+    friction:                           # optional: for a seal file, and for friction from geometry alone
+      friction_coefficient: {law: power_law, coefficient: 2.1, exponent: 0.56}
+      stiction: 2.5
+      uncertainty: {relative_std: 0.2}
+    measured: {seals: 2, pressures: [...], frictions: [...], source: ...}   # optional: to set beside it
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from seal_friction_ros.core.coulomb import Uncertainty
+from seal_friction_ros.core.friction_coefficient import FrictionCoefficientLaw
+from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase, check_pressures
+from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
+from seal_friction_ros.core.seal import SealGeometry
+from seal_friction_ros.core.seal_file import parse_friction_coefficient
+from seal_friction_ros.core.validated import check, from_mapping, parameter, plain
+
+_KEYS = (
+    'name', 'source', 'geometry', 'groove', 'rubber', 'wall_friction', 'numerics', 'pressures', 'friction', 'measured',
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Friction:
+    """What a seal file needs besides geometry and normal force."""
+
+    friction_coefficient: Mapping[str, Any]
+    """as in a seal file"""
+    law: FrictionCoefficientLaw
+    stiction: float
+    """[N]"""
+    uncertainty: Uncertainty
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Friction that was measured, to set beside the computed one.
+
+    Raises:
+        ValueError: A number is out of bounds, or there are not as many frictions as pressures.
+    """
+
+    seals: int = parameter(unit='', lower=1, upper=100, description='Seals that the friction is of.')
+    pressures: tuple[float, ...] = parameter(unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures.')
+    frictions: tuple[float, ...] = parameter(unit='N', lower=0.0, upper=1e9, description='Sliding friction at each.')
+    source: str = ''
+
+    def __post_init__(self) -> None:
+        check(self)
+        if len(self.frictions) != len(self.pressures) or not self.pressures:
+            raise ValueError(
+                f'Measured: {len(self.frictions)} frictions at {len(self.pressures)} pressures: give one a pressure'
+            )
+
+
+@dataclass(frozen=True)
+class CaseFile:
+    """A case, and what is wanted of it."""
+
+    case: OringCase
+    pressures: tuple[float, ...]
+    """[Pa, gauge], increasing"""
+    source: str
+    friction: Friction | None
+    measured: Measured | None
+
+
+@dataclass(frozen=True)
+class _Pressures:
+    pressures: tuple[float, ...]
+
+
+def parse_case(document: Any) -> CaseFile:
+    """Make a case from the document of a case file.
+
+    Raises:
+        ValueError: The document makes no sense; the message names the case, the field, its value and its bound.
+    """
+    if not isinstance(document, Mapping):
+        raise ValueError(f'a case file is a mapping of names to values, not {type(document).__name__}')
+    name = document.get('name')
+    if not isinstance(name, str) or not name or not name.isprintable():
+        raise ValueError(f'case file: name = {name!r} is not one line of text')
+    where = f'case {name}'
+    unknown = sorted(plain(key) for key in document if key not in _KEYS)
+    if unknown:
+        raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(_KEYS)}')
+    source = document.get('source', '')
+    if not isinstance(source, str):
+        raise ValueError(f'{where}: source = {source!r} is not a text')
+    rubber = _rubber(document.get('rubber'), f'{where}: rubber')
+    geometry = from_mapping(
+        SealGeometry, document.get('geometry'), f'{where}: geometry', elastic_modulus=rubber.elastic_modulus
+    )
+    case = from_mapping(
+        OringCase,
+        {'wall_friction': document['wall_friction']} if 'wall_friction' in document else {},
+        where,
+        name=name,
+        geometry=geometry,
+        groove=from_mapping(Groove, document.get('groove'), f'{where}: groove'),
+        rubber=rubber,
+        numerics=from_mapping(Numerics, document.get('numerics', {}), f'{where}: numerics'),
+    )
+    pressures = from_mapping(_Pressures, {'pressures': document.get('pressures')}, where).pressures
+    check_pressures(case, pressures)
+    return CaseFile(case, pressures, source, _friction(document, where), _measured(document, where))
+
+
+def _rubber(values: Any, where: str) -> Rubber:
+    """Rubber by its modulus or its hardness, one of the two."""
+    if not isinstance(values, Mapping) or ('hardness' in values) == ('elastic_modulus' in values):
+        raise ValueError(f'{where}: give one of hardness [Shore A] and elastic_modulus [Pa], not {values!r}')
+    others = {key: value for key, value in values.items() if key != 'hardness'}
+    if 'hardness' in values:
+        hardness = from_mapping(_Hardness, {'hardness': values['hardness']}, where).hardness
+        try:
+            others['elastic_modulus'] = elastic_modulus_of_hardness(hardness)
+        except ValueError as error:
+            raise ValueError(f'{where}: {error}') from None
+    return from_mapping(Rubber, others, where)
+
+
+@dataclass(frozen=True)
+class _Hardness:
+    hardness: float
+
+
+@dataclass(frozen=True)
+class _Stiction:
+    stiction: float = parameter(0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway above Coulomb friction.')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def _friction(document: Mapping[str, Any], where: str) -> Friction | None:
+    values = document.get('friction')
+    if values is None:
+        return None
+    where = f'{where}: friction'
+    allowed = ('friction_coefficient', 'stiction', 'uncertainty')
+    if not isinstance(values, Mapping) or not set(values) <= set(allowed):
+        raise ValueError(f'{where} is not a mapping with {", ".join(allowed)} but {values!r}')
+    law = parse_friction_coefficient(values, where)
+    stiction = from_mapping(_Stiction, {k: v for k, v in values.items() if k == 'stiction'}, where).stiction
+    uncertainty = from_mapping(Uncertainty, values.get('uncertainty'), f'{where}: uncertainty')
+    return Friction(values['friction_coefficient'], law, stiction, uncertainty)
+
+
+def _measured(document: Mapping[str, Any], where: str) -> Measured | None:
+    values = document.get('measured')
+    return None if values is None else from_mapping(Measured, values, f'{where}: measured')

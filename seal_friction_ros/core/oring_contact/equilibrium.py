@@ -1,0 +1,199 @@
+"""Equilibrium of the ring by Newton's method: sparse stiffness, direct solution, and a verdict."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from seal_friction_ros.core.oring_contact.arrays import FloatArray, IntArray
+from seal_friction_ros.core.oring_contact.elements import (
+    Elements,
+    deformation_gradient,
+    element_forces,
+    is_inside_out,
+    make_elements,
+)
+from seal_friction_ros.core.oring_contact.material import Rubber
+from seal_friction_ros.core.oring_contact.mesh import Mesh
+from seal_friction_ros.core.oring_contact.surroundings import Surroundings, outline_freedoms, surface_forces
+
+TOLERANCE = 1e-9
+"""Largest force out of balance at a node as a share of 2 pi R E d (own choice)."""
+MAX_ITERATIONS = 25
+"""Newton steps before giving up (own choice: good load steps take 3 to 8)."""
+_SHORTEST_STEP = 1.0 / 64.0  # of Newton's, before a fold is taken for final
+_PIVOT = 0.01  # entry on the diagonal over the largest of its column, from which on it is taken: little fill
+
+
+class NotConverged(ValueError):  # noqa: N818  (what happened, as SciPy's NoConvergence has it)
+    """No equilibrium was found; the message says where and how far it came."""
+
+
+class Model(NamedTuple):
+    """A meshed ring of one material."""
+
+    mesh: Mesh
+    elements: Elements
+    rubber: Rubber
+    force_scale: float
+    """2 pi R E d, R the radius of the ring [N]: forces out of balance are small against it"""
+    guide: tuple[int, int]
+    """nodes between which the guide against rolling acts, side by side over r"""
+    guide_stiffness: float
+    """force per difference of their axial displacements [N/m]"""
+
+
+class State(NamedTuple):
+    """Where the ring is."""
+
+    displacement: FloatArray
+    """r and z of the nodes in turn [m], shape (2 n,)"""
+    tension: FloatArray
+    """mean tension of the elements [Pa], shape (e,)"""
+
+
+class Assembly(NamedTuple):
+    """Where entries of element and node matrices go in the sparse matrix of the free displacements."""
+
+    free: IntArray
+    """free displacements, shape (f,)"""
+    slots: IntArray
+    """place of each entry among the stored ones; the last is for what is not free"""
+    rows: IntArray
+    starts: IntArray
+
+
+class Balance(NamedTuple):
+    """Forces out of balance and stiffness of the whole ring."""
+
+    residual: FloatArray
+    """[N], shape (2 n,)"""
+    entries: FloatArray
+    """stiffness of elements, outline and guide, flat [N/m]"""
+    tension: FloatArray
+    """[Pa], shape (e,)"""
+    tension_rows: FloatArray
+    """[Pa/m], shape (e, 8)"""
+
+
+def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float) -> Model:
+    """Model of a meshed ring.
+
+    Between frictionless walls a round ring rolls almost freely: only that its fibres stay on their circles holds it,
+    and facets of the mesh turn that into small jumps. A guide, a couple without net force, holds the two nodes half
+    way to rod and gland level with each other (own choice; see docs/oring.md for how little it changes).
+
+    Args:
+        mesh: Mesh of the section.
+        rubber: Material.
+        section_diameter: d [m].
+        guide: Stiffness of the guide as a share of 2 pi R E, R the radius of the ring.
+    """
+    center = mesh.nodes.mean(axis=0)
+    quarter = np.array([section_diameter / 4.0, 0.0])
+    inner, outer = (int(np.argmin(np.linalg.norm(mesh.nodes - center - side * quarter, axis=1))) for side in (-1, 1))
+    per_length = float(2.0 * np.pi * center[0] * rubber.elastic_modulus)
+    return Model(mesh, make_elements(mesh), rubber, per_length * section_diameter, (inner, outer), guide * per_length)
+
+
+def at_rest(model: Model, displacement: FloatArray | None = None) -> State:
+    """State without tension, by default without displacement either."""
+    if displacement is None:
+        displacement = np.zeros(model.mesh.nodes.size)
+    return State(displacement, np.zeros(len(model.mesh.elements)))
+
+
+def outline(model: Model, state: State) -> FloatArray:
+    """Position of the nodes of the outline [m], shape (s, 2)."""
+    position: FloatArray = model.mesh.nodes + state.displacement.reshape(-1, 2)
+    return position[model.mesh.surface]
+
+
+def make_assembly(model: Model, held: tuple[int, ...] = ()) -> Assembly:
+    """Sparsity of the stiffness with the displacements ``held`` (2 node for r, 2 node + 1 for z) left out."""
+    count = model.mesh.nodes.size
+    number = np.full(count, -1)
+    free = np.setdiff1d(np.arange(count), held)
+    number[free] = np.arange(len(free))
+    around = outline_freedoms(model.mesh.surface)
+    guided = np.array([[2 * node + 1 for node in model.guide]])
+    blocks = ((model.elements.freedoms, model.elements.freedoms), (around[:, 2:4], around), (guided, guided))
+    row = number[np.concatenate([np.repeat(rows, columns.shape[1], axis=1).ravel() for rows, columns in blocks])]
+    column = number[np.concatenate([np.tile(columns, (1, rows.shape[1])).ravel() for rows, columns in blocks])]
+    keys = np.where((row >= 0) & (column >= 0), column * len(free) + row, len(free) ** 2)
+    stored, slots = np.unique(keys, return_inverse=True)
+    stored = stored[stored < len(free) ** 2]
+    starts = np.searchsorted(stored, np.arange(len(free) + 1) * len(free))
+    return Assembly(free, slots, stored % len(free), starts)
+
+
+def balance(model: Model, surroundings: Surroundings, state: State) -> Balance | None:
+    """Forces out of balance at a state; None if an element is inside out."""
+    gradient = deformation_gradient(model.elements, state.displacement)
+    if is_inside_out(gradient):
+        return None
+    inner = element_forces(model.elements, model.rubber, gradient, state.tension)
+    outer = surface_forces(surroundings, outline(model, state))
+    count = len(state.displacement)
+    residual: FloatArray = np.bincount(model.elements.freedoms.ravel(), inner.force.ravel(), count).astype(float)
+    residual.reshape(-1, 2)[model.mesh.surface] += outer.force
+    low, high = (2 * node + 1 for node in model.guide)
+    pull = model.guide_stiffness * (state.displacement[high] - state.displacement[low])
+    residual[high] += pull
+    residual[low] -= pull
+    couple = model.guide_stiffness * np.array([1.0, -1.0, -1.0, 1.0])
+    entries = np.concatenate((inner.stiffness.ravel(), outer.stiffness.ravel(), couple))
+    return Balance(residual, entries, inner.tension, inner.tension_rows)
+
+
+def stiffness_matrix(assembly: Assembly, entries: FloatArray) -> csc_array:
+    """Stiffness of the free displacements [N/m], shape (f, f)."""
+    size, count = len(assembly.rows), len(assembly.free)
+    data = np.bincount(assembly.slots, entries, size + 1)[:size]
+    return csc_array((data, assembly.rows, assembly.starts), shape=(count, count))
+
+
+def solve(model: Model, assembly: Assembly, surroundings: Surroundings, start: State) -> tuple[State, int]:
+    """State in equilibrium, from one to start with, and the Newton steps it took.
+
+    Raises:
+        NotConverged: None was found.
+    """
+    state, now = start, balance(model, surroundings, start)
+    if now is None:
+        raise NotConverged('an element is inside out at the start')
+    imbalance = np.inf
+    for step in range(MAX_ITERATIONS + 1):
+        residual = now.residual[assembly.free]
+        imbalance = float(np.abs(residual).max()) / model.force_scale
+        if not np.isfinite(imbalance):
+            break
+        if imbalance < TOLERANCE:
+            return State(state.displacement, now.tension), step
+        matrix = stiffness_matrix(assembly, now.entries)
+        try:
+            factors = splu(
+                matrix, permc_spec='MMD_AT_PLUS_A', diag_pivot_thresh=_PIVOT, options={'SymmetricMode': True}
+            )
+        except RuntimeError as error:
+            raise NotConverged(f'the stiffness is singular: {error}') from None
+        state, now = _take(model, surroundings, state, now, assembly.free, factors.solve(residual))
+    raise NotConverged(f'{imbalance:.1e} 2 pi R E d out of balance after {MAX_ITERATIONS} Newton steps')
+
+
+def _take(
+    model: Model, surroundings: Surroundings, state: State, now: Balance, free: IntArray, step: FloatArray
+) -> tuple[State, Balance]:
+    """Take a Newton step, halved until no element is inside out; tensions follow it linearly."""
+    length = 1.0
+    while length >= _SHORTEST_STEP:
+        change = np.zeros_like(state.displacement)
+        change[free] = -length * step
+        tension = now.tension + (now.tension_rows * change[model.elements.freedoms]).sum(axis=1)
+        trial = State(state.displacement + change, tension)
+        after = balance(model, surroundings, trial)
+        if after is not None:
+            return trial, after
+        length /= 2.0
+    raise NotConverged('an element turns inside out')

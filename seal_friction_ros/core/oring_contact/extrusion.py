@@ -1,0 +1,43 @@
+"""Pressure at which an O-ring is squeezed out through the clearance between rod and gland."""
+
+import math
+
+from seal_friction_ros.core.oring_contact.material import elastic_modulus_of_hardness, hardness_of_elastic_modulus
+from seal_friction_ros.core.units import INCH, PSI
+
+_PRESSURES = (500.0 * PSI, 1000.0 * PSI, 1500.0 * PSI, 2000.0 * PSI, 3000.0 * PSI)  # [Pa]
+_CLEARANCES = {
+    70.0: (0.016 * INCH, 0.010 * INCH, 0.006 * INCH, 0.004 * INCH, 0.002 * INCH),  # [m]
+    90.0: (0.028 * INCH, 0.024 * INCH, 0.020 * INCH, 0.016 * INCH, 0.010 * INCH),
+}
+"""Shore A -> largest diametral clearance at each of the pressures."""
+
+
+def extrusion_pressure(diametral_clearance: float, elastic_modulus: float) -> float:
+    """Highest pressure [Pa, gauge] without a back-up ring.
+
+    A straight line of log pressure over clearance between the values of the table, continued beyond its ends, and
+    between the hardnesses of the table; a softer rubber counts as 70 Shore A less in proportion to its modulus, one
+    harder than 90 as 90.
+
+    Args:
+        diametral_clearance: Difference of the diameters between which the ring could creep [m].
+        elastic_modulus: E of the rubber [Pa]; its hardness follows from it.
+
+    Source: [SealDesign]_, Limits of Diametral Clearance Against Fluid Pressure; each band counted at its upper end.
+    Interpolation and what is beyond the table are our choice.
+    """
+    soft = _limit(_CLEARANCES[70.0], diametral_clearance)
+    at_70 = elastic_modulus_of_hardness(70.0)
+    if elastic_modulus <= at_70:
+        return soft * elastic_modulus / at_70
+    hard = _limit(_CLEARANCES[90.0], diametral_clearance)
+    share = (min(hardness_of_elastic_modulus(elastic_modulus), 90.0) - 70.0) / 20.0
+    return math.exp((1.0 - share) * math.log(soft) + share * math.log(hard))
+
+
+def _limit(clearances: tuple[float, ...], clearance: float) -> float:
+    """Clearances fall; the two points around the wanted one, or the two last on its side."""
+    i = next((i for i in range(1, len(clearances) - 1) if clearance >= clearances[i]), len(clearances) - 1)
+    share = (clearance - clearances[i]) / (clearances[i - 1] - clearances[i])
+    return math.exp(math.log(_PRESSURES[i]) + share * math.log(_PRESSURES[i - 1] / _PRESSURES[i]))

@@ -1,0 +1,51 @@
+"""Line contact of Hertz: what the computation has to give for a long ring at small squeeze."""
+
+import math
+from typing import NamedTuple
+
+from scipy.optimize import brentq
+
+
+class LineContact(NamedTuple):
+    """A cylinder that is pressed."""
+
+    force_per_length: float
+    """[N/m]"""
+    peak_stress: float
+    """[Pa]"""
+    width: float
+    """[m]"""
+
+
+def cylinder_between_plates(squeeze: float, diameter: float, plane_modulus: float) -> LineContact:
+    r"""Contact of a cylinder with each of two rigid plates that squeeze it.
+
+    .. math:: s\,d = 2 \frac{F}{\pi E^*} \left(2 \ln\frac{2 d}{a} - 1\right), \quad a^2 = \frac{2 F d}{\pi E^*}, \quad
+        p_0 = \frac{2 F}{\pi a}
+
+    Args:
+        squeeze: Approach of the plates over the diameter, s [-].
+        diameter: d [m].
+        plane_modulus: E* = E / (1 - nu^2) [Pa], 4/3 E for rubber.
+
+    Source: [Johnson1985]_ equations (4.43), (4.45) and (5.57), the last for each of the two contacts.
+    """
+
+    def half_width(force: float) -> float:
+        return math.sqrt(2.0 * force * diameter / (math.pi * plane_modulus))
+
+    def too_far(force: float) -> float:
+        approach = 2.0 * force / (math.pi * plane_modulus) * (2.0 * math.log(2.0 * diameter / half_width(force)) - 1.0)
+        return approach - squeeze * diameter
+
+    scale = plane_modulus * diameter  # of a force per length
+    force = float(brentq(too_far, 1e-9 * scale, 0.2 * scale, xtol=1e-12 * scale))
+    return LineContact(force, 2.0 * force / (math.pi * half_width(force)), 2.0 * half_width(force))
+
+
+def force_of_profile(peak_stress: float, width: float, diameter: float) -> float:
+    """Force [N] all around a wall of ``diameter`` [m] of an elliptic profile of contact stress [Pa] and width [m].
+
+    Source: [Johnson1985]_ equation (4.44), the profile of Hertz.
+    """
+    return math.pi / 4.0 * peak_stress * width * math.pi * diameter

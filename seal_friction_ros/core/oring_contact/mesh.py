@@ -1,0 +1,97 @@
+"""Mesh of the ring section: an O-grid of quadrilaterals, a square core inside layers that follow the circle."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.oring_contact.arrays import FloatArray, IntArray
+
+CORE = 0.5
+"""Half width of the core as a share of the section radius (own choice: keeps the elements well shaped)."""
+ROUNDING = 0.4
+"""How far the core's sides are bent towards a circle, 0 to 1 (own choice, as above)."""
+LAYER_RATIO = 0.5
+"""Thickness of the outermost layer as a share of the innermost one (own choice: the contact is at the surface)."""
+CROWDING = 0.4
+"""Share by which edges in the middle of sides are shorter than even ones (own choice: the fluid's edge is there)."""
+AXIAL_SHARE = 0.6
+"""Edges facing the wall over those facing the rod (own choice: what is to be known precisely is at rod and gland)."""
+
+
+class Mesh(NamedTuple):
+    """Quadrilaterals of the free ring section in the half plane of the axis."""
+
+    nodes: FloatArray
+    """position (r, z) [m], shape (n, 2)"""
+    elements: IntArray
+    """corners, counterclockwise with r to the right and z up, shape (e, 4)"""
+    surface: IntArray
+    """nodes of the outline, counterclockwise from the one next to the axis, shape (s,)"""
+
+
+def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
+    """O-grid of a circular section.
+
+    Args:
+        section_diameter: Diameter of the section, d [m].
+        center_radius: Distance of its centre from the axis [m].
+        lines: Grid lines that end on the quarter of the outline that faces the rod, at least 5; as many face the
+            gland, fewer the wall and the fluid.
+
+    Raises:
+        ValueError: There are too few lines.
+    """
+    if lines < 5:
+        raise ValueError(f'o_grid: lines = {lines} is below 5: the contact would be a node or two')
+    z_sides = lines - 1
+    r_sides = max(2, round(AXIAL_SHARE * z_sides))
+    layers = max(2, round(0.5 * z_sides))
+    position, index = _core(r_sides, z_sides)
+    around = _outline(index)
+    circle = position[around] / np.linalg.norm(position[around], axis=1, keepdims=True)
+    share = np.cumsum(np.geomspace(1.0, LAYER_RATIO, layers))
+    nodes, rows = [position], [around]
+    for layer, fraction in enumerate(share / share[-1]):
+        nodes.append((1.0 - fraction) * position[around] + fraction * circle)
+        rows.append(len(position) + layer * len(around) + np.arange(len(around)))
+    blocks = [_quadrilaterals(index), *(_ring(a, b) for a, b in pairwise(rows))]
+    center = np.array([center_radius, 0.0])
+    return Mesh(center + section_diameter / 2.0 * np.concatenate(nodes), np.concatenate(blocks), rows[-1])
+
+
+def _core(r_sides: int, z_sides: int) -> tuple[FloatArray, IntArray]:
+    """Nodes of the core for a circle of radius 1, shape (n, 2), and their indices in a grid over (r, z)."""
+    grid = np.stack(np.meshgrid(_tangents(r_sides), _tangents(z_sides), indexing='ij'), axis=-1).reshape(-1, 2)
+    level = np.abs(grid).max(axis=1, keepdims=True)
+    length = np.linalg.norm(grid, axis=1, keepdims=True)
+    length[length == 0.0] = 1.0
+    mean_radius = 4.0 / np.pi * np.log(1.0 + np.sqrt(2.0))  # of a square of half width 1
+    bent = ROUNDING * level
+    position = CORE * ((1.0 - bent) * grid + bent * level * mean_radius * grid / length)
+    return position, np.arange(len(grid)).reshape(r_sides + 1, z_sides + 1)
+
+
+def _tangents(sides: int) -> FloatArray:
+    """Where lines to the surface cross a side of the core, -1 to 1: their angles are closer in the middle."""
+    even = np.linspace(-1.0, 1.0, sides + 1)
+    angle: FloatArray = np.pi / 4.0 * (even - CROWDING * np.sin(np.pi * even) / np.pi)
+    return np.tan(angle)
+
+
+def _outline(index: IntArray) -> IntArray:
+    """Indices around the core, counterclockwise from the middle of the side next to the axis.
+
+    With an odd number of sides there is no node in the middle: then from the one past it.
+    """
+    loop = np.concatenate((index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]))
+    return np.roll(loop, index.shape[1] // 2)
+
+
+def _quadrilaterals(index: IntArray) -> IntArray:
+    corners = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
+    return np.stack([corner.ravel() for corner in corners], axis=1)
+
+
+def _ring(inner: IntArray, outer: IntArray) -> IntArray:
+    return np.stack((inner, outer, np.roll(outer, -1), np.roll(inner, -1)), axis=1)

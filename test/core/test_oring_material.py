@@ -1,0 +1,80 @@
+"""The rubber of the finite-element O-ring: derivatives of its energy, small strains, no part of it in pure volume."""
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.oring_contact.material import (
+    Rubber,
+    elastic_modulus_of_hardness,
+    hardness_of_elastic_modulus,
+    mooney_rivlin_constants,
+    shear_response,
+    volume_response,
+    von_mises_stress,
+)
+
+UNDEFORMED = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
+RUBBER = Rubber(elastic_modulus=6e6)
+DEFORMED = UNDEFORMED + np.array([0.12, -0.3, 0.21, -0.15, 0.08])
+
+
+def slopes(function, at: np.ndarray, step: float = 1e-6) -> np.ndarray:
+    """Derivative by central differences, over the last axis."""
+    columns = []
+    for i in range(len(at)):
+        change = np.zeros(len(at))
+        change[i] = step
+        columns.append((function(at + change) - function(at - change)) / (2.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize('response', [lambda f: shear_response(RUBBER, f), volume_response])
+def test_stress_and_stiffness_are_the_derivatives_of_the_energy(response):
+    at = response(DEFORMED)
+    scale = np.abs(at.stiffness).max()
+    assert slopes(lambda f: response(f).energy, DEFORMED) == pytest.approx(at.stress, abs=1e-8 * scale)
+    assert slopes(lambda f: response(f).stress, DEFORMED) == pytest.approx(at.stiffness, abs=1e-8 * scale)
+
+
+def test_free_rubber_bears_nothing_and_swelling_costs_no_shear_energy():
+    assert shear_response(RUBBER, UNDEFORMED).energy == pytest.approx(0.0, abs=1e-9)
+    swollen = UNDEFORMED * 1.2
+    assert shear_response(RUBBER, swollen).energy == pytest.approx(0.0, abs=1e-9)
+    assert von_mises_stress(RUBBER, swollen) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_turning_the_section_costs_nothing():
+    c, s = np.cos(0.7), np.sin(0.7)
+    turned = np.array([c, -s, s, c, 1.0])
+    assert shear_response(RUBBER, turned).energy == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize('stretch', [0.7, 0.999, 1.001, 1.5])
+def test_a_strip_pulled_along_the_hoop_carries_the_stress_of_mooney_and_rivlin(stretch: float):
+    c10, c01 = mooney_rivlin_constants(RUBBER)
+    thinner = stretch**-0.5
+    pulled = np.array([thinner, 0.0, 0.0, thinner, stretch])
+    expected = 2.0 * (stretch**2 - 1.0 / stretch) * (c10 + c01 / stretch)  # Cauchy stress
+    assert von_mises_stress(RUBBER, pulled) == pytest.approx(abs(expected), rel=1e-12)
+
+
+def test_at_small_strain_it_has_its_young_modulus():
+    strain = 1e-5
+    pulled = np.array([(1 + strain) ** -0.5, 0.0, 0.0, (1 + strain) ** -0.5, 1 + strain])
+    assert von_mises_stress(RUBBER, pulled) / strain == pytest.approx(6e6, rel=1e-4)
+
+
+def test_hardness_70_is_5_5_mpa_as_gent_has_it_and_back():
+    assert elastic_modulus_of_hardness(70.0) == pytest.approx(5.52e6, rel=1e-3)
+    assert hardness_of_elastic_modulus(elastic_modulus_of_hardness(83.0)) == pytest.approx(83.0, rel=1e-12)
+
+
+@pytest.mark.parametrize('hardness', [10.0, 99.0, float('nan')])
+def test_a_hardness_beyond_the_rule_is_refused(hardness: float):
+    with pytest.raises(ValueError, match='20 to 95'):
+        elastic_modulus_of_hardness(hardness)
+
+
+def test_what_is_no_rubber_is_refused():
+    with pytest.raises(ValueError, match='not a nearly incompressible rubber'):
+        Rubber(elastic_modulus=1e9, bulk_modulus=2e9)
