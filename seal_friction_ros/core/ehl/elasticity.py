@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
+from scipy.fft import next_fast_len
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -34,6 +35,7 @@ class HalfPlane:
     """deflection of a cell by a unit pressure r cells away [m/Pa], shape (cells,)"""
     stiffness_band: FloatArray = field(init=False, repr=False)
     """banded approximate inverse of the influence matrix: stiffness against a cell r away [Pa/m], shape (7,)"""
+    _length: int = field(init=False, repr=False)
     _spectrum: npt.NDArray[np.complex128] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -44,15 +46,19 @@ class HalfPlane:
                 f'HalfPlane.depth = {self.depth} m is less than the {self.cells * self.cell_width} m of the film'
             )
         influence = _influence(np.arange(self.cells), self.cell_width, self.modulus, self.depth)
-        ring = np.concatenate((influence, [0.0], influence[:0:-1]))  # circulant that holds the Toeplitz matrix
+        length = next_fast_len(2 * self.cells, real=True)
+        ring = np.zeros(length)  # first column of a circulant that holds the Toeplitz matrix
+        ring[: self.cells] = influence
+        ring[-self.cells + 1 :] = influence[:0:-1]
+        object.__setattr__(self, '_length', length)
         object.__setattr__(self, 'influence', influence)
         object.__setattr__(self, '_spectrum', np.fft.rfft(ring))
         object.__setattr__(self, 'stiffness_band', _stiffness_band(self.cells, self.cell_width, self.modulus))
 
     def deflection(self, pressure: FloatArray) -> FloatArray:
         """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,); n log n by fast Fourier transform."""
-        length = 2 * self.cells
-        return np.fft.irfft(np.fft.rfft(pressure, length) * self._spectrum, length)[: self.cells]
+        spectrum = np.fft.rfft(pressure, self._length) * self._spectrum
+        return np.fft.irfft(spectrum, self._length)[: self.cells]
 
     def matrix(self) -> FloatArray:
         """Full influence matrix [m/Pa], shape (cells, cells)."""

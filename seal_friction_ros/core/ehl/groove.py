@@ -20,11 +20,11 @@ class Groove:
     """
 
     stiffness: float = parameter(
-        3.5e4,
+        2.2e4,
         unit='N/m',
         lower=10.0,
         upper=1e9,
-        description='k, about G A / t of a ring of 6 mm, 0.5 mm wide and 1 mm high.',
+        description='k, about G A / t: shear modulus, contact area and height of the seal.',
     )
     half_clearance: float = parameter(
         0.0, unit='m', lower=0.0, upper=1e-2, description='c, half the axial clearance; 0 is a plain spring.'

@@ -99,7 +99,7 @@ def sliding_velocity(
         fastest: A speed to begin the search with [m/s].
 
     Raises:
-        ValueError: There is no balance below 1000 times ``fastest``.
+        ValueError: There is no balance below a million times ``fastest``.
 
     The method is that of Illinois, M. Dowell, P. Jarratt 1971.
     """
@@ -113,7 +113,7 @@ def sliding_velocity(
     while at_high > 0.0:
         low, at_low = high, at_high
         high *= 2.0
-        if high > 1000.0 * fastest:
+        if high > 1e6 * fastest:
             raise ValueError(f'no sliding velocity below {high:.3g} m/s balances {drive:.4g} N: is the seal held at all?')
         at_high = surplus(high)
     kept = 0

@@ -147,14 +147,15 @@ class RunResult(NamedTuple):
 
 
 def rest(model: Model, position: float) -> Moment:
-    """The seal at rest and relaxed, dry contact, gap full of lubricant (or as full as the film on the wall makes it).
+    """The seal at rest and relaxed on its left seat, dry contact, gap full of lubricant (or as full as the film on the wall makes it).
 
     Raises:
         NotConvergedError: The dry contact was not found.
     """
     case = model.case
     n = case.numerics.cells
-    gap = dry_contact(model.contact, model.rigid_gap(position))
+    lag = -case.seated_groove.half_clearance
+    gap = dry_contact(model.contact, model.rigid_gap(position - lag))
     pressure, _ = asperity_pressure(gap, model.contact.asperities)
     creep = np.zeros(n)
     if case.viscoelasticity:
@@ -169,7 +170,7 @@ def rest(model: Model, position: float) -> Moment:
         count = math.ceil(2.0 * reach / width)
         start = position - reach
         wall_film = WallFilm(start, width, np.full(count, film * width))
-    return Moment(0.0, position, 0.0, ContactState(gap, np.zeros(n), saturation), wall_film, creep)
+    return Moment(0.0, position, lag, ContactState(gap, np.zeros(n), saturation), wall_film, creep)
 
 
 def advance(model: Model, moment: Moment, time: float, position: float) -> tuple[Moment, Forces, int, float]:
@@ -251,7 +252,7 @@ def _slide(model: Model, moment: Moment, step: float, position: float) -> tuple[
         solid,
         lambda v: _fluid_force(model, moment.state, v) - fluid_at_rest,
         lambda v: groove.force(stuck_lag - v * step) - edge - fluid_at_rest,
-        max(abs(position - moment.position) / step, 1e-9),
+        max(abs(position - moment.position), (abs(drive) - solid) / groove.stiffness) / step,
     )
     return velocity, stuck_lag - velocity * step
 
