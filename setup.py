@@ -23,6 +23,7 @@ setup(
         shared('config/seals', '*.yaml'),
         shared('config/programs', '*.yaml'),
         shared('config/rigs', '*.yaml'),
+        shared('config/ehl', '*.yaml'),
         shared('data/thesis', '*.csv'),
     ],
     package_data={NAME: ['py.typed']},

@@ -5,7 +5,7 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     name: ms28775_114
     source: where the numbers are from
     geometry: {section_diameter: 2.69e-3, ...}
-    coulomb_law: physics_based          # or prior_art_chart
+    coulomb_law: physics_based          # or prior_art_chart, friction_map
     normal_force: {law: area_deformation_gain, area_deformation_gain: 0.39, radial_force: 9.3}
     friction_coefficient: {law: power_law, coefficient: 2.1, exponent: 0.56}
     stiction: 2.5
@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from seal_friction_ros.core.coulomb import CoulombLaw, MountedSeal, PhysicsBased, PriorArtChart, Seal, Uncertainty
+from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
@@ -24,10 +25,14 @@ from seal_friction_ros.core.validated import from_mapping, plain
 
 NORMAL_FORCE_LAWS: dict[str, type] = {'area_deformation_gain': AreaDeformationGain, 'monotone_table': NormalForceTable}
 FRICTION_COEFFICIENT_LAWS: dict[str, type] = {'power_law': PowerLaw, 'monotone_table': CoefficientTable}
-COULOMB_LAWS = ('physics_based', 'prior_art_chart')
+COULOMB_LAWS = ('physics_based', 'prior_art_chart', 'friction_map')
 
 _COMMON = {'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'uncertainty', 'identified_pressure'}
-_PARTS = {'physics_based': {'normal_force', 'friction_coefficient'}, 'prior_art_chart': {'chart'}}
+_PARTS = {
+    'physics_based': {'normal_force', 'friction_coefficient'},
+    'prior_art_chart': {'chart'},
+    'friction_map': {'friction_map'},
+}
 
 
 def parse_seal(document: Any) -> Seal:
@@ -60,6 +65,8 @@ def parse_seal(document: Any) -> Seal:
             _law(document, 'normal_force', NORMAL_FORCE_LAWS, where),
             _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where),
         )
+    elif law_name == 'friction_map':
+        law = from_mapping(FrictionMap, document.get('friction_map'), f'{where}: friction_map')
     else:
         law = from_mapping(PriorArtChart, document.get('chart'), f'{where}: chart', geometry=geometry)
     uncertainty = from_mapping(Uncertainty, document.get('uncertainty'), f'{where}: uncertainty')

@@ -87,6 +87,28 @@ def _charts(arguments: argparse.Namespace) -> int:
     return _tell(arguments, write_seal_charts(path, arguments.out), f'{arguments.out}: written')
 
 
+def _ehl_run(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.ehl_commands import run_command
+
+    return _tell(
+        arguments, *run_command(arguments.case, arguments.jobs, arguments.out, arguments.bag, arguments.window)
+    )
+
+
+def _ehl_study(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.ehl_commands import study_command
+
+    return _tell(arguments, *study_command(arguments.case, arguments.jobs, arguments.out, arguments.work))
+
+
+def _ehl_map(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.ehl_commands import map_command
+
+    return _tell(
+        arguments, *map_command(arguments.case, arguments.jobs, arguments.out, arguments.work, arguments.seal_file)
+    )
+
+
 def _counts(counts: dict[str, int]) -> Iterable[str]:
     return [f'{name} {count}' for name, count in counts.items()]
 
@@ -163,7 +185,25 @@ def make_parser() -> argparse.ArgumentParser:
     charts.add_argument('seal', help='seal file: a path, or the name of one in config/seals')
     for page in (report, charts):
         page.add_argument('--out', type=Path, required=True, metavar='FILE.html')
+    _add_ehl(commands)
     return parser
+
+
+def _add_ehl(commands: Any) -> None:
+    ehl = commands.add_parser('ehl', help='lubricated contact of a seal', description='Lubricated contact of a seal.')
+    steps = ehl.add_subparsers(title='commands', required=True, metavar='COMMAND')
+    run = _add(steps, 'run', _ehl_run, 'friction, film and contact over a motion')
+    run.add_argument('--bag', type=Path, help='run through the position of this bag, and compare with its force')
+    run.add_argument('--window', type=float, nargs=2, metavar=('FROM', 'TO'), help='part of the bag to take [s]')
+    study = _add(steps, 'study', _ehl_study, 'friction with other solid shear stresses')
+    chart = _add(steps, 'map', _ehl_map, 'friction map: steady friction over speed and pressure')
+    chart.add_argument('--seal-file', type=Path, metavar='FILE.yaml', help='write it as a seal file; must not exist')
+    for step in (run, study, chart):
+        step.add_argument('case', help='case file: a path, or the name of one in config/ehl')
+        step.add_argument('--jobs', type=int, default=os.cpu_count() or 1, help='processes; default: one for each core')
+        step.add_argument('--out', type=Path, metavar='FILE.html', help='write a page with figures')
+    for step in (study, chart):
+        step.add_argument('--work', type=Path, metavar='FOLDER', help='keep finished parts here, and go on from them')
 
 
 def _tolerance(text: str) -> float:

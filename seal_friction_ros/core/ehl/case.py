@@ -11,7 +11,7 @@ A case file looks like this; every part and field is in docs/ehl.md::
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from seal_friction_ros.core.ehl.grease import Grease
@@ -30,7 +30,9 @@ class SealBody:
         ValueError: A value is out of bounds, or the material has no stiffness.
     """
 
-    sealing_diameter: float = parameter(6e-3, unit='m', lower=1e-4, upper=10.0, description='Of the seat (paper: 6 mm).')
+    sealing_diameter: float = parameter(
+        6e-3, unit='m', lower=1e-4, upper=10.0, description='Of the seat (paper: 6 mm).'
+    )
     crown_radius_left: float = parameter(
         1e-3, unit='m', lower=1e-5, upper=1.0, description='Radius of the profile left of its crown.'
     )
@@ -178,15 +180,15 @@ class Case:
 
     name: str
     source: str = ''
-    seal: SealBody = SealBody()
-    topography: Topography = Topography()
-    grease: Grease = Grease()
-    groove: Groove = Groove()
-    air: Air = Air()
-    motion: ConstantAcceleration = ConstantAcceleration()
-    numerics: Numerics = Numerics()
-    study: Study = Study()
-    map: MapGrid = MapGrid()
+    seal: SealBody = field(default_factory=SealBody)
+    topography: Topography = field(default_factory=Topography)
+    grease: Grease = field(default_factory=Grease)
+    groove: Groove = field(default_factory=Groove)
+    air: Air = field(default_factory=Air)
+    motion: ConstantAcceleration = field(default_factory=ConstantAcceleration)
+    numerics: Numerics = field(default_factory=Numerics)
+    study: Study = field(default_factory=Study)
+    map: MapGrid = field(default_factory=MapGrid)
     control_edge: ControlEdge | None = None
     film_supply: FilmSupply | None = None
     viscoelasticity: Viscoelasticity | None = None
@@ -287,7 +289,7 @@ def parse_case(document: Any) -> Case | Spool:
         raise ValueError(f'case {name} has no {", ".join(unknown)}: it has {", ".join(sorted(known))}')
     if 'seals' in document:
         return _parse_spool(document, name, source)
-    parts = {
+    parts: dict[str, Any] = {
         key: from_mapping(record, document[key] if document[key] is not None else {}, f'case {name}: {key}')
         for key, record in _PARTS.items()
         if key in document

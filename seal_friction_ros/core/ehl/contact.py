@@ -185,7 +185,7 @@ def _solve_band(band: FloatArray, elastic: FloatArray, flow: FloatArray) -> tupl
 def _banded_product(stiffness: FloatArray, x: FloatArray) -> FloatArray:
     """Product of the symmetric banded Toeplitz matrix and a vector."""
     n, reach = x.shape[0], stiffness.shape[0] - 1
-    product = stiffness[0] * x
+    product: FloatArray = stiffness[0] * x
     for r in range(1, reach + 1):
         for i in range(n - r):
             product[i] += stiffness[r] * x[i + r]
@@ -289,15 +289,13 @@ def contact_step(
         elastic = gap - rigid_gap - compliance_factor * plane.deflection(pressure + solid)
         largest_flow = float(np.abs(flow).max()) + rate * plane.cell_width * float(np.abs(old_thickness).max())
         off = float(np.abs(elastic).max())
-        rounding = _ROUNDING * float((properties[0] * pressure).max()) / plane.cell_width  # of a difference of pressures
+        rounding = (
+            _ROUNDING * float((properties[0] * pressure).max()) / plane.cell_width
+        )  # of a difference of pressures
         flow_off = max(float(np.abs(residual).max()) - rounding, 0.0) / largest_flow
         if not math.isfinite(off + flow_off):
             break
-        if (
-            off <= _GAP_TOLERANCE
-            and flow_off <= _FLOW_TOLERANCE
-            and imperfection <= _COMPLEMENTARITY_TOLERANCE
-        ):
+        if off <= _GAP_TOLERANCE and flow_off <= _FLOW_TOLERANCE and imperfection <= _COMPLEMENTARITY_TOLERANCE:
             if gap.min() <= 0.0:
                 raise NotConvergedError(
                     f'contact step: the surfaces overlap by {-gap.min():.2g} m: the roughness is crushed; give it a '

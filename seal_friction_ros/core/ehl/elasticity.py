@@ -58,12 +58,12 @@ class HalfPlane:
     def deflection(self, pressure: FloatArray) -> FloatArray:
         """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,); n log n by fast Fourier transform."""
         spectrum = np.fft.rfft(pressure, self._length) * self._spectrum
-        return np.fft.irfft(spectrum, self._length)[: self.cells]
+        return np.asarray(np.fft.irfft(spectrum, self._length)[: self.cells])
 
     def matrix(self) -> FloatArray:
         """Full influence matrix [m/Pa], shape (cells, cells)."""
         i = np.arange(self.cells)
-        return self.influence[np.abs(i[:, None] - i)]
+        return np.asarray(self.influence[np.abs(i[:, None] - i)])
 
 
 def _influence(distance: FloatArray | npt.NDArray[np.int64], width: float, modulus: float, depth: float) -> FloatArray:

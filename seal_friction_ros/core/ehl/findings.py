@@ -23,32 +23,32 @@ SLOW_SHARE = 0.2
 class Findings(NamedTuple):
     """Numbers of the last cycle of a run; None where the run has no such thing."""
 
-    friction_N: float
-    """mean magnitude within 0.5 mm of the middle"""
+    friction: float
+    """[N] mean magnitude within 0.5 mm of the middle"""
     solid_share: float
     """of solid and fluid friction there"""
-    solid_slow_N: float | None
-    """solid friction while slowing down, at 0.2 of the highest speed; mean of both strokes"""
-    solid_fast_N: float
-    """solid friction at the highest speed, where it is steadiest (smallest)"""
-    fluid_slow_N: float | None
-    """like the solid one"""
-    fluid_fast_N: float
-    """like the solid one"""
+    solid_slow: float | None
+    """[N] solid friction while slowing down, at 0.2 of the highest speed; mean of both strokes"""
+    solid_fast: float
+    """[N] solid friction at the highest speed, where it is steadiest (smallest)"""
+    fluid_slow: float | None
+    """[N] like the solid one"""
+    fluid_fast: float
+    """[N] like the solid one"""
     rise_on_deceleration: float | None
-    """friction at 0.2 of the highest speed, slowing down, over the last at constant speed, less 1; mean of both strokes"""
-    assisted_length_m: float | None
-    """way of the spool after a reversal over which friction pushes along, mean of those in the last cycle"""
-    elastic_length_m: float | None
-    """the same by elasticity alone: friction at the reversal over the stiffness of the groove"""
-    second_lobe_m: float | None
-    """position of the spool at which friction begins to fall again while the seal still sticks; None with one seat"""
+    """friction at 0.2 of the highest speed, slowing down, over the last at the highest, less 1; mean of strokes"""
+    assisted_length: float | None
+    """[m] way of the spool after a reversal over which friction pushes along, mean of those in the last cycle"""
+    elastic_length: float | None
+    """[m] the same by elasticity alone: friction at the reversal over the stiffness of the groove"""
+    second_lobe: float | None
+    """[m] where friction begins to fall again while the seal still sticks; None with one seat"""
     edge_peak: float | None
     """largest friction on meeting the control edge over the mean in the seat after it"""
-    edge_assist_N: float | None
-    """largest push of the chamfer along the motion, on leaving the seat"""
-    after_edge_N: float | None
-    """mean friction well inside the seat, after the control edge"""
+    edge_assist: float | None
+    """[N] largest push of the chamfer along the motion, on leaving the seat"""
+    after_edge: float | None
+    """[N] mean friction well inside the seat, after the control edge"""
 
 
 def findings(result: RunResult) -> Findings:
@@ -70,23 +70,21 @@ def findings(result: RunResult) -> Findings:
     assisted, elastic = _assisted(result, last)
     edge = case.control_edge
     return Findings(
-        friction_N=float(np.abs(result.friction[middle]).mean()),
+        friction=float(np.abs(result.friction[middle]).mean()),
         solid_share=float(solid[sliding].sum() / (solid[sliding] + fluid[sliding]).sum()),
-        solid_slow_N=_mean(solid[slowing]) if edge is None else None,
-        solid_fast_N=float(solid[_fast(result, last)].min()),
-        fluid_slow_N=_mean(fluid[slowing]) if edge is None else None,
-        fluid_fast_N=float(fluid[_fast(result, last)].max()),
-        rise_on_deceleration=_mean(
-            np.array([abs(result.friction[i] / result.friction[j]) - 1.0 for i, j in slow])
-        )
+        solid_slow=_mean(solid[slowing]) if edge is None else None,
+        solid_fast=float(solid[_fast(result, last)].min()),
+        fluid_slow=_mean(fluid[slowing]) if edge is None else None,
+        fluid_fast=float(fluid[_fast(result, last)].max()),
+        rise_on_deceleration=_mean(np.array([abs(result.friction[i] / result.friction[j]) - 1.0 for i, j in slow]))
         if edge is None
         else None,
-        assisted_length_m=assisted,
-        elastic_length_m=elastic,
-        second_lobe_m=_second_lobe(result, last),
+        assisted_length=assisted,
+        elastic_length=elastic,
+        second_lobe=_second_lobe(result, last),
         edge_peak=_edge_peak(result, last) if edge else None,
-        edge_assist_N=float(max(0.0, -result.edge[last & (result.velocity > 0.0)].min())) if edge else None,
-        after_edge_N=_after_edge(result, last) if edge else None,
+        edge_assist=float(max(0.0, -result.edge[last & (result.velocity > 0.0)].min())) if edge else None,
+        after_edge=_after_edge(result, last) if edge else None,
     )
 
 
@@ -127,7 +125,7 @@ def _fast(result: RunResult, last: BoolArray) -> BoolArray:
     fast = last & (speed >= 0.99 * speed[last].max())
     edge = result.case.control_edge
     inside = fast if edge is None else fast & (result.position + _half_width(result) < edge.position)
-    return inside if inside.any() else fast
+    return np.asarray(inside if inside.any() else fast)
 
 
 def _half_width(result: RunResult) -> float:
@@ -146,7 +144,9 @@ def _slowing(result: RunResult, stroke: BoolArray) -> tuple[int, int]:
 def _assisted(result: RunResult, last: BoolArray) -> tuple[float | None, float | None]:
     """Mean way after the reversals of the last cycle until friction changes sign, and what elasticity says."""
     reversals = [
-        int(i) for i in np.flatnonzero(np.diff(np.sign(result.velocity)) != 0) if last[i] and abs(result.friction[i]) > 0
+        int(i)
+        for i in np.flatnonzero(np.diff(np.sign(result.velocity)) != 0)
+        if last[i] and abs(result.friction[i]) > 0
     ]
     ways, estimates = [], []
     for i in reversals:

@@ -1,4 +1,4 @@
-"""How roughness hinders the flow of pressure and adds to the flow of shear: factors of the average Reynolds equation."""
+"""How roughness hinders the flow of pressure and adds to that of shear: factors of the average Reynolds equation."""
 
 import math
 
@@ -34,8 +34,8 @@ def flow_factor_coefficients(peklenik_number: float) -> tuple[float, ...]:
 def pressure_flow_factor(coefficients: tuple[float, ...], ratio: float) -> tuple[float, float]:
     """phi_x and its derivative at ``ratio`` H = gap / rms roughness, H > 0.
 
-    1 - C exp(-r H) for isotropic roughness, else 1 + C H^-r. Used below the H = 0.5 of the fit too (our choice: it stays
-    positive down to contact).
+    1 - C exp(-r H) for isotropic roughness, else 1 + C H^-r. Used below the H = 0.5 of the fit too (our choice: it
+    stays positive down to contact).
     """
     c, r = coefficients[1], coefficients[2]
     if coefficients[0] <= 1.0:

@@ -55,4 +55,5 @@ def apparent_viscosity(grease: tuple[float, float, float, float, float], shear_r
     """
     yield_stress, consistency, index, base, floor = grease
     rate = math.sqrt(shear_rate * shear_rate + floor * floor)
-    return (yield_stress + consistency * rate**index) / rate + base
+    viscosity: float = (yield_stress + consistency * rate**index) / rate + base
+    return viscosity

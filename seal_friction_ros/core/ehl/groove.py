@@ -1,4 +1,4 @@
-"""What holds the seal in the groove of the spool, along the motion: a spring, or two seats with a ridge between them."""
+"""What holds the seal in the groove of the spool, along the motion: a spring, or two seats with a ridge between."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,9 @@ class Groove:
 
     .. math:: F(e) = k (|e| - c)\,\mathrm{sgn}(e)\ (|e| \ge c),\quad F(e) = \tfrac{k}{2} e (e^2 / c^2 - 1)\ (|e| < c)
 
-    With an axial clearance 2 c the seal can lean on either flank of the groove: two stable positions at e = -c and c and an
-    unstable one at 0, as the spool-valve paper describes (section 7.1). The cubic between them is our choice: the simplest
-    that joins the springs with their slope. Both numbers are ours: the geometry of the paper is not public.
+    With an axial clearance 2 c the seal can lean on either flank of the groove: two stable positions at e = -c and c
+    and an unstable one at 0, as the spool-valve paper describes (section 7.1). The cubic between them is our choice:
+    the simplest that joins the springs with their slope. Both numbers are ours: the paper's geometry is not public.
 
     Raises:
         ValueError: A value is out of bounds.

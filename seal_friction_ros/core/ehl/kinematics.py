@@ -91,7 +91,9 @@ class MeasuredMotion:
 
     def __init__(self, times: Sequence[float], positions: Sequence[float]) -> None:
         if len(times) != len(positions) or len(times) < 2:
-            raise ValueError(f'MeasuredMotion: {len(times)} times and {len(positions)} positions: give two or more of each')
+            raise ValueError(
+                f'MeasuredMotion: {len(times)} times and {len(positions)} positions: give two or more of each'
+            )
         if not all(math.isfinite(value) for value in (*times, *positions)):
             raise ValueError('MeasuredMotion: not every time and position is finite')
         if any(later <= earlier for earlier, later in pairwise(times)):

@@ -47,7 +47,10 @@ def gmres(
         column = (shares + again).tolist()
         length = float(np.linalg.norm(image))
         for i, (cosine, sine) in enumerate(rotations):
-            column[i], column[i + 1] = cosine * column[i] + sine * column[i + 1], cosine * column[i + 1] - sine * column[i]
+            column[i], column[i + 1] = (
+                cosine * column[i] + sine * column[i + 1],
+                cosine * column[i + 1] - sine * column[i],
+            )
         radius = math.hypot(column[k], length)
         if not 0.0 < radius < math.inf:
             break

@@ -67,7 +67,7 @@ def reynolds_rows(
     rate: float,
     old_thickness: FloatArray,
     width: float,
-    ends: tuple[float, float, float, float],
+    ends: FilmEnds,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Flow out of each cell less flow in plus what is stored, and its derivatives.
 
@@ -219,7 +219,7 @@ def film_of_gap(
     pressure, saturation = np.zeros(n), np.ones(n)
     for iteration in range(_ITERATIONS):
         residual, rows, flow = reynolds_rows(
-            h, pressure, saturation, properties, mean_velocity, rate, before, cell_width, tuple(ends)
+            h, pressure, saturation, properties, mean_velocity, rate, before, cell_width, ends
         )
         kept, imperfection = complementarity(pressure, saturation, scale)
         if imperfection <= _TOLERANCE and np.abs(residual).max() <= n * _TOLERANCE * largest_flow:
@@ -247,7 +247,7 @@ def _eliminated_change(residual: FloatArray, rows: FloatArray, kept: FloatArray)
 
 def _times(rows: FloatArray, x: FloatArray) -> FloatArray:
     """Product of a tridiagonal matrix, rows of shape (3, n), and a vector."""
-    product = rows[1] * x
+    product: FloatArray = rows[1] * x
     product[1:] += rows[0, 1:] * x[:-1]
     product[:-1] += rows[2, :-1] * x[1:]
     return product

@@ -11,6 +11,7 @@ from scipy.special import erf
 from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.ehl.contact import Contact, ContactState, asperity_pressure
 from seal_friction_ros.core.ehl.grease import apparent_viscosity
+from seal_friction_ros.core.ehl.reynolds import FilmEnds
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def fluid_shear(
     wall_velocity: float,
     grease: tuple[float, float, float, float, float],
     width: float,
-    ends: tuple[float, float, float, float],
+    ends: FilmEnds,
 ) -> float:
     """Shear force of the film on the seal [N/m], in the direction of the moving wall if positive with its velocity.
 
@@ -72,7 +73,7 @@ def shear(
     state: ContactState,
     wall_velocity: float,
     solid_shear_stress: float,
-    ends: tuple[float, float, float, float],
+    ends: FilmEnds,
 ) -> Shear:
     """Both shear forces [N/m] at a ``wall_velocity`` [m/s] in the frame of the seal and tau_c [Pa]."""
     fluid = fluid_shear(*state, wall_velocity, contact.grease.numbers, contact.half_plane.cell_width, ends)
@@ -88,8 +89,8 @@ def sliding_velocity(
 ) -> float:
     """Velocity at which spring and friction balance, if the seal does not stick.
 
-    solid sign(v) + fluid(v) = spring(v), the film held. The left side rises with v and the right side falls, so there is
-    one solution between 0 and whatever the spring could drive.
+    solid sign(v) + fluid(v) = spring(v), the film held. The left side rises with v and the right side falls, so there
+    is one solution between 0 and whatever the spring could drive.
 
     Args:
         drive: Force of the spring if the seal stuck [N], of a magnitude above ``solid``.
@@ -114,7 +115,9 @@ def sliding_velocity(
         low, at_low = high, at_high
         high *= 2.0
         if high > 1e6 * fastest:
-            raise ValueError(f'no sliding velocity below {high:.3g} m/s balances {drive:.4g} N: is the seal held at all?')
+            raise ValueError(
+                f'no sliding velocity below {high:.3g} m/s balances {drive:.4g} N: is the seal held at all?'
+            )
         at_high = surplus(high)
     kept = 0
     for _ in range(100):

@@ -3,17 +3,21 @@
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from seal_friction_ros.core.ehl.findings import REFERENCE_HALF_WIDTH, findings
 from seal_friction_ros.core.ehl.transient import RunResult
+
+FloatArray = npt.NDArray[np.float64]
 
 
 class StudyTable(NamedTuple):
     """One entry per run, in order of tau_c."""
 
-    solid_shear_stress_Pa: tuple[float, ...]
-    friction_N: tuple[float, ...]
-    """mean magnitude within 0.5 mm of the middle"""
+    solid_shear_stress: tuple[float, ...]
+    """[Pa]"""
+    friction: tuple[float, ...]
+    """[N] mean magnitude within 0.5 mm of the middle"""
     solid_share: tuple[float, ...]
     """of solid and fluid friction there"""
     deviation: tuple[float, ...]
@@ -33,20 +37,20 @@ def study_table(runs: list[RunResult]) -> StudyTable:
     ordered = sorted(runs, key=lambda run: run.case.seal.solid_shear_stress)
     stresses = np.array([run.case.seal.solid_shear_stress for run in ordered])
     found = [findings(run) for run in ordered]
-    quotient = np.array([f.friction_N for f in found]) / stresses
+    quotient = np.array([f.friction for f in found]) / stresses
     curves = np.array([_middle(run) for run in ordered]) / stresses[:, None]
     curve_deviation = np.abs(curves / curves.mean(axis=0) - 1.0).max(axis=1)
     return StudyTable(
         tuple(stresses.tolist()),
-        tuple(f.friction_N for f in found),
+        tuple(f.friction for f in found),
         tuple(f.solid_share for f in found),
         tuple((quotient / quotient.mean() - 1.0).tolist()),
         tuple(curve_deviation.tolist()),
     )
 
 
-def _middle(run: RunResult) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _middle(run: RunResult) -> FloatArray:
     """Friction of the steps within 0.5 mm of the middle in the last cycle [N]."""
     motion = run.case.motion
     last = run.time > run.time[-1] * (1.0 - 1.0 / motion.cycles) + 1e-12
-    return run.friction[last & (np.abs(run.position - motion.centre) <= REFERENCE_HALF_WIDTH)]
+    return np.asarray(run.friction[last & (np.abs(run.position - motion.centre) <= REFERENCE_HALF_WIDTH)])

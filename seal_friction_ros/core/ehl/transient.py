@@ -1,7 +1,7 @@
 r"""A whole motion of one seal, step by step: ``moment = rest(model)``, then ``moment, forces = advance(...)``.
 
-The spool drives the contact through the groove (`groove`): lag e, velocity of the contact v = spool velocity - de/dt. One
-step first finds v from the balance of spring and friction with the film as it is, sticking included, then moves the
+The spool drives the contact through the groove (`groove`): lag e, velocity of the contact v = spool velocity - de/dt.
+One step first finds v from the balance of spring and friction with the film as it is, sticking included, then moves the
 film by one implicit Euler step with that v (our choice: of first order in the step, like the film itself). Forces count
 positive where they resist a motion to the right, so friction has the sign of the velocity.
 """
@@ -147,7 +147,7 @@ class RunResult(NamedTuple):
 
 
 def rest(model: Model, position: float) -> Moment:
-    """The seal at rest and relaxed on its left seat, dry contact, gap full of lubricant (or as full as the film on the wall makes it).
+    """The seal at rest and relaxed on its left seat: dry contact, gap as full of lubricant as the wall makes it.
 
     Raises:
         NotConvergedError: The dry contact was not found.

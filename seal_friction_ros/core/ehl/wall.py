@@ -81,7 +81,7 @@ class WallFilm:
 
     def _overlap(self, left: float, right: float) -> FloatArray:
         edges = self.start + self.width * np.arange(len(self.volume) + 1)
-        return np.clip(np.minimum(edges[1:], right) - np.maximum(edges[:-1], left), 0.0, None)
+        return np.asarray(np.clip(np.minimum(edges[1:], right) - np.maximum(edges[:-1], left), 0.0, None))
 
     def ahead(self, left: float, right: float, seal_left: float, seal_right: float) -> FloatArray:
         """Volume [m^2] of each cell that lies between ``left`` and ``right``, both outside the seal [m]."""
@@ -89,7 +89,9 @@ class WallFilm:
         share = np.divide(self._overlap(left, right), free, out=np.zeros_like(free), where=free > 1e-9 * self.width)
         return self.volume * np.minimum(share, 1.0)
 
-    def moved(self, taken: FloatArray, given_back: float, back_at: float, left: float, right: float, laid: float) -> 'WallFilm':
+    def moved(
+        self, taken: FloatArray, given_back: float, back_at: float, left: float, right: float, laid: float
+    ) -> 'WallFilm':
         """The film after a step.
 
         Args:
