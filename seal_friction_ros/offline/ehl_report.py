@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter
 
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.findings import REFERENCE_HALF_WIDTH
@@ -177,12 +178,12 @@ def film_figure(result: RunResult) -> Plot:
     axes[0, 0].set_ylabel('pressure [MPa]')
     axes[1, 0].set_ylabel('gap [µm]')
     axes[1, 0].set_ylim(0.0, 1e6 * _gap_limit(result))
-    legend_above(axes[0, 2], fontsize=8.0)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc='upper right', ncols=3)
     return Plot(
         'film',
         figure,
-        'Above: pressure of film and asperities, and their sum. Below: gap, filled as far as the film is; the wall moves '
-        'to the left under the seal. The edge of the contact is steep: the gap axis is cut.',
+        'Above: pressure of film and asperities, and their sum. Below: gap, filled as far as the film is; the wall '
+        'moves to the left under the seal. The edge of the contact is steep: the gap axis is cut.',
     )
 
 
@@ -255,6 +256,7 @@ def map_figure(computed: MapRuns) -> Plot:
     right.set_ylabel('solid share')
     for ax in (left, right):
         ax.set_xlabel('speed [mm/s]')
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f'{value:g}'))
         legend_above(ax)
     left.set_ylim(bottom=0.0)
     return Plot('friction_map', figure, 'Friction map: mean of both directions, flooded, elastic, on a plain wall.')

@@ -37,6 +37,7 @@ _GMRES_TOLERANCE = 1e-2  # of the elastic residual, at each Newton iteration
 _GAP_TOLERANCE = 1e-13  # [m] left of the elastic equation
 _FLOW_TOLERANCE = 1e-13  # of the largest flow
 _ROUNDING = 2e-15  # relative
+_LEAST_FLOW = 1e-25  # [m^2/s] less than this is none: a dry contact has no flow to compare with
 _COMPLEMENTARITY_TOLERANCE = 1e-13
 _PRESSURE_SCALE = 1e5  # [Pa] p_s of the complementarity
 _THINNEST = 1e-9  # [m] a gap below this flows like this
@@ -287,11 +288,12 @@ def contact_step(
         kept, imperfection = complementarity(pressure, saturation, _PRESSURE_SCALE)
         solid, slope = asperity_pressure(gap, contact.asperities)
         elastic = gap - rigid_gap - compliance_factor * plane.deflection(pressure + solid)
-        largest_flow = float(np.abs(flow).max()) + rate * plane.cell_width * float(np.abs(old_thickness).max())
+        largest_flow = (
+            _LEAST_FLOW + float(np.abs(flow).max()) + rate * plane.cell_width * float(np.abs(old_thickness).max())
+        )
         off = float(np.abs(elastic).max())
-        rounding = (
-            _ROUNDING * float((properties[0] * pressure).max()) / plane.cell_width
-        )  # of a difference of pressures
+        # what rounding leaves of the difference of two pressures, times the mobility
+        rounding = _ROUNDING * float((properties[0] * pressure).max()) / plane.cell_width
         flow_off = max(float(np.abs(residual).max()) - rounding, 0.0) / largest_flow
         if not math.isfinite(off + flow_off):
             break
