@@ -329,7 +329,7 @@ def compare_with_bag(
 
     Args:
         case: The case; its own motion is not used. The middle of the measured way is put at its centre.
-        bag: The bag; needs velocity samples with position and force sum.
+        bag: The bag, with estimates; needs a force sum, and a position or else the velocity is summed up.
         window: Begin and end of the part to take [s]; None takes all.
         chain: The measuring chain.
 
@@ -340,12 +340,16 @@ def compare_with_bag(
     recorded = read_run(bag)
     begin, end = window or (0.0, float('inf'))
     good = (recorded.time >= begin) & (recorded.time <= end)
-    good &= np.isfinite(recorded.position) & np.isfinite(recorded.force_sum)
+    course = recorded.position
+    if not np.isfinite(course).any():
+        steps_of_way = 0.5 * (recorded.velocity[1:] + recorded.velocity[:-1]) * np.diff(recorded.time)
+        course = np.concatenate(([0.0], np.cumsum(steps_of_way)))
+    good &= np.isfinite(course) & np.isfinite(recorded.force_sum)
     if good.sum() < _SHORTEST_RECORD:
         raise ValueError(
             f'{bag}: {good.sum()} samples with position and force in {begin} to {end} s: take another window'
         )
-    time, position, force = recorded.time[good], recorded.position[good], recorded.force_sum[good]
+    time, position, force = recorded.time[good], course[good], recorded.force_sum[good]
     time = time - time[0]
     position = position - 0.5 * (position.max() + position.min()) + case.motion.centre
     motion = MeasuredMotion(time.tolist(), position.tolist())

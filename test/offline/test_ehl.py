@@ -1,0 +1,193 @@
+"""``seal_friction ehl``: files in, numbers, pages and seal files out; work that goes on where it was left."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core import wire
+from seal_friction_ros.core.ehl.case import Case, Spool
+from seal_friction_ros.core.ehl.kinematics import ConstantAcceleration
+from seal_friction_ros.core.ehl.transient import run
+from seal_friction_ros.core.records import Force
+from seal_friction_ros.core.seal_file import parse_seal
+from seal_friction_ros.core.wire import Position, Velocity
+from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline import bag as b
+from seal_friction_ros.offline import ehl
+from seal_friction_ros.offline.cli import main
+from seal_friction_ros.offline.ehl import load_case
+
+ROOT = Path(__file__).parents[2]
+SMALL = """name: small
+motion: {cycles: 1}
+numerics: {cells: 48, time_step: 2.0e-3}
+study: {solid_shear_stresses: [1.0e+6, 2.0e+6]}
+map: {velocity_min: 1.0e-3, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+5, pressures: 2}
+"""
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> str:
+    path = tmp_path / 'small.yaml'
+    path.write_text(SMALL)
+    return str(path)
+
+
+def answer(capsys, *arguments: str) -> dict:
+    assert main(['ehl', *arguments, '--json', '--jobs', '1']) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'config' / 'ehl').glob('*.yaml')), ids=lambda path: path.stem)
+def test_every_case_of_the_repository_is_one_and_says_what_is_ours(path: Path):
+    case = load_case(path.stem)
+    assert isinstance(case, Case | Spool)
+    assert case.name == path.stem
+    assert case.source
+    if isinstance(case, Spool):
+        assert all(isinstance(load_case(member.case), Case) for member in case.members)
+
+
+def test_run_gives_its_findings_with_their_errors(small, capsys):
+    found = answer(capsys, 'run', small)
+    assert found['friction_N'] > 0.0
+    assert 0.9 < found['solid_share'] < 1.0
+    assert found['step_errors'].keys() == found['grid_errors'].keys() >= {'friction_N', 'rise_on_deceleration'}
+    assert found['mass_defect'] < 1e-12
+    assert found['retried_steps'] == 0
+
+
+def test_run_with_a_page_writes_figures_and_an_animation(small, tmp_path, capsys):
+    page = tmp_path / 'page.html'
+    found = answer(capsys, 'run', small, '--out', str(page))
+    text = page.read_text()
+    assert 'Findings' in text
+    assert 'grease.flow_index' in text
+    assert {Path(f).name for f in found['figures']} >= {'friction_over_position.png', 'film.svg', 'film.gif'}
+    assert all(Path(f).stat().st_size > 1000 for f in found['figures'])
+
+
+def test_study_has_the_keys_of_the_paper_and_is_one_json_object_on_stdout(small, tmp_path):
+    command = [sys.executable, '-m', 'seal_friction_ros.offline.cli', 'ehl', 'study', small, '--json', '--jobs', '1']
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found['solid_shear_stress_Pa'] == [1e6, 2e6]
+    assert found['friction_N'][1] == pytest.approx(2.0 * found['friction_N'][0], rel=0.1)
+    assert len(found['solid_share']) == 2
+
+
+def test_two_processes_find_what_one_does(small, capsys):
+    alone = answer(capsys, 'study', small)
+    assert main(['ehl', 'study', small, '--json', '--jobs', '2']) == 0
+    assert json.loads(capsys.readouterr().out) == alone
+
+
+def test_interrupted_work_goes_on_where_it_was_left(small, tmp_path, capsys, monkeypatch):
+    work = tmp_path / 'work'
+    first = answer(capsys, 'study', small, '--work', str(work))
+    finished = sorted(work.glob('*.json'))
+    assert len(finished) == 2
+    finished[0].unlink()
+    asked = []
+    monkeypatch.setattr(ehl, 'run', lambda case, *rest: asked.append(case) or run(case, *rest))
+    assert (
+        answer(capsys, 'study', small, '--work', str(work), '--out', str(tmp_path / 'p.html'))['friction_N']
+        == (first['friction_N'])
+    )
+    assert len(asked) == 1
+
+
+def test_map_becomes_a_seal_file_that_the_estimator_takes(small, tmp_path, capsys):
+    seal_file = tmp_path / 'mapped.yaml'
+    work = ('--work', str(tmp_path / 'work'))
+    found = answer(capsys, 'map', small, '--seal-file', str(seal_file), '--out', str(tmp_path / 'map.html'), *work)
+    assert np.array(found['friction_N']).shape == (2, 3)
+    assert found['memory_length_m'] > 0.0
+    seal = parse_seal(read_yaml(seal_file))
+    assert seal.coulomb_law.sliding_friction(0.0, 1e-2) == pytest.approx(found['friction_N'][0][1], rel=1e-5)
+    assert seal.coulomb_law.coulomb_friction(1e5) > seal.coulomb_law.coulomb_friction(0.0)
+    assert answer(capsys, 'map', small, *work) == {k: v for k, v in found.items() if k not in ('page', 'figures')}
+    assert main(['charts', str(seal_file), '--out', str(tmp_path / 'charts.html')]) == 0
+
+
+def test_map_does_not_overwrite_a_seal_file(small, tmp_path, capsys):
+    there = tmp_path / 'there.yaml'
+    there.write_text('mine')
+    assert main(['ehl', 'map', small, '--seal-file', str(there)]) == 2
+    assert 'exists already, not overwriting' in capsys.readouterr().err
+    assert there.read_text() == 'mine'
+
+
+def test_spool_adds_up_its_seals(small, tmp_path, capsys):
+    spool = tmp_path / 'spool.yaml'
+    spool.write_text(
+        'name: pair\nmotion: {distance: 1.8e-3, cycles: 1}\n'
+        'seals: [{case: small}, {case: small}, {case: small, mirrored: true}]\n'
+    )
+    found = answer(capsys, 'run', str(spool), '--out', str(tmp_path / 'spool.html'))
+    single = np.abs(run(load_case(small)).friction).max()
+    assert found['largest_friction_N'] == pytest.approx(3.0 * single, rel=0.01)
+    assert found['seals'] == ['small', 'small', 'small, mirrored']
+
+
+def measured_bag(folder: Path, with_position: bool) -> Path:
+    """A rod on the motion of the paper under a force that is a square wave about an offset, with estimates."""
+    motion, step = ConstantAcceleration(cycles=1), 1e-3
+    raw = folder / 'raw'
+    with b.BagWriter(raw) as writer:
+        for i in range(round(motion.duration / step)):
+            stamp = 1_000_000_000 + i * 1_000_000
+            velocity = (motion.position((i + 1) * step) - motion.position((i - 1) * step)) / (2.0 * step) if i else 0.0
+            force = Force(stamp, 3.0 + 0.8 * float(np.sign(velocity)))
+            writer.write(b.FORCE_TOPIC, wire.FORCE_TYPE, stamp, wire.encode_force(force, b'rod'))
+            if with_position:
+                position = Position(stamp, 0.1 + motion.position(i * step))
+                writer.write(b.POSITION_TOPIC, wire.POSITION_TYPE, stamp, wire.encode_position(position, b'rod'))
+            data = wire.encode_velocity(Velocity(stamp, velocity, b'rod'))
+            writer.write(b.VELOCITY_TOPIC, wire.VELOCITY_TYPE, stamp, data)
+    seal = ROOT / 'config' / 'seals' / 'ms28775_114.yaml'
+    assert main(['replay', str(raw), '--seal', str(seal), '--out', str(folder / 'bag')]) == 0
+    return folder / 'bag'
+
+
+@pytest.mark.parametrize('with_position', [True, False])
+def test_measured_motion_of_a_bag_is_run_and_its_force_compared(small, tmp_path, capsys, with_position):
+    bag = measured_bag(tmp_path, with_position)
+    capsys.readouterr()
+    found = answer(capsys, 'run', small, '--bag', str(bag), '--out', str(tmp_path / 'p.html'))
+    assert found['correlation'] > 0.9
+    assert found['measured_mean_N'] == pytest.approx(0.7, abs=0.1)
+    assert 'simulation_against_measurement' in (tmp_path / 'p.html').read_text()
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['run', 'nowhere'], 'nowhere.yaml: No such file'),
+        (['study', 'spool'], 'a spool has no study'),
+        (['map', 'spool'], 'a spool has no friction map'),
+        (['run', 'spool', '--bag', 'x'], 'a spool cannot be compared with a bag'),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(arguments, words, capsys):
+    assert main(['ehl', *arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count('\n') == 1
+
+
+def test_run_that_does_not_converge_is_an_error_and_no_curve(tmp_path, capsys):
+    """Roughness that the load crushes."""
+    path = tmp_path / 'crushed.yaml'
+    path.write_text(SMALL.replace('small', 'crushed') + 'topography: {rms_height: 0.2e-6, rms_slope: 0.1}\n')
+    page = tmp_path / 'page.html'
+    assert main(['ehl', 'run', str(path), '--out', str(page)]) == 2
+    said = capsys.readouterr()
+    assert said.out == ''
+    assert 'case crushed at' in said.err
+    assert not page.exists()
