@@ -10,6 +10,13 @@ from pathlib import Path
 
 from seal_friction_ros.core.configuration import SealSelection
 from seal_friction_ros.core.coulomb import PriorArtChart, Uncertainty
+from seal_friction_ros.core.ehl.case import Air, MapGrid, Member, Numerics, SealBody, Study, Viscoelasticity
+from seal_friction_ros.core.ehl.friction_law import FrictionMap
+from seal_friction_ros.core.ehl.grease import Grease
+from seal_friction_ros.core.ehl.groove import Groove
+from seal_friction_ros.core.ehl.kinematics import ConstantAcceleration
+from seal_friction_ros.core.ehl.topography import Topography
+from seal_friction_ros.core.ehl.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
@@ -48,6 +55,20 @@ RECORDS = (
     CoefficientTable,
     PriorArtChart,
     Uncertainty,
+    FrictionMap,
+    SealBody,
+    Topography,
+    Grease,
+    Groove,
+    Air,
+    ConstantAcceleration,
+    Numerics,
+    ControlEdge,
+    FilmSupply,
+    Viscoelasticity,
+    Study,
+    MapGrid,
+    Member,
 )
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.ticker import FuncFormatter
+from PIL import Image
 
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.findings import REFERENCE_HALF_WIDTH
@@ -32,13 +33,13 @@ from seal_friction_ros.offline.figures import (
     house_style,
     legend_above,
     new_figure,
-    render,
 )
 from seal_friction_ros.offline.report import number, table, tiles, write_page
 
 MM, MICRON, MPA = 1e-3, 1e-6, 1e6  # [m], [m], [Pa]
-_FRAMES = 120  # of the animation
-_FRAME_RATE = 20  # [1/s]
+_FRAMES = 80  # of the animation
+_FRAME_RATE = 12  # [1/s]
+_ANIMATION_DPI = 80
 
 _MODEL = (
     'One-dimensional transient mixed lubrication of the seal on its wall: Reynolds equation with mass-conserving '
@@ -304,35 +305,41 @@ def spool_figure(result: SpoolResult, labels: list[str]) -> Plot:
 
 def _write_animation(result: RunResult, path: Path) -> None:
     """Film and friction over the last cycle as an animated GIF; the same run gives the same bytes."""
-    steps: IntArray = np.flatnonzero(_last_cycle(result))
-    steps = steps[np.linspace(0, len(steps) - 1, min(_FRAMES, len(steps))).astype(int)]
     last = _last_cycle(result)
-    figure, (upper, lower, loop) = new_figure(result.case.name, 5.6, nrows=3)
-    figure.set_dpi(80)
+    steps: IntArray = np.flatnonzero(last)
+    steps = steps[np.linspace(0, len(steps) - 1, min(_FRAMES, len(steps))).astype(int)]
     x = result.place / MM
-    top = 1.1 * float((result.contact_pressure[last] + result.film_pressure[last]).max()) / MPA
-
-    def draw(step: int) -> None:
-        for ax in (upper, lower, loop):
-            ax.clear()
-        _draw_pressure(upper, x, result, step)
-        upper.set_ylim(0.0, top)
-        upper.set_ylabel('pressure [MPa]')
-        legend_above(upper)
-        _draw_film(lower, x, result, step)
-        lower.set_ylim(0.0, 1e6 * _gap_limit(result))
-        lower.set_ylabel('gap [µm]')
-        lower.set_xlabel('along the seal [mm]')
-        loop.plot(result.position[last] / MM, result.friction[last], color=GREY)
-        loop.plot(result.position[step] / MM, result.friction[step], 'o', color=VERMILLION)
-        loop.set_ylabel('friction [N]')
-        loop.set_xlabel('position of the spool [mm]')
-
-    draw(int(steps[0]))
-    render(figure)  # settles the layout
-    animation = FuncAnimation(figure, lambda i: draw(int(steps[i])), frames=len(steps), blit=False)
+    figure, (upper, lower, loop) = new_figure(result.case.name, 5.6, nrows=3)
+    _draw_pressure(upper, x, result, int(steps[0]))
+    upper.set_ylim(0.0, 1.1 * float((result.contact_pressure[last] + result.film_pressure[last]).max()) / MPA)
+    upper.set_ylabel('pressure [MPa]')
+    legend_above(upper)
+    gap = lower.plot(x, result.gap[steps[0]] / MICRON, color=BLUE, label='gap')[0]
+    film = lower.plot(x, result.gap[steps[0]] / MICRON, color=SKY, lw=4.0, alpha=0.5, label='filled')[0]
+    lower.set_ylim(0.0, 1e6 * _gap_limit(result))
+    lower.set_ylabel('gap [µm]')
+    lower.set_xlabel('along the seal [mm]')
+    legend_above(lower)
+    loop.plot(result.position[last] / MM, result.friction[last], color=GREY)
+    dot = loop.plot([], [], 'o', color=VERMILLION)[0]
+    loop.set_ylabel('friction [N]')
+    loop.set_xlabel('position of the spool [mm]')
+    figure.set_dpi(_ANIMATION_DPI)
+    canvas: Any = FigureCanvasAgg(figure)  # its methods have no annotations
+    figure.draw_without_rendering()
+    figure.set_layout_engine('none')
+    frames = []
+    for step in steps:
+        pressures = (result.contact_pressure[step] + result.film_pressure[step], result.contact_pressure[step])
+        for line, values in zip(upper.lines, (*pressures, result.film_pressure[step]), strict=True):
+            line.set_ydata(values / MPA)
+        gap.set_ydata(result.gap[step] / MICRON)
+        film.set_ydata(result.gap[step] * result.saturation[step] / MICRON)
+        dot.set_data([result.position[step] / MM], [result.friction[step]])
+        canvas.draw()
+        frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB'))
     try:
-        animation.save(str(path), writer=PillowWriter(fps=_FRAME_RATE), dpi=80)
+        frames[0].save(path, save_all=True, append_images=frames[1:], duration=1000 // _FRAME_RATE, loop=0)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror or error}') from None
 
