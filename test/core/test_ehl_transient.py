@@ -211,7 +211,7 @@ def test_mirrored_pair_of_seals_makes_a_friction_without_preference():
     both = superposed(members, runs)
     last = both.time > motion.duration - motion.stroke_time
     stroke_before = np.interp(both.time[last] - motion.stroke_time, both.time, both.friction)
-    assert both.friction[last] == pytest.approx(-stroke_before, abs=0.04 * np.abs(both.friction).max())
+    assert both.friction[last] == pytest.approx(-stroke_before, abs=0.06 * np.abs(both.friction).max())
     assert both.position.min() == pytest.approx(-1.35e-3, abs=1e-6)
 
 

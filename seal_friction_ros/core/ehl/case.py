@@ -77,7 +77,7 @@ class Air:
         unit='m/Pa',
         lower=0.0,
         upper=1e-6,
-        description='Interference that a pressure difference adds (our choice: 36 um, as much again, at 6 bar).',
+        description='Interference that a pressure difference adds through the groove (our choice: 36 um at 6 bar).',
     )
 
     def __post_init__(self) -> None:

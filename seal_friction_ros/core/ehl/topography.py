@@ -32,7 +32,7 @@ class Topography:
     rms_height: float = parameter(
         2e-6, unit='m', lower=1e-9, upper=1e-4, description='Combined rms roughness of both surfaces, h_rms.'
     )
-    rms_slope: float = parameter(0.6, unit='1', lower=1e-3, upper=5.0, description='Combined rms slope.')
+    rms_slope: float = parameter(0.8, unit='1', lower=1e-3, upper=5.0, description='Combined rms slope.')
     roll_off_length: float = parameter(
         25e-6, unit='m', lower=1e-7, upper=1e-2, description='Longest wavelength of the roughness, 2 pi / q_0.'
     )

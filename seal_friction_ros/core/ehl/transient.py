@@ -39,6 +39,9 @@ _MOST_HALVINGS = 10
 class Model:
     """A case made ready to run.
 
+    Air presses on the seal from all sides, and rubber passes that on like a fluid; so only what film and asperities
+    press above the air deflects it (our choice: the air changes sides at the crown).
+
     Raises:
         ValueError: The grid does not fit the seal.
     """
@@ -47,8 +50,10 @@ class Model:
     contact: Contact = field(init=False)
     place: FloatArray = field(init=False)
     """cells along the seal from its crown [m], shape (n,)"""
+    ambient: FloatArray = field(init=False)
+    """pressure of the air, that of the left up to the crown, then that of the right [Pa], shape (n,)"""
     profile: FloatArray = field(init=False)
-    """gap of the undeformed seal to a plain wall [m], shape (n,)"""
+    """gap of the undeformed seal to a plain wall, less what the air deflects [m], shape (n,)"""
     circumference: float = field(init=False)
     """[m]"""
 
@@ -60,7 +65,10 @@ class Model:
         radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
         object.__setattr__(self, 'contact', Contact(plane, case.topography, case.grease))
         object.__setattr__(self, 'place', place)
-        object.__setattr__(self, 'profile', place**2 / (2.0 * radius) - case.interference)
+        ambient = np.where(place < 0.0, case.air.pressure_left, case.air.pressure_right)
+        profile = place**2 / (2.0 * radius) - case.interference - plane.deflection(ambient)
+        object.__setattr__(self, 'ambient', ambient)
+        object.__setattr__(self, 'profile', profile)
         object.__setattr__(self, 'circumference', math.pi * case.seal.sealing_diameter)
 
     def rigid_gap(self, contact_place: float) -> FloatArray:
@@ -155,12 +163,13 @@ def rest(model: Model, position: float) -> Moment:
     case = model.case
     n = case.numerics.cells
     lag = -case.seated_groove.half_clearance
-    gap = dry_contact(model.contact, model.rigid_gap(position - lag))
+    air_deflects = model.contact.half_plane.deflection(model.ambient)
+    gap = dry_contact(model.contact, model.rigid_gap(position - lag) + air_deflects)
     pressure, _ = asperity_pressure(gap, model.contact.asperities)
     creep = np.zeros(n)
     if case.viscoelasticity:
         stiffening = case.viscoelasticity.stiffening
-        creep = stiffening / (1.0 + stiffening) * model.contact.half_plane.deflection(pressure)
+        creep = stiffening / (1.0 + stiffening) * model.contact.half_plane.deflection(pressure + model.ambient)
     saturation, wall_film = np.ones(n), None
     if case.film_supply:
         film = case.film_supply.initial_film
@@ -170,7 +179,7 @@ def rest(model: Model, position: float) -> Moment:
         count = math.ceil(2.0 * reach / width)
         start = position - reach
         wall_film = WallFilm(start, width, np.full(count, film * width))
-    return Moment(0.0, position, lag, ContactState(gap, np.zeros(n), saturation), wall_film, creep)
+    return Moment(0.0, position, lag, ContactState(gap, np.array(model.ambient), saturation), wall_film, creep)
 
 
 def advance(model: Model, moment: Moment, time: float, position: float) -> tuple[Moment, Forces, int, float]:
