@@ -22,6 +22,7 @@ setup(
         shared('config', '*.yaml'),
         shared('config/seals', '*.yaml'),
         shared('config/programs', '*.yaml'),
+        shared('config/security', '*.xml'),
         shared('config/rigs', '*.yaml'),
         shared('config/ehl', '*.yaml'),
         shared('data/thesis', '*.csv'),

@@ -13,18 +13,24 @@ from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.validated import from_mapping, meanings, plain
 
 _CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # what PyYAML lets out for '!!int foo'
-_OF_THE_NODE = ('autostart', 'record', 'record_directory', 'record_name', 'use_sim_time', 'qos_overrides')
+_OF_THE_NODE = (
+    'autostart',
+    'record',
+    'record_directory',
+    'record_name',
+    'record_split_size',
+    'record_split_duration',
+    'use_sim_time',
+    'qos_overrides',
+)
 DEFAULT_FEEDFORWARD = FeedForwardSettings()
-_LARGEST_YAML = 1 << 20  # [bytes] a seal or parameter file has a few thousand
+_LARGEST_YAML = 1 << 16  # [bytes] a seal or parameter file has a few thousand
+_DEEPEST_YAML = 40  # levels
+_LONGEST_SCALAR = 1 << 14  # characters without quotes: a number of base 60 takes the square of its length
 
 
-class _PlainLoader(yaml.SafeLoader):
-    """Safe loader that takes no aliases (a few lines of them can unfold to gigabytes) and no duplicate keys."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.AliasEvent):
-            raise yaml.YAMLError('aliases (*name) are not allowed')
-        return super().compose_node(parent, index)
+class _PlainLoader(yaml.CSafeLoader):
+    """Safe loader that takes no duplicate keys."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         keys = Counter(str(key.value) for key, _ in node.value)
@@ -34,8 +40,29 @@ class _PlainLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def read_yaml(path: Path) -> Any:
+def _check_plain(text: str) -> None:
+    """Refuse what takes more memory or time to load than its length suggests.
+
+    Raises:
+        yaml.YAMLError: The text has aliases (a few lines of them can unfold to gigabytes), or is too deep.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.CSafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            raise yaml.YAMLError('aliases (*name) are not allowed')
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST_YAML:
+            raise yaml.YAMLError(f'more than {_DEEPEST_YAML} levels deep')
+        if isinstance(event, yaml.ScalarEvent) and event.implicit[0] and len(event.value) > _LONGEST_SCALAR:
+            raise yaml.YAMLError(f'a value of {len(event.value)} characters without quotes')
+
+
+def read_yaml(path: Path, largest: int = _LARGEST_YAML) -> Any:
     """Document of a YAML file, plain data only.
+
+    Args:
+        path: The file.
+        largest: Size beyond which it is refused [bytes].
 
     Raises:
         ValueError: The file is missing, not readable, too large or not plain YAML; one line that names it.
@@ -44,15 +71,26 @@ def read_yaml(path: Path) -> Any:
         if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe or a device never ends
             raise ValueError(f'{path}: not a file')
         with path.open('rb') as file:
-            data = file.read(_LARGEST_YAML + 1)
+            data = file.read(largest + 1)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
-    if len(data) > _LARGEST_YAML:
-        raise ValueError(f'{path}: larger than {_LARGEST_YAML} bytes, not a file of this kind')
+    if len(data) > largest:
+        raise ValueError(f'{path}: larger than {largest} bytes, not a file of this kind')
+    return parse_yaml(data, str(path))
+
+
+def parse_yaml(data: bytes, where: str) -> Any:
+    """Document in YAML, plain data only; ``where`` it is from is for the error message.
+
+    Raises:
+        ValueError: It is not plain YAML.
+    """
     try:
-        return _PlainLoader(data.decode('utf-8')).get_single_data()
+        text = data.decode('utf-8')
+        _check_plain(text)
+        return _PlainLoader(text).get_single_data()
     except (yaml.YAMLError, RecursionError, *_CONSTRUCTOR_ERRORS) as error:
-        raise ValueError(f'{path}: not plain YAML: {" ".join(str(error).split())}') from None
+        raise ValueError(f'{where}: not plain YAML: {" ".join(str(error).split())}') from None
 
 
 def share_directory(package: str, module_file: str) -> Path:

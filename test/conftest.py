@@ -1,6 +1,8 @@
-"""Property tests draw the same examples every time, so a run is reproducible."""
+"""Property tests draw the same examples every time, so a run is reproducible; linear algebra has one thread."""
 
 from hypothesis import settings
+
+import seal_friction_ros.offline.cli  # noqa: F401  sets the number of threads, before any test loads numpy
 
 settings.register_profile('reproducible', derandomize=True, deadline=None, database=None)
 settings.load_profile('reproducible')

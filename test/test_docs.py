@@ -81,24 +81,25 @@ def test_the_node_runs_as_the_readme_says_and_records(checkout: Path):
 
 def test_the_servo_on_the_desk_runs_as_the_readme_says_and_gets_its_feed_forward(checkout: Path):
     environment = graph_environment(free_domain())
-    processes = [
-        subprocess.Popen(
-            command.replace('.venv/bin', str(ROOT / '.venv' / 'bin')).replace('build/bags', 'build/desk').split(),
-            cwd=checkout,
-            env=environment,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for command in commands(' desk')
-    ]
+    logs = [checkout / f'build/desk_{i}.log' for i in range(2)]
+    processes = []
     try:
-        time.sleep(12.0)  # five of them for the simulator to compile
+        for command, log in zip(commands(' desk'), logs, strict=True):
+            words = (
+                command.replace('.venv/bin', str(ROOT / '.venv' / 'bin')).replace('build/bags', 'build/desk').split()
+            )
+            with log.open('w') as said:
+                processes.append(subprocess.Popen(words, cwd=checkout, env=environment, stderr=said))
+        deadline = time.monotonic() + 60.0
+        while 'simulating' not in logs[0].read_text():  # it compiles first
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        time.sleep(5.0)
     finally:
         for process in processes:
             process.terminate()
-        said = [process.communicate(timeout=20.0)[1] for process in processes]
-    assert [process.returncode for process in processes] == [0, 0]
-    assert 'simulating' in said[0]
+        codes = [process.wait(20.0) for process in processes]
+    assert codes == [0, 0]
     (bag,) = (path.parent for path in checkout.glob('build/desk/*/metadata.yaml'))
     verdict = replay(bag)
     assert verdict.identical

@@ -1,14 +1,18 @@
 """``make demo``: real friction readings through the live node on a real graph, recorded, replayed, reported.
 
 Plays the thesis's pull test and, where they are, the runs of the O-ring rig into the estimator, in separate processes;
-verifies each recording byte for byte; writes a report for each; ends with measured against estimated friction.
+then closes the loop with the simulated servo, without feed-forward and with it; verifies each recording byte for byte;
+writes a report for each; ends with measured against estimated friction and with how the servo tracked.
 """
 
+import os
 import shutil
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 from rich.console import Console
@@ -17,29 +21,36 @@ from rich.text import Text
 
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.files import config_path
+from seal_friction_ros.nodes.closed_loop import close_loop_live
 from seal_friction_ros.nodes.processes import free_domain, play_live
-from seal_friction_ros.offline.bag_evaluation import evaluate, read_run
+from seal_friction_ros.nodes.realtime import realtime_granted
 from seal_friction_ros.offline.import_log import import_log
 from seal_friction_ros.offline.import_thesis import import_thesis
 from seal_friction_ros.offline.replay import replay
-from seal_friction_ros.offline.report import write_report
+from seal_friction_ros.offline.report import ReportSummary, write_report
+from seal_friction_ros.offline.servo_charts import write_servo_charts
 
 ROOT = Path(__file__).parents[1]
 OUT = ROOT / 'build' / 'demo'
+LOOP_BAG = OUT / 'closed_loop'
+SERVO_PAGE = OUT / 'servo.html'
 RIG_LOGS = ROOT.parent / 'shared' / 'data' / 'delft'
 PULL_TEST_RATE = 10.0  # [times the pace of the data] 100 Hz of readings become the 1 kHz of a servo controller
-RIG_RATE = 25.0  # [times the pace of the data] the runs last minutes
+LOOP_TIME = 10.0  # [s] without feed-forward, and as long with it
+REALTIME_PRIORITY = 50  # where the system grants it
+RIG_RATE = 30.0  # [times the pace of the data] the runs last minutes
 
 
 @dataclass(frozen=True)
 class Run:
-    """One bag played live."""
+    """One bag recorded live."""
 
-    name: str
-    figures: dict[str, str]
-    identical: bool
     bag: Path
-    report: Path
+    figures: dict[str, str]
+    """what was measured meanwhile"""
+    identical: bool
+    """whether its replay gave the same bytes"""
+    report: ReportSummary
 
 
 def inputs(folder: Path) -> Iterator[tuple[Path, float, dict[str, object]]]:
@@ -52,14 +63,22 @@ def inputs(folder: Path) -> Iterator[tuple[Path, float, dict[str, object]]]:
         yield folder / log.stem, RIG_RATE, rig
 
 
-def run_live(bag: Path, rate: float, parameters: dict[str, object]) -> Run:
-    """Play one bag live, verify what was recorded, report it."""
-    recorded = OUT / bag.name
-    figures = play_live(bag, recorded, free_domain(), rate, parameters)
-    identical = replay(recorded).identical
-    report = OUT / f'{bag.name}.html'
-    write_report(recorded, report)
-    return Run(bag.name, figures, identical, recorded, report)
+def priority() -> int:
+    """Real-time priority of the nodes: none where the system does not grant it."""
+    return REALTIME_PRIORITY if realtime_granted() else 0
+
+
+def identical(bag: Path) -> bool:
+    """Whether the replay of a recording gives the same bytes."""
+    return replay(bag).identical
+
+
+def play_all(console: Console) -> Iterator[tuple[Path, dict[str, str]]]:
+    """Play every bag live, one after the other; what was recorded, and what was measured meanwhile."""
+    for inputs_bag, rate, parameters in inputs(OUT / 'inputs'):
+        console.print(f'playing {inputs_bag.name} ...')
+        bag = OUT / inputs_bag.name
+        yield bag, play_live(inputs_bag, bag, free_domain(), rate, parameters)
 
 
 def friction_table(runs: list[Run]) -> Table:
@@ -68,10 +87,10 @@ def friction_table(runs: list[Run]) -> Table:
     for heading in ('run', 'pressure [bar]', 'measured [N]', 'estimated [N]', 'std [N]', 'deviation [%]'):
         table.add_column(Text(heading), justify='left' if heading == 'run' else 'right')
     for run in runs:
-        for level in evaluate(read_run(run.bag)).friction.sliding:
-            deviation = 'none' if level.deviation_percent is None else f'{level.deviation_percent:+.1f}'
-            numbers = (level.pressure / BAR, level.measured, level.estimated, level.estimated_std)
-            table.add_row(run.name, *(f'{number:.2f}' for number in numbers), deviation)
+        for level in run.report.numbers['friction']['sliding']:
+            deviation = 'none' if level['deviation_percent'] is None else f'{level["deviation_percent"]:+.1f}'
+            numbers = (level['pressure'] / BAR, level['measured'], level['estimated'], level['estimated_std'])
+            table.add_row(run.bag.name, *(f'{number:.2f}' for number in numbers), deviation)
     return table
 
 
@@ -83,8 +102,26 @@ def run_table(runs: list[Run]) -> Table:
     for run in runs:
         f = run.figures
         verdict = 'identical' if run.identical else 'DIFFERENT'
-        figures = (f['velocity samples'], f['round trip p50 [us]'], f['round trip p99 [us]'])
-        table.add_row(run.name, *figures, verdict, *(str(p.relative_to(ROOT)) for p in (run.bag, run.report)))
+        figures = (f.get(name, '') for name in ('velocity samples', 'round trip p50 [us]', 'round trip p99 [us]'))
+        paths = (str(path.relative_to(ROOT)) for path in (run.bag, run.report.page))
+        table.add_row(run.bag.name, *figures, verdict, *paths)
+    return table
+
+
+def tracking_table(loop: Run) -> Table:
+    """How the servo tracked without and with feed-forward, and what that cost."""
+    missed = f'{loop.figures.get("missed ticks")} of {loop.figures.get("ticks")} ticks missed'
+    share = f'{loop.figures.get("share of a core [%]")} % of a core'
+    kind = 'real-time' if priority() else 'normal'
+    title = f'Closed loop at {loop.figures.get("rate [Hz]")} Hz, {kind} priority'
+    table = Table(title=title, caption=f'simulator: {share}, {missed}')
+    for heading in ('feed-forward', 'RMS [um]', 'peak [um]', 'rest per reversal [ms]', 'RMS [%]', 'rest [%]'):
+        table.add_column(Text(heading), justify='left' if heading == 'feed-forward' else 'right')
+    for stretch in loop.report.numbers['tracking']:
+        name = f'up to {stretch["feedforward_peak"]:.0f} N' if stretch['feedforward_peak'] else 'none'
+        dwell = 'no reversal' if stretch['dwell'] is None else f'{stretch["dwell"] * 1e3:.1f}'
+        changes = ('' if stretch[c] is None else f'{stretch[c]:+.0f}' for c in ('rms_change', 'dwell_change'))
+        table.add_row(name, f'{stretch["rms"] * 1e6:.0f}', f'{stretch["peak"] * 1e6:.0f}', dwell, *changes)
     return table
 
 
@@ -93,15 +130,30 @@ def main() -> int:
     started = time.monotonic()
     console = Console(width=None if sys.stdout.isatty() else 120)
     shutil.rmtree(OUT, ignore_errors=True)
-    runs = []
-    for bag, rate, parameters in inputs(OUT / 'inputs'):
-        console.print(f'playing {bag.name} ...')
-        runs.append(run_live(bag, rate, parameters))
-    if len(runs) == 1:
+    recorded = [*play_all(console)]
+    with ProcessPoolExecutor(2, get_context('spawn'), os.nice, (19,)) as pool:  # beside the loop, and out of its way
+
+        def examined(bag: Path) -> tuple[Future[bool], Future[ReportSummary]]:
+            return pool.submit(identical, bag), pool.submit(write_report, bag, bag.with_name(f'{bag.name}.html'))
+
+        charts = pool.submit(write_servo_charts, SERVO_PAGE)
+        findings = [examined(bag) for bag, _ in recorded]
+        console.print(f'closing the loop with the simulated servo for {2 * LOOP_TIME:.0f} s ...')
+        simulator = ROOT / 'config' / 'servo_simulator.yaml'
+        recorded.append((LOOP_BAG, close_loop_live(LOOP_BAG, free_domain(), LOOP_TIME, simulator, priority())))
+        findings.append(examined(LOOP_BAG))
+        runs = [
+            Run(bag, figures, same.result(), report.result())
+            for (bag, figures), (same, report) in zip(recorded, findings, strict=True)
+        ]
+        charts.result()
+    *played, loop = runs
+    if len(played) == 1:
         console.print(f'no rig logs at {RIG_LOGS.relative_to(ROOT.parent)}: only the pull test was played')
-    console.print(friction_table(runs), run_table(runs))
+    console.print(friction_table(played), run_table([*played, loop]), tracking_table(loop))
+    console.print(f'the servo with and without friction: {SERVO_PAGE.relative_to(ROOT)}')
     console.print(f'{time.monotonic() - started:.0f} s in all')
-    return 0 if all(run.identical for run in runs) else 1
+    return 0 if all(run.identical for run in (*played, loop)) else 1
 
 
 if __name__ == '__main__':

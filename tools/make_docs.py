@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from seal_friction_ros.core.configuration import SealSelection
-from seal_friction_ros.core.coulomb import PriorArtChart, Uncertainty
+from seal_friction_ros.core.coulomb import ConstantCoulomb, PressurePowerLaw, PriorArtChart, Uncertainty, VelocityTerms
 from seal_friction_ros.core.ehl.case import Air, MapGrid, Member, Numerics, SealBody, Study, Viscoelasticity
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.ehl.grease import Grease
@@ -26,6 +26,9 @@ from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.sensors import SensorSettings
 from seal_friction_ros.core.servo_controller import ServoController
 from seal_friction_ros.core.servo_plant import Cylinder, Load, ServoValve
+from seal_friction_ros.core.signal_preparation import SavitzkyGolay, Sliding
+from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
+from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
 from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
@@ -35,6 +38,8 @@ RECORDS = (
     SealSelection,
     EstimatorSettings,
     FeedForwardSettings,
+    TuningSettings,
+    MatchSettings,
     StartOptions,
     SimulatorSettings,
     SensorSettings,
@@ -54,6 +59,9 @@ RECORDS = (
     PowerLaw,
     CoefficientTable,
     PriorArtChart,
+    PressurePowerLaw,
+    ConstantCoulomb,
+    VelocityTerms,
     Uncertainty,
     FrictionMap,
     SealBody,
@@ -69,6 +77,9 @@ RECORDS = (
     Study,
     MapGrid,
     Member,
+    SavitzkyGolay,
+    Sliding,
+    SpoolEvaluation,
 )
 
 

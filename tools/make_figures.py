@@ -10,6 +10,7 @@ from seal_friction_ros.offline.import_thesis import import_thesis
 from seal_friction_ros.offline.replay import replay
 from seal_friction_ros.offline.report import write_report
 from seal_friction_ros.offline.seal_charts import write_seal_charts
+from seal_friction_ros.offline.servo_charts import write_servo_charts
 
 FIGURES = Path(__file__).parents[1] / 'docs' / 'figures'
 
@@ -22,11 +23,13 @@ def main() -> int:
         replay(folder / 'inputs', out=folder / 'pull_test')
         write_report(folder / 'pull_test', folder / 'report.html')
         write_seal_charts(config_path('seals', 'ms28775_114'), folder / 'seal.html')
+        write_servo_charts(folder / 'servo.html')
         FIGURES.mkdir(parents=True, exist_ok=True)
         for source, target in {
             'report_figures/live_estimate.png': 'live_estimate.png',
             'report_figures/friction_over_pressure.png': 'friction_over_pressure.png',
             'seal_figures/fig23_states_2_and_3.png': 'friction_states.png',
+            'servo_figures/fig25_servo_with_and_without_friction.png': 'fig25_servo_with_and_without_friction.png',
         }.items():
             shutil.copy(folder / source, FIGURES / target)
     return 0

@@ -8,6 +8,7 @@ from seal_friction_ros.core.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.monotone import MonotoneTable
 from seal_friction_ros.core.normal_force import NormalForceLaw
 from seal_friction_ros.core.seal import SealGeometry, contact_length, projected_area
+from seal_friction_ros.core.units import BAR
 from seal_friction_ros.core.validated import check, parameter
 
 
@@ -38,6 +39,54 @@ class PhysicsBased:
         """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]."""
         normal_force = self.normal_force_law.normal_force(pressure, self.projected_area)
         return self.friction_coefficient_law.coefficient_of_friction(normal_force) * normal_force
+
+
+@dataclass(frozen=True)
+class ConstantCoulomb:
+    """Coulomb friction that does not depend on pressure: what is mostly assumed today.
+
+    Source: thesis, chapter 1 ("the friction force is usually approximated as a constant value").
+
+    Raises:
+        ValueError: A parameter is out of bounds.
+    """
+
+    coulomb_friction_at_any_pressure: float = parameter(
+        unit='N', lower=0.0, upper=1e6, description='Sliding friction of the seal.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def coulomb_friction(self, pressure: float) -> float:
+        """Magnitude of the sliding friction [N], whatever the pressure [Pa, gauge, >= 0]."""
+        del pressure
+        return self.coulomb_friction_at_any_pressure
+
+
+@dataclass(frozen=True)
+class PressurePowerLaw:
+    """Coulomb friction that rises as a power of the pressure: f_c = f_0 + k (P / 1 bar)^m. It needs no geometry.
+
+    With m = 2/3 this is an elastic contact [Schallamach1958]_ whose normal force is proportional to the pressure.
+
+    Raises:
+        ValueError: A parameter is out of bounds.
+    """
+
+    friction_at_no_pressure: float = parameter(unit='N', lower=0.0, upper=1e6, description='f_0.')
+    friction_at_one_bar: float = parameter(
+        unit='N', lower=0.0, upper=1e6, description='k, what a pressure of 1 bar adds.'
+    )
+    pressure_exponent: float = parameter(unit='1', lower=0.05, upper=2.0, description='m.')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def coulomb_friction(self, pressure: float) -> float:
+        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]."""
+        risen = math.pow(pressure / BAR, self.pressure_exponent)
+        return self.friction_at_no_pressure + self.friction_at_one_bar * risen
 
 
 @dataclass(frozen=True)
@@ -98,9 +147,48 @@ class Uncertainty:
         return math.sqrt((self.relative_std * friction) ** 2 + self.absolute_std**2)
 
 
+@dataclass(frozen=True)
+class VelocityTerms:
+    r"""What the friction of a sliding seal has besides its Coulomb friction.
+
+    .. math:: F = [f_c + \sigma |v| + f_S\,e^{-|v|/v_S}]\,(1 + a\,\mathrm{sgn}(v))
+
+    Source: [Armstrong1994]_ eq. (5) with an exponent of 1, which is our choice, as is one asymmetry of it all.
+
+    Raises:
+        ValueError: A value is out of bounds.
+    """
+
+    viscous_friction: float = parameter(0.0, unit='N s/m', lower=0.0, upper=1e7, description='sigma, viscous friction.')
+    stribeck_friction: float = parameter(
+        0.0, unit='N', lower=0.0, upper=1e6, description='f_S, what the slowest motion has above Coulomb friction.'
+    )
+    stribeck_velocity: float = parameter(
+        0.01, unit='m/s', lower=1e-6, upper=10.0, description='v_S, speed over which that falls to 37 %.'
+    )
+    asymmetry: float = parameter(
+        0.0, unit='1', lower=-0.9, upper=0.9, description='a, share by which extension has more and retraction less.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def added(self, coulomb_friction: float, velocity: float) -> float:
+        """Magnitude [N] that comes on top of ``coulomb_friction`` [N] at ``velocity`` [m/s]; may be negative."""
+        if velocity == 0.0:
+            return 0.0
+        speed = abs(velocity)
+        sliding = coulomb_friction + self.viscous_friction * speed
+        if self.stribeck_friction > 0.0:
+            sliding += self.stribeck_friction * math.exp(-speed / self.stribeck_velocity)
+        return sliding * (1.0 + self.asymmetry if velocity > 0.0 else 1.0 - self.asymmetry) - coulomb_friction
+
+
 @dataclass(frozen=True, kw_only=True)
 class Seal:
     """One seal: its Coulomb law, what comes on top at breakaway, how sure we are, and where that holds.
+
+    Breakaway force is (1 + ``stiction_ratio``) f_c + ``stiction``.
 
     Raises:
         ValueError: A value is out of bounds, or friction falls with pressure inside the identified range.
@@ -112,6 +200,10 @@ class Seal:
     stiction: float = parameter(
         0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway force above Coulomb friction.'
     )
+    stiction_ratio: float = parameter(
+        0.0, unit='1', lower=0.0, upper=10.0, description='The same, as a share of the Coulomb friction.'
+    )
+    velocity_terms: VelocityTerms | None = None
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
 
@@ -169,9 +261,13 @@ class ActuatorFriction(NamedTuple):
     stiction: float
     """[N]"""
     in_identified_range: bool
+    velocity_friction: float
+    """[N] what sliding at the velocity adds to the magnitude; 0 at rest"""
 
 
-def actuator_friction(seals: tuple[MountedSeal, ...], pressure_a: float, pressure_b: float) -> ActuatorFriction:
+def actuator_friction(
+    seals: tuple[MountedSeal, ...], pressure_a: float, pressure_b: float, velocity: float = 0.0
+) -> ActuatorFriction:
     """Sum over the seals of an actuator.
 
     Standard deviations add up linearly, since the seals of an actuator are of one kind, age and temperature and are
@@ -183,16 +279,21 @@ def actuator_friction(seals: tuple[MountedSeal, ...], pressure_a: float, pressur
         seals: Seals and their chambers.
         pressure_a: Pressure of chamber a [Pa, gauge].
         pressure_b: Pressure of chamber b [Pa, gauge].
+        velocity: Rod velocity [m/s], positive on extension. The standard deviation is that of a reading at it.
     """
-    total = std = stiction = 0.0
+    total = std = stiction = added = 0.0
     inside = True
     for mounted in seals:
         seal = mounted.seal
         pressure = pressure_a if mounted.chamber == 'a' else pressure_b
         friction = coulomb_friction(seal, pressure)
         total += friction
+        stiction += seal.stiction + seal.stiction_ratio * friction
+        if seal.velocity_terms is not None:
+            more = seal.velocity_terms.added(friction, velocity)
+            added += more
+            friction += more
         std += seal.uncertainty.std(friction)
-        stiction += seal.stiction
         margin = 0.01 * (seal.pressure_max - seal.pressure_min)
         inside = inside and seal.pressure_min - margin <= pressure <= seal.pressure_max + margin
-    return ActuatorFriction(total, std, stiction, inside)
+    return ActuatorFriction(total, std, stiction, inside, added)

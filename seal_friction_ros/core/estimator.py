@@ -147,25 +147,28 @@ def step(
         status |= _FORCE_STALE
     input_age = -1.0 if pressure is None or force is None else max(pressure_age, force_age)
 
-    coulomb = std = breakaway = 0.0
-    if pressure is not None:
-        friction = actuator_friction(parameters.seals, pressure.chamber_a, pressure.chamber_b)
-        coulomb, std = friction.coulomb_friction, friction.coulomb_friction_std
-        breakaway = coulomb + friction.stiction if settings.use_stiction else coulomb
-        if not friction.in_identified_range:
-            status |= _OUTSIDE_IDENTIFIED_RANGE
-
     fault = _velocity_fault(settings, sample.velocity)
     status |= fault
     at_rest = state.at_rest
     if not fault:
         at_rest = is_at_rest(sample.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
+
+    coulomb = std = breakaway = sliding = 0.0
+    if pressure is not None:
+        velocity = 0.0 if fault or at_rest else sample.velocity
+        friction = actuator_friction(parameters.seals, pressure.chamber_a, pressure.chamber_b, velocity)
+        coulomb, std = friction.coulomb_friction, friction.coulomb_friction_std
+        sliding = coulomb + friction.velocity_friction
+        breakaway = coulomb + friction.stiction if settings.use_stiction else coulomb
+        if not friction.in_identified_range:
+            status |= _OUTSIDE_IDENTIFIED_RANGE
+
     force_known = force is not None and not status & _FORCE_STALE
     if fault or pressure is None or (at_rest and not force_known):
         acting = (FrictionState.UNKNOWN, 0, 0.0)
     else:
         force_sum = force.force if force is not None else 0.0
-        acting = state_friction(sample.velocity, force_sum, at_rest, coulomb, breakaway)
+        acting = state_friction(sample.velocity, force_sum, at_rest, sliding, breakaway)
 
     estimate = FrictionEstimate(
         sample.stamp, coulomb, std, breakaway, acting[2], acting[0], acting[1], status, input_age

@@ -3,9 +3,10 @@ r"""Estimate and reference velocity -> the force that cancels the seal friction 
 ``state = init(settings)``, then ``state, feedforward = step(settings, state, stamp, estimate, motion)``.
 
 .. math::
-    F = \tanh(v / w)\,[s_C f_c + s_S (f_b - f_c)\, e^{-|v / v_S|^\delta}] + s_V \sigma v
+    F = \tanh(v / w)\,[s_C f_c + s_S (f_b - f_c)\, e^{-|v / v_S|^\delta} + s_V f_v] + s_V \sigma v
 
-with v the reference velocity, seen ``lead_time`` ahead. It comes from the reference and not from the rod, so it closes
+with v the reference velocity, seen ``lead_time`` ahead, and f_v what the seals add at it by the velocity terms of their
+seal files (viscous, Stribeck, direction). It comes from the reference and not from the rod, so it closes
 no loop: too large a force makes an error, but no limit cycle. Scales below 1 leave some friction to the controller,
 which a wrong model needs. tanh is smooth through zero here, where it shapes a command; the friction itself
 is never smoothed.
@@ -108,6 +109,8 @@ class Motion(NamedTuple):
     """[m/s]"""
     reference_age: float = 0.0
     """[s] how long ago the reference was for"""
+    velocity_friction: float = 0.0
+    """[N] f_v, at `wanted_velocity`"""
 
 
 class FeedForwardState(NamedTuple):
@@ -154,11 +157,14 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
     return not settings.use_measured_velocity or estimate.state != FrictionState.UNKNOWN
 
 
-def compensation(settings: FeedForwardSettings, estimate: FrictionEstimate, velocity: float) -> float:
-    """Force [N] for a velocity [m/s], before fade and limits: the equation at the head of this file."""
+def compensation(
+    settings: FeedForwardSettings, estimate: FrictionEstimate, velocity: float, velocity_friction: float = 0.0
+) -> float:
+    """Force [N] for a velocity [m/s] and f_v [N], before fade and limits: the equation at the head of this file."""
     stribeck = math.exp(-(abs(velocity / settings.stribeck_velocity) ** settings.stribeck_exponent))
     stiction = estimate.breakaway_force - estimate.coulomb_friction
     coulomb = settings.coulomb_scale * estimate.coulomb_friction + settings.stribeck_scale * stiction * stribeck
+    coulomb += settings.viscous_scale * velocity_friction
     viscous = settings.viscous_scale * settings.viscous_friction * velocity
     return math.tanh(velocity / settings.smoothing_velocity) * coulomb + viscous
 
@@ -187,7 +193,7 @@ def step(
     if estimate is not None and usable(settings, estimate):
         good = estimate
         valid = abs(stamp - estimate.stamp) * 1e-9 <= settings.estimate_timeout
-    velocity = _velocity(settings, motion)
+    velocity = wanted_velocity(settings, motion)
     if velocity is None:
         velocity, valid = state.velocity, False
     change = elapsed / settings.fade_time
@@ -195,7 +201,7 @@ def step(
     fade = 1.0 if first else min(max(state.fade + (change if valid else -change), 0.0), 1.0)
 
     limited = int(Limited.FADE) if fade < 1.0 or not valid else 0
-    wanted = 0.0 if good is None else fade * compensation(settings, good, velocity)
+    wanted = 0.0 if good is None else fade * compensation(settings, good, velocity, motion.velocity_friction)
     clamped = min(max(wanted, -settings.force_limit), settings.force_limit)
     if clamped != wanted:
         limited |= int(Limited.CLAMP)
@@ -207,8 +213,8 @@ def step(
     return FeedForwardState(stamp, force, fade, good, velocity), feedforward
 
 
-def _velocity(settings: FeedForwardSettings, motion: Motion) -> float | None:
-    """Velocity [m/s] that gives the direction; None if it is not usable."""
+def wanted_velocity(settings: FeedForwardSettings, motion: Motion) -> float | None:
+    """Velocity v [m/s] of the equation; None if it is not usable."""
     if settings.use_measured_velocity:
         velocity = motion.measured_velocity
     elif abs(motion.reference_age) > settings.reference_timeout:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from seal_friction_ros.core import estimator, feedforward, wire
+from seal_friction_ros.core.coulomb import actuator_friction
 from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.feedforward import FeedForward, FeedForwardSettings, FeedForwardState, Motion
 from seal_friction_ros.core.records import Force, FrictionEstimate, Pressure, RodSample
@@ -92,6 +93,7 @@ def _on_velocity(
     compensation = None
     if reference is not None or parameters.feedforward.use_measured_velocity:
         motion = _motion(reference, stamp, measured)
+        motion = _with_velocity_friction(parameters, motion, estimator_state.pressure)
         force_state, compensation = feedforward.step(parameters.feedforward, force_state, stamp, estimate, motion)
     answer = Answer(estimate, compensation, frame_id)
     return PipelineState(estimator_state, force_state, pressure, force, reference), answer
@@ -101,6 +103,17 @@ def _motion(reference: ServoReference | None, stamp: int, measured: float) -> Mo
     if reference is None:
         return Motion(0.0, 0.0, measured, math.inf)
     return Motion(reference.velocity, reference.acceleration, measured, (stamp - reference.stamp) * 1e-9)
+
+
+def _with_velocity_friction(parameters: PipelineParameters, motion: Motion, pressure: Pressure | None) -> Motion:
+    seals = parameters.estimator.seals
+    if pressure is None or not any(mounted.seal.velocity_terms for mounted in seals):
+        return motion
+    velocity = feedforward.wanted_velocity(parameters.feedforward, motion)
+    if velocity is None:
+        return motion
+    friction = actuator_friction(seals, pressure.chamber_a, pressure.chamber_b, velocity)
+    return motion._replace(velocity_friction=friction.velocity_friction)
 
 
 def encoded(answer: Answer) -> Iterator[tuple[str, bytes]]:

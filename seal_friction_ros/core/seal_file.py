@@ -5,18 +5,32 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     name: ms28775_114
     source: where the numbers are from
     geometry: {section_diameter: 2.69e-3, ...}
-    coulomb_law: physics_based          # or prior_art_chart, friction_map
+    coulomb_law: physics_based          # or pressure_power_law, constant_coulomb, prior_art_chart, friction_map
     normal_force: {law: area_deformation_gain, area_deformation_gain: 0.39, radial_force: 9.3}
     friction_coefficient: {law: power_law, coefficient: 2.1, exponent: 0.56}
     stiction: 2.5
     uncertainty: {relative_std: 0.08, absolute_std: 0.3}
     identified_pressure: [0.0, 6.9e+6]
+
+``velocity_terms`` and ``stiction_ratio`` may be left out, as may ``identification``, which holds what
+``seal_friction identify`` says of its data and is passed over here.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
-from seal_friction_ros.core.coulomb import CoulombLaw, MountedSeal, PhysicsBased, PriorArtChart, Seal, Uncertainty
+from seal_friction_ros.core.coulomb import (
+    ConstantCoulomb,
+    CoulombLaw,
+    MountedSeal,
+    PhysicsBased,
+    PressurePowerLaw,
+    PriorArtChart,
+    Seal,
+    Uncertainty,
+    VelocityTerms,
+)
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
@@ -25,14 +39,22 @@ from seal_friction_ros.core.validated import from_mapping, plain
 
 NORMAL_FORCE_LAWS: dict[str, type] = {'area_deformation_gain': AreaDeformationGain, 'monotone_table': NormalForceTable}
 FRICTION_COEFFICIENT_LAWS: dict[str, type] = {'power_law': PowerLaw, 'monotone_table': CoefficientTable}
-COULOMB_LAWS = ('physics_based', 'prior_art_chart', 'friction_map')
+COULOMB_LAWS = ('physics_based', 'prior_art_chart', 'pressure_power_law', 'constant_coulomb', 'friction_map')
 
-_COMMON = {'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'uncertainty', 'identified_pressure'}
+_COMMON = {
+    'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
+    'identified_pressure', 'identification',
+}  # fmt: skip
 _PARTS = {
     'physics_based': {'normal_force', 'friction_coefficient'},
+    'pressure_power_law': {'pressure_power_law'},
+    'constant_coulomb': {'constant_coulomb'},
     'prior_art_chart': {'chart'},
     'friction_map': {'friction_map'},
 }
+_WITHOUT_GEOMETRY = {
+    'pressure_power_law': PressurePowerLaw, 'constant_coulomb': ConstantCoulomb, 'friction_map': FrictionMap,
+}  # fmt: skip
 
 
 def parse_seal(document: Any) -> Seal:
@@ -57,22 +79,35 @@ def parse_seal(document: Any) -> Seal:
     source = document.get('source', '')
     if not isinstance(source, str):
         raise ValueError(f'{where}: source = {source!r} is not a text')
+    law = _coulomb_law(document, law_name, where)
+    terms = None
+    if 'velocity_terms' in document:
+        terms = from_mapping(VelocityTerms, document['velocity_terms'], f'{where}: velocity_terms')
+    about = document.get('identification', {})
+    if not isinstance(about, Mapping) or not _can_be_recorded(about):
+        raise ValueError(f'{where}: identification is not a mapping of texts, finite numbers, and lists of them')
+    uncertainty = from_mapping(Uncertainty, document.get('uncertainty'), f'{where}: uncertainty')
+    pressure_min, pressure_max = _range(document, where)
+    numbers = {'pressure_min': pressure_min, 'pressure_max': pressure_max}
+    numbers |= {key: document[key] for key in ('stiction', 'stiction_ratio') if key in document}
+    made = {'name': name, 'coulomb_law': law, 'uncertainty': uncertainty, 'velocity_terms': terms}
+    return from_mapping(Seal, numbers, where, **made)
+
+
+def _coulomb_law(document: Mapping[str, Any], law_name: str, where: str) -> CoulombLaw:
+    if law_name in _WITHOUT_GEOMETRY:
+        if 'geometry' in document:  # the law has no use for it, but a wrong one is still wrong
+            from_mapping(SealGeometry, document['geometry'], f'{where}: geometry')
+        law: CoulombLaw = from_mapping(_WITHOUT_GEOMETRY[law_name], document.get(law_name), f'{where}: {law_name}')
+        return law
     geometry = from_mapping(SealGeometry, document.get('geometry'), f'{where}: geometry')
-    law: CoulombLaw
     if law_name == 'physics_based':
-        law = PhysicsBased(
+        return PhysicsBased(
             geometry,
             _law(document, 'normal_force', NORMAL_FORCE_LAWS, where),
             _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where),
         )
-    elif law_name == 'friction_map':
-        law = from_mapping(FrictionMap, document.get('friction_map'), f'{where}: friction_map')
-    else:
-        law = from_mapping(PriorArtChart, document.get('chart'), f'{where}: chart', geometry=geometry)
-    uncertainty = from_mapping(Uncertainty, document.get('uncertainty'), f'{where}: uncertainty')
-    pressure_min, pressure_max = _range(document, where)
-    numbers = {'pressure_min': pressure_min, 'pressure_max': pressure_max, 'stiction': document.get('stiction', 0.0)}
-    return from_mapping(Seal, numbers, where, name=name, coulomb_law=law, uncertainty=uncertainty)
+    return from_mapping(PriorArtChart, document.get('chart'), f'{where}: chart', geometry=geometry)
 
 
 def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:
@@ -86,6 +121,15 @@ def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[
             f'seals has {len(documents)} entries but seal_chambers has {len(chambers)}: give one chamber a seal'
         )
     return tuple(MountedSeal(parse_seal(d), chamber) for d, chamber in zip(documents, chambers, strict=True))
+
+
+def _can_be_recorded(value: Any) -> bool:
+    """Whether a value can be kept in a bag: what JSON can hold."""
+    if isinstance(value, Mapping):
+        return all(isinstance(key, str) and _can_be_recorded(item) for key, item in value.items())
+    if isinstance(value, list | tuple):
+        return all(map(_can_be_recorded, value))
+    return value is None or isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
 
 
 def _choice(document: Mapping[str, Any], key: str, choices: Any, where: str) -> str:

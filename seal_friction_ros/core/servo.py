@@ -33,6 +33,7 @@ from seal_friction_ros.core.servo_plant import (
     Load,
     PlantState,
     ServoValve,
+    breakaway,
     chamber_pressure,
     constants,
     coulomb,
@@ -52,7 +53,7 @@ class ServoParameters:
 
     Raises:
         ValueError: A value is out of bounds, an inner step does not divide the sample or is too long for the fastest
-            part of the plant, or the closed loop is unstable.
+            part of the plant, a seal has friction that depends on the velocity, or the closed loop is unstable.
     """
 
     valve: ServoValve = field(default_factory=ServoValve)
@@ -79,6 +80,7 @@ class ServoParameters:
                 f'inner_step = {self.inner_step} s'
             )
         self._check_inner_step()
+        self._check_seals()
         c = constants(self.valve, self.cylinder, self.load, self.seals)
         g = gains(self.controller, c, self.control_period)
         radius = spectral_radius(g, c)
@@ -89,6 +91,14 @@ class ServoParameters:
             )
         for name, value in (('inner_steps', steps), ('constants', c), ('gains', g)):
             object.__setattr__(self, name, value)  # frozen: the only way to keep what was built from the fields
+
+    def _check_seals(self) -> None:
+        moving = sorted({mounted.seal.name for mounted in self.seals if mounted.seal.velocity_terms is not None})
+        if moving:
+            raise ValueError(
+                f'ServoParameters.seals: friction of {", ".join(moving)} depends on the velocity, which the simulated '
+                'servo does not have: take a seal file without velocity terms'
+            )
 
     def _check_inner_step(self) -> None:
         rate, part = fastest_rate(self.valve, self.cylinder, self.load)
@@ -175,11 +185,11 @@ def measure(c: Constants, state: PlantState) -> Measurement:
 
 
 @compiled
-def observe(c: Constants, plant: PlantState, load_force: float) -> tuple[float, float]:
-    """Force sum and Coulomb friction [N] in a state of the plant."""
+def observe(c: Constants, plant: PlantState, load_force: float) -> tuple[float, float, float]:
+    """Force sum, Coulomb friction and breakaway force [N] in a state of the plant."""
     y = plant[:8]
-    friction = coulomb(c, chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour))
-    return force_sum(c, y, load_force), friction
+    a, b = chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour)
+    return force_sum(c, y, load_force), coulomb(c, a, b), breakaway(c, a, b)
 
 
 @compiled
@@ -192,7 +202,7 @@ def _step(
     load_force: float,
     inner_step_time: float,
     inner_steps: int,
-) -> tuple[ServoState, Command, tuple[float, float]]:
+) -> tuple[ServoState, Command, tuple[float, float, float]]:
     controller, command = control(g, c, state.controller, measure(c, state.plant), reference, feedforward)
     plant = advance_plant(c, state.plant, command.spool, load_force, inner_step_time, inner_steps)
     return ServoState(plant, controller), command, observe(c, plant, load_force)
@@ -231,10 +241,11 @@ def outputs(
     return _outputs(parameters.constants, plant, command, *observe(parameters.constants, plant, load_force))
 
 
-def _outputs(c: Constants, plant: PlantState, command: Command, force: float, friction: float) -> ServoOutputs:
+def _outputs(
+    c: Constants, plant: PlantState, command: Command, force: float, friction: float, holding: float
+) -> ServoOutputs:
     """Friction as the estimator's own equation has it, at rest where V = 0 exactly."""
-    breakaway = friction + c.stiction
-    acting = state_friction(plant.velocity, force, plant.velocity == 0.0, friction, breakaway)
+    acting = state_friction(plant.velocity, force, plant.velocity == 0.0, friction, holding)
     return ServoOutputs(
         plant.position,
         plant.velocity,
@@ -244,7 +255,7 @@ def _outputs(c: Constants, plant: PlantState, command: Command, force: float, fr
         force,
         acting.friction_force,
         friction,
-        breakaway,
+        holding,
         acting.state,
         acting.direction,
         command,
@@ -261,6 +272,7 @@ class Trajectory(NamedTuple):
     spool: NDArray[np.float64]
     force_sum: NDArray[np.float64]
     coulomb_friction: NDArray[np.float64]
+    breakaway_force: NDArray[np.float64]
     limited: NDArray[np.float64]
 
 
@@ -282,8 +294,8 @@ def _simulate(
         rows[i, 0], rows[i, 1] = measured.position, measured.velocity
         rows[i, 2], rows[i, 3] = measured.pressure_a, measured.pressure_b
         rows[i, 4] = state.plant.spool
-        rows[i, 5], rows[i, 6] = forces
-        rows[i, 7] = command.limited
+        rows[i, 5], rows[i, 6], rows[i, 7] = forces
+        rows[i, 8] = command.limited
     return state
 
 

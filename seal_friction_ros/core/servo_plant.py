@@ -182,11 +182,13 @@ class Constants(NamedTuple):
     stiffness: float
     spring_position: float
     damping: float
-    stiction: float
     table_interval: float
     coulomb_a: Any
     """Coulomb friction [N] of the seals on chamber a at multiples of ``table_interval`` [Pa]."""
     coulomb_b: Any
+    breakaway_a: Any
+    """Breakaway force [N], likewise."""
+    breakaway_b: Any
 
 
 class PlantState(NamedTuple):
@@ -226,6 +228,8 @@ def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[Mo
     pressures = [i * interval for i in range(TABLE_INTERVALS + 1)]
     on_a = tuple(m for m in seals if m.chamber == 'a')
     on_b = tuple(m for m in seals if m.chamber == 'b')
+    frictions_a = [actuator_friction(on_a, p, 0.0) for p in pressures]
+    frictions_b = [actuator_friction(on_b, 0.0, p) for p in pressures]
     return Constants(
         supply=valve.supply_pressure,
         ret=valve.return_pressure,
@@ -247,10 +251,11 @@ def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[Mo
         stiffness=load.spring_stiffness,
         spring_position=load.spring_position,
         damping=load.viscous_damping,
-        stiction=math.fsum(m.seal.stiction for m in seals),
         table_interval=interval,
-        coulomb_a=np.array([actuator_friction(on_a, p, 0.0).coulomb_friction for p in pressures]),
-        coulomb_b=np.array([actuator_friction(on_b, 0.0, p).coulomb_friction for p in pressures]),
+        coulomb_a=np.array([f.coulomb_friction for f in frictions_a]),
+        coulomb_b=np.array([f.coulomb_friction for f in frictions_b]),
+        breakaway_a=np.array([f.coulomb_friction + f.stiction for f in frictions_a]),
+        breakaway_b=np.array([f.coulomb_friction + f.stiction for f in frictions_b]),
     )
 
 
@@ -293,6 +298,14 @@ def coulomb(c: Constants, pressure_a: float, pressure_b: float) -> float:
     """Coulomb friction of all seals [N]: `coulomb.actuator_friction`, from its tables."""
     return from_table(c.coulomb_a, pressure_a / c.table_interval) + from_table(
         c.coulomb_b, pressure_b / c.table_interval
+    )
+
+
+@compiled
+def breakaway(c: Constants, pressure_a: float, pressure_b: float) -> float:
+    """Breakaway force of all seals [N], likewise."""
+    return from_table(c.breakaway_a, pressure_a / c.table_interval) + from_table(
+        c.breakaway_b, pressure_b / c.table_interval
     )
 
 
@@ -426,8 +439,8 @@ def margin(c: Constants, y: tuple[float, ...], direction: int, load_force: float
     Stuck: breakaway force minus force sum [N]. Sliding: the smaller of speed [m/s] and way to the stop ahead [m].
     """
     if direction == 0:
-        friction = coulomb(c, chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour))
-        return friction + c.stiction - abs(force_sum(c, y, load_force))
+        holding = breakaway(c, chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour))
+        return holding - abs(force_sum(c, y, load_force))
     return min(y[1] * direction, c.limit - y[0] * direction)
 
 

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
+from seal_friction_msgs.msg import FrictionEstimate
 
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.nodes.processes import graph_environment, running
@@ -27,18 +28,20 @@ class _Operator(Node):
     def __init__(self, context: Context) -> None:
         super().__init__('operator', context=context)
         self.said: dict[str, str] = {}
+        self.estimating = False
+        self._first = self.create_subscription(FrictionEstimate, 'friction_estimate', self._on_estimate, 1, raw=True)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self._estimator = AsyncParameterClient(self, 'friction_estimator')
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self)
 
+    def _on_estimate(self, _: bytes) -> None:
+        self.estimating = True
+        self.destroy_subscription(self._first)  # one is enough
+
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.said |= {value.key: value.value for value in status.values}
-
-    def estimating(self) -> bool:
-        """Whether the estimator has said that it makes estimates."""
-        return self.said.get('estimates', '0') != '0'
 
     def wait(self, seconds: float) -> None:
         """Let time pass [s]."""
@@ -71,14 +74,15 @@ def _operator(domain: int) -> Iterator[_Operator]:
         rclpy.try_shutdown(context=context)
 
 
-def close_loop_live(out: Path, domain: int, seconds: float, simulator: Mapping[str, object]) -> dict[str, str]:
+def close_loop_live(out: Path, domain: int, seconds: float, simulator: Path, priority: int = 0) -> dict[str, str]:
     """Run simulator and estimator in separate processes and record: first without feed-forward, then as long with it.
 
     Args:
         out: Bag to record; must not exist.
         domain: ROS domain.
         seconds: How long each half lasts [s].
-        simulator: ROS parameters of the simulator.
+        simulator: ROS parameter file of the simulator.
+        priority: Real-time priority of both; 0: none.
 
     Returns:
         What the two nodes said last on ``/diagnostics``.
@@ -89,13 +93,14 @@ def close_loop_live(out: Path, domain: int, seconds: float, simulator: Mapping[s
     out.parent.mkdir(parents=True, exist_ok=True)
     log = out.with_suffix('.log')
     recording = {'record': True, 'record_directory': str(out.parent), 'record_name': out.name}
+    realtime = {'realtime_priority': priority}
     with (
-        running('friction_estimator', domain, {**recording, _SCALE: 0.0}, log),
-        running('servo_simulator', domain, simulator, log),
+        running('friction_estimator', domain, {**recording, **realtime, _SCALE: 0.0}, log),
+        running('servo_simulator', domain, realtime, log, parameter_file=simulator),
         _operator(domain) as operator,
     ):
         start = time.monotonic()
-        while not operator.estimating():
+        while not operator.estimating:
             if time.monotonic() > start + _START:
                 raise RuntimeError(f'no estimate within {_START} s; {log}: {log.read_text().strip()}')
             operator.wait(0.1)

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
@@ -22,6 +23,8 @@ from seal_friction_ros.nodes.live_statistics import LiveStatistics
 from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.parameters import Group, RecordingOptions
 from seal_friction_ros.nodes.recording import Recording
+
+_SWITCH_INTERVAL = 2e-4  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
 
 
 class FrictionEstimator(ManagedNode):
@@ -93,7 +96,7 @@ class FrictionEstimator(ManagedNode):
     def finish(self) -> None:
         """Stop estimating; finish the bag."""
         self.active = False
-        outcome = self._recording.stop()
+        outcome = self._recording.close()
         if outcome:
             self.get_logger().info(outcome)
 
@@ -103,7 +106,13 @@ class FrictionEstimator(ManagedNode):
         overriding = qos.overridable() if profile is qos.STREAM else None
         kind, callback = message_class(wire.INPUTS[name]), partial(self._on_input, name)
         self._inputs[name] = self.create_subscription(
-            kind, name, callback, profile, raw=True, qos_overriding_options=overriding
+            kind,
+            name,
+            callback,
+            profile,
+            raw=True,
+            qos_overriding_options=overriding,
+            event_callbacks=SubscriptionEventCallbacks(matched=self.on_matched),
         )
         self._topics[name] = self._inputs[name].topic_name
 
@@ -158,9 +167,8 @@ class FrictionEstimator(ManagedNode):
 
     def _start_recording(self) -> tuple[bool, str]:
         """Start a bag, which begins with a snapshot; whether that went well, and where the bag is or why not."""
-        options = self.settings(RecordingOptions)
         try:
-            path = self._recording.start(options.record_directory, options.record_name)
+            path = self._recording.start(self.settings(RecordingOptions))
         except ValueError as error:
             self.get_logger().error(str(error))
             self._publish_configuration()
@@ -216,6 +224,7 @@ class FrictionEstimator(ManagedNode):
 
 def main() -> int:
     """Run the node: ``friction_estimator --ros-args -p seals:=[...] --params-file FILE``."""
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     return run(FrictionEstimator, FrictionEstimator.autostart, FrictionEstimator.finish)
 
 

@@ -11,6 +11,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 
 from seal_friction_ros.nodes.parameters import Group, StartOptions, declare, read
+from seal_friction_ros.nodes.realtime import take_realtime_priority
 
 Record = TypeVar('Record')
 
@@ -131,6 +132,7 @@ class ManagedNode(LifecycleNode):
         try:
             self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
             self.make()
+            take_realtime_priority(self.settings(StartOptions).realtime_priority)
             # By steady time diagnostics go on while simulated time stands still.
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._diagnostics_timer = self.create_timer(_DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
@@ -176,6 +178,11 @@ class ManagedNode(LifecycleNode):
             self.destroy_publisher(self._diagnostics_publisher)
         self._diagnostics_timer = self._diagnostics_publisher = None
         self.release()
+
+    def on_matched(self, _: Any) -> None:
+        """Say at once, in diagnostics, that a publisher came or went."""
+        if self._diagnostics_timer is not None:
+            self._on_diagnostics()
 
     def _on_diagnostics(self) -> None:
         message = DiagnosticArray()

@@ -7,7 +7,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
 
-from seal_friction_ros.core.validated import Meaning, meanings, parameter
+from seal_friction_ros.core.validated import Meaning, check, meanings, parameter
 
 Record = TypeVar('Record')
 
@@ -17,6 +17,14 @@ class StartOptions:
     """How a node starts, one field per ROS parameter."""
 
     autostart: bool = parameter(True, unit='', live=False, description='Configure and activate by itself at start.')
+    realtime_priority: int = parameter(
+        0,
+        unit='',
+        lower=0,
+        upper=99,
+        live=False,
+        description='SCHED_FIFO priority of the whole process from configuration on; 0: none.',
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,7 +32,8 @@ class RecordingOptions:
     """What is recorded and where, one field per ROS parameter.
 
     Raises:
-        ValueError: The name of the bag is not a plain name: it could lead out of the folder.
+        ValueError: The name of the bag is not a plain name: it could lead out of the folder. Or files would be so small
+            that a bag has thousands of them.
     """
 
     record: bool = parameter(False, unit='', live=False, description='Record from activation on.')
@@ -32,8 +41,27 @@ class RecordingOptions:
     record_name: str = parameter(
         '', unit='', description='Name of the bag; never overwritten. Empty: friction_ and the time of its start.'
     )
+    record_split_size: int = parameter(
+        0,
+        unit='bytes',
+        lower=0,
+        upper=10**15,
+        description='A new file of the bag begins where one would grow larger; 0: never.',
+    )
+    record_split_duration: float = parameter(
+        0.0,
+        unit='s',
+        lower=0.0,
+        upper=1e9,
+        description='A new file of the bag begins where one would become longer; 0: never.',
+    )
 
     def __post_init__(self) -> None:
+        check(self)
+        for name, least in (('record_split_size', 1_000_000), ('record_split_duration', 10.0)):
+            value = getattr(self, name)
+            if 0 < value < least:
+                raise ValueError(f'RecordingOptions.{name} = {value} makes too many files: 0 or at least {least}')
         if '/' in self.record_name or not self.record_name.isprintable() or self.record_name in ('.', '..'):
             raise ValueError(f'RecordingOptions.record_name = {self.record_name!r} is not a plain name of a folder')
 

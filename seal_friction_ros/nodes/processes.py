@@ -39,7 +39,12 @@ def graph_environment(domain: int) -> dict[str, str]:
 
 @contextmanager
 def running(
-    module: str, domain: int, parameters: Mapping[str, object], log: Path, remap: tuple[str, ...] = ()
+    module: str,
+    domain: int,
+    parameters: Mapping[str, object],
+    log: Path,
+    remap: tuple[str, ...] = (),
+    parameter_file: Path | None = None,
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Run a node while the block runs, then stop it by SIGINT and wait.
 
@@ -49,8 +54,11 @@ def running(
         parameters: ROS parameters by name; text, numbers, truth values and lists of them.
         log: File for what it prints.
         remap: Remapping rules, ``FROM:=TO``.
+        parameter_file: ROS parameter file; ``parameters`` come after it.
     """
     command = [sys.executable, '-m', f'seal_friction_ros.nodes.{module}', '--ros-args']
+    if parameter_file is not None:
+        command += ['--params-file', str(parameter_file)]
     for name, value in parameters.items():
         command += ['-p', f'{name}:={_yaml(value)}']
     for rule in remap:

@@ -193,7 +193,8 @@ class ServoSimulator(ManagedNode):
         self._under_way: deque[tuple[int, Readings]] = deque()
         self._counts: Counter[str] = Counter()
         self._recent: Counter[str] = Counter()
-        self._reported = (time.monotonic(), 0, time.process_time())
+        self._reported = (time.monotonic(), 0)
+        self._began = (time.monotonic(), time.process_time())
         if self._rig is not None:
             self._rig_state = init_pull_rig(self._rig)
             self._outputs = outputs(self._rig.servos[0], self._rig_state.plant)
@@ -357,10 +358,10 @@ class ServoSimulator(ManagedNode):
         if not self.active:
             status.message = 'inactive'
             return {'simulator': status}
-        since, index, processor = self._reported
-        now = (time.monotonic(), self._index, time.process_time())
+        since, index = self._reported
+        now = (time.monotonic(), self._index)
         self._reported = now
-        seconds = max(now[0] - since, 1e-3)
+        seconds, whole = max(now[0] - since, 1e-3), max(now[0] - self._began[0], 1e-3)
         recent, self._recent = self._recent, Counter()
         self._counts += recent
         if self._failure:
@@ -372,7 +373,7 @@ class ServoSimulator(ManagedNode):
         values = {
             'rate [Hz]': f'{(now[1] - index) / seconds:.1f}',
             'time factor': f'{(now[1] - index) * self._period * 1e-9 / seconds:.3f}',
-            'share of a core [%]': f'{100.0 * (now[2] - processor) / seconds:.1f}',
+            'share of a core [%]': f'{100.0 * (time.process_time() - self._began[1]) / whole:.1f}',
             'ticks': str(self._index),
             'missed ticks': '0',
             'feed-forward [N]': f'{force:.3f}',

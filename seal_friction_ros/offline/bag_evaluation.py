@@ -61,6 +61,8 @@ class RecordedRun:
     """frame names of the velocity samples"""
     configurations: tuple[tuple[float, str], ...]
     """time [s] and JSON text of each change of configuration"""
+    configuration_rows: tuple[int, ...]
+    """estimates before each of them, in the order of the bag"""
     chambers: tuple[str, ...]
     """chamber of each seal"""
     start: int
@@ -232,7 +234,7 @@ class _Collector:
         self._held = dict.fromkeys(_INPUTS, math.nan)
         self._pending: dict[int, tuple[float, ...]] = {}
         self._frames: dict[bytes, None] = {}
-        self._configurations: list[tuple[int, str]] = []
+        self._configurations: list[tuple[int, int, str]] = []
 
     def take(self, message: BagMessage) -> None:
         """Take one message in; a damaged one is an error that names it."""
@@ -262,7 +264,7 @@ class _Collector:
             if self.stamps and self.stamps[-1] == record.stamp:
                 self._rows[-1] = record.force
         else:
-            self._configurations.append((message.log_time, record))
+            self._configurations.append((message.log_time, len(self.stamps), record))
 
     def _take_velocity(self, sample: Velocity) -> None:
         self._held['velocity'] = sample.velocity
@@ -284,12 +286,13 @@ class _Collector:
         values['velocity'][refused] = math.nan
         start = int(stamps[0])
         # A configuration has no stamp of its own: it counts from when it was recorded.
-        changes = tuple((round((t - start) * 1e-9, 6), text) for t, text in self._configurations)
+        changes = tuple((round((t - start) * 1e-9, 6), text) for t, _, text in self._configurations)
         return RecordedRun(
             name=name,
             topics=counts,
             frames=tuple(frame.decode(errors='replace') for frame in self._frames),
             configurations=changes,
+            configuration_rows=tuple(row for _, row, _ in self._configurations),
             chambers=_chambers(changes),
             start=start,
             time=np.asarray((stamps - start) * 1e-9, dtype=np.float64),
@@ -402,7 +405,7 @@ def _steady_stroke(run: RecordedRun, usable: BoolArray, direction: int, index: I
         direction,
         pressure=float(run.pressure[steady].mean()),
         force_sum=float(run.force_sum[steady].mean()),
-        estimated=float(run.coulomb_friction[steady].mean()),
+        estimated=float((direction * run.friction_force[steady]).mean()),  # Coulomb, and what the velocity adds
         std=float(run.coulomb_friction_std[steady].mean()),
         samples=len(steady),
         first=int(index[0]),

@@ -14,7 +14,15 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
+from seal_friction_ros.core.validated import Meaning, meanings
+
 DIFFERENT, UNUSABLE, INTERRUPTED = 1, 2, 130
+
+# Before numpy is loaded: with several threads the last bits of a sum depend on how many there are, and the long, narrow
+# matrices of a fit take many times longer.
+for _library in ('OPENBLAS', 'MKL', 'OMP'):
+    os.environ.setdefault(f'{_library}_NUM_THREADS', '1')
 
 
 def _import_log(arguments: argparse.Namespace) -> int:
@@ -71,6 +79,13 @@ def _info(arguments: argparse.Namespace) -> int:
     return _tell(arguments, info, '\n'.join(lines))
 
 
+def _recover(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.recover import recover
+
+    found = recover(arguments.bag, arguments.out)
+    return _tell(arguments, found, found.in_words())
+
+
 def _report(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.report import write_report
 
@@ -107,6 +122,107 @@ def _ehl_map(arguments: argparse.Namespace) -> int:
     return _tell(
         arguments, *map_command(arguments.case, arguments.jobs, arguments.out, arguments.work, arguments.seal_file)
     )
+
+
+def _tune(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.replay import chosen_configuration
+    from seal_friction_ros.offline.tune import tune_bag, tune_simulator
+
+    kind, other = (MatchSettings, TuningSettings) if arguments.bag else (TuningSettings, MatchSettings)
+    given = {name: value for name in _tuning_options() if (value := getattr(arguments, name)) is not None}
+    foreign = [name for name in given if name in meanings(other) and name not in meanings(kind)]
+    if foreign or (arguments.namespace and not arguments.bag):
+        name = (foreign or ['namespace'])[0].replace('_', '-')
+        raise ValueError(f'--{name} is {"not for" if arguments.bag else "only for"} a --bag')
+    configuration = chosen_configuration(arguments.params, arguments.seal)
+    if arguments.bag:
+        known = MatchSettings(**given)
+        summary = tune_bag(arguments.bag, arguments.out, known, configuration, arguments.namespace)
+    else:
+        summary = tune_simulator(arguments.out, TuningSettings(**given), configuration)
+    figures = {**summary.numbers, 'file': summary.file, 'page': summary.page, 'figures': summary.figures}
+    _tell(arguments, figures, f'{summary.verdict}\n{summary.file} and {summary.page}: written')
+    return 0 if summary.better_in_every_case else DIFFERENT
+
+
+def _tuning_options() -> dict[str, Meaning]:
+    """Settings of both kinds of tuning by name."""
+    return meanings(TuningSettings) | meanings(MatchSettings)
+
+
+def _servo(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.servo_charts import write_servo_charts
+
+    return _tell(arguments, write_servo_charts(arguments.out), f'{arguments.out}: written')
+
+
+def _identify(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.friction_sources import Choices
+    from seal_friction_ros.offline.identify import Wishes, as_figures, identify, in_words, write_seal
+
+    choices = Choices(
+        rig=arguments.rig,
+        chambers=arguments.seal_chambers,
+        namespace=arguments.namespace,
+        slowest=arguments.slowest,
+        largest_acceleration=arguments.largest_acceleration,
+    )
+    wishes = Wishes(
+        sources=choices,
+        seal=arguments.seal,
+        squeeze_force=arguments.squeeze_force,
+        law=arguments.law,
+        run_to_run=arguments.run_to_run,
+        name=arguments.name,
+    )
+    found = identify(arguments.sources, wishes, arguments.out.stem)
+    written: dict[str, Any] = {'seal_file': str(arguments.out)}
+    if arguments.report:
+        from seal_friction_ros.offline.identification_report import write_identification_report
+
+        figures = write_identification_report(found, arguments.report)
+        written |= {'report': str(arguments.report), 'figures': [str(path) for path in figures]}
+    write_seal(found.document, arguments.out)
+    return _tell(arguments, as_figures(found) | written, f'{in_words(found)}\n{arguments.out}: written')
+
+
+def _sheet(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.core.seal import SealGeometry
+    from seal_friction_ros.core.validated import from_mapping
+    from seal_friction_ros.files import config_path, read_yaml
+    from seal_friction_ros.offline.test_plan import make_plan, write_sheet
+
+    geometry = None
+    if arguments.seal:
+        path = config_path('seals', arguments.seal)
+        document = read_yaml(path)
+        if not isinstance(document, dict):
+            raise ValueError(f'{path}: a seal file is a mapping of names to values')
+        geometry = from_mapping(SealGeometry, document.get('geometry'), f'{path}: geometry')
+    low, high, steps = arguments.pressures
+    plan = make_plan(
+        arguments.name,
+        low,
+        high,
+        steps,
+        tests=arguments.tests,
+        seals=arguments.seals,
+        pressure_unit=arguments.pressure_unit,
+        force_unit=arguments.force_unit,
+        length_unit=arguments.length_unit,
+        geometry=geometry,
+    )
+    sheet, page = write_sheet(plan, arguments.out)
+    return _tell(arguments, {'sheet': str(sheet), 'page': str(page)}, f'{sheet}, {page}: written')
+
+
+def _spool(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
+    from seal_friction_ros.offline.spool import write_spool_report
+
+    law = SpoolEvaluation(cycles=arguments.cycles, evaluated_cycle=arguments.cycle, moving_average=arguments.average)
+    summary = write_spool_report(arguments.table, arguments.out, law, arguments.reference)
+    return _tell(arguments, summary, f'{arguments.out}: written')
 
 
 def _counts(counts: dict[str, int]) -> Iterable[str]:
@@ -178,15 +294,101 @@ def make_parser() -> argparse.ArgumentParser:
 
     _add(commands, 'info', _info, 'what is in a bag').add_argument('bag', type=Path)
 
+    _add_identify(commands)
+    _add_sheet(commands)
+    _add_spool(commands)
+
+    recover = _add(commands, 'recover', _recover, 'a valid bag of what can be read of a damaged or unfinished one')
+    recover.add_argument('bag', type=Path)
+    recover.add_argument('--out', type=Path, metavar='BAG', help='bag to make; default: BAG_recovered')
+
     report = _add(commands, 'report', _report, 'a page with figures and numbers, PNG and SVG beside it')
     report.add_argument('bag', type=Path)
     report.add_argument('--namespace', default='', help='look only at topics below it')
     charts = _add(commands, 'charts', _charts, 'a page with the curves of a seal file, PNG and SVG beside it')
     charts.add_argument('seal', help='seal file: a path, or the name of one in config/seals')
-    for page in (report, charts):
+    servo = _add(
+        commands, 'servo', _servo, 'a page on a simulated servo with and without friction, PNG and SVG beside it'
+    )
+    for page in (report, charts, servo):
         page.add_argument('--out', type=Path, required=True, metavar='FILE.html')
+
+    tune = _add(commands, 'tune', _tune, 'parameters of the feed-forward for the simulated servo or a recorded axis')
+    tune.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
+    tune.add_argument('--out', type=Path, required=True, metavar='FILE', help='parameter file; a report goes beside it')
+    tune.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file with seals and what is not tuned')
+    tune.add_argument('--seal', type=Path, metavar='FILE', help='seal file for every seal')
+    tune.add_argument('--namespace', default='', help='with --bag: look only at topics below it')
+    for name, meaning in _tuning_options().items():
+        where = '' if name in meanings(TuningSettings) else 'with --bag: '
+        number = int if name == 'seed' else float
+        unit = f' [{meaning.unit}]' if meaning.unit else ''
+        text = f'{where}{meaning.description}{unit}'.replace('%', '%%')
+        tune.add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
     _add_ehl(commands)
     return parser
+
+
+def _add_identify(commands: Any) -> None:
+    identify = _add(commands, 'identify', _identify, 'a seal file from bags, logs, tables or filled data sheets')
+    identify.add_argument('sources', type=Path, nargs='+', metavar='SOURCE', help='bag, log, table or data sheet')
+    identify.add_argument('--out', type=Path, required=True, metavar='SEAL.yaml', help='seal file to write')
+    identify.add_argument('--report', type=Path, metavar='FILE.html', help='page with figures and numbers')
+    identify.add_argument('--rig', help='rig file of the logs: a path, or the name of one in config/rigs')
+    identify.add_argument('--seal', help='seal file with the geometry of the ring: a path, or one in config/seals')
+    identify.add_argument(
+        '--squeeze-force', action='store_true', help='normal force from the geometry, even if --seal has one'
+    )
+    identify.add_argument(
+        '--seal-chambers', type=_chambers, metavar='a,b', help='chamber that each seal sees, one letter for each seal'
+    )
+    identify.add_argument('--law', help='law to save instead of the recommended one')
+    identify.add_argument(
+        '--run-to-run', type=_tolerance, metavar='SHARE', help='relative standard deviation between runs, if known'
+    )
+    identify.add_argument('--name', default='', help='name of the seal; default: that of the file')
+    identify.add_argument('--slowest', type=_tolerance, metavar='M/S', help='slower counts as at rest')
+    identify.add_argument(
+        '--largest-acceleration', type=_tolerance, metavar='M/S2', help='samples beyond it are not used'
+    )
+    identify.add_argument('--namespace', default='', help='look only at topics below it')
+
+
+def _add_spool(commands: Any) -> None:
+    spool = _add(commands, 'spool', _spool, 'a rig that drives to and fro, evaluated as the spool-valve paper does')
+    spool.add_argument('table', type=Path, help='columns time_s, displacement_mm, force_N')
+    spool.add_argument('--out', type=Path, required=True, metavar='FILE.html')
+    spool.add_argument('--cycles', type=int, default=10, help='cycles of a measurement, default 10')
+    spool.add_argument('--cycle', type=int, default=9, help='the one to evaluate, default 9')
+    spool.add_argument('--average', type=int, default=50, metavar='SAMPLES', help='moving average, default 50')
+    spool.add_argument('--reference', type=float, metavar='N', help='reference force of another measurement')
+
+
+def _add_sheet(commands: Any) -> None:
+    sheet = _add(commands, 'sheet', _sheet, 'an empty data sheet of the friction test plan: CSV, and a page to print')
+    sheet.add_argument('name', help='name of the seal')
+    sheet.add_argument('--out', type=Path, required=True, metavar='SHEET.csv', help='must not exist')
+    sheet.add_argument(
+        '--pressures', type=_pressures, default=(0.0, 1000.0, 10), metavar='LOW:HIGH:STEPS', help='default 0:1000:10'
+    )
+    sheet.add_argument('--tests', type=int, default=3, help='default 3')
+    sheet.add_argument('--seals', type=int, default=2, help='seals that share the pressure, default 2')
+    sheet.add_argument('--seal', help='seal file whose geometry is filled in: a path, or the name of one')
+    sheet.add_argument('--pressure-unit', choices=('psi', 'bar', 'MPa', 'kPa'), default='psi')
+    sheet.add_argument('--force-unit', choices=('lbf', 'N', 'kN'), default='lbf')
+    sheet.add_argument('--length-unit', choices=('in', 'mm'), default='in')
+
+
+def _chambers(text: str) -> tuple[str, ...]:
+    chambers = tuple(text.split(','))
+    if not set(chambers) <= {'a', 'b'}:
+        raise argparse.ArgumentTypeError(f'{text} is not a list like a,b')
+    return chambers
+
+
+def _pressures(text: str) -> tuple[float, float, int]:
+    low, high, steps = text.split(':')
+    return float(low), float(high), int(steps)
 
 
 def _add_ehl(commands: Any) -> None:

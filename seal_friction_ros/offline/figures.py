@@ -151,7 +151,8 @@ def thinned(values: FloatArray, columns: int = _COLUMNS) -> IntArray:
     return kept[kept < n]
 
 
-def _line(ax: Axes, time: FloatArray, values: FloatArray, **look: Any) -> None:
+def line(ax: Axes, time: FloatArray, values: FloatArray, **look: Any) -> None:
+    """Line over time [s], `thinned`."""
     kept = thinned(values)
     ax.plot(time[kept], values[kept], **look)
 
@@ -270,12 +271,12 @@ def _friction_over_time(ax: Axes, run: RecordedRun, part: slice, level: Pressure
         ax.fill_between(time[kept], side * low, side * high, color=SKY, alpha=0.35, lw=0, label=label)
     if level is not None and _offset_matters(level):
         offset = level.offset or 0.0
-        _line(ax, time, run.force_sum[part] / size, color=GREY, lw=0.8, ls=':', label='force sum')
+        line(ax, time, run.force_sum[part] / size, color=GREY, lw=0.8, ls=':', label='force sum')
         name = f'force sum less its offset of {offset / size:.3g} {unit}'
-        _line(ax, time, (run.force_sum[part] - offset) / size, color=BLACK, lw=1.0, label=name)
+        line(ax, time, (run.force_sum[part] - offset) / size, color=BLACK, lw=1.0, label=name)
     else:
-        _line(ax, time, run.force_sum[part] / size, color=BLACK, lw=1.0, label='force sum (measured)')
-    _line(ax, time, run.friction_force[part] / size, color=BLUE, lw=1.6, alpha=0.9, label='estimated friction force')
+        line(ax, time, run.force_sum[part] / size, color=BLACK, lw=1.0, label='force sum (measured)')
+    line(ax, time, run.friction_force[part] / size, color=BLUE, lw=1.6, alpha=0.9, label='estimated friction force')
     ax.axhline(0.0, color=GREY, lw=0.6)
     ax.set_ylim(-1.15 * largest / size, 1.15 * largest / size)
     ax.set_xlim(time[0], time[-1] if time[-1] > time[0] else time[0] + 1.0)
@@ -324,16 +325,16 @@ def inputs_figure(run: RecordedRun) -> Plot:
     figure, axes = new_figure(title, 5.4, nrows=3, sharex=True)
     same = np.array_equal(run.pressure_a, run.pressure_b, equal_nan=True)
     name = 'chambers a and b' if same else 'chamber a'
-    _line(axes[0], run.time, run.pressure_a / BAR, color=BLUE, lw=1.1, label=name)
+    line(axes[0], run.time, run.pressure_a / BAR, color=BLUE, lw=1.1, label=name)
     if not same:
-        _line(axes[0], run.time, run.pressure_b / BAR, color=ORANGE, lw=1.1, label='chamber b')
+        line(axes[0], run.time, run.pressure_b / BAR, color=ORANGE, lw=1.1, label='chamber b')
     legend_above(axes[0])
     axes[0].set_ylabel('pressure\n[bar, gauge]')
     name, size = ('m/s', 1.0) if _largest(run.velocity) >= 1.0 else ('mm/s', 1e-3)
-    _line(axes[1], run.time, run.velocity / size, color=GREEN, lw=1.0)
+    line(axes[1], run.time, run.velocity / size, color=GREEN, lw=1.0)
     axes[1].set_ylabel(f'rod velocity\n[{name}]')
     name, size = force_unit(_largest(run.force_sum))
-    _line(axes[2], run.time, run.force_sum / size, color=BLACK, lw=1.0)
+    line(axes[2], run.time, run.force_sum / size, color=BLACK, lw=1.0)
     axes[2].set_ylabel(f'force sum\n[{name}]')
     axes[2].set_xlabel('time since the first estimate [s]')
     axes[2].set_xlim(run.time.min(), max(run.time.max(), run.time.min() + 1e-3))

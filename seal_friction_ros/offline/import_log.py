@@ -17,19 +17,21 @@ files in ``config/rigs`` are examples::
     velocity:
       terms: [{column: 4, unit: mm, gain: -1.0}]
       savitzky_golay: {window: 0.2, order: 2, largest_gap: 0.05} # absent: the terms are a velocity already
+    sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # what identification takes; absent: these values
 """
 
-from collections.abc import Iterator, Mapping
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.records import Force, Pressure
+from seal_friction_ros.core.signal_preparation import SavitzkyGolay, Sliding, slope
 from seal_friction_ros.core.units import unit_size
 from seal_friction_ros.core.validated import check, from_mapping, parameter
 from seal_friction_ros.files import read_yaml
@@ -39,6 +41,7 @@ from seal_friction_ros.offline.progress import progress
 Array = NDArray[np.float64]
 
 _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one that the int32 seconds of a ROS stamp do not hold
+_LONGEST_LINE = 1 << 18  # characters
 _SHOWN = 40  # characters of a wrong cell that an error repeats
 _PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
 _HEADERS = ('none', 'row', 'comment')
@@ -106,24 +109,6 @@ class Combination:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SavitzkyGolay:
-    """How a velocity is made from a position: the slope of a polynomial fitted to the samples around each one.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
-
-    window: float = parameter(unit='s', lower=1e-6, upper=3600.0, description='Width of the fit, centred.')
-    order: int = parameter(2, unit='', lower=1, upper=6, description='Order of the polynomial.')
-    largest_gap: float = parameter(
-        unit='s', lower=1e-6, upper=3600.0, description='No fit reaches across a longer pause.'
-    )
-
-    def __post_init__(self) -> None:
-        check(self)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Rig:
     """What a log of one rig is.
 
@@ -143,6 +128,7 @@ class Rig:
     force_sum: Combination
     velocity: Combination
     savitzky_golay: SavitzkyGolay | None
+    sliding: Sliding
 
     def __post_init__(self) -> None:
         check(self)
@@ -215,8 +201,25 @@ def import_log(log: Path, rig_file: Path, out: Path) -> ImportSummary:
         BagError: There is something at ``out`` already, or it cannot be made.
     """
     rig = read_rig(rig_file)
-    cells = _read_log(log, rig)
-    return write_samples(out, _samples(log, rig, cells), rig.frame_id)
+    return write_samples(out, read_samples(log, rig).samples, rig.frame_id)
+
+
+class ReadLog(NamedTuple):
+    """A log in SI, and the columns it came from."""
+
+    samples: 'Samples'
+    columns: dict[Term, Array]
+    """as they stand in the log, in the units of the terms"""
+
+
+def read_samples(log: Path, rig: Rig) -> ReadLog:
+    """Read a log.
+
+    Raises:
+        ValueError: The log cannot be read or makes no sense; one line that names file and field or line.
+    """
+    cells = _read_cells(log, rig)
+    return ReadLog(_samples(log, rig, cells), cells.columns)
 
 
 def read_rig(path: Path) -> Rig:
@@ -236,12 +239,13 @@ def read_rig(path: Path) -> Rig:
     parts['velocity'] = _combination(velocity, f'{path}: velocity')
     return from_mapping(
         Rig,
-        {key: value for key, value in document.items() if key not in _PARTS},
+        {key: value for key, value in document.items() if key not in (*_PARTS, 'sliding')},
         str(path),
         time=from_mapping(Term, document['time'], f'{path}: time'),
         savitzky_golay=None
         if filter_values is None
         else from_mapping(SavitzkyGolay, filter_values, f'{path}: velocity.savitzky_golay'),
+        sliding=from_mapping(Sliding, document.get('sliding', {}), f'{path}: sliding'),
         **parts,
     )
 
@@ -266,17 +270,18 @@ def _combination(document: Any, where: str) -> Combination:
 class _Cells(NamedTuple):
     """The cells of a log that the rig file asks for."""
 
-    line_numbers: list[int]
+    line_numbers: Sequence[int]
     columns: dict[Term, Array]
 
 
-def _read_log(log: Path, rig: Rig) -> _Cells:
+def _read_cells(log: Path, rig: Rig) -> _Cells:
+    if log.exists() and not (log.is_file() or log.is_dir()):  # a pipe or a device never ends
+        raise ValueError(f'{log}: not a file')
     terms = list(dict(rig.terms()).values())
-    line_numbers: list[int] = []
-    rows: list[list[float]] = []
+    line_numbers, numbers = array('q'), array('d')
     try:
         with log.open(encoding='utf-8-sig') as file:
-            header, lines = _parted(enumerate(file, start=1), rig.header)
+            header, lines = _parted(enumerate(_lines(file, log), start=1), rig.header)
             width = len(header)
             positions: list[int] = []
             for count, (number, cells) in enumerate(lines):
@@ -284,16 +289,23 @@ def _read_log(log: Path, rig: Rig) -> _Cells:
                 if not positions:
                     positions = [_position(term, where, header, width, log) for where, term in rig.terms()]
                 if count >= rig.skip_rows:
-                    rows.append(_numbers(cells, positions, width, f'{log}: line {number}'))
+                    numbers.extend(_numbers(cells, positions, width, f'{log}: line {number}'))
                     line_numbers.append(number)
     except OSError as error:
         raise ValueError(f'{log}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{log}: not a text file') from None
-    if not rows:
+    if not line_numbers:
         raise ValueError(f'{log}: no row of numbers in it after the {rig.skip_rows} that the rig file passes over')
-    columns = np.array(rows, dtype=np.float64).T
+    columns = np.frombuffer(numbers, dtype=np.float64).reshape(len(line_numbers), len(terms)).T
     return _Cells(line_numbers, dict(zip(terms, columns, strict=True)))
+
+
+def _lines(file: TextIO, log: Path) -> Iterator[str]:
+    while line := file.readline(_LONGEST_LINE):
+        if len(line) == _LONGEST_LINE:
+            raise ValueError(f'{log}: a line of more than {_LONGEST_LINE} characters, so not a log')
+        yield line
 
 
 def _parted(
@@ -368,7 +380,7 @@ def _samples(log: Path, rig: Rig, cells: _Cells) -> Samples:
     if rig.savitzky_golay is not None:
         seconds = (stamps - stamps[0]) * 1e-9
         try:
-            signals['velocity'] = velocity_from_position(seconds, signals['velocity'], rig.savitzky_golay)
+            signals['velocity'] = slope(seconds, signals['velocity'], rig.savitzky_golay)
         except ValueError as error:
             raise ValueError(f'{log}: {error}') from None
     return Samples(stamps, signals['chamber_a'], signals['chamber_b'], signals['force_sum'], signals['velocity'])
@@ -401,60 +413,6 @@ def _stamps(log: Path, rig: Rig, cells: _Cells) -> NDArray[np.int64]:
             f'{stamps[row - 1] * 1e-9:.9g} s in the row before'
         )
     return stamps
-
-
-def velocity_from_position(time: Array, position: Array, law: SavitzkyGolay) -> Array:
-    """Velocity [m/s] by a Savitzky-Golay filter, at the times of the samples.
-
-    At each sample, the slope of the polynomial of least squares through the samples within the window around it; over
-    the first and last half window of a segment, the slope of the polynomial of that segment's first and last window.
-    The window is centred, so the velocity has no delay: good for a log, not to be had live.
-
-    A log's stamps jitter and the filter wants a uniform grid, so each segment (samples without a pause longer than
-    ``largest_gap``) is interpolated to as many equidistant times as it has samples, filtered and interpolated back.
-
-    Args:
-        time: Time of the samples [s], increasing, shape (n,).
-        position: Position [m], shape (n,); samples that are not finite are left out.
-        law: Window, order and largest gap.
-
-    Returns:
-        Velocity [m/s], shape (n,); NaN where the position is not finite or the segment is shorter than the window.
-
-    Raises:
-        ValueError: No segment is as long as the window, or the window holds too few samples for the order.
-
-    Source: [SavitzkyGolay1964]_; grid, gaps and edges are our choice.
-    """
-    velocity = np.full(len(time), np.nan)
-    usable = np.flatnonzero(np.isfinite(position))
-    cuts = np.flatnonzero(np.diff(time[usable]) > law.largest_gap) + 1
-    for segment in np.split(usable, cuts):
-        if len(segment) > law.order + 1:
-            velocity[segment] = _segment_velocity(time[segment], position[segment], law)
-    if np.isnan(velocity).all():
-        raise ValueError(
-            f'no stretch of rows without a pause above {law.largest_gap} s is long enough for '
-            f'a Savitzky-Golay window of {law.window} s'
-        )
-    return velocity
-
-
-def _segment_velocity(time: Array, position: Array, law: SavitzkyGolay) -> Array:
-    rows = len(time)
-    interval = (time[-1] - time[0]) / (rows - 1)
-    points = 2 * round(law.window / interval / 2.0) + 1
-    if points <= law.order:
-        raise ValueError(
-            f'SavitzkyGolay.window = {law.window} s holds {points} samples, {interval:.3g} s apart: '
-            f'order {law.order} needs {law.order + 1}'
-        )
-    if points > rows:
-        return np.full(rows, np.nan)
-    grid = np.linspace(time[0], time[-1], rows)
-    slope = savgol_filter(np.interp(grid, time, position), points, law.order, deriv=1, delta=interval, mode='interp')
-    velocity: Array = np.interp(time, grid, slope)
-    return velocity
 
 
 def write_samples(out: Path, samples: Samples, frame_id: str) -> ImportSummary:

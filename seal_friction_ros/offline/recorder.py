@@ -1,7 +1,9 @@
 """Records what the estimator consumed and published without ever making it wait.
 
-Messages go into a bounded queue; a thread of the recorder's own takes them out and writes the bag. When the disk cannot
-keep up, messages are dropped and counted; when it fails, recording stops and says why. The estimate goes on either way.
+Messages go into a bounded queue; a thread of the recorder's own takes them out and writes the bag. What was taken out
+is handed to the operating system within `FLUSH_PERIOD`, so that it outlives the process. When the disk cannot keep up,
+messages are dropped and counted; when it fails, recording stops, says why and leaves a valid bag of what was written.
+The estimate goes on either way.
 """
 
 import threading
@@ -9,10 +11,13 @@ import time
 from collections import deque
 from pathlib import Path
 
-from seal_friction_ros.offline.bag import BagMessage, BagWriter
+from seal_friction_ros.offline.bag import BagWriter
 
-QUEUE_LENGTH = 50_000  # [messages] ten seconds of five topics at 1 kHz
+QUEUE_LENGTH = 100_000  # [messages] fourteen seconds of seven topics at 1 kHz
+FLUSH_PERIOD = 0.3  # [s]
 _PERIOD = 0.01  # [s] between two looks at the queue: waking the thread for each message would slow the estimator
+_HASTE = 0.002  # [s] the same while more messages wait than are written at a time
+_AT_A_TIME = 100  # messages written before the estimator has the processor again, so a backlog does not delay it
 
 
 class Recorder:
@@ -21,18 +26,22 @@ class Recorder:
     Args:
         path: Folder of the bag; must not exist.
         queue_length: Messages that may wait for the disk.
+        split_size: As of `BagWriter` [bytes].
+        split_duration: As of `BagWriter` [s].
 
     Raises:
         BagError: The bag cannot be made.
     """
 
-    def __init__(self, path: Path, *, queue_length: int = QUEUE_LENGTH) -> None:
+    def __init__(
+        self, path: Path, *, queue_length: int = QUEUE_LENGTH, split_size: int = 0, split_duration: float = 0.0
+    ) -> None:
         self.path = path
         self.dropped = 0
         self.error = ''
         self._queue_length = queue_length
-        self._queue: deque[BagMessage] = deque()
-        self._writer = BagWriter(path)
+        self._queue: deque[tuple[str, str, int, bytes]] = deque()  # plain tuples: the garbage collector lets go of them
+        self._writer = BagWriter(path, split_size=split_size, split_duration=split_duration)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
         self._thread.start()
@@ -42,7 +51,7 @@ class Recorder:
         if self.error or len(self._queue) >= self._queue_length:
             self.dropped += 1
         else:
-            self._queue.append(BagMessage(topic, type_name, log_time, data))
+            self._queue.append((topic, type_name, log_time, data))
 
     @property
     def written(self) -> int:
@@ -54,25 +63,45 @@ class Recorder:
         """Messages in the queue."""
         return len(self._queue)
 
+    @property
+    def is_finished(self) -> bool:
+        """Whether nothing more will be written: after `stop`, in time, or after an error."""
+        return not self._thread.is_alive()
+
+    def stop(self) -> None:
+        """Have what is queued written and the bag finished, without waiting for that."""
+        self._stop.set()
+
     def close(self) -> None:
         """Write what is queued and finish the bag; how many messages were dropped is kept in its metadata."""
-        self._stop.set()
+        self.stop()
         self._thread.join()
 
     def _run(self) -> None:
         try:
-            while not self._stop.is_set():
-                self._drain()
-                time.sleep(_PERIOD)
-            self._drain()
+            self._write_until_stopped()
             self._writer.close({'dropped_messages': str(self.dropped)})
         except Exception as error:  # noqa: BLE001  whatever it is, the thread must not end without a word
-            self.dropped += len(self._queue)
-            self._queue.clear()
-            self.error = f'{self.path}: recording stopped: {error}'
-            self._writer.abandon()
+            self._rescue(error)
 
-    def _drain(self) -> None:
-        while self._queue:
-            message = self._queue.popleft()
-            self._writer.write(*message)
+    def _write_until_stopped(self) -> None:
+        flushed = time.monotonic()
+        while self._queue or not self._stop.is_set():
+            for _ in range(min(len(self._queue), _AT_A_TIME)):
+                self._writer.write(*self._queue.popleft())
+            if time.monotonic() - flushed >= FLUSH_PERIOD:
+                self._writer.flush()
+                flushed = time.monotonic()
+            time.sleep(_HASTE if self._queue else _PERIOD)
+
+    def _rescue(self, failure: Exception) -> None:
+        """Leave a valid bag of what was written, and say what happened."""
+        words = f'{self.path}: recording stopped: {failure}'
+        try:
+            lost = self._writer.rescue(str(failure), self.dropped + len(self._queue))
+        except Exception as error:  # noqa: BLE001  as above
+            lost = 0
+            words += f'; and the bag could not be finished ({error}): seal_friction recover makes one of it'
+        self.error = words
+        self.dropped += lost + len(self._queue)
+        self._queue.clear()

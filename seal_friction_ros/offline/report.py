@@ -34,6 +34,15 @@ from seal_friction_ros.offline.bag_evaluation import (
     read_run,
 )
 from seal_friction_ros.offline.figures import Plot, force_unit, house_style, render, run_figures, verdict
+from seal_friction_ros.offline.tracking_evaluation import (
+    SAME,
+    SETTLING_TIME,
+    TrackingEvaluation,
+    TrackingStretch,
+    evaluate_tracking,
+    tracking_numbers,
+)
+from seal_friction_ros.offline.tracking_figures import length, stretch_name, tracking_plots, tracking_verdict
 
 _MINUS = '\N{MINUS SIGN}'
 _MAX_CONFIGURATIONS = 5  # shown in full; a bag with more says how many
@@ -95,6 +104,19 @@ the seal was identified do count: the measurement is good there, and the deviati
 the bag itself.</dd>
 </dl>"""
 
+_TRACKING_EXPLANATIONS = f"""<dl>
+<dt>Tracking</dt>
+<dd>A stretch is what lies between two changes of configuration. Of each, the fade time of the feed-forward and another
+{SETTLING_TIME} s are left out, in which it fades in and the servo settles; of a reference that repeats itself, whole
+periods count. The error is the reference less the position, both as they were held at the estimate: how old a sample of
+either is adds to it. Changes are against the first stretch without any feed-forward force, if the reference had the
+same amplitude and period within {100 * SAME:.0f} %.</dd>
+<dt>Dwell</dt>
+<dd>Mean time for which the speed of the rod stays at or below the stick velocity of the estimator while its direction
+changes. A rod that follows its reference is as slow around the turning points: that time stands beside it. Noise of
+the velocity above the stick velocity cuts a dwell in pieces.</dd>
+</dl>"""
+
 
 @dataclass(frozen=True)
 class ReportSummary:
@@ -103,7 +125,7 @@ class ReportSummary:
     page: Path
     figures: tuple[Path, ...]
     numbers: dict[str, Any]
-    """see `bag_evaluation.as_figures`; None where there is no number"""
+    """see `bag_evaluation.as_figures`, and ``tracking``, a list of `TrackingStretch`; None where there is no number"""
 
 
 def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
@@ -121,15 +143,16 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         ValueError: The report cannot be written.
     """
     run = read_run(bag, namespace)
-    evaluation = evaluate(run)
+    evaluation, tracking = evaluate(run), evaluate_tracking(run)
     with house_style():
+        plots = run_figures(run, evaluation) + (tracking_plots(run, tracking) if tracking else [])
         written = write_page(
             out,
             f'Seal friction: {run.name}',
-            lambda figure: _sections(run, evaluation, figure),
-            run_figures(run, evaluation),
+            lambda figure: _sections(run, evaluation, tracking, figure),
+            plots,
         )
-    return ReportSummary(out, written, as_figures(evaluation))
+    return ReportSummary(out, written, {**as_figures(evaluation), 'tracking': tracking_numbers(tracking)})
 
 
 # -- any page ---------------------------------------------------------------------------------------------------------
@@ -172,13 +195,13 @@ def write_page(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for path, content in {**files, out: page.encode('utf-8', 'replace')}.items():
-            _write_whole(path, content)
+            write_whole(path, content)
     except OSError as error:
         raise ValueError(f'{out}: cannot write the page or its figures: {error.strerror or error}') from None
     return tuple(files)
 
 
-def _write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that it is there whole or not at all."""
     partial = path.with_name(f'.{path.name}.partial')
     try:
@@ -218,7 +241,9 @@ def number(value: float | None, digits: int = 2, *, signed: bool = False) -> str
 # -- the page of a bag ------------------------------------------------------------------------------------------------
 
 
-def _sections(run: RecordedRun, evaluation: BagEvaluation, figure: Callable[[str], str]) -> Iterable[str]:
+def _sections(
+    run: RecordedRun, evaluation: BagEvaluation, tracking: TrackingEvaluation | None, figure: Callable[[str], str]
+) -> Iterable[str]:
     friction = evaluation.friction
     start = datetime.fromtimestamp(evaluation.start // 1_000_000_000, UTC)
     yield f'<h1>{escape(run.name)}</h1>'
@@ -227,6 +252,8 @@ def _sections(run: RecordedRun, evaluation: BagEvaluation, figure: Callable[[str
     yield from (f'<p class="note">{escape(note)}</p>' for note in friction.notes)
     yield '<h2>Live estimate</h2>'
     yield figure('live_estimate')
+    if tracking:
+        yield from _tracking(tracking, figure)
     yield '<h2>Friction by pressure</h2>'
     yield from _friction_tables(evaluation)
     yield figure('friction_over_pressure')
@@ -246,6 +273,8 @@ def _sections(run: RecordedRun, evaluation: BagEvaluation, figure: Callable[[str
     yield from _configurations(run)
     yield '<h2>How the numbers are made</h2>'
     yield _EXPLANATIONS
+    if tracking:
+        yield _TRACKING_EXPLANATIONS
 
 
 def _tiles(evaluation: BagEvaluation) -> str:
@@ -275,6 +304,84 @@ def _friction_tables(evaluation: BagEvaluation) -> Iterable[str]:
         yield '<h3>Breakaway</h3>' + _level_table(friction.breakaway, 'starts')
     else:
         yield '<p>No start from rest, so no measured breakaway force.</p>'
+
+
+def _tracking(tracking: TrackingEvaluation, figure: Callable[[str], str]) -> Iterable[str]:
+    yield '<h2>Tracking</h2>'
+    yield f'<p>{escape(tracking_verdict(tracking))}.</p>'
+    yield from (f'<p class="note">{escape(note)}</p>' for note in tracking.notes)
+    if not tracking.stretches:
+        return
+    yield figure('tracking')
+    yield figure('friction_and_feedforward')
+    numbers = (
+        'stretch',
+        'time [s]',
+        'RMS error [µm]',
+        'change [%]',
+        'peak error [µm]',
+        'dwell per reversal [ms]',
+        'change [%]',
+        'of the reference [ms]',
+        'not sliding [%]',
+    )
+    yield table(numbers, [_tracking_row(stretch) for stretch in tracking.stretches])
+    conditions = (
+        'time [s]',
+        'left out before [s]',
+        'samples',
+        'reference',
+        'largest feed-forward [N]',
+        'Coulomb scale',
+        'Stribeck scale',
+        'viscous friction [N s/m]',
+        'smoothing velocity [mm/s]',
+        'lead time [ms]',
+    )
+    yield table(conditions, [_settings_row(stretch) for stretch in tracking.stretches], ())
+
+
+def _span(stretch: TrackingStretch) -> str:
+    return f'{stretch.start:.1f} to {stretch.end:.1f}'
+
+
+def _tracking_row(stretch: TrackingStretch) -> Sequence[str]:
+    still = stretch.not_sliding
+    return (
+        stretch_name(stretch),
+        _span(stretch),
+        number(stretch.rms * 1e6, 1),
+        number(stretch.rms_change, 1, signed=True),
+        number(stretch.peak * 1e6, 1),
+        'no reversal' if stretch.dwell is None else number(stretch.dwell * 1e3, 1),
+        number(stretch.dwell_change, 1, signed=True),
+        number(None if stretch.reference_dwell is None else stretch.reference_dwell * 1e3, 1),
+        number(None if still is None else 100.0 * still, 1),
+    )
+
+
+def _settings_row(stretch: TrackingStretch) -> Sequence[str]:
+    repeats = f', {1.0 / stretch.period:.3g} Hz' if stretch.period else ''
+    settings = stretch.settings
+    known = (
+        (
+            settings.coulomb_scale,
+            settings.stribeck_scale,
+            settings.viscous_scale * settings.viscous_friction,
+            settings.smoothing_velocity * 1e3,
+            settings.lead_time * 1e3,
+        )
+        if settings
+        else (None,) * 5
+    )
+    return (
+        _span(stretch),
+        number(stretch.settling),
+        str(stretch.samples),
+        f'± {length(stretch.amplitude)}{repeats}',
+        number(stretch.feedforward_peak),
+        *(number(value) for value in known),
+    )
 
 
 def _level_table(levels: Sequence[PressureLevel], events: str) -> str:

@@ -1,9 +1,11 @@
 """The path of every message: who triggers what, and that the feed-forward dies away when any of its inputs does."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
+from seal_friction_ros.core.coulomb import MountedSeal, VelocityTerms, actuator_friction
 from seal_friction_ros.core.feedforward import FeedForwardSettings, Limited
 from seal_friction_ros.core.pipeline import NOTHING, PipelineParameters, encoded, init, receive
 from seal_friction_ros.core.records import Force, Pressure, Status
@@ -129,3 +131,19 @@ def test_whatever_comes_in_what_goes_out_is_finite_and_within_the_limit(bad):
         assert math.isfinite(answer.feedforward.force)
         assert abs(answer.feedforward.force) <= PARAMETERS.feedforward.force_limit
         assert all(math.isfinite(value) for value in answer.estimate[1:])
+
+
+def test_velocity_terms_of_the_seals_are_compensated_at_the_velocity_of_the_reference():
+    terms = VelocityTerms(viscous_friction=200.0, stribeck_friction=3.0, stribeck_velocity=0.02, asymmetry=0.1)
+    seals = tuple(
+        MountedSeal(replace(mounted.seal, velocity_terms=terms), mounted.chamber)
+        for mounted in PARAMETERS.estimator.seals
+    )
+    parameters = PARAMETERS._replace(estimator=replace(PARAMETERS.estimator, seals=seals))
+    for speed in (0.05, -0.05):
+        last = run(ticks(0, 300, speed=speed), parameters)[-1]
+        both = actuator_friction(seals, 3e6, 3e6, speed)
+        scale = PARAMETERS.feedforward.viscous_scale
+        expected = 0.9 * both.coulomb_friction + scale * both.velocity_friction
+        assert last.feedforward.force == pytest.approx(math.copysign(expected, speed), rel=1e-6)
+        assert both.velocity_friction > 5.0

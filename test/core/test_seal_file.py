@@ -9,7 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seal_friction_ros.core.coulomb import PhysicsBased, PriorArtChart, coulomb_friction
+from seal_friction_ros.core.coulomb import (
+    MountedSeal,
+    PhysicsBased,
+    PriorArtChart,
+    actuator_friction,
+    coulomb_friction,
+)
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal_file import mount_seals, parse_seal
@@ -87,6 +93,64 @@ def test_laws_are_chosen_by_name():
     assert type(power.coulomb_law.friction_coefficient_law) is PowerLaw
     assert type(table.coulomb_law.normal_force_law) is NormalForceTable
     assert type(table.coulomb_law.friction_coefficient_law) is CoefficientTable
+
+
+BARE = {'name': 'x', 'uncertainty': {'relative_std': 0.1}, 'identified_pressure': [0.0, 5e6]}
+CONSTANT = {**BARE, 'coulomb_law': 'constant_coulomb', 'constant_coulomb': {'coulomb_friction_at_any_pressure': 12.0}}
+BY_PRESSURE = {
+    **BARE,
+    'coulomb_law': 'pressure_power_law',
+    'pressure_power_law': {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.8, 'pressure_exponent': 0.7},
+}
+
+
+def test_laws_that_need_no_geometry_do_without_it():
+    assert coulomb_friction(parse_seal(CONSTANT), 4e6) == 12.0
+    assert coulomb_friction(parse_seal(BY_PRESSURE), 1e5) == pytest.approx(5.8)
+    assert coulomb_friction(parse_seal(BY_PRESSURE), -5e4) == 5.0
+    assert parse_seal(changed(BY_PRESSURE, 'geometry', POWER['geometry'])).name == 'x'
+    assert 'squeeze' in complaint(changed(BY_PRESSURE, 'geometry', {**POWER['geometry'], 'section_diameter': 1e-3}))
+
+
+def test_what_a_sliding_seal_has_besides_its_coulomb_friction():
+    terms = {'viscous_friction': 100.0, 'stribeck_friction': 3.0, 'stribeck_velocity': 0.02, 'asymmetry': 0.1}
+    seal = parse_seal({**CONSTANT, 'velocity_terms': terms})
+    out, back = (actuator_friction((MountedSeal(seal, 'a'),), 1e6, 0.0, v).velocity_friction for v in (0.02, -0.02))
+    symmetric = 12.0 + 2.0 + 3.0 / math.e
+    assert (12.0 + out, 12.0 + back) == pytest.approx((1.1 * symmetric, 0.9 * symmetric))
+    at_rest = actuator_friction((MountedSeal(seal, 'a'),), 1e6, 0.0)
+    assert (at_rest.coulomb_friction, at_rest.velocity_friction) == (12.0, 0.0)
+
+
+def test_breakaway_may_follow_the_load():
+    seal = parse_seal({**BY_PRESSURE, 'stiction': 1.0, 'stiction_ratio': 0.2})
+    low, high = (actuator_friction((MountedSeal(seal, 'a'),), p, 0.0) for p in (0.0, 4e6))
+    assert low.stiction == pytest.approx(1.0 + 0.2 * low.coulomb_friction)
+    assert high.stiction == pytest.approx(1.0 + 0.2 * high.coulomb_friction)
+
+
+@pytest.mark.parametrize(
+    ('document', 'words'),
+    [
+        (changed(BY_PRESSURE, 'pressure_power_law.pressure_exponent', 9.0), 'pressure_exponent = 9.0'),
+        (changed(BY_PRESSURE, 'pressure_power_law', REMOVED), 'pressure_power_law is not a mapping'),
+        (changed(CONSTANT, 'constant_coulomb.coulomb_friction_at_any_pressure', -1.0), 'is below its lower bound'),
+        ({**CONSTANT, 'velocity_terms': {'asymmetry': 2.0}}, 'asymmetry = 2.0'),
+        ({**CONSTANT, 'velocity_terms': 3}, 'velocity_terms is not a mapping'),
+        ({**CONSTANT, 'stiction_ratio': -0.1}, 'stiction_ratio = -0.1'),
+        ({**CONSTANT, 'chart': {}}, 'constant_coulomb has no chart'),
+        ({**CONSTANT, 'identification': 'mine'}, 'identification is not a mapping'),
+        ({**CONSTANT, 'identification': {'rms': math.nan}}, 'identification is not a mapping'),
+        ({**CONSTANT, 'identification': {'day': date(2022, 1, 28)}}, 'identification is not a mapping'),
+    ],
+)
+def test_a_spoiled_part_of_an_identified_seal_is_named(document, words):
+    assert words in complaint(document)
+
+
+def test_what_identification_says_of_itself_is_passed_over():
+    plain, told = CONSTANT, {**CONSTANT, 'identification': {'law': 'x', 'measured_N': [1.0, None], 'data': [{'n': 1}]}}
+    assert parse_seal(plain) == parse_seal(told)
 
 
 def test_laws_of_different_kinds_go_together():

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from seal_friction_ros.core import estimator, feedforward
-from seal_friction_ros.core.coulomb import MountedSeal
+from seal_friction_ros.core.coulomb import MountedSeal, VelocityTerms, actuator_friction
 from seal_friction_ros.core.records import Force, Pressure, RodSample
 from seal_friction_ros.core.reference import Reference, Sine, Step
 from seal_friction_ros.core.seal_file import parse_seal
@@ -57,7 +57,7 @@ def closed_loop(wave, settings, error=1.0):
         motion = feedforward.Motion(reference.velocity, reference.acceleration, out.velocity)
         fed, force = feedforward.step(settings, fed, stamp, estimate, motion)
         state, out = step(SERVO, state, reference, force.force)
-        rows.append((out.position, out.velocity, *[0.0] * 6))
+        rows.append((out.position, out.velocity, *[0.0] * 7))
     return Trajectory(*np.array(rows).T)
 
 
@@ -202,3 +202,23 @@ def test_command_beyond_what_supply_and_spool_can_do_is_cut_and_says_so():
     _, command = control(SERVO.gains, SERVO.constants, ControllerState(0.0, 0.0), fast, Reference(0.0, 0.0, 0.0), 0.0)
     assert command.limited == Limited.FORCE | Limited.SPOOL
     assert command.spool == 1.0
+
+
+def test_a_breakaway_that_follows_the_load_holds_the_simulated_rod_as_it_does_the_estimate():
+    seal = dataclasses.replace(SEAL, stiction=0.5, stiction_ratio=0.3)
+    servo = ServoParameters(seals=(MountedSeal(seal, 'a'), MountedSeal(seal, 'b')))
+    out = outputs(servo, init(servo).plant)
+    expected = actuator_friction(servo.seals, out.pressure_a, out.pressure_b)
+    assert expected.stiction > 2.0 * seal.stiction + 10.0
+    assert out.breakaway_force == pytest.approx(expected.coulomb_friction + expected.stiction, rel=1e-5)
+    plant = init(servo).plant
+    for share, moves in ((0.99, False), (1.01, True)):
+        for _ in range(200):
+            plant = advance(servo, plant, 0.0, share * out.breakaway_force)
+        assert (plant.position != 0.0) == moves
+
+
+def test_a_seal_whose_friction_depends_on_the_velocity_is_refused():
+    seal = dataclasses.replace(SEAL, velocity_terms=VelocityTerms(viscous_friction=10.0))
+    with pytest.raises(ValueError, match='depends on the velocity'):
+        ServoParameters(seals=(MountedSeal(seal, 'a'),))

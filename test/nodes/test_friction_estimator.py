@@ -21,6 +21,7 @@ from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
 from seal_friction_ros.offline.bag import bag_topics
 from seal_friction_ros.offline.replay import replay
 
@@ -220,7 +221,8 @@ def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_pat
             g.estimate(SECOND + i * 10**6, 0.0015, force=math.nan if i == 7 else 3.0)
         assert g.call(Trigger, 'friction_estimator/stop_recording', Trigger.Request()).success
         assert not g.call(Trigger, 'friction_estimator/stop_recording', Trigger.Request()).success
-        assert replay(Path(started.message)).identical
+        g.estimator.finish()
+    assert replay(Path(started.message)).identical
 
 
 def test_a_parameter_change_amid_a_recording_replays_to_the_byte(tmp_path: Path):
@@ -274,7 +276,7 @@ def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_
 def test_the_node_has_no_arithmetic_parameter_of_its_own():
     with graph() as g:
         declared = {name for name in g.estimator._parameters if not name.startswith(('qos_overrides', 'use_sim_time'))}
-        known = {'autostart', 'record', 'record_directory', 'record_name', 'seals', 'seal_chambers'}
+        known = {'seals', 'seal_chambers', *meanings(StartOptions), *meanings(RecordingOptions)}
         settings = {*meanings(EstimatorSettings), *(f'feedforward.{name}' for name in meanings(FeedForwardSettings))}
         assert declared - known - {'start_type_description_service'} == settings
         assert isinstance(g.estimator, FrictionEstimator)

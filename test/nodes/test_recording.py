@@ -1,5 +1,7 @@
 """Recording from the node's side: what cannot be recorded is said, and the estimate goes on."""
 
+import os
+import time
 from pathlib import Path
 
 import pytest
@@ -9,8 +11,10 @@ from rcl_interfaces.srv import SetParametersAtomically
 from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
+from seal_friction_ros.nodes.parameters import RecordingOptions
 from seal_friction_ros.nodes.recording import Recording
-from seal_friction_ros.offline.bag import BagError, BagWriter
+from seal_friction_ros.offline import mcap_output
+from seal_friction_ros.offline.bag import BagError, BagWriter, read_messages
 
 START = 'friction_estimator/start_recording'
 STOP = 'friction_estimator/stop_recording'
@@ -26,7 +30,7 @@ def test_a_place_that_cannot_be_is_refused_with_its_name_and_nothing_is_left(
     monkeypatch.chdir(tmp_path)
     recording = Recording()
     with pytest.raises(BagError, match='record_directory'):
-        recording.start(directory, name)
+        recording.start(RecordingOptions(record_directory=directory, record_name=name))
     assert recording.failure
     assert list(tmp_path.iterdir()) == []
 
@@ -54,6 +58,50 @@ def test_a_disk_that_fails_is_logged_and_a_new_recording_can_start(tmp_path: Pat
         assert g.estimate(10**9, 0.1).state == FrictionEstimate.SLIDING
         assert g.call(Trigger, START, Trigger.Request()).success
         assert g.call(Trigger, STOP, Trigger.Request()).success
+
+
+def test_a_request_to_stop_is_answered_though_the_disk_stalls_and_the_bag_is_finished_all_the_same(
+    tmp_path, monkeypatch
+):
+    class StalledDisk:
+        pwrite = staticmethod(lambda *arguments: time.sleep(0.5) or os.pwrite(*arguments))
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(os, name)
+
+    with graph({'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
+        g.connect()
+        assert g.call(Trigger, START, Trigger.Request()).success
+        with monkeypatch.context() as stalled:
+            stalled.setattr(mcap_output, 'os', StalledDisk())
+            started = time.monotonic()
+            assert g.call(Trigger, STOP, Trigger.Request()).success
+            assert g.estimate(10**9, 0.1).state == FrictionEstimate.SLIDING
+            assert time.monotonic() - started < 0.5
+            assert g.spin_until(lambda: g.probe.values('recorder').get('message', '') == 'writing the end of a bag')
+        assert g.spin_until(lambda: g.probe.values('recorder').get('message', '') == 'not recording')
+    assert len(list(read_messages(tmp_path / 'bag'))) == 1
+
+
+@pytest.mark.parametrize(
+    ('split', 'words'), [({'record_split_size': 1000}, '1000000'), ({'record_split_duration': 1.0}, '10')]
+)
+def test_a_split_that_would_make_thousands_of_files_is_refused(split: dict[str, float], words: str):
+    with pytest.raises(ValueError, match=words):
+        RecordingOptions(**split)
+
+
+def test_a_recording_is_split_as_the_parameters_say(tmp_path: Path):
+    with graph(
+        {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag', 'record_split_size': 1_000_000}
+    ) as g:
+        g.connect()
+        recording = g.estimator._recording
+        for number in range(9000):
+            recording.record('/t', 'std_msgs/msg/String', number, bytes(400))
+        g.spin(0.1)
+    assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 5
+    assert len(list(read_messages(tmp_path / 'bag'))) == 9001
 
 
 @pytest.mark.parametrize('name', ['../escaped', '/absolute', '..', 'two\nlines'])

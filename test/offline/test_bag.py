@@ -2,15 +2,18 @@
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 from example_bags import write_inputs
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from seal_friction_ros.core import wire
+from seal_friction_ros.offline import mcap_file
 from seal_friction_ros.offline.bag import (
     BagError,
     BagWriter,
@@ -87,6 +90,93 @@ def test_messages_come_back_in_the_order_written_even_at_equal_times(tmp_path: P
     messages = list(read_messages(tmp_path / 'bag'))
     assert [m.topic for m in messages] == ['/z', '/a', '/m', '/z']
     assert [m.log_time for m in messages] == [5, 6, 7, 8]
+
+
+def write_split(path: Path, source: Path, **split: float) -> dict[str, Any]:
+    """Copy a bag into one that is split; its metadata."""
+    with BagWriter(path, **split) as writer:
+        for message in read_messages(source):
+            writer.write(*message)
+    return yaml.safe_load((path / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+
+
+@pytest.mark.parametrize('split', [{'split_size': 50_000}, {'split_duration': 0.7}])
+def test_a_split_bag_is_one_bag_to_every_reader(recorded: Path, tmp_path: Path, split: dict[str, float]):
+    information = write_split(tmp_path / 'split', recorded, **split)
+    names = [f'split_{i}.mcap' for i in range(len(information['files']))]
+    assert len(names) > 3
+    assert information['relative_file_paths'] == names == [file['path'] for file in information['files']]
+    assert {path.name for path in (tmp_path / 'split').iterdir()} == {*names, 'metadata.yaml'}
+    assert list(read_messages(tmp_path / 'split')) == list(read_messages(recorded))
+    assert bag_topics(tmp_path / 'split') == bag_topics(recorded)
+    assert replay(tmp_path / 'split').identical
+    with AnyReader([tmp_path / 'split']) as reader:
+        theirs = [(c.topic, log_time, bytes(data)) for c, log_time, data in reader.messages()]
+    assert theirs == [(m.topic, m.log_time, m.data) for m in read_messages(recorded)]
+
+
+def test_each_file_of_a_split_bag_stands_alone_and_metadata_is_true_of_it(recorded: Path, tmp_path: Path):
+    information = write_split(tmp_path / 'split', recorded, split_size=50_000)
+    for file in information['files']:
+        path = tmp_path / 'split' / file['path']
+        messages = list(read_messages(path))
+        assert file['message_count'] == len(messages) == sum(info.message_count for info in bag_topics(path).values())
+        assert file['starting_time']['nanoseconds_since_epoch'] == messages[0].log_time
+        assert file['duration']['nanoseconds'] == messages[-1].log_time - messages[0].log_time
+        assert path.stat().st_size < 50_000 + 40_000  # definitions and index come on top
+        with path.open('rb') as stream:
+            assert len(list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())) > 50
+    assert information['message_count'] == sum(file['message_count'] for file in information['files'])
+
+
+def test_a_file_lasts_no_longer_than_the_split_duration(recorded: Path, tmp_path: Path):
+    information = write_split(tmp_path / 'split', recorded, split_duration=0.5)
+    assert all(file['duration']['nanoseconds'] <= 500_000_000 for file in information['files'])
+
+
+def test_metadata_is_there_from_the_start_and_lists_each_new_file_and_topic(tmp_path: Path):
+    def information() -> dict[str, Any]:
+        return yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+
+    writer = BagWriter(tmp_path / 'bag', split_duration=1e-9)
+    assert information()['relative_file_paths'] == ['bag_0.mcap']
+    writer.write('/t', wire.CONFIGURATION_TYPE, 1, wire.encode_text('a'))
+    writer.flush()
+    assert [t['topic_metadata']['name'] for t in information()['topics_with_message_count']] == ['/t']
+    for log_time in (5, 9):
+        writer.write('/t', wire.CONFIGURATION_TYPE, log_time, wire.encode_text('b'))
+    assert information()['relative_file_paths'] == ['bag_0.mcap', 'bag_1.mcap', 'bag_2.mcap']
+    assert information()['message_count'] == 2
+    writer.close()
+    assert information()['message_count'] == 3
+
+
+def test_what_was_flushed_is_in_the_file_and_whole(tmp_path: Path):
+    writer = BagWriter(tmp_path / 'bag')
+    for number in range(10):
+        writer.write('/t', wire.CONFIGURATION_TYPE, number, wire.encode_text(str(number)))
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        assert list(mcap_file.messages(file, mcap_file.scan(file))) == []
+        writer.flush()
+        layout = mcap_file.scan(file)
+        assert [wire.decode_text(data) for _, _, data in mcap_file.messages(file, layout)] == list('0123456789')
+        assert layout.sound_size == (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size
+    writer.close()
+
+
+def test_chunks_that_overlap_in_time_come_out_in_order_of_time(tmp_path: Path):
+    with (tmp_path / 'mixed.mcap').open('wb') as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel('/t', 'cdr', writer.register_schema('a/msg/B', 'ros2msg', b''))
+        for times in ([5, 3, 9], [4, 4, 8], [20, 21, 22], [1, 30, 10]):
+            for log_time in times:
+                writer.add_message(channel, log_time, bytes([log_time]), 0)
+            writer.flush()
+        writer.finish()
+    messages = list(read_messages(tmp_path / 'mixed.mcap'))
+    assert [m.log_time for m in messages] == [1, 3, 4, 4, 5, 8, 9, 10, 20, 21, 22, 30]
+    assert [m.data[0] for m in messages] == [m.log_time for m in messages]
 
 
 def test_a_bag_is_never_overwritten(tmp_path: Path):

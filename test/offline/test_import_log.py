@@ -13,10 +13,11 @@ from scipy.optimize import least_squares
 from seal_friction_ros.core import units, wire
 from seal_friction_ros.core.seal import projected_area, squeeze
 from seal_friction_ros.core.seal_file import parse_seal
+from seal_friction_ros.core.signal_preparation import SavitzkyGolay, slope
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline import import_log as module
 from seal_friction_ros.offline.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagError, read_messages
-from seal_friction_ros.offline.import_log import SavitzkyGolay, import_log, read_rig, velocity_from_position
+from seal_friction_ros.offline.import_log import import_log, read_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / 'shared' / 'data'
@@ -170,7 +171,7 @@ def jittered(duration, seed=1):
 
 def test_a_quadratic_is_differentiated_exactly_edges_included():
     time = np.arange(0.0, 2.0, 0.01)
-    velocity = velocity_from_position(time, 0.3 + 0.02 * time - 0.05 * time**2, FILTER)
+    velocity = slope(time, 0.3 + 0.02 * time - 0.05 * time**2, FILTER)
     assert velocity == pytest.approx(0.02 - 0.1 * time, abs=1e-12)
 
 
@@ -180,7 +181,7 @@ def test_a_sine_is_differentiated_within_the_filters_own_error():
     omega, amplitude = 2 * np.pi * 0.5, 0.02
     low = omega**2 * 0.01**2 * (3 * 10**2 + 3 * 10 - 1) / 30
     time = np.arange(0.0, 4.0, 0.01)
-    velocity = velocity_from_position(time, amplitude * np.sin(omega * time), FILTER)
+    velocity = slope(time, amplitude * np.sin(omega * time), FILTER)
     truth = amplitude * omega * np.cos(omega * time)
     inner = slice(10, -10)
     assert velocity[inner] == pytest.approx((1 - low) * truth[inner], abs=1e-2 * low * amplitude * omega)
@@ -190,17 +191,17 @@ def test_a_sine_is_differentiated_within_the_filters_own_error():
 def test_jitter_costs_little():
     time = jittered(4.0)
     omega, amplitude = 2 * np.pi * 0.5, 0.02
-    velocity = velocity_from_position(time, amplitude * np.sin(omega * time), FILTER)
+    velocity = slope(time, amplitude * np.sin(omega * time), FILTER)
     error = velocity - amplitude * omega * np.cos(omega * time)
     assert np.abs(error[10:-10]).max() < 0.013 * amplitude * omega  # 1.1 % of it is the filter's
-    even = velocity_from_position(np.arange(400) * 0.01, amplitude * np.sin(omega * time), FILTER)
+    even = slope(np.arange(400) * 0.01, amplitude * np.sin(omega * time), FILTER)
     error_without_grid = even - amplitude * omega * np.cos(omega * time)
     assert np.abs(error_without_grid[10:-10]).max() > 2 * np.abs(error[10:-10]).max()
 
 
 def test_noise_is_reduced_as_the_filter_says():
     noise = np.random.default_rng(2).normal(0.0, 4e-5, 20000)
-    velocity = velocity_from_position(np.arange(20000) * 0.01, noise, FILTER)
+    velocity = slope(np.arange(20000) * 0.01, noise, FILTER)
     expected = 4e-5 / 0.01 * math.sqrt(12 / (21 * (21**2 - 1)))  # slope of a line through 21 points
     assert velocity.std() == pytest.approx(expected, rel=0.05)
     assert expected == pytest.approx(1.44e-4, rel=0.01)  # what config/rigs/delft.yaml says
@@ -210,8 +211,8 @@ def test_no_fit_reaches_across_a_gap():
     time = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(2.0, 3.0, 0.01)])
     position = np.where(time < 1.5, 0.01 * time, 5.0 - 0.02 * time)
     truth = np.where(time < 1.5, 0.01, -0.02)
-    assert velocity_from_position(time, position, FILTER) == pytest.approx(truth, abs=1e-11)
-    joined = velocity_from_position(time, position, SavitzkyGolay(window=0.2, order=2, largest_gap=2.0))
+    assert slope(time, position, FILTER) == pytest.approx(truth, abs=1e-11)
+    joined = slope(time, position, SavitzkyGolay(window=0.2, order=2, largest_gap=2.0))
     assert np.abs(joined - truth).max() > 0.1
 
 
@@ -219,14 +220,14 @@ def test_a_hole_in_the_position_stays_a_hole_and_spreads_not():
     time = np.arange(0.0, 1.0, 0.01)
     position = 0.01 * time
     position[[30, 31]] = np.nan, np.inf
-    velocity = velocity_from_position(time, position, FILTER)
+    velocity = slope(time, position, FILTER)
     assert np.flatnonzero(np.isnan(velocity)).tolist() == [30, 31]
     assert np.nanmax(np.abs(velocity - 0.01)) < 1e-11
 
 
 def test_a_segment_shorter_than_the_window_has_no_velocity():
     time = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(2.0, 2.1, 0.01)])
-    velocity = velocity_from_position(time, 0.01 * time, FILTER)
+    velocity = slope(time, 0.01 * time, FILTER)
     assert np.isnan(velocity[100:]).all()
     assert np.isfinite(velocity[:100]).all()
 

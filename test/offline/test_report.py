@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from closed_loop_bags import write_closed_loop
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.configuration import SealSelection, first_snapshot, snapshot_text
@@ -121,6 +122,50 @@ def test_what_comes_from_a_bag_is_escaped(tmp_path):
     assert 'alert(1)' in page
     assert 'script' not in Links(page).tags
     assert '<b>bag' not in page
+
+
+@pytest.fixture(scope='module')
+def closed_loop(tmp_path_factory):
+    return write_closed_loop(tmp_path_factory.mktemp('bag') / 'closed_loop', seconds=1.5)
+
+
+def test_a_closed_loop_is_shown_with_its_numbers(closed_loop, tmp_path):
+    summary = write_report(closed_loop, tmp_path / 'report.html')
+    page = summary.page.read_text()
+    without, compensated = summary.numbers['tracking']
+    assert '<h2>Tracking</h2>' in page
+    assert {'tracking', 'friction_and_feedforward'} <= {path.stem for path in summary.figures}
+    for stretch in (without, compensated):
+        assert f'>{number(stretch["rms"] * 1e6, 1)}<' in page
+        assert f'>{number(stretch["dwell"] * 1e3, 1)}<' in page
+    assert f'>{number(compensated["rms_change"], 1, signed=True)}<' in page
+    assert compensated['rms_change'] < -60.0
+    assert (without['settings']['coulomb_scale'], compensated['settings']['coulomb_scale']) == (0.0, 0.9)
+    again = write_report(closed_loop, tmp_path / 'again' / 'report.html')
+    for one, other in zip((summary.page, *summary.figures), (again.page, *again.figures), strict=True):
+        assert one.read_bytes() == other.read_bytes(), one.name
+
+
+def test_without_a_reference_there_is_no_tracking(tmp_path):
+    summary = write_report(make_bag(tmp_path), tmp_path / 'report.html')
+    assert 'racking' not in summary.page.read_text()
+    assert summary.numbers['tracking'] == []
+
+
+def test_a_loop_that_was_never_changed_is_shown_alone(tmp_path):
+    bag = write_closed_loop(tmp_path / 'bag', scales=(0.9,), seconds=1.2)
+    summary = write_report(bag, tmp_path / 'report.html')
+    (stretch,) = summary.numbers['tracking']
+    assert stretch['rms_change'] is None
+    assert 'no stretch without feed-forward' in summary.page.read_text()
+    assert 'tracking' in {path.stem for path in summary.figures}
+
+
+def test_a_loop_that_is_too_short_is_said(tmp_path):
+    bag = write_closed_loop(tmp_path / 'bag', seconds=0.3)
+    summary = write_report(bag, tmp_path / 'report.html')
+    assert summary.numbers['tracking'] == []
+    assert 'too short' in summary.page.read_text()
 
 
 def test_a_configuration_that_is_missing_or_not_understood_is_said_or_shown_as_text(tmp_path):

@@ -1,0 +1,204 @@
+"""Recordings killed at random moments, recovered and replayed: ``python bench/kill_recorder.py --times 200 [--json]``.
+
+Each time a process of its own estimates at 1 kHz and records all seven topics, until SIGKILL. What was offered to the
+recorder stands in shared memory, so what is missing from the recovered bag is known to the message.
+"""
+
+import argparse
+import json
+import mmap
+import random
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from itertools import count
+from math import sin
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from seal_friction_ros.core import wire
+from seal_friction_ros.core.configuration import first_snapshot, snapshot_text
+from seal_friction_ros.core.pipeline import Input, encoded, init, receive
+from seal_friction_ros.core.records import Force, Pressure
+from seal_friction_ros.core.wire import Position, ServoReference, Velocity
+from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline import bag as b
+from seal_friction_ros.offline.recorder import Recorder
+from seal_friction_ros.offline.recover import recover
+from seal_friction_ros.offline.replay import replay
+
+PERIOD = 1_000_000  # [ns]
+LARGEST_LOSS = 1.0  # [s]
+OUTPUTS = {wire.ESTIMATE_TYPE: b.ESTIMATE_TOPIC, wire.FEEDFORWARD_TYPE: b.FEEDFORWARD_TOPIC}
+_OFFERED = struct.Struct('<q')  # log time [ns] of one message
+_MOST_OFFERED = 1_000_000  # messages of one run
+
+
+def inputs(stamp: int, number: int) -> Iterator[tuple[str, str, Input, bytes]]:
+    """Topic, type, record and bytes of the five inputs of one moment."""
+    velocity = 0.05 * sin(number / 200)
+    pressure = Pressure(stamp, 2e6 + 1e6 * sin(number / 700), 5e5)
+    force = Force(stamp, 60.0 * sin(number / 200 + 0.3))
+    reference = ServoReference(stamp, 0.001 * number, velocity, 0.0, b'rod')
+    position, measured = Position(stamp, 0.001 * number), Velocity(stamp, velocity, b'rod')
+    yield b.PRESSURE_TOPIC, wire.PRESSURE_TYPE, pressure, wire.encode_pressure(pressure, b'rod')
+    yield b.FORCE_TOPIC, wire.FORCE_TYPE, force, wire.encode_force(force, b'rod')
+    yield b.REFERENCE_TOPIC, wire.REFERENCE_TYPE, reference, wire.encode_reference(reference)
+    yield b.POSITION_TOPIC, wire.POSITION_TYPE, position, wire.encode_position(position, b'rod')
+    yield b.VELOCITY_TOPIC, wire.VELOCITY_TYPE, measured, wire.encode_velocity(measured)
+
+
+def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
+    """Estimate and record at 1 kHz; each message is noted in ``offered_file`` before the recorder has it."""
+    with offered_file.open('r+b') as file:
+        offered = mmap.mmap(file.fileno(), 0)
+    configuration = default_configuration()
+    parameters = configuration.parameters()
+    state = init(parameters)
+    recorder = Recorder(bag, split_size=split_size)
+    places = count()
+
+    def record(topic: str, type_name: str, data: bytes) -> None:
+        log_time = time.time_ns()
+        _OFFERED.pack_into(offered, next(places) * _OFFERED.size, log_time)
+        recorder.record(topic, type_name, log_time, data)
+
+    text = snapshot_text(first_snapshot(configuration))
+    record(b.CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, wire.encode_text(text))
+    print('recording', flush=True)
+    start = time.perf_counter_ns()
+    for number in count():
+        time.sleep(max(start + number * PERIOD - time.perf_counter_ns(), 0) * 1e-9)
+        for topic, type_name, message, data in inputs(time.time_ns(), number):
+            record(topic, type_name, data)
+            state, answer = receive(parameters, state, message)
+            for answer_type, answer_data in encoded(answer):
+                record(OUTPUTS[answer_type], answer_type, answer_data)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one recording."""
+
+    offered: int
+    """messages that the recorder was given"""
+    recovered: int
+    in_order: bool
+    """whether the recovered messages are the first ones given, none missing in between"""
+    oldest_lost: float
+    """[s] before the kill that the oldest lost message was given to the recorder"""
+    verified: bool
+    """whether the recovered estimates and feed-forwards replay to the byte"""
+    files: int
+    lost_bytes: int
+    """of a chunk that was cut in two"""
+    failure: str
+    """why nothing could be recovered; empty if it could"""
+
+    @property
+    def good(self) -> bool:
+        """Whether what is required was met."""
+        return self.in_order and self.oldest_lost <= LARGEST_LOSS and self.verified
+
+
+def killed(folder: Path, seconds: float, split_size: int) -> Outcome:
+    """Record for ``seconds`` [s], kill, recover, replay."""
+    bag, offered_file = folder / 'bag', folder / 'offered'
+    with offered_file.open('wb') as file:
+        file.truncate(_MOST_OFFERED * _OFFERED.size)
+    command = [sys.executable, __file__, '--record', str(bag), str(offered_file), str(split_size)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        if process.stdout is None or process.stdout.readline() != b'recording\n':
+            raise RuntimeError(f'the recording did not start: {" ".join(command)}')
+        time.sleep(seconds)
+        kill_time = time.time_ns()
+        process.send_signal(signal.SIGKILL)
+    offered = [time for (time,) in _OFFERED.iter_unpack(offered_file.read_bytes()) if time and time <= kill_time]
+    try:
+        found = recover(bag)
+    except ValueError as error:
+        return Outcome(len(offered), 0, False, seconds, False, 0, 0, str(error))
+    times = [message.log_time for message in b.read_messages(Path(found.out))]
+    lost = offered[len(times) :]
+    # The bag makes equal times strictly increasing, so a recovered time may be some ns after the one given.
+    in_order = all(0 <= ours - theirs < 1000 for ours, theirs in zip(times, offered, strict=False))
+    age = (kill_time - lost[0]) * 1e-9 if lost else 0.0
+    verdict = replay(Path(found.out))
+    return Outcome(
+        len(offered),
+        found.messages,
+        in_order and len(times) == found.messages,
+        age,
+        verdict.identical and verdict.recorded_feedforwards > 0,
+        len(list(bag.glob('*.mcap'))),
+        found.lost_bytes,
+        '',
+    )
+
+
+def campaign(times: int, longest: float, parallel: int, split_size: int, seed: int) -> list[Outcome]:
+    """Kill recordings after random times up to ``longest`` [s]."""
+    chance = random.Random(seed)  # noqa: S311  no secret depends on it
+    moments = [chance.uniform(0.3, longest) for _ in range(times)]
+
+    def run(seconds: float) -> Outcome:
+        with tempfile.TemporaryDirectory() as folder:
+            return killed(Path(folder), seconds, split_size)
+
+    with ThreadPoolExecutor(parallel) as pool:
+        return list(pool.map(run, moments))
+
+
+def main() -> int:
+    """Kill, recover, verify; print a table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--times', type=int, default=20)
+    parser.add_argument('--longest', type=float, default=3.0, help='longest recording [s]')
+    parser.add_argument('--parallel', type=int, default=1)
+    parser.add_argument('--split-size', type=int, default=500_000, help='of the files of the bag [bytes]')
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--json', action='store_true')
+    parser.add_argument('--record', nargs=3, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.record:
+        bag, offered, split_size = arguments.record
+        record_until_killed(Path(bag), Path(offered), int(split_size))
+    outcomes = campaign(arguments.times, arguments.longest, arguments.parallel, arguments.split_size, arguments.seed)
+    figures = {
+        'killed': len(outcomes),
+        'recovered': sum(outcome.recovered > 0 for outcome in outcomes),
+        'first messages, none missing in between': sum(outcome.in_order for outcome in outcomes),
+        'verified byte for byte': sum(outcome.verified for outcome in outcomes),
+        'oldest message lost, before the kill [s]': max(outcome.oldest_lost for outcome in outcomes),
+        'messages offered': sum(outcome.offered for outcome in outcomes),
+        'messages recovered': sum(outcome.recovered for outcome in outcomes),
+        'with a chunk cut in two': sum(outcome.lost_bytes > 0 for outcome in outcomes),
+        'most files of a bag': max(outcome.files for outcome in outcomes),
+    }
+    good = all(outcome.good for outcome in outcomes)
+    if arguments.json:
+        print(json.dumps({**figures, 'good': good, 'bad': [asdict(o) for o in outcomes if not o.good]}))
+        return 0 if good else 1
+    table = Table(title=f'{len(outcomes)} recordings at 1 kHz, killed')
+    table.add_column('')
+    table.add_column('', justify='right')
+    for name, figure in figures.items():
+        table.add_row(Text(name), f'{figure:.3f}' if isinstance(figure, float) else str(figure))
+    Console().print(table)
+    for outcome in outcomes:
+        if not outcome.good:
+            print(outcome)
+    return 0 if good else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,110 @@
+"""Estimates while the disk stalls: ``python bench/stalled_disk.py [--seconds 12] [--stall 5] [--json]``.
+
+Estimates at 1 kHz with all seven topics recorded: on a disk that takes everything at once, on one that takes nothing
+for a while (the write blocks, as that of a busy disk does), and on the first again. Latency is from the moment a sample
+was due to its estimate and feed-forward having been recorded; the wake-up by the operating system is part of it.
+"""
+
+import argparse
+import gc
+import json
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from kill_recorder import OUTPUTS, PERIOD, inputs
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from seal_friction_ros.core.pipeline import encoded, init, receive
+from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline import mcap_output
+from seal_friction_ros.offline.recorder import Recorder
+
+
+class StallingDisk:
+    """Stands for ``os`` in the module that writes: blocks once for ``stall`` [s], ``after`` [s] from now."""
+
+    def __init__(self, stall: float, after: float) -> None:
+        self.stalls = 0
+        self._stall, self._moment = stall, time.monotonic() + after
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(os, name)
+
+    def pwrite(self, handle: int, data: bytes, offset: int) -> int:
+        """Write, after the stall if it is time for it."""
+        if self._stall and not self.stalls and time.monotonic() > self._moment:
+            self.stalls += 1
+            time.sleep(self._stall)
+        return os.pwrite(handle, data, offset)
+
+
+def latencies(bag: Path, seconds: float, disk: StallingDisk) -> tuple[list[float], Recorder]:
+    """Latency of each estimate [s], and the recorder, closed."""
+    mcap_output.os = disk
+    parameters = default_configuration().parameters()
+    state = init(parameters)
+    recorder = Recorder(bag)
+    found = []
+    start = time.perf_counter_ns() + PERIOD
+    for number in range(round(seconds * 1e9 / PERIOD)):
+        due = start + number * PERIOD
+        time.sleep(max(due - time.perf_counter_ns(), 0) * 1e-9)
+        for topic, type_name, message, data in inputs(time.time_ns(), number):
+            recorder.record(topic, type_name, time.time_ns(), data)
+            state, answer = receive(parameters, state, message)
+            for answer_type, answer_data in encoded(answer):
+                recorder.record(OUTPUTS[answer_type], answer_type, time.time_ns(), answer_data)
+        found.append((time.perf_counter_ns() - due) * 1e-9)
+    recorder.close()
+    return found, recorder
+
+
+def figures(found: list[float], recorder: Recorder, stalls: int) -> dict[str, float]:
+    """Percentiles [ms] and counts."""
+    ordered = sorted(found)
+    shares = {'p50 [ms]': 0.5, 'p99 [ms]': 0.99, 'p99.9 [ms]': 0.999}
+    return {
+        **{name: ordered[int(share * len(ordered))] * 1e3 for name, share in shares.items()},
+        'largest [ms]': ordered[-1] * 1e3,
+        'stalls': stalls,
+        'written': recorder.written,
+        'dropped': recorder.dropped,
+    }
+
+
+def main() -> int:
+    """Measure both in turn; print a table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--seconds', type=float, default=12.0)
+    parser.add_argument('--stall', type=float, default=5.0, help='[s]')
+    parser.add_argument('--json', action='store_true')
+    arguments = parser.parse_args()
+    gc.freeze()
+    sys.setswitchinterval(2e-4)  # as the node does
+    runs = {}
+    for name, stall in (('quiet', 0.0), ('stalled', arguments.stall), ('quiet again', 0.0)):
+        with tempfile.TemporaryDirectory() as folder:
+            disk = StallingDisk(stall, after=1.0)
+            found, recorder = latencies(Path(folder) / 'bag', arguments.seconds, disk)
+            runs[name] = figures(found, recorder, disk.stalls)
+    if arguments.json:
+        print(json.dumps(runs))
+        return 0
+    table = Table(title=f'{arguments.seconds:g} s at 1 kHz, a stall of {arguments.stall:g} s')
+    for heading in ('', *runs):
+        table.add_column(Text(heading), justify='right' if heading else 'left')
+    for figure in runs['quiet']:
+        table.add_row(
+            Text(figure), *(f'{run[figure]:.3f}' if 'ms' in figure else str(run[figure]) for run in runs.values())
+        )
+    Console().print(table)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,61 @@
+"""Bags of a closed servo loop: the servo of the simulator, estimate and feed-forward in one loop, without ROS."""
+
+import dataclasses
+from pathlib import Path
+
+from seal_friction_ros.core import pipeline, wire
+from seal_friction_ros.core.configuration import Configuration, Snapshot, snapshot_text
+from seal_friction_ros.core.records import Force, Pressure
+from seal_friction_ros.core.reference import Sine, Wave
+from seal_friction_ros.core.servo import ServoParameters, init, outputs, step
+from seal_friction_ros.core.wire import Position, ServoReference, Velocity
+from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline import bag as b
+
+RATE = 1000  # [Hz]
+START = 1_700_000_000_000_000_000  # [ns]
+ANSWER_TOPICS = {wire.ESTIMATE_TYPE: b.ESTIMATE_TOPIC, wire.FEEDFORWARD_TYPE: b.FEEDFORWARD_TOPIC}
+
+
+def with_coulomb_scale(scale: float) -> Configuration:
+    configuration = default_configuration()
+    return dataclasses.replace(
+        configuration, feedforward=dataclasses.replace(configuration.feedforward, coulomb_scale=scale)
+    )
+
+
+def write_closed_loop(
+    path: Path, scales: tuple[float, ...] = (0.0, 0.9), seconds: float = 2.0, waves: tuple[Wave, ...] = (Sine(),)
+) -> Path:
+    """A servo that follows a wave, ``seconds`` with each Coulomb scale, changed live (and the wave with it)."""
+    servo = ServoParameters(
+        seals=default_configuration().parameters().estimator.seals, control_period=1.0 / RATE, inner_step=1e-4
+    )
+    state = init(servo)
+    now = outputs(servo, state.plant)
+    known = pipeline.init(with_coulomb_scale(scales[0]).parameters())
+    samples = round(seconds * RATE)
+    with b.BagWriter(path) as writer:
+        for stretch, scale in enumerate(scales):
+            configuration = with_coulomb_scale(scale)
+            parameters, wave = configuration.parameters(), waves[stretch % len(waves)]
+            text = wire.encode_text(snapshot_text(Snapshot(configuration, known)))
+            stamp = START + stretch * samples * (1_000_000_000 // RATE)
+            writer.write(b.CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, stamp, text)
+            for i in range(stretch * samples, (stretch + 1) * samples):
+                stamp, wanted, force = START + i * (1_000_000_000 // RATE), wave.at(i / RATE), 0.0
+                inputs = (
+                    (b.REFERENCE_TOPIC, ServoReference(stamp, *wanted, b'rod'), wire.encode_reference),
+                    (b.PRESSURE_TOPIC, Pressure(stamp, now.pressure_a, now.pressure_b), wire.encode_pressure),
+                    (b.FORCE_TOPIC, Force(stamp, now.force_sum), wire.encode_force),
+                    (b.POSITION_TOPIC, Position(stamp, now.position), wire.encode_position),
+                    (b.VELOCITY_TOPIC, Velocity(stamp, now.velocity, b'rod'), wire.encode_velocity),
+                )
+                for topic, record, encode in inputs:
+                    writer.write(topic, wire.INPUTS[topic.strip('/')], stamp, encode(record))
+                    known, answer = pipeline.receive(parameters, known, record)
+                    for kind, data in pipeline.encoded(answer):
+                        writer.write(ANSWER_TOPICS[kind], kind, stamp, data)
+                    force = answer.feedforward.force if answer.feedforward else force
+                state, now = step(servo, state, wanted, force)
+    return path

@@ -1,0 +1,36 @@
+"""Real-time priority is taken by every thread, or refused with what to do."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from seal_friction_ros.nodes.realtime import realtime_granted, take_realtime_priority
+
+RUN = """
+import os, threading, time
+from seal_friction_ros.nodes.realtime import take_realtime_priority
+early = threading.Thread(target=time.sleep, args=(5,), daemon=True); early.start()
+take_realtime_priority(7)
+late = threading.Thread(target=time.sleep, args=(5,), daemon=True); late.start()
+threads = [int(name) for name in os.listdir('/proc/self/task')]
+print({(os.sched_getscheduler(t), os.sched_getparam(t).sched_priority) for t in threads})
+"""
+
+
+@pytest.mark.skipif(not realtime_granted(), reason='the system grants this user no real-time priority')
+def test_every_thread_has_it_early_and_late_ones():
+    done = subprocess.run([sys.executable, '-c', RUN], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f'{{({os.SCHED_FIFO}, 7)}}'
+
+
+def test_what_the_system_does_not_grant_is_refused_with_what_to_do(monkeypatch):
+    def refuse(*_):
+        raise PermissionError(1, 'Operation not permitted')
+
+    monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    with pytest.raises(ValueError, match=r'realtime_priority = 50 is not granted: .*CAP_SYS_NICE'):
+        take_realtime_priority(50)
+    assert not realtime_granted()
+    take_realtime_priority(0)
