@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
+from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.monotone import MonotoneTable
 from seal_friction_ros.core.normal_force import NormalForceLaw
@@ -191,7 +192,8 @@ class Seal:
     Breakaway force is (1 + ``stiction_ratio``) f_c + ``stiction``.
 
     Raises:
-        ValueError: A value is out of bounds, or friction falls with pressure inside the identified range.
+        ValueError: A value is out of bounds, friction falls with pressure inside the identified range, or both the law
+            and the terms say what the velocity does.
     """
 
     name: str
@@ -206,9 +208,17 @@ class Seal:
     velocity_terms: VelocityTerms | None = None
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
+    follows_velocity: bool = field(init=False, repr=False, compare=False)
+    """whether friction depends on the velocity, by terms or by a map"""
 
     def __post_init__(self) -> None:
         check(self)
+        mapped = isinstance(self.coulomb_law, FrictionMap)
+        if mapped and self.velocity_terms is not None:
+            raise ValueError(
+                f'Seal {self.name}: its friction_map has the velocity in it: leave out velocity_terms, or take another law'
+            )
+        object.__setattr__(self, 'follows_velocity', mapped or self.velocity_terms is not None)
         if self.pressure_max <= self.pressure_min:
             raise ValueError(
                 f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa'
@@ -224,6 +234,22 @@ class Seal:
                 raise ValueError(
                     f'Seal {self.name}: Coulomb friction falls from {low:.6g} N to {high:.6g} N at {p:.6g} Pa'
                 )
+
+
+def velocity_friction(seal: Seal, coulomb_friction: float, pressure: float, velocity: float) -> float:
+    """Magnitude [N] that sliding at ``velocity`` [m/s] adds to the Coulomb friction of one seal; may be negative.
+
+    Args:
+        seal: The seal.
+        coulomb_friction: Its Coulomb friction at ``pressure`` [N].
+        pressure: [Pa, gauge]
+        velocity: [m/s], positive on extension; at 0 nothing is added.
+    """
+    if seal.velocity_terms is not None:
+        return seal.velocity_terms.added(coulomb_friction, velocity)
+    if isinstance(seal.coulomb_law, FrictionMap) and velocity != 0.0:
+        return seal.coulomb_law.sliding_friction(max(pressure, 0.0), abs(velocity)) - coulomb_friction
+    return 0.0
 
 
 def coulomb_friction(seal: Seal, pressure: float) -> float:
@@ -289,8 +315,8 @@ def actuator_friction(
         friction = coulomb_friction(seal, pressure)
         total += friction
         stiction += seal.stiction + seal.stiction_ratio * friction
-        if seal.velocity_terms is not None:
-            more = seal.velocity_terms.added(friction, velocity)
+        if seal.follows_velocity:
+            more = velocity_friction(seal, friction, pressure, velocity)
             added += more
             friction += more
         std += seal.uncertainty.std(friction)
