@@ -215,9 +215,7 @@ class Seal:
         check(self)
         mapped = isinstance(self.coulomb_law, FrictionMap)
         if mapped and self.velocity_terms is not None:
-            raise ValueError(
-                f'Seal {self.name}: its friction_map has the velocity in it: leave out velocity_terms, or take another law'
-            )
+            raise ValueError(f'Seal {self.name}: its friction_map has the velocity in it: leave out velocity_terms')
         object.__setattr__(self, 'follows_velocity', mapped or self.velocity_terms is not None)
         if self.pressure_max <= self.pressure_min:
             raise ValueError(

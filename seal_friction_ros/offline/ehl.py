@@ -6,12 +6,12 @@ Nothing here draws chance: the same case gives the same numbers, however many pr
 import hashlib
 import json
 import multiprocessing
-import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from statistics import fmean
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,10 +28,16 @@ from seal_friction_ros.core.ehl.friction_map import (
     steady_friction,
 )
 from seal_friction_ros.core.ehl.kinematics import MeasuredMotion
-from seal_friction_ros.core.ehl.measuring_chain import MeasuringChain, moving_average, transducer_force
+from seal_friction_ros.core.ehl.measuring_chain import MeasuringChain, transducer_force
 from seal_friction_ros.core.ehl.spool import MemberMotion, SpoolResult, superposed
 from seal_friction_ros.core.ehl.study import StudyTable, study_table
 from seal_friction_ros.core.ehl.transient import RunResult, run, with_solid_shear_stress
+from seal_friction_ros.core.spool_evaluation import (
+    SpoolEvaluation,
+    moving_average,
+    resonance_frequency,
+    without_resonance,
+)
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bag_evaluation import FloatArray, read_run
 from seal_friction_ros.offline.progress import progress
@@ -247,7 +253,8 @@ def run_map(case: Case, jobs: int, work: Path | None = None) -> MapRuns:
 def write_seal_file(case: Case, computed: MapRuns, out: Path) -> None:
     """Write the friction map as a seal file.
 
-    The uncertainty is ours: one tenth of the friction, as nothing here was measured.
+    The uncertainty is ours: one tenth of the friction, as nothing here was measured. Breakaway is the friction at the
+    lowest speed of the map, as a share of that at its reference speed: the mean over the pressures.
 
     Raises:
         ValueError: The file exists, or cannot be written.
@@ -256,15 +263,11 @@ def write_seal_file(case: Case, computed: MapRuns, out: Path) -> None:
     columns = len(law.speeds)
     frictions = [law.frictions[i : i + columns] for i in range(0, len(law.frictions), columns)]
     table = ',\n    '.join(', '.join(f'{value:.6e}' for value in row) for row in frictions)
-    diameter = case.seal.sealing_diameter
-    section = case.seal.section_height
+    creeping = fmean(
+        row[0] / law.coulomb_friction(pressure) for row, pressure in zip(frictions, law.pressures, strict=True)
+    )
     text = f"""name: {out.stem}
 source: computed by seal_friction ehl map from the case {case.name}; steady sliding, mean of both directions
-geometry:  # of the contact alone: the map does not use it
-  section_diameter: {section:.6e}
-  ring_inner_diameter: {diameter:.6e}
-  rod_diameter: {diameter:.6e}
-  gland_diameter: {diameter + 1.8 * section:.6e}
 coulomb_law: friction_map
 friction_map:
   speeds: [{', '.join(f'{value:.12e}' for value in law.speeds)}]
@@ -274,6 +277,7 @@ friction_map:
   reference_speed: {law.reference_speed:.6e}
   memory_length: {law.memory_length:.6e}
   presliding_length: {law.presliding_length:.6e}
+stiction_ratio: {max(0.0, creeping - 1.0):.3f}  # friction of creeping over that at the reference speed, less 1
 uncertainty: {{relative_std: 0.1}}
 identified_pressure: [{law.pressures[0]:.6e}, {law.pressures[-1]:.6e}]
 """
@@ -301,9 +305,12 @@ class Comparison:
     position: FloatArray
     """measured [m]"""
     measured: FloatArray
-    """force sum less its mean [N]"""
+    """force sum less the offset of the transducer [N]"""
     filtered: FloatArray
-    """the same, moving average [N]"""
+    """the same, resonance notched out, moving average [N]"""
+    averaged_samples: int
+    resonance: float | None
+    """[Hz] of the measuring chain, recognised in the force; None if none stands out"""
     shown: FloatArray
     """what the measuring chain would show of the computed friction [N], at the times of ``result``"""
 
@@ -313,6 +320,7 @@ class Comparison:
         return {
             'case': self.result.case.name,
             'bag': self.bag,
+            'resonance_Hz': self.resonance,
             'measured_mean_N': float(np.abs(self.filtered).mean()),
             'computed_mean_N': float(np.abs(computed).mean()),
             'rms_difference_N': float(np.sqrt(np.mean((computed - self.filtered) ** 2))),
@@ -323,20 +331,23 @@ class Comparison:
 
 
 def compare_with_bag(
-    case: Case, bag: Path, window: tuple[float, float] | None, chain: MeasuringChain | None = None
+    case: Case, bag: Path, window: tuple[float, float] | None, evaluation: SpoolEvaluation | None = None
 ) -> Comparison:
     """Run a case through the position that a bag recorded and set its force against the computed friction.
+
+    A resonance of the measuring chain is recognised in the force and taken out of it; the computed friction is shown
+    as a chain of that frequency would show it. Without one, or if the samples are uneven in time, that of the paper.
 
     Args:
         case: The case; its own motion is not used. The middle of the measured way is put at its centre.
         bag: The bag, with estimates; needs a force sum, and a position or else the velocity is summed up.
         window: Begin and end of the part to take [s]; None takes all.
-        chain: The measuring chain.
+        evaluation: How a resonance is recognised, and the samples of the moving average.
 
     Raises:
         ValueError: The bag cannot be read, or has no position and force in the window; or a step failed however small.
     """
-    chain = MeasuringChain() if chain is None else chain
+    law = SpoolEvaluation() if evaluation is None else evaluation
     recorded = read_run(bag)
     begin, end = window or (0.0, float('inf'))
     good = (recorded.time >= begin) & (recorded.time <= end)
@@ -359,10 +370,27 @@ def compare_with_bag(
     )
     with progress(f'{case.name} on {bag.name}', steps) as advance:
         result = run(moved, motion, advance)
-    measured = force - force.mean()
+    measured = force - _offset(position, force)
+    resonance = resonance_frequency(time, measured, law) if _even(time) else None
+    chain = MeasuringChain() if resonance is None else MeasuringChain(natural_frequency=resonance)
+    quiet = measured if resonance is None else without_resonance(time, measured, resonance, law)
+    filtered = moving_average(quiet, law.moving_average)
     shown = transducer_force(chain, result.time, result.friction)
-    filtered = moving_average(measured, chain.averaged_samples)
-    return Comparison(bag.name, chain, result, time, position, measured, filtered, shown)
+    return Comparison(bag.name, chain, result, time, position, measured, filtered, law.moving_average, resonance, shown)
+
+
+def _offset(position: FloatArray, force: FloatArray) -> float:
+    """Offset of the transducer [N]: the middle between the mean forces of both directions; 0 if there is one only."""
+    way = np.gradient(position)
+    means = [float(force[side].mean()) for side in (way > 0.0, way < 0.0) if side.any()]
+    return 0.5 * sum(means) if len(means) == 2 else 0.0
+
+
+def _even(time: FloatArray) -> bool:
+    """Whether the samples are even enough in time for a filter."""
+    steps = np.diff(time)
+    typical = float(np.median(steps))
+    return bool(steps.min() > 0.5 * typical and steps.max() < 1.5 * typical)
 
 
 # -- work in parallel, kept on disk -----------------------------------------------------------------------------------
@@ -391,7 +419,7 @@ def _results(work: list[tuple[str, Callable[[], Any]]], jobs: int) -> Iterable[t
         return
     # A fresh process each: numba and the progress thread do not survive a fork.
     context = multiprocessing.get_context('spawn')
-    with _one_blas_thread(), ProcessPoolExecutor(jobs, mp_context=context) as pool:
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
         names = {pool.submit(function): name for name, function in work}
         try:
             for future in as_completed(names):
@@ -399,23 +427,6 @@ def _results(work: list[tuple[str, Callable[[], Any]]], jobs: int) -> Iterable[t
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-
-
-class _one_blas_thread:  # noqa: N801  (a context manager, used like a function)
-    """Processes started inside have one BLAS thread each: two are slower on small systems."""
-
-    _NAMES = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
-
-    def __enter__(self) -> None:
-        self._before = {name: os.environ.get(name) for name in self._NAMES}
-        os.environ.update(dict.fromkeys(self._NAMES, '1'))
-
-    def __exit__(self, *_error: object) -> None:
-        for name, value in self._before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 class _Store:

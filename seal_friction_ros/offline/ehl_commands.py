@@ -35,7 +35,7 @@ def run_command(name: str, jobs: int, out: Path | None, bag: Path | None, window
             raise ValueError(f'{name}: a spool cannot be compared with a bag: take the case of one of its seals')
         spool = run_spool(case, name, jobs)
         labels = [f'{member.case}{", mirrored" if member.mirrored else ""}' for member in case.members]
-        largest = float(np.abs(spool.friction).max())
+        largest = float(np.abs(spool.friction[spool.last_cycle]).max())
         figures = {'spool': case.name, 'seals': labels, 'largest_friction_N': largest}
         words = f'{case.name}: {len(labels)} seals, largest friction {largest:.3g} N'
         return _paged(figures, words, out, lambda page: write_spool_page(case.name, spool, labels, page))

@@ -15,7 +15,7 @@ from PIL import Image
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.findings import REFERENCE_HALF_WIDTH
 from seal_friction_ros.core.ehl.spool import SpoolResult
-from seal_friction_ros.core.ehl.transient import RunResult
+from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.offline.bag_evaluation import FloatArray, IntArray
@@ -97,7 +97,7 @@ def write_spool_page(name: str, result: SpoolResult, labels: list[str], out: Pat
 
 def friction_figure(result: RunResult) -> Plot:
     """Friction over displacement with its shares (Figure 14)."""
-    last = _last_cycle(result)
+    last = last_cycle(result)
     x = result.position[last] / MM
     has_edge = bool(np.any(result.edge))
     figure, (ax, detail) = new_figure('Friction over the way of the spool', 4.4, ncols=2)
@@ -154,7 +154,7 @@ def time_figure(result: RunResult) -> Plot:
 
 def moments(result: RunResult) -> dict[str, int]:
     """Steps of the stroke to the right of the last cycle at which the film is shown, by what they are."""
-    steps = np.flatnonzero(_last_cycle(result) & (result.velocity > 0.0))
+    steps = np.flatnonzero(last_cycle(result) & (result.velocity > 0.0))
     if not len(steps):
         steps = np.arange(len(result.time))
     speed = result.sliding_velocity[steps]
@@ -190,10 +190,8 @@ def film_figure(result: RunResult) -> Plot:
 
 def _gap_limit(result: RunResult) -> float:
     """Height of the gap axis [m]: some films high."""
-    loaded = (
-        result.contact_pressure + result.film_pressure > 0.02 * (result.contact_pressure + result.film_pressure).max()
-    )
-    return float(3.0 * np.quantile(result.gap[loaded], 0.9)) if loaded.any() else float(result.gap.max())
+    touching = result.contact_pressure > 0.02 * result.contact_pressure.max()
+    return float(3.0 * np.quantile(result.gap[touching], 0.9)) if touching.any() else float(result.gap.max())
 
 
 def _draw_pressure(ax: Axes, x: FloatArray, result: RunResult, step: int) -> None:
@@ -216,7 +214,7 @@ def study_figure(study: StudyRuns) -> Plot:
     )
     count = len(study.runs)
     for i, run in enumerate(study.runs):
-        last = _last_cycle(run)
+        last = last_cycle(run)
         stress = run.case.seal.solid_shear_stress
         share = 0.15 + 0.85 * i / max(1, count - 1)
         look = {
@@ -269,7 +267,7 @@ def comparison_figure(comparison: Comparison) -> Plot:
     figure, ax = new_figure(f'Simulation against measurement: {comparison.bag}', 4.6)
     x = comparison.position / MM
     ax.plot(x, comparison.measured, color='#d9d9d9', lw=0.7, label='measured')
-    ax.plot(x, comparison.filtered, color=GREY, label=f'measured, mean of {comparison.chain.averaged_samples}')
+    ax.plot(x, comparison.filtered, color=GREY, label=f'measured, mean of {comparison.averaged_samples}')
     ax.plot(result.position / MM, comparison.shown, color=SKY, lw=0.8, label='computed, by the chain')
     ax.plot(result.position / MM, result.friction, color=VERMILLION, lw=1.8, label='computed')
     ax.set_xlabel('position of the spool [mm]')
@@ -278,16 +276,23 @@ def comparison_figure(comparison: Comparison) -> Plot:
     return Plot(
         'simulation_against_measurement',
         figure,
-        'Friction on the measured motion (spool-valve paper, Figure 16). The mean of the measured force is removed: an '
-        'offset of the transducer. The chain is one oscillator of '
-        f'{comparison.chain.natural_frequency:g} Hz.',
+        'Friction on the measured motion (spool-valve paper, Figure 16). From the measured force its middle between '
+        f'both directions is taken off, an offset of the transducer, {_resonance(comparison)}',
     )
+
+
+def _resonance(comparison: Comparison) -> str:
+    """What was done about the measuring chain, in words."""
+    chain = f'The chain is one oscillator of {comparison.chain.natural_frequency:.3g} Hz'
+    if comparison.resonance is None:
+        return f'and no resonance was found in it. {chain}, as in the paper.'
+    return f'and a resonance of {comparison.resonance:.3g} Hz. {chain}.'
 
 
 def spool_figure(result: SpoolResult, labels: list[str]) -> Plot:
     """Friction of a spool and of its seals over displacement (Figure 13)."""
     figure, ax = new_figure('Friction of all seals of the spool', 4.6)
-    last = result.time > 0.5 * result.time[-1]
+    last = result.last_cycle
     x = result.position[last] / MM
     colours = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION)
     shown: set[str] = set()
@@ -305,7 +310,7 @@ def spool_figure(result: SpoolResult, labels: list[str]) -> Plot:
 
 def _write_animation(result: RunResult, path: Path) -> None:
     """Film and friction over the last cycle as an animated GIF; the same run gives the same bytes."""
-    last = _last_cycle(result)
+    last = last_cycle(result)
     steps: IntArray = np.flatnonzero(last)
     steps = steps[np.linspace(0, len(steps) - 1, min(_FRAMES, len(steps))).astype(int)]
     x = result.place / MM
@@ -324,10 +329,15 @@ def _write_animation(result: RunResult, path: Path) -> None:
     dot = loop.plot([], [], 'o', color=VERMILLION)[0]
     loop.set_ylabel('friction [N]')
     loop.set_xlabel('position of the spool [mm]')
+    moving = [(upper, line) for line in upper.lines] + [(lower, gap), (lower, film), (loop, dot)]
+    for _, line in moving:
+        line.set_animated(True)
     figure.set_dpi(_ANIMATION_DPI)
     canvas: Any = FigureCanvasAgg(figure)  # its methods have no annotations
     figure.draw_without_rendering()
     figure.set_layout_engine('none')
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
     frames = []
     for step in steps:
         pressures = (result.contact_pressure[step] + result.film_pressure[step], result.contact_pressure[step])
@@ -336,7 +346,9 @@ def _write_animation(result: RunResult, path: Path) -> None:
         gap.set_ydata(result.gap[step] / MICRON)
         film.set_ydata(result.gap[step] * result.saturation[step] / MICRON)
         dot.set_data([result.position[step] / MM], [result.friction[step]])
-        canvas.draw()
+        canvas.restore_region(still)
+        for axes, line in moving:
+            axes.draw_artist(line)
         frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB'))
     try:
         frames[0].save(path, save_all=True, append_images=frames[1:], duration=1000 // _FRAME_RATE, loop=0)
@@ -452,8 +464,10 @@ def _spool_sections(name: str, result: SpoolResult, figure: Callable[[str], str]
     yield f'<h1>{escape(name)}</h1>'
     yield f'<p class="lead">{_MODEL}</p>'
     yield figure('spool')
-    rows = [(i + 1, number(float(np.abs(friction).max()), 3)) for i, friction in enumerate(result.members)]
-    yield table(('seal', 'largest friction [N]'), [*rows, ('all', number(float(np.abs(result.friction).max()), 3))])
+    last = result.last_cycle
+    rows = [(i + 1, number(float(np.abs(friction[last]).max()), 3)) for i, friction in enumerate(result.members)]
+    rows_of_all = [*rows, ('all', number(float(np.abs(result.friction[last]).max()), 3))]
+    yield table(('seal', 'largest friction in the last cycle [N]'), rows_of_all)
 
 
 def _head(case: Case) -> Iterable[str]:
@@ -474,7 +488,3 @@ def _parameters(case: Case) -> Iterable[str]:
                 for name, meaning in meanings(record).items()
             ]
     yield table(('parameter', 'value', 'unit', 'meaning'), rows, (0, 2, 3))
-
-
-def _last_cycle(result: RunResult) -> np.ndarray[tuple[Any, ...], np.dtype[np.bool_]]:
-    return np.asarray(result.time > result.time[-1] * (1.0 - 1.0 / result.case.motion.cycles) + 1e-12)

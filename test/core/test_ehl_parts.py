@@ -19,7 +19,7 @@ from seal_friction_ros.core.ehl.grease import Grease, apparent_viscosity
 from seal_friction_ros.core.ehl.groove import Groove
 from seal_friction_ros.core.ehl.kinematics import ConstantAcceleration, MeasuredMotion
 from seal_friction_ros.core.ehl.krylov import StalledError, gmres
-from seal_friction_ros.core.ehl.measuring_chain import MeasuringChain, moving_average, transducer_force
+from seal_friction_ros.core.ehl.measuring_chain import MeasuringChain, transducer_force
 from seal_friction_ros.core.ehl.topography import Topography, contact_pressure
 from seal_friction_ros.core.ehl.wall import ControlEdge, WallFilm
 
@@ -214,9 +214,3 @@ def test_transducer_follows_a_ramp_the_same_with_any_step():
     assert transducer_force(chain, fine, 3.0 * fine)[::100] == pytest.approx(
         transducer_force(chain, coarse, 3.0 * coarse)
     )
-
-
-def test_moving_average_of_a_line_is_the_line():
-    line = np.arange(100.0)
-    assert moving_average(line, 7)[10:90] == pytest.approx(line[10:90])
-    assert moving_average(np.ones(10), 50) == pytest.approx(np.ones(10))

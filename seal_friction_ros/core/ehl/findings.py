@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core.ehl.case import Case
-from seal_friction_ros.core.ehl.transient import RunResult
+from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -58,7 +58,7 @@ def findings(result: RunResult) -> Findings:
         ValueError: The motion never passes the middle at speed.
     """
     case = result.case
-    last = result.time > result.time[-1] * (1.0 - 1.0 / case.motion.cycles) + 1e-12
+    last = last_cycle(result)
     middle = last & (np.abs(result.position - case.motion.centre) <= REFERENCE_HALF_WIDTH)
     sliding = middle & (result.sliding_velocity != 0.0)
     if not sliding.any():
@@ -171,14 +171,16 @@ def _turning_point(result: RunResult, i: int) -> float:
 
 
 def _second_lobe(result: RunResult, last: BoolArray) -> float | None:
-    """Where on the stroke to the right friction has its first maximum while the seal sticks."""
+    """Where on the stroke to the right friction has its first maximum while the seal sticks: vertex of a parabola."""
     if result.case.seated_groove.half_clearance == 0.0:
         return None
     steps = np.flatnonzero(last & (result.velocity > 0.0))
     friction = result.friction[steps]
     for i in range(1, len(steps) - 1):
         if friction[i] > 0.0 and friction[i] >= friction[i - 1] and friction[i] > friction[i + 1]:
-            return float(result.position[steps[i]])
+            bend = friction[i - 1] - 2.0 * friction[i] + friction[i + 1]
+            ahead = 0.5 * (friction[i - 1] - friction[i + 1]) / bend  # in steps
+            return float(np.interp(i + ahead, np.arange(len(steps)), result.position[steps]))
     return None
 
 

@@ -1,4 +1,4 @@
-"""What a force transducer on a flexible rod makes of a friction force, and the filter it is looked at through."""
+"""What a force transducer on a flexible rod makes of a friction force."""
 
 import math
 from dataclasses import dataclass
@@ -18,12 +18,11 @@ class MeasuringChain:
     Raises:
         ValueError: A value is out of bounds.
 
-    Source: spool-valve paper, section 6.2 (157 Hz) and 7.3 (moving average of 50); the damping is our choice.
+    Source: spool-valve paper, section 6.2 (157 Hz); the damping is our choice.
     """
 
     natural_frequency: float = parameter(157.0, unit='Hz', lower=0.1, upper=1e6, description='w / 2 pi.')
     damping_ratio: float = parameter(0.05, unit='1', lower=0.0, upper=0.99, description='D.')
-    averaged_samples: int = parameter(50, unit='1', lower=1, upper=100000, description='Of the moving average.')
 
     def __post_init__(self) -> None:
         check(self)
@@ -55,12 +54,3 @@ def transducer_force(chain: MeasuringChain, time: FloatArray, friction: FloatArr
         shown[i] = friction[i] - lag + fade * (away * cosine + mixed * sine)
         speed = slope + fade * (away_speed * cosine - (decay * mixed + ring * away) * sine)
     return shown
-
-
-def moving_average(values: FloatArray, samples: int) -> FloatArray:
-    """Centred mean of ``samples`` neighbours, fewer at the ends, shape (n,)."""
-    n = len(values)
-    total = np.concatenate(([0.0], np.cumsum(values)))
-    first = np.clip(np.arange(n) - samples // 2, 0, n)
-    last = np.clip(np.arange(n) + (samples + 1) // 2, 0, n)
-    return np.asarray((total[last] - total[first]) / (last - first))

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from seal_friction_ros.core.ehl.case import Member
 from seal_friction_ros.core.ehl.kinematics import Motion
-from seal_friction_ros.core.ehl.transient import RunResult
+from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -41,6 +41,8 @@ class SpoolResult(NamedTuple):
     """of all seals [N], with the sign of the velocity it resists"""
     members: FloatArray
     """of each seal [N], shape (seals, steps)"""
+    last_cycle: npt.NDArray[np.bool_]
+    """whether each step is in the last cycle"""
 
 
 def superposed(members: Sequence[Member], runs: Sequence[RunResult]) -> SpoolResult:
@@ -54,4 +56,4 @@ def superposed(members: Sequence[Member], runs: Sequence[RunResult]) -> SpoolRes
         raise ValueError('superposed: the seals were not run with one time step: give their cases the same')
     frictions = np.array([-run.friction if m.mirrored else run.friction for m, run in zip(members, runs, strict=True)])
     position = (first.position - members[0].shift) * (-1.0 if members[0].mirrored else 1.0)
-    return SpoolResult(first.time, position, frictions.sum(axis=0), frictions)
+    return SpoolResult(first.time, position, frictions.sum(axis=0), frictions, last_cycle(first))

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core.ehl.findings import REFERENCE_HALF_WIDTH, findings
-from seal_friction_ros.core.ehl.transient import RunResult
+from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -51,6 +51,5 @@ def study_table(runs: list[RunResult]) -> StudyTable:
 
 def _middle(run: RunResult) -> FloatArray:
     """Friction of the steps within 0.5 mm of the middle in the last cycle [N]."""
-    motion = run.case.motion
-    last = run.time > run.time[-1] * (1.0 - 1.0 / motion.cycles) + 1e-12
-    return np.asarray(run.friction[last & (np.abs(run.position - motion.centre) <= REFERENCE_HALF_WIDTH)])
+    middle = np.abs(run.position - run.case.motion.centre) <= REFERENCE_HALF_WIDTH
+    return np.asarray(run.friction[last_cycle(run) & middle])

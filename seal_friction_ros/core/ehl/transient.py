@@ -33,6 +33,7 @@ from seal_friction_ros.core.ehl.wall import WallFilm
 FloatArray = npt.NDArray[np.float64]
 
 _MOST_HALVINGS = 10
+_LARGEST_RECORD = 100_000_000  # numbers along the seal that a run may keep, 0.8 GB
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Model:
     """A case made ready to run.
 
     Air presses on the seal from all sides, and rubber passes that on like a fluid; so only what film and asperities
-    press above the air deflects it (our choice: the air changes sides at the crown).
+    press above the air deflects it (our choice: between the sides the air falls over the middle half of the film).
 
     Raises:
         ValueError: The grid does not fit the seal.
@@ -51,7 +52,7 @@ class Model:
     place: FloatArray = field(init=False)
     """cells along the seal from its crown [m], shape (n,)"""
     ambient: FloatArray = field(init=False)
-    """pressure of the air, that of the left up to the crown, then that of the right [Pa], shape (n,)"""
+    """pressure of the air, from that on the left to that on the right [Pa], shape (n,)"""
     profile: FloatArray = field(init=False)
     """gap of the undeformed seal to a plain wall, less what the air deflects [m], shape (n,)"""
     circumference: float = field(init=False)
@@ -65,7 +66,8 @@ class Model:
         radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
         object.__setattr__(self, 'contact', Contact(plane, case.topography, case.grease))
         object.__setattr__(self, 'place', place)
-        ambient = np.where(place < 0.0, case.air.pressure_left, case.air.pressure_right)
+        passed = np.clip(0.5 + 2.0 * place / numerics.film_width, 0.0, 1.0)
+        ambient = case.air.pressure_left + passed * (case.air.pressure_right - case.air.pressure_left)
         profile = place**2 / (2.0 * radius) - case.interference - plane.deflection(ambient)
         object.__setattr__(self, 'ambient', ambient)
         object.__setattr__(self, 'profile', profile)
@@ -152,6 +154,12 @@ class RunResult(NamedTuple):
     newton_iterations: int
     mass_defect: float
     """largest difference between lubricant in and out and that in the film, over that in the film, of any step"""
+
+
+def last_cycle(result: RunResult) -> npt.NDArray[np.bool_]:
+    """Whether each step is in the last cycle of the motion of the case, shape (steps,)."""
+    begin = result.time[-1] * (1.0 - 1.0 / result.case.motion.cycles)
+    return np.asarray(result.time > begin + 1e-12)
 
 
 def rest(model: Model, position: float) -> Moment:
@@ -325,10 +333,16 @@ def run(case: Case, motion: Motion | None = None, on_step: Callable[[int], None]
 
     Raises:
         NotConvergedError: A step failed however small; the message says when.
+        ValueError: The result would not fit in memory.
     """
     moved = case.motion if motion is None else motion
     model = Model(case)
     steps = max(1, math.ceil(moved.duration / case.numerics.time_step - 1e-9))
+    if 4 * steps * case.numerics.cells > _LARGEST_RECORD:
+        raise ValueError(
+            f'case {case.name}: {steps} steps of {case.numerics.cells} cells are too many to keep: make the motion '
+            'shorter, or numerics.time_step longer'
+        )
     moment = rest(model, moved.position(0.0))
     rows: list[tuple[float, ...]] = []
     profiles: list[tuple[FloatArray, ...]] = []
