@@ -106,7 +106,8 @@ def _ehl_run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.ehl_commands import run_command
 
     return _tell(
-        arguments, *run_command(arguments.case, arguments.jobs, arguments.out, arguments.bag, arguments.window)
+        arguments,
+        *run_command(arguments.case, arguments.jobs, arguments.out, arguments.bag, arguments.window, arguments.average),
     )
 
 
@@ -397,6 +398,7 @@ def _add_ehl(commands: Any) -> None:
     run = _add(steps, 'run', _ehl_run, 'friction, film and contact over a motion')
     run.add_argument('--bag', type=Path, help='run through the position of this bag, and compare with its force')
     run.add_argument('--window', type=float, nargs=2, metavar=('FROM', 'TO'), help='part of the bag to take [s]')
+    run.add_argument('--average', type=int, default=50, metavar='SAMPLES', help='moving average, default 50')
     study = _add(steps, 'study', _ehl_study, 'friction with other solid shear stresses')
     chart = _add(steps, 'map', _ehl_map, 'friction map: steady friction over speed and pressure')
     chart.add_argument('--seal-file', type=Path, metavar='FILE.yaml', help='write it as a seal file; must not exist')

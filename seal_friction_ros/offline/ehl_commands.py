@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from seal_friction_ros.core.ehl.case import Spool
+from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.offline.ehl import (
     compare_with_bag,
     load_case,
@@ -27,7 +28,9 @@ from seal_friction_ros.offline.ehl_report import (
 Answer = tuple[dict[str, Any], str]
 
 
-def run_command(name: str, jobs: int, out: Path | None, bag: Path | None, window: list[float] | None) -> Answer:
+def run_command(
+    name: str, jobs: int, out: Path | None, bag: Path | None, window: list[float] | None, average: int
+) -> Answer:
     """Run a case or a spool, or a case on the motion of a bag."""
     case = load_case(name)
     if isinstance(case, Spool):
@@ -41,7 +44,7 @@ def run_command(name: str, jobs: int, out: Path | None, bag: Path | None, window
         return _paged(figures, words, out, lambda page: write_spool_page(case.name, spool, labels, page))
     if bag is not None:
         part = None if window is None else (window[0], window[1])
-        comparison = compare_with_bag(case, bag, part)
+        comparison = compare_with_bag(case, bag, part, SpoolEvaluation(moving_average=average))
         figures = comparison.figures()
         words = (
             f'{case.name} on {bag}: measured {figures["measured_mean_N"]:.3g} N, '

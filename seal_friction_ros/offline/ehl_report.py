@@ -153,7 +153,7 @@ def time_figure(result: RunResult) -> Plot:
 
 
 def moments(result: RunResult) -> dict[str, int]:
-    """Steps of the stroke to the right of the last cycle at which the film is shown, by what they are."""
+    """Steps of the last cycle at which the film is shown, by what they are."""
     steps = np.flatnonzero(last_cycle(result) & (result.velocity > 0.0))
     if not len(steps):
         steps = np.arange(len(result.time))
@@ -163,7 +163,12 @@ def moments(result: RunResult) -> dict[str, int]:
     fast = int(np.argmax(result.velocity[steps]))
     slow = int(np.flatnonzero(result.velocity[steps] >= 0.2 * result.velocity[steps].max())[-1])
     chosen = {'seal begins to slide': first, 'speed is reached': fast, 'slowing down': slow}
-    return {name: int(steps[i]) for name, i in chosen.items()}
+    found = {name: int(steps[i]) for name, i in chosen.items()}
+    back = np.flatnonzero(last_cycle(result) & (result.velocity < 0.0))
+    if result.case.control_edge and len(back):  # slowing down, there is nothing left to see
+        del found['slowing down']
+        found['pushed up the chamfer'] = int(back[np.argmax(np.abs(result.edge[back]))])
+    return found
 
 
 def film_figure(result: RunResult) -> Plot:
@@ -183,8 +188,8 @@ def film_figure(result: RunResult) -> Plot:
     return Plot(
         'film',
         figure,
-        'Above: pressure of film and asperities, and their sum. Below: gap, filled as far as the film is; the wall '
-        'moves to the left under the seal. The edge of the contact is steep: the gap axis is cut.',
+        'Above: pressure of film and asperities, and their sum. Below: gap, filled as far as the film is. A seal at a '
+        'positive velocity slides to the right. The edge of the contact is steep: the gap axis is cut.',
     )
 
 

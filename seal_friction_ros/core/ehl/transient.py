@@ -33,6 +33,7 @@ from seal_friction_ros.core.ehl.wall import WallFilm
 FloatArray = npt.NDArray[np.float64]
 
 _MOST_HALVINGS = 10
+_LONGEST_WALL = 1_000_000  # cells of its film
 _LARGEST_RECORD = 100_000_000  # numbers along the seal that a run may keep, 0.8 GB
 
 
@@ -167,6 +168,7 @@ def rest(model: Model, position: float) -> Moment:
 
     Raises:
         NotConvergedError: The dry contact was not found.
+        ValueError: The wall is too long to carry a film.
     """
     case = model.case
     n = case.numerics.cells
@@ -185,6 +187,11 @@ def rest(model: Model, position: float) -> Moment:
         width = model.contact.half_plane.cell_width
         reach = case.motion.distance + 2.0 * case.numerics.film_width
         count = math.ceil(2.0 * reach / width)
+        if count > _LONGEST_WALL:
+            raise ValueError(
+                f'case {case.name}: the film on the wall has {count} cells: make motion.distance shorter, '
+                'or leave out film_supply'
+            )
         start = position - reach
         wall_film = WallFilm(start, width, np.full(count, film * width))
     return Moment(0.0, position, lag, ContactState(gap, np.array(model.ambient), saturation), wall_film, creep)
