@@ -174,8 +174,9 @@ class VelocityTerms:
     def __post_init__(self) -> None:
         check(self)
 
-    def added(self, coulomb_friction: float, velocity: float) -> float:
-        """Magnitude [N] that comes on top of ``coulomb_friction`` [N] at ``velocity`` [m/s]; may be negative."""
+    def added(self, coulomb_friction: float, pressure: float, velocity: float) -> float:
+        """Magnitude [N] on top of ``coulomb_friction`` [N] at ``velocity`` [m/s], at any pressure; may be negative."""
+        del pressure
         if velocity == 0.0:
             return 0.0
         speed = abs(velocity)
@@ -208,15 +209,15 @@ class Seal:
     velocity_terms: VelocityTerms | None = None
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
-    follows_velocity: bool = field(init=False, repr=False, compare=False)
-    """whether friction depends on the velocity, by terms or by a map"""
+    velocity_law: VelocityTerms | FrictionMap | None = field(init=False, repr=False, compare=False)
+    """what the velocity adds to the Coulomb friction; None if nothing"""
 
     def __post_init__(self) -> None:
         check(self)
-        mapped = isinstance(self.coulomb_law, FrictionMap)
-        if mapped and self.velocity_terms is not None:
+        mapped = self.coulomb_law if isinstance(self.coulomb_law, FrictionMap) else None
+        if mapped and self.velocity_terms:
             raise ValueError(f'Seal {self.name}: its friction_map has the velocity in it: leave out velocity_terms')
-        object.__setattr__(self, 'follows_velocity', mapped or self.velocity_terms is not None)
+        object.__setattr__(self, 'velocity_law', mapped or self.velocity_terms)
         if self.pressure_max <= self.pressure_min:
             raise ValueError(
                 f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa'
@@ -232,22 +233,6 @@ class Seal:
                 raise ValueError(
                     f'Seal {self.name}: Coulomb friction falls from {low:.6g} N to {high:.6g} N at {p:.6g} Pa'
                 )
-
-
-def velocity_friction(seal: Seal, coulomb_friction: float, pressure: float, velocity: float) -> float:
-    """Magnitude [N] that sliding at ``velocity`` [m/s] adds to the Coulomb friction of one seal; may be negative.
-
-    Args:
-        seal: The seal.
-        coulomb_friction: Its Coulomb friction at ``pressure`` [N].
-        pressure: [Pa, gauge]
-        velocity: [m/s], positive on extension; at 0 nothing is added.
-    """
-    if seal.velocity_terms is not None:
-        return seal.velocity_terms.added(coulomb_friction, velocity)
-    if isinstance(seal.coulomb_law, FrictionMap) and velocity != 0.0:
-        return seal.coulomb_law.sliding_friction(max(pressure, 0.0), abs(velocity)) - coulomb_friction
-    return 0.0
 
 
 def coulomb_friction(seal: Seal, pressure: float) -> float:
@@ -313,8 +298,8 @@ def actuator_friction(
         friction = coulomb_friction(seal, pressure)
         total += friction
         stiction += seal.stiction + seal.stiction_ratio * friction
-        if seal.follows_velocity:
-            more = velocity_friction(seal, friction, pressure, velocity)
+        if seal.velocity_law is not None:
+            more = seal.velocity_law.added(friction, pressure, velocity)
             added += more
             friction += more
         std += seal.uncertainty.std(friction)

@@ -107,7 +107,7 @@ def _motion(reference: ServoReference | None, stamp: int, measured: float) -> Mo
 
 def _with_velocity_friction(parameters: PipelineParameters, motion: Motion, pressure: Pressure | None) -> Motion:
     seals = parameters.estimator.seals
-    if pressure is None or not any(mounted.seal.follows_velocity for mounted in seals):
+    if pressure is None or not any(mounted.seal.velocity_law for mounted in seals):
         return motion
     velocity = feedforward.wanted_velocity(parameters.feedforward, motion)
     if velocity is None:

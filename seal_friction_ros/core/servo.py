@@ -93,7 +93,7 @@ class ServoParameters:
             object.__setattr__(self, name, value)  # frozen: the only way to keep what was built from the fields
 
     def _check_seals(self) -> None:
-        moving = sorted({mounted.seal.name for mounted in self.seals if mounted.seal.follows_velocity})
+        moving = sorted({mounted.seal.name for mounted in self.seals if mounted.seal.velocity_law})
         if moving:
             raise ValueError(
                 f'ServoParameters.seals: friction of {", ".join(moving)} depends on the velocity, which the simulated '

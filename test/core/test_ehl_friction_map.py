@@ -13,6 +13,8 @@ from seal_friction_ros.core.coulomb import actuator_friction
 from seal_friction_ros.core.ehl.case import Case, MapGrid, Numerics
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.ehl.friction_map import friction_map, memory_length, steady_friction
+from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings, init, step
+from seal_friction_ros.core.records import Force, Pressure, RodSample
 from seal_friction_ros.core.seal_file import mount_seals
 
 CASE = Case(
@@ -96,12 +98,8 @@ def test_table_without_sense_is_refused(change, words):
 
 def document(law: FrictionMap) -> dict:
     fields = {f.name: getattr(law, f.name) for f in dataclasses.fields(law) if f.init}
-    geometry = {
-        'section_diameter': 1e-3, 'ring_inner_diameter': 6e-3, 'rod_diameter': 6e-3, 'gland_diameter': 7.8e-3,
-    }  # fmt: skip
     return {
         'name': 'mapped',
-        'geometry': geometry,
         'coulomb_law': 'friction_map',
         'friction_map': {k: list(v) if isinstance(v, tuple) else v for k, v in fields.items()},
         'uncertainty': {'relative_std': 0.1},
@@ -112,6 +110,33 @@ def document(law: FrictionMap) -> dict:
 def test_map_in_a_seal_file_is_a_coulomb_law_of_the_estimator():
     (mounted,) = mount_seals((document(LAW),), ('a',))
     assert actuator_friction((mounted,), 1e5, 0.0).coulomb_friction == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize('velocity', [-0.2, -1e-2, -1e-5, 1e-5, 3e-3, 5.0])
+def test_estimator_slides_with_the_friction_of_the_map_at_its_velocity(velocity):
+    seals = mount_seals((document(LAW),), ('a',))
+    friction = actuator_friction(seals, 0.5e5, 0.0, velocity)
+    assert friction.coulomb_friction + friction.velocity_friction == pytest.approx(
+        LAW.sliding_friction(0.5e5, abs(velocity))
+    )
+    assert friction.coulomb_friction_std == pytest.approx(0.1 * LAW.sliding_friction(0.5e5, abs(velocity)))
+    assert actuator_friction(seals, -1e4, 0.0, velocity) == actuator_friction(seals, 0.0, 0.0, velocity)._replace(
+        in_identified_range=False
+    )
+    sample = RodSample(1, velocity, Pressure(1, 0.5e5, 0.0), Force(1, 0.0))
+    parameters = EstimatorParameters(EstimatorSettings(stick_velocity=0.0, slip_velocity=0.0), seals)
+    _, estimate = step(parameters, init(parameters), sample)
+    assert estimate.friction_force == pytest.approx(math.copysign(LAW.sliding_friction(0.5e5, abs(velocity)), velocity))
+
+
+def test_at_rest_the_map_adds_nothing():
+    seals = mount_seals((document(LAW),), ('a',))
+    assert actuator_friction(seals, 0.5e5, 0.0, 0.0).velocity_friction == 0.0
+
+
+def test_map_and_velocity_terms_together_are_refused():
+    with pytest.raises(ValueError, match=r'Seal mapped: its friction_map has the velocity in it: leave out'):
+        mount_seals((document(LAW) | {'velocity_terms': {'viscous_friction': 1.0}},), ('a',))
 
 
 def test_looking_up_the_map_costs_a_few_microseconds():

@@ -45,6 +45,7 @@ class FrictionMap:
     _rows: tuple[tuple[float, ...], ...] = field(init=False, repr=False, compare=False)
     _start: float = field(init=False, repr=False, compare=False)
     _rate: float = field(init=False, repr=False, compare=False)
+    _at_reference: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         check(self)
@@ -66,16 +67,20 @@ class FrictionMap:
         object.__setattr__(self, '_rows', rows)
         object.__setattr__(self, '_start', start)
         object.__setattr__(self, '_rate', (n - 1) / (end - start))
+        at_reference = tuple(self.sliding_friction(p, self.reference_speed) for p in self.pressures)
+        object.__setattr__(self, '_at_reference', at_reference)
 
     def sliding_friction(self, pressure: float, speed: float) -> float:
         """Magnitude of the steady sliding friction [N] at ``pressure`` [Pa, gauge] and ``speed`` [m/s, >= 0]."""
-        last = len(self.speeds) - 1
-        column = (math.log(speed) - self._start) * self._rate if speed > self.speeds[0] else 0.0
-        j = min(int(column), last - 1)
-        along = min(column - j, 1.0)
-        pressures = self.pressures
-        i = min(max(bisect_right(pressures, pressure) - 1, 0), len(pressures) - 2)
-        across = min(max((pressure - pressures[i]) / (pressures[i + 1] - pressures[i]), 0.0), 1.0)
+        speeds = self.speeds
+        j, along = 0, 0.0
+        if speed >= speeds[-1]:
+            j, along = len(speeds) - 2, 1.0
+        elif speed > speeds[0]:
+            column = (math.log(speed) - self._start) * self._rate
+            j = min(int(column), len(speeds) - 2)
+            along = column - j
+        i, across = self._between_pressures(pressure)
         low, high = self._rows[i], self._rows[i + 1]
         at_low = low[j] + along * (low[j + 1] - low[j])
         at_high = high[j] + along * (high[j + 1] - high[j])
@@ -83,7 +88,23 @@ class FrictionMap:
 
     def coulomb_friction(self, pressure: float) -> float:
         """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge] and the reference speed."""
-        return self.sliding_friction(pressure, self.reference_speed)
+        i, across = self._between_pressures(pressure)
+        low = self._at_reference[i]
+        return low + across * (self._at_reference[i + 1] - low)
+
+    def added(self, coulomb_friction: float, pressure: float, velocity: float) -> float:
+        """Magnitude [N] that sliding at ``velocity`` [m/s] has above ``coulomb_friction`` [N]; 0 at rest."""
+        return self.sliding_friction(pressure, abs(velocity)) - coulomb_friction if velocity else 0.0
+
+    def _between_pressures(self, pressure: float) -> tuple[int, float]:
+        """Row below ``pressure`` [Pa] in the table, and the share of the way to the next."""
+        pressures = self.pressures
+        if pressure >= pressures[-1]:
+            return len(pressures) - 2, 1.0
+        if pressure <= pressures[0]:
+            return 0, 0.0
+        i = bisect_right(pressures, pressure) - 1
+        return i, (pressure - pressures[i]) / (pressures[i + 1] - pressures[i])
 
     def lagged(self, friction: float, pressure: float, speed: float, way: float) -> float:
         """Friction [N] after sliding on by ``way`` [m] at ``speed`` [m/s], when it was ``friction`` [N] before."""
