@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from seal_friction_ros.files import config_path
+from seal_friction_ros.offline.ehl_commands import map_command, run_command, study_command
 from seal_friction_ros.offline.import_thesis import import_thesis
 from seal_friction_ros.offline.replay import replay
 from seal_friction_ros.offline.report import write_report
@@ -16,7 +17,7 @@ FIGURES = Path(__file__).parents[1] / 'docs' / 'figures'
 
 
 def main() -> int:
-    """Replay the pull test, draw it and the seal's charts, and keep the pictures that are shown."""
+    """Draw a replay of the pull test, the charts of its seal, the servo and the lubricated contact; keep what is shown."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         import_thesis(folder / 'inputs')
@@ -24,11 +25,19 @@ def main() -> int:
         write_report(folder / 'pull_test', folder / 'report.html')
         write_seal_charts(config_path('seals', 'ms28775_114'), folder / 'seal.html')
         write_servo_charts(folder / 'servo.html')
+        run_command('inner_seal', 1, folder / 'inner.html', None, None, 1)
+        run_command('inner_seal_groove', 1, folder / 'groove.html', None, None, 1)
+        study_command('inner_seal', 1, folder / 'study.html', None)
+        map_command('inner_seal', 1, folder / 'map.html', None, None)
         FIGURES.mkdir(parents=True, exist_ok=True)
         for source, target in {
             'report_figures/live_estimate.png': 'live_estimate.png',
             'report_figures/friction_over_pressure.png': 'friction_over_pressure.png',
             'seal_figures/fig23_states_2_and_3.png': 'friction_states.png',
+            'groove_figures/friction_over_position.png': 'ehl_friction.png',
+            'inner_figures/film.png': 'ehl_film.png',
+            'study_figures/solid_shear_stress.png': 'ehl_study.png',
+            'map_figures/friction_map.png': 'ehl_map.png',
             'servo_figures/fig25_servo_with_and_without_friction.png': 'fig25_servo_with_and_without_friction.png',
         }.items():
             shutil.copy(folder / source, FIGURES / target)

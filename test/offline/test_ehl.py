@@ -1,6 +1,7 @@
 """``seal_friction ehl``: files in, numbers, pages and seal files out; work that goes on where it was left."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -73,20 +74,15 @@ def test_run_with_a_page_writes_figures_and_an_animation(small, tmp_path, capsys
     assert all(Path(f).stat().st_size > 1000 for f in found['figures'])
 
 
-def test_study_has_the_keys_of_the_paper_and_is_one_json_object_on_stdout(small, tmp_path):
-    command = [sys.executable, '-m', 'seal_friction_ros.offline.cli', 'ehl', 'study', small, '--json', '--jobs', '1']
+def test_study_has_the_keys_of_the_paper_as_one_json_object_and_two_processes_find_what_one_does(small, capsys):
+    command = [sys.executable, '-m', 'seal_friction_ros.offline.cli', 'ehl', 'study', small, '--json', '--jobs', '2']
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found['solid_shear_stress_Pa'] == [1e6, 2e6]
     assert found['friction_N'][1] == pytest.approx(2.0 * found['friction_N'][0], rel=0.1)
     assert len(found['solid_share']) == 2
-
-
-def test_two_processes_find_what_one_does(small, capsys):
-    alone = answer(capsys, 'study', small)
-    assert main(['ehl', 'study', small, '--json', '--jobs', '2']) == 0
-    assert json.loads(capsys.readouterr().out) == alone
+    assert found == answer(capsys, 'study', small)
 
 
 def test_interrupted_work_goes_on_where_it_was_left(small, tmp_path, capsys, monkeypatch):
@@ -136,6 +132,24 @@ def test_map_does_not_overwrite_a_seal_file(small, tmp_path, capsys):
     assert main(['ehl', 'map', small, '--seal-file', str(there)]) == 2
     assert 'exists already, not overwriting' in capsys.readouterr().err
     assert there.read_text() == 'mine'
+
+
+def test_every_command_of_the_page_is_one(small, tmp_path, capsys, monkeypatch):
+    """With a small case instead of those of the page, so that it takes no longer than it must."""
+    monkeypatch.chdir(tmp_path)
+    Path('build').mkdir()
+    Path('spool.yaml').write_text('name: spool\nmotion: {distance: 1.8e-3, cycles: 1}\nseals: [{case: small}]\n')
+    swapped = {'inner_seal': small, 'spool': 'spool.yaml', 'BAG': str(measured_bag(tmp_path, with_position=True))}
+    blocks = re.findall(r'```bash\n(.*?)```', (ROOT / 'docs' / 'ehl.md').read_text(), re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines()]
+    assert len(lines) == 5
+    for line in lines:
+        program, *words = line.split()
+        assert program == '.venv/bin/seal_friction'
+        assert main([*(swapped.get(word, word) for word in words), '--jobs', '1']) == 0, line
+        page = Path(words[words.index('--out') + 1])
+        assert page.stat().st_size > 1000
+        page.unlink()
 
 
 def test_spool_adds_up_its_seals(small, tmp_path, capsys):
