@@ -17,7 +17,7 @@ FIGURES = Path(__file__).parents[1] / 'docs' / 'figures'
 
 
 def main() -> int:
-    """Draw a replay of the pull test, the charts of its seal, the servo and the lubricated contact; keep what is shown."""
+    """Draw a replay of the pull test, charts of its seal, the servo and the lubricated contact; keep what is shown."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         import_thesis(folder / 'inputs')
