@@ -66,7 +66,7 @@ def times(case: Case) -> dict[str, float]:
     by_steps = [one_cycle(case, time_step=step) for step in STEPS]
     start = time.process_time()
     rows = [steady_friction(case, float(pressure)) for pressure in map_pressures(case.map)]
-    law = friction_map(case, rows, memory_length(case))
+    law = friction_map(case, rows, memory_length(case).length)
     map_time = time.process_time() - start
     return {
         **{f'cycle, {cells} cells [s]': value for cells, value in zip(CELLS, by_cells, strict=True)},

@@ -21,6 +21,7 @@ from seal_friction_ros.core.ehl.case import Case, Spool, parse_case
 from seal_friction_ros.core.ehl.findings import Findings, discretisation_errors, findings
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.ehl.friction_map import (
+    Memory,
     SteadyFriction,
     friction_map,
     map_pressures,
@@ -43,6 +44,7 @@ from seal_friction_ros.offline.bag_evaluation import FloatArray, read_run
 from seal_friction_ros.offline.progress import progress
 
 _PROFILES = ('gap', 'film_pressure', 'contact_pressure', 'saturation')
+_CURVES = tuple(name for name in RunResult._fields if name not in (*_PROFILES, 'case'))
 _SHORTEST_RECORD = 10  # samples
 
 
@@ -119,7 +121,7 @@ def run_case(case: Case) -> CaseRun:
     """
     motion = case.motion
     steps = round(motion.duration / case.numerics.time_step)
-    with progress(f'{case.name}: 3 runs', 2 * steps) as advance:
+    with progress(f'{case.name}: 3 runs', steps + steps // 2 + steps) as advance:
         result = run(case, on_step=advance)
         found = findings(result)
         by_step, by_grid = discretisation_errors(case, found, partial(run, on_step=advance))
@@ -177,7 +179,7 @@ def run_study(case: Case, jobs: int, work: Path | None = None) -> StudyRuns:
     """
     cases = [with_solid_shear_stress(case, stress) for stress in case.study.solid_shear_stresses]
     store = _Store(work)
-    runs = {c: _restored(c, kept) for c in cases if (kept := store.get(_key('study', c))) is not None}
+    runs = {c: _restored(c, kept) for c in cases if (kept := store.get(_key('study', c), _CURVES)) is not None}
     missing: list[tuple[str, Callable[[], Any]]] = [
         (str(i), partial(_curves, c)) for i, c in enumerate(cases) if c not in runs
     ]
@@ -197,8 +199,8 @@ def _curves(case: Case) -> RunResult:
 
 
 def _as_lists(result: RunResult) -> dict[str, Any]:
-    fields = {k: v for k, v in result._asdict().items() if k not in (*_PROFILES, 'case')}
-    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in fields.items()}
+    fields = result._asdict()
+    return {k: fields[k].tolist() if isinstance(fields[k], np.ndarray) else fields[k] for k in _CURVES}
 
 
 def _restored(case: Case, kept: dict[str, Any]) -> RunResult:
@@ -214,6 +216,8 @@ class MapRuns(NamedTuple):
 
     law: FrictionMap
     rows: list[SteadyFriction]
+    retried_steps: int
+    """steps that failed and were taken again in halves"""
 
 
 def run_map(case: Case, jobs: int, work: Path | None = None) -> MapRuns:
@@ -221,33 +225,34 @@ def run_map(case: Case, jobs: int, work: Path | None = None) -> MapRuns:
     pressures = map_pressures(case.map).tolist()
     store = _Store(work)
     rows: dict[str, SteadyFriction] = {}
-    memory: list[float] = []
+    memory: list[Memory] = []
     jobs_left: list[tuple[str, Callable[[], Any]]] = []
     for pressure in pressures:
-        kept = store.get(_key(f'map {pressure!r}', case))
+        kept = store.get(_key(f'map {pressure!r}', case), SteadyFriction._fields)
         if kept is None:
             jobs_left.append((repr(pressure), partial(steady_friction, case, pressure)))
         else:
-            rows[repr(pressure)] = SteadyFriction(
-                pressure, *(np.array(kept[name]) for name in SteadyFriction._fields[1:])
-            )
-    kept_memory = store.get(_key('memory', case))
+            arrays: dict[str, Any] = {k: np.array(v) if isinstance(v, list) else v for k, v in kept.items()}
+            rows[repr(pressure)] = SteadyFriction(**arrays)
+    kept_memory = store.get(_key('memory', case), Memory._fields)
     if kept_memory is None:
         jobs_left.append(('memory', partial(memory_length, case)))
     else:
-        memory.append(kept_memory['length'])
+        memory.append(Memory(**kept_memory))
 
     def keep(name: str, result: Any) -> None:
         if name == 'memory':
             memory.append(result)
-            store.put(_key('memory', case), {'length': result})
+            store.put(_key('memory', case), result._asdict())
             return
         rows[name] = result
-        store.put(_key(f'map {name}', case), {k: np.asarray(v).tolist() for k, v in result._asdict().items()})
+        lists = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in result._asdict().items()}
+        store.put(_key(f'map {name}', case), lists)
 
     _in_parallel(f'{case.name}: map', jobs_left, jobs, keep)
     ordered = [rows[repr(pressure)] for pressure in pressures]
-    return MapRuns(friction_map(case, ordered, memory[0]), ordered)
+    retried = memory[0].retried_steps + sum(row.retried_steps for row in ordered)
+    return MapRuns(friction_map(case, ordered, memory[0].length), ordered, retried)
 
 
 def write_seal_file(case: Case, computed: MapRuns, out: Path) -> None:
@@ -363,7 +368,10 @@ def compare_with_bag(
     time, position, force = recorded.time[good], course[good], recorded.force_sum[good]
     time = time - time[0]
     position = position - 0.5 * (position.max() + position.min()) + case.motion.centre
-    motion = MeasuredMotion(time.tolist(), position.tolist())
+    try:
+        motion = MeasuredMotion(time.tolist(), position.tolist())
+    except ValueError as error:
+        raise ValueError(f'{bag}: {error}: take another window') from None
     steps = round(motion.duration / case.numerics.time_step)
     moved = replace(
         case, motion=replace(case.motion, distance=max(float(np.ptp(position)), case.motion.distance), cycles=1)
@@ -440,15 +448,15 @@ class _Store:
             except OSError as error:
                 raise ValueError(f'{folder}: {error.strerror}') from None
 
-    def get(self, key: str) -> dict[str, Any] | None:
-        """Result of a key; None if there is none, or none that can be read."""
+    def get(self, key: str, fields: Iterable[str]) -> dict[str, Any] | None:
+        """Result of a key; None if there is none, or none that can be read and has these fields."""
         if self._folder is None:
             return None
         try:
             kept = json.loads((self._folder / f'{key}.json').read_text(encoding='utf-8'))
         except (OSError, ValueError):
             return None
-        return kept if isinstance(kept, dict) else None
+        return kept if isinstance(kept, dict) and kept.keys() == set(fields) else None
 
     def put(self, key: str, result: dict[str, Any]) -> None:
         """Keep a result."""

@@ -32,6 +32,8 @@ def run_command(
     name: str, jobs: int, out: Path | None, bag: Path | None, window: list[float] | None, average: int
 ) -> Answer:
     """Run a case or a spool, or a case on the motion of a bag."""
+    if bag is None and window is not None:
+        raise ValueError('--window is only for a --bag')
     case = load_case(name)
     if isinstance(case, Spool):
         if bag is not None:
@@ -71,6 +73,7 @@ def study_command(name: str, jobs: int, out: Path | None, work: Path | None) -> 
         'solid_share': found.solid_share,
         'deviation': found.deviation,
         'curve_deviation': found.curve_deviation,
+        'retried_steps': [run.retried_steps for run in study.runs],
     }
     rows = zip(*found, strict=True)
     words = '\n'.join(
@@ -86,6 +89,8 @@ def map_command(name: str, jobs: int, out: Path | None, work: Path | None, seal_
     case = single_case(name, 'friction map')
     if seal_file is not None and seal_file.exists():
         raise ValueError(f'{seal_file}: exists already, not overwriting')
+    if seal_file is not None and not seal_file.parent.is_dir():
+        raise ValueError(f'{seal_file.parent}: no such folder')
     computed = run_map(case, jobs, work)
     if seal_file is not None:
         write_seal_file(case, computed, seal_file)
@@ -98,6 +103,7 @@ def map_command(name: str, jobs: int, out: Path | None, work: Path | None, seal_
         'solid_share': [(row.solid / row.friction).tolist() for row in computed.rows],
         'memory_length_m': law.memory_length,
         'presliding_length_m': law.presliding_length,
+        'retried_steps': computed.retried_steps,
     }
     low, high = min(law.frictions), max(law.frictions)
     words = f'{case.name}: {len(law.speeds)} speeds x {len(law.pressures)} pressures, {low:.3g} to {high:.3g} N'

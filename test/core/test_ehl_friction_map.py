@@ -10,9 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.coulomb import actuator_friction
+from seal_friction_ros.core.ehl import friction_map as module
 from seal_friction_ros.core.ehl.case import Case, MapGrid, Numerics
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.ehl.friction_map import friction_map, memory_length, steady_friction
+from seal_friction_ros.core.ehl.reynolds import NotConvergedError
+from seal_friction_ros.core.ehl.transient import Model, rest
 from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings, init, step
 from seal_friction_ros.core.records import Force, Pressure, RodSample
 from seal_friction_ros.core.seal_file import mount_seals
@@ -56,7 +59,39 @@ def test_rows_that_are_not_of_the_grid_are_refused(rows):
 
 
 def test_film_remembers_over_about_the_length_of_the_contact():
-    assert 0.05e-3 < memory_length(CASE) < 0.6e-3
+    found = memory_length(CASE)
+    assert 0.05e-3 < found.length < 0.6e-3
+    assert found.retried_steps == 0
+
+
+def test_step_of_the_map_that_fails_is_taken_in_halves_and_counted(monkeypatch):
+    really, asked = module.contact_step, []
+
+    def fails_at_first(*arguments):
+        asked.append(arguments[6])
+        if len(asked) in (3, 13):  # a finite step, then the infinite one
+            raise NotConvergedError('told to')
+        return really(*arguments)
+
+    model = Model(CASE)
+    start = rest(model, 0.0).state
+    smoothly, none = module.steady_state(model, start, 0.01)
+    monkeypatch.setattr(module, 'contact_step', fails_at_first)
+    state, retried = module.steady_state(model, start, 0.01)
+    assert (none, retried) == (0, 2)
+    assert asked[3] == asked[4] == 0.5 * asked[2]
+    assert math.isinf(asked[12])
+    assert math.isinf(asked[14])
+    assert state.gap == pytest.approx(smoothly.gap, rel=1e-9)
+
+
+def test_map_that_does_not_converge_is_an_error_that_says_where(monkeypatch):
+    def fails(*_arguments):
+        raise NotConvergedError('told to')
+
+    monkeypatch.setattr(module, 'contact_step', fails)
+    with pytest.raises(NotConvergedError, match=r'^case inner at 0.001 m/s, 3e\+05 Pa: told to$'):
+        steady_friction(CASE, 3e5)
 
 
 def test_law_passes_through_its_table_and_holds_beyond_its_ends():

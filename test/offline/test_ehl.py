@@ -102,6 +102,9 @@ def test_interrupted_work_goes_on_where_it_was_left(small, tmp_path, capsys, mon
     monkeypatch.setattr(ehl, 'run', lambda case, *rest: asked.append(case) or run(case, *rest))
     assert answer(capsys, 'study', small, '--work', str(work))['friction_N'] == (first['friction_N'])
     assert len(asked) == 1
+    for path in finished:
+        path.write_text('{"half": 1}')
+    assert answer(capsys, 'study', small, '--work', str(work)) == first
 
 
 def test_map_becomes_a_seal_file_that_the_estimator_takes(small, tmp_path, capsys):
@@ -216,6 +219,8 @@ def test_measured_motion_of_a_bag_is_run_and_its_force_compared(small, tmp_path,
         (['study', 'spool'], 'a spool has no study'),
         (['map', 'spool'], 'a spool has no friction map'),
         (['run', 'spool', '--bag', 'x'], 'a spool cannot be compared with a bag'),
+        (['run', 'inner_seal', '--window', '0', '1'], '--window is only for a --bag'),
+        (['map', 'inner_seal', '--seal-file', 'nowhere/x.yaml'], 'nowhere: no such folder'),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(arguments, words, capsys):

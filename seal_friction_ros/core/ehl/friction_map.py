@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
 _MOST_RETRIES = 20
 _MEMORY_STEPS = 200
+_LONG_PASSAGES = 250.0  # a step of so many is nearly one to the steady film
 
 
 class SteadyFriction(NamedTuple):
@@ -32,6 +34,15 @@ class SteadyFriction(NamedTuple):
     """[N] mean of both directions"""
     direction_difference: FloatArray
     """[N] friction towards the pressure less that away from it"""
+    retried_steps: int
+
+
+class Memory(NamedTuple):
+    """How long friction remembers."""
+
+    length: float
+    """[m] of sliding"""
+    retried_steps: int
 
 
 def map_speeds(grid: MapGrid) -> FloatArray:
@@ -59,29 +70,51 @@ def _friction(model: Model, state: ContactState, velocity: float) -> tuple[float
     return solid + model.circumference * fluid * math.copysign(1.0, wall), solid
 
 
-def steady_state(model: Model, start: ContactState, velocity: float) -> ContactState:
-    """Film of steady sliding at a ``velocity`` [m/s]: ever longer steps from ``start``, a quarter where one fails.
+def _slid(
+    model: Model, start: ContactState, velocity: float, durations: Sequence[float]
+) -> tuple[ContactState, list[ContactState], int]:
+    """Sliding at a ``velocity`` [m/s] by implicit Euler steps of ``durations`` [s]; one that fails is taken in halves.
+
+    An infinite step, to the steady film, is taken again after a finite one.
+
+    Returns:
+        The last state, that after each of ``durations``, and how many steps failed.
 
     Raises:
-        NotConvergedError: A step did not converge.
+        NotConvergedError: More than 20 steps failed.
+    """
+    state, states, retried = start, [], 0
+    for duration in durations:
+        left = [duration]
+        while left:
+            old = state.saturation * state.gap
+            try:
+                done = contact_step(model.contact, state, model.profile, -velocity, model.ends(), old, left[-1])
+            except NotConvergedError:
+                retried += 1
+                if retried > _MOST_RETRIES:
+                    raise
+                failed = left.pop()
+                if math.isinf(failed):
+                    left += [failed, _LONG_PASSAGES * model.case.numerics.film_width / abs(velocity)]
+                else:
+                    left += [0.5 * failed, 0.5 * failed]
+                continue
+            left.pop()
+            state = done.state
+        states.append(state)
+    return state, states, retried
+
+
+def steady_state(model: Model, start: ContactState, velocity: float) -> tuple[ContactState, int]:
+    """Film of steady sliding at a ``velocity`` [m/s] by ever longer steps from ``start``; how many steps failed.
+
+    Raises:
+        NotConvergedError: More than 20 steps failed.
     """
     passage = model.case.numerics.film_width / abs(velocity)
-    state = start
-    shares = list(reversed(_PASSAGES))
-    retried = 0
-    while shares:
-        old = state.saturation * state.gap
-        try:
-            step = contact_step(model.contact, state, model.profile, -velocity, model.ends(), old, shares[-1] * passage)
-        except NotConvergedError:
-            retried += 1
-            if retried > _MOST_RETRIES:
-                raise
-            shares.append(0.25 * min(shares[-1], 1000.0))
-            continue
-        shares.pop()
-        state = step.state
-    return state
+    state, _, retried = _slid(model, start, velocity, [share * passage for share in _PASSAGES])
+    return state, retried
 
 
 def steady_friction(case: Case, pressure: float) -> SteadyFriction:
@@ -94,19 +127,21 @@ def steady_friction(case: Case, pressure: float) -> SteadyFriction:
     speeds = map_speeds(case.map)
     values = np.empty((2, 2, len(speeds)))
     begin = rest(model, 0.0).state
+    retried = 0
     for k, direction in enumerate((1.0, -1.0)):
         state = begin
         for i, speed in enumerate(speeds):
             try:
-                state = steady_state(model, state, direction * float(speed))
+                state, more = steady_state(model, state, direction * float(speed))
             except NotConvergedError as error:
                 raise NotConvergedError(f'case {case.name} at {speed:.4g} m/s, {pressure:.4g} Pa: {error}') from None
+            retried += more
             values[k, :, i] = _friction(model, state, direction * float(speed))
     friction, solid = values.mean(axis=0)
-    return SteadyFriction(pressure, friction, solid, values[1, 0] - values[0, 0])
+    return SteadyFriction(pressure, friction, solid, values[1, 0] - values[0, 0], retried)
 
 
-def memory_length(case: Case) -> float:
+def memory_length(case: Case) -> Memory:
     """Sliding over which friction follows a change of speed [m], without pressure.
 
     From steady sliding at a fifth of the highest speed of the motion the speed is set to the highest; the length is
@@ -117,16 +152,14 @@ def memory_length(case: Case) -> float:
     """
     model = Model(_plain(case, 0.0))
     fast = case.motion.speed
-    state = steady_state(model, rest(model, 0.0).state, 0.2 * fast)
-    end = _friction(model, steady_state(model, state, fast), fast)[0]
+    slow, first = steady_state(model, rest(model, 0.0).state, 0.2 * fast)
+    steady, second = steady_state(model, slow, fast)
     step = 4.0 * case.numerics.film_width / fast / _MEMORY_STEPS
-    course = [_friction(model, state, fast)[0]]
-    for _ in range(_MEMORY_STEPS):
-        old = state.saturation * state.gap
-        state = contact_step(model.contact, state, model.profile, -fast, model.ends(), old, step).state
-        course.append(_friction(model, state, fast)[0])
-    over = (np.array(course) - end) / (course[0] - end)
-    return float(np.trapezoid(over) * step * fast)
+    _, states, third = _slid(model, slow, fast, [step] * _MEMORY_STEPS)
+    course = np.array([_friction(model, state, fast)[0] for state in (slow, *states)])
+    end = _friction(model, steady, fast)[0]
+    over = (course - end) / (course[0] - end)
+    return Memory(float(np.trapezoid(over) * step * fast), first + second + third)
 
 
 def friction_map(case: Case, rows: list[SteadyFriction], memory: float) -> FrictionMap:
