@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -240,3 +241,8 @@ def test_run_that_does_not_converge_is_an_error_and_no_curve(tmp_path, capsys):
     assert said.out == ''
     assert 'case crushed at' in said.err
     assert not page.exists()
+
+
+def test_case_of_the_paper_stands_in_full_in_its_file_and_is_what_the_others_build_on():
+    case = load_case('inner_seal')
+    assert replace(case, name='x', source='') == Case(name='x')
