@@ -397,7 +397,8 @@ def _run_sections(run: CaseRun, figure: Callable[[str], str]) -> Iterable[str]:
         if value is not None:
             title, unit, size = _TITLES[name]
             errors = (run.step_errors.get(name), run.grid_errors.get(name))
-            rows.append((title, unit, number(value / size, 3), *(number(e and e / size, 3) for e in errors)))
+            blurred = ('' if e is None else f'{e / size:.1g}' for e in errors)
+            rows.append((title, unit, f'{value / size:.4g}', *blurred))
     yield '<h2>Findings</h2>'
     yield table(('finding', 'unit', 'value', 'twice the step moves it by', 'half the cells move it by'), rows, (0, 1))
     yield '<h2>Over time</h2>'
@@ -458,7 +459,7 @@ def _map_sections(case: Case, computed: MapRuns, figure: Callable[[str], str]) -
 def _comparison_sections(comparison: Comparison, figure: Callable[[str], str]) -> Iterable[str]:
     yield from _head(comparison.result.case)
     yield figure('simulation_against_measurement')
-    rows = [(name, value) for name, value in comparison.figures().items()]
+    rows = [(name, f'{v:.3g}' if isinstance(v, float) else v) for name, v in comparison.figures().items()]
     yield table(('number', 'value'), rows)
     yield figure('friction_over_position')
     yield figure('film')
