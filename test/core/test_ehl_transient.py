@@ -234,6 +234,7 @@ def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
         ({'name': 'x', 'grease': {'flow_index': 2.0}}, 'flow_index = 2.0 1 is above its upper bound 1.0'),
         ({'name': 'x', 'numerics': {'film_width': 2e-3}}, 'section_height = 0.001 m is less than numerics.film_width'),
         ({'name': 'x', 'film_supply': {}, 'air': {'pressure_left': 1e5}}, 'film_supply needs both sides at ambient'),
+        ({'name': 'x', 'control_edge': {}, 'air': {'pressure_right': 1e5}}, 'control_edge needs both sides at ambient'),
         ({'name': 'x', 'seal': {'mooney_c01': 0.0}}, 'give the seal a stiffness'),
         ({'name': 'x', 'seals': []}, 'seals is empty'),
         ({'name': 'x', 'seals': [{'case': 'y', 'side': 1}]}, r'seals\[0\] has no side'),

@@ -199,10 +199,12 @@ class Case:
                 f'case {self.name}: seal.section_height = {self.seal.section_height} m is less than '
                 f'numerics.film_width = {self.numerics.film_width} m: the half-plane needs more depth than width'
             )
-        if self.film_supply and (self.air.pressure_left or self.air.pressure_right):
-            raise ValueError(
-                f'case {self.name}: film_supply needs both sides at ambient pressure: leave out air, or film_supply'
-            )
+        if self.air.pressure_left or self.air.pressure_right:
+            for part in ('film_supply', 'control_edge'):
+                if getattr(self, part):
+                    raise ValueError(
+                        f'case {self.name}: {part} needs both sides at ambient pressure: leave out air, or {part}'
+                    )
 
     @property
     def interference(self) -> float:
