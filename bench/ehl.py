@@ -41,6 +41,7 @@ OURS = (  # part, field: what the paper does not give
     ('numerics', 'film_width'),
 )
 CHANGE = 0.2
+CALLS = 5_000
 SINGLE = (
     'inner_seal', 'inner_seal_groove', 'inner_seal_control_edge', 'inner_seal_viscoelastic', 'inner_seal_starved',
     'inner_seal_pressure', 'outer_seal', 'outer_seal_pressure',
@@ -96,7 +97,7 @@ def estimator_steps(law: FrictionMap) -> dict[str, float]:
 
 def _fastest(function: Callable[[], object], repeat: int = 9) -> float:
     """Time of one call [s]."""
-    return min(timeit.repeat(function, number=5_000, repeat=repeat)) / 5_000
+    return min(timeit.repeat(function, number=CALLS, repeat=repeat)) / CALLS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +129,7 @@ def study_rows(case: Case) -> list[Row]:
     """Deviation of friction over tau_c from its mean, with its errors; the study's runs are one cycle each."""
     once = dataclasses.replace(case, motion=dataclasses.replace(case.motion, cycles=1))
     n = once.numerics
-    grids = (n, dataclasses.replace(n, time_step=2.0 * n.time_step), dataclasses.replace(n, cells=n.cells // 2))
+    grids = (n, dataclasses.replace(n, time_step=2.0 * n.time_step), dataclasses.replace(n, cells=max(32, n.cells // 2)))
     fine, step_, grid = (run_study(dataclasses.replace(once, numerics=g), 1).table for g in grids)
     return [
         Row(

@@ -1,5 +1,6 @@
 """``seal_friction ehl``: files in, numbers, pages and seal files out; work that goes on where it was left."""
 
+import importlib.util
 import json
 import os
 import re
@@ -164,6 +165,28 @@ def test_every_command_of_the_page_is_one(small, tmp_path, capsys, monkeypatch):
     assert {path.name for path in figures} >= {
         'film.gif', 'film.svg', 'friction_over_position.png', 'spool.png', 'solid_shear_stress.png', 'friction_map.png',
     }  # fmt: skip
+
+
+def test_every_bench_of_the_page_is_one(small, capsys, monkeypatch):
+    """With a small case, like the commands."""
+    specification = importlib.util.spec_from_file_location('bench_ehl', ROOT / 'bench' / 'ehl.py')
+    bench = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(bench)
+    monkeypatch.setattr(bench, 'single_case', lambda _name, what: ehl.single_case(small, what))
+    monkeypatch.setattr(bench, 'SINGLE', ('small',))
+    monkeypatch.setattr(bench, 'CELLS', (32, 48))
+    monkeypatch.setattr(bench, 'STEPS', (8e-3, 4e-3))
+    monkeypatch.setattr(bench, 'CALLS', 50)
+    lines = set(re.findall(r'`python (bench/ehl\.py[^`]*)`', (ROOT / 'docs' / 'ehl.md').read_text()))
+    assert len(lines) == 3
+    for line in lines:
+        monkeypatch.setattr(sys, 'argv', [*line.split(), '--json'])
+        bench.main()
+        found = json.loads(capsys.readouterr().out)
+        if '--findings' in line:
+            assert {'friction', 'deviation', 'retried_steps'} <= {row['name'] for row in found}
+        else:
+            assert ('topography.rms_height' if '--influence' in line else 'estimator step, friction_map [us]') in found
 
 
 def test_spool_adds_up_its_seals(small, tmp_path, capsys):
