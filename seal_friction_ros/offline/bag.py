@@ -5,6 +5,7 @@ inside. What is read may be any rosbag2 bag (MCAP or SQLite), a bare MCAP or SQL
 look like one: memory is bounded, and nothing outside of the bag is opened.
 """
 
+import errno
 import shutil
 import sqlite3
 import struct
@@ -35,6 +36,7 @@ ESTIMATE_TOPIC = '/friction_estimate'
 FEEDFORWARD_TOPIC = '/friction_feedforward'
 CONFIGURATION_TOPIC = '/friction_estimator/configuration'
 _LARGEST_METADATA = 1 << 20  # [bytes] of metadata.yaml, with some 5000 files or 1000 topics
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 
 
@@ -87,7 +89,7 @@ class BagWriter:
 
     Log times are made strictly increasing, so that every reader, which sorts by them, gives the messages back in the
     order in which they were written. ``metadata.yaml`` is there from the start; it is true at the end and, in between,
-    as of the newest file and the newest topic.
+    as of the last finished file and the newest topic.
 
     As a context manager it removes what it wrote if the block fails, so that a failed command leaves nothing behind.
 
@@ -108,7 +110,6 @@ class BagWriter:
         self._descriptions: dict[tuple[str, str], Description] = {}
         self._listed = 0
         self._last_time = -1
-        self._taken = 0
         self._custom_data: dict[str, str] = {}
         self._finished: list[tuple[str, Span]] = []
         self._finished_counts: dict[tuple[str, str], int] = {}
@@ -119,7 +120,7 @@ class BagWriter:
         except OSError as error:
             raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
         try:
-            self._output = self._begin_file()
+            self._output = self._file(0)
             try:
                 self._write_metadata()
             except OSError:
@@ -154,7 +155,6 @@ class BagWriter:
         if self._is_full(log_time, len(data)):
             self._split()
         self._last_time = log_time
-        self._taken += 1
         self._output.write(topic, known, log_time, data)
         return log_time
 
@@ -182,16 +182,14 @@ class BagWriter:
         self._custom_data = custom_data or {}
         self._output.finish(_yaml_text(self._information()))
         self._write_metadata()
+        self._output.close()
 
-    def rescue(self, failure: str, dropped: int) -> int:
+    def rescue(self, failure: str, offered: int) -> None:
         """After a failure: leave a valid bag of all whole chunks; on a full disk without the last, to make room.
 
         Args:
             failure: What went wrong; kept in ``metadata.yaml``.
-            dropped: Messages that never came to be written; kept there, too, with those that are lost now.
-
-        Returns:
-            Messages that are lost now.
+            offered: Messages that were to be recorded; those that are not in the bag are counted there, too.
 
         Raises:
             OSError: Not even that could be done; what is there is for ``seal_friction recover``.
@@ -200,13 +198,18 @@ class BagWriter:
             while True:
                 try:
                     self._output.finish_early()
-                    lost = self._taken - self.message_count
-                    self._custom_data = {'dropped_messages': str(dropped + lost), 'failure': failure}
+                    self._custom_data = {'dropped_messages': str(offered - self.message_count), 'failure': failure}
                     self._write_metadata()
-                    return lost
-                except OSError:
-                    if not self._output.give_back():
+                    return
+                except OSError as error:
+                    if error.errno not in _FULL:
                         raise
+                    if not self._output.give_back():
+                        break
+            if self._finished:
+                self._output.path.unlink(missing_ok=True)  # a new file without a chunk
+            (self.path / 'metadata.yaml').unlink(missing_ok=True)  # the last room there is
+            self._write_metadata()
         finally:
             self._output.close()
 
@@ -235,15 +238,17 @@ class BagWriter:
         too_long = self._split_time and log_time - span.first_time > self._split_time
         return bool(span.messages and (too_large or too_long))
 
-    def _begin_file(self) -> McapOutput:
-        return McapOutput(self.path / f'{self.path.name}_{len(self._finished)}.mcap')
+    def _file(self, number: int) -> McapOutput:
+        return McapOutput(self.path / f'{self.path.name}_{number}.mcap')
 
     def _split(self) -> None:
         finished = self._output
         finished.finish(_yaml_text(self._information()))
+        following = self._file(len(self._finished) + 1)
+        finished.close()
         self._finished.append((finished.path.name, finished.span))
         self._finished_counts = self._counts(finished)
-        self._output = self._begin_file()
+        self._output = following
         self._write_metadata()
 
     def _counts(self, newest: McapOutput) -> dict[tuple[str, str], int]:
@@ -253,8 +258,9 @@ class BagWriter:
         return counts
 
     def _information(self) -> dict[str, Any]:
-        files = [*self._finished, (self._output.path.name, self._output.span)]
-        spans = [span for _, span in files if span.messages] or [Span()]
+        newest = (self._output.path.name, self._output.span)
+        files = [*self._finished, newest] if newest[1].messages or not self._finished else self._finished
+        spans = [span for _, span in files]
         counts = self._counts(self._output)
         return {
             'version': 9,

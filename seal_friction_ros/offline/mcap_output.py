@@ -66,6 +66,7 @@ class McapOutput:
             self._writer.start(profile='ros2', library='seal_friction_ros')
         except OSError:
             self._stream.close()
+            path.unlink(missing_ok=True)
             raise
         self._channels: dict[tuple[str, str], int] = {}
         self._pending = 0
@@ -107,7 +108,6 @@ class McapOutput:
         self.flush()
         self._writer.add_metadata('rosbag2', {'serialized_metadata': metadata})
         self._writer.finish()
-        self._stream.close()
 
     def finish_early(self) -> None:
         """After a failure: cut off what is not whole and write an end without index, for which there is always room.

@@ -37,8 +37,8 @@ class Recorder:
         self, path: Path, *, queue_length: int = QUEUE_LENGTH, split_size: int = 0, split_duration: float = 0.0
     ) -> None:
         self.path = path
-        self.dropped = 0
         self.error = ''
+        self._offered = self._refused = 0
         self._queue_length = queue_length
         self._queue: deque[tuple[str, str, int, bytes]] = deque()  # plain tuples: the garbage collector lets go of them
         self._writer = BagWriter(path, split_size=split_size, split_duration=split_duration)
@@ -48,8 +48,9 @@ class Recorder:
 
     def record(self, topic: str, type_name: str, log_time: int, data: bytes) -> None:
         """Queue one serialised message, or drop and count it; never blocks."""
+        self._offered += 1
         if self.error or len(self._queue) >= self._queue_length:
-            self.dropped += 1
+            self._refused += 1
         else:
             self._queue.append((topic, type_name, log_time, data))
 
@@ -57,6 +58,11 @@ class Recorder:
     def written(self) -> int:
         """Messages written so far."""
         return self._writer.message_count
+
+    @property
+    def dropped(self) -> int:
+        """Messages that are not and will not be in the bag: the queue was full, or the recording failed."""
+        return self._offered - self.written if self.error else self._refused
 
     @property
     def waiting(self) -> int:
@@ -98,10 +104,8 @@ class Recorder:
         """Leave a valid bag of what was written, and say what happened."""
         words = f'{self.path}: recording stopped: {failure}'
         try:
-            lost = self._writer.rescue(str(failure), self.dropped + len(self._queue))
+            self._writer.rescue(str(failure), self._offered)
         except Exception as error:  # noqa: BLE001  as above
-            lost = 0
             words += f'; and the bag could not be finished ({error}): seal_friction recover makes one of it'
         self.error = words
-        self.dropped += lost + len(self._queue)
         self._queue.clear()

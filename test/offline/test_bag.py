@@ -134,7 +134,7 @@ def test_a_file_lasts_no_longer_than_the_split_duration(recorded: Path, tmp_path
     assert all(file['duration']['nanoseconds'] <= 500_000_000 for file in information['files'])
 
 
-def test_metadata_is_there_from_the_start_and_lists_each_new_file_and_topic(tmp_path: Path):
+def test_metadata_is_there_from_the_start_and_lists_each_finished_file_and_new_topic(tmp_path: Path):
     def information() -> dict[str, Any]:
         return yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
 
@@ -145,9 +145,11 @@ def test_metadata_is_there_from_the_start_and_lists_each_new_file_and_topic(tmp_
     assert [t['topic_metadata']['name'] for t in information()['topics_with_message_count']] == ['/t']
     for log_time in (5, 9):
         writer.write('/t', wire.CONFIGURATION_TYPE, log_time, wire.encode_text('b'))
-    assert information()['relative_file_paths'] == ['bag_0.mcap', 'bag_1.mcap', 'bag_2.mcap']
+    assert information()['relative_file_paths'] == ['bag_0.mcap', 'bag_1.mcap']
     assert information()['message_count'] == 2
+    assert len(list(read_messages(tmp_path / 'bag'))) == 2  # the finished files are a valid bag already
     writer.close()
+    assert information()['relative_file_paths'] == ['bag_0.mcap', 'bag_1.mcap', 'bag_2.mcap']
     assert information()['message_count'] == 3
 
 
