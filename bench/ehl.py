@@ -129,7 +129,9 @@ def study_rows(case: Case) -> list[Row]:
     """Deviation of friction over tau_c from its mean, with its errors; the study's runs are one cycle each."""
     once = dataclasses.replace(case, motion=dataclasses.replace(case.motion, cycles=1))
     n = once.numerics
-    grids = (n, dataclasses.replace(n, time_step=2.0 * n.time_step), dataclasses.replace(n, cells=max(32, n.cells // 2)))
+    longer = dataclasses.replace(n, time_step=2.0 * n.time_step)
+    coarser = dataclasses.replace(n, cells=max(32, n.cells // 2))
+    grids = (n, longer, coarser)
     fine, step_, grid = (run_study(dataclasses.replace(once, numerics=g), 1).table for g in grids)
     return [
         Row(
