@@ -16,9 +16,9 @@ from rich.text import Text
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.estimator import step
-from seal_friction_ros.core.pipeline import encoded, init, receive
+from seal_friction_ros.core.pipeline import Reference, encoded, init, receive
 from seal_friction_ros.core.records import Force, Pressure, RodSample
-from seal_friction_ros.core.wire import ServoReference, Velocity
+from seal_friction_ros.core.wire import Velocity
 from seal_friction_ros.files import default_configuration
 
 CALLS = 2000
@@ -31,7 +31,7 @@ def stages() -> dict[str, Callable[[], object]]:
     pressure, force, velocity = Pressure(1, 3e6, 1e6), Force(1, 20.0), Velocity(1, 0.1, b'rod')
     sample = RodSample(1, 0.1, pressure, force)
     alone = init(parameters)._replace(pressure=pressure, force=force)
-    guided = alone._replace(reference=ServoReference(1, 0.0, 0.1, 0.0))
+    guided = alone._replace(reference=Reference(1, 0.1, 0.0))
     _, answer = receive(parameters, alone, velocity)
     _, both = receive(parameters, guided, velocity)
     velocity_bytes, pressure_bytes = wire.encode_velocity(velocity), wire.encode_pressure(pressure, b'rod')

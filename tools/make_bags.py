@@ -30,6 +30,7 @@ from seal_friction_ros.offline.bag import (
 )
 from seal_friction_ros.offline.import_thesis import import_thesis
 
+TIGHT = {'pressure_rate_max': 1e8, 'force_rate_max': 1e4, 'acceleration_max': 10.0}  # so that leaps show at 100 Hz
 BAGS = Path(__file__).parents[1] / 'bags'
 SECOND = 1_000_000_000  # [ns]
 STEP = 10_000_000  # [ns]
@@ -51,10 +52,10 @@ def faults(folder: Path) -> Iterable[BagMessage]:
     for i in range(600):
         stamp = SECOND + i * STEP
         pressure = 3e6 + 2e6 * math.sin(i / 40)
-        pressures = {100: math.nan, 110: math.inf, 120: 1e12, 130: -9e5, 140: 2e7}
-        forces = {160: math.nan, 170: -math.inf, 180: 1e9}
+        pressures = {100: math.nan, 110: math.inf, 120: 1e12, 130: -9e5, 140: 2e7, 141: 2e7}
+        forces = {160: math.nan, 170: -math.inf, 180: 1e9, 190: 400.0}
         velocity = max(abs(math.sin(i / 30)) - 0.4, 0.0) * math.copysign(0.05, math.sin(i / 30))
-        velocities = {200: math.nan, 210: -math.inf, 220: 99.0}
+        velocities = {200: math.nan, 210: -math.inf, 220: 99.0, 225: 0.5}
         if i >= 5 and not 300 <= i < 330:
             sample = Pressure(stamp, pressures.get(i, pressure), pressure / 2)
             yield BagMessage(PRESSURE_TOPIC, wire.PRESSURE_TYPE, stamp, wire.encode_pressure(sample, b'rod'))
@@ -79,15 +80,16 @@ def main() -> int:
         'pull_test': (
             pull_test,
             'Thesis, Table A-1: readings played as signals (import thesis).',
+            {},
         ),
-        'faults': (faults, 'Made up: sine waves with one fault after another.'),
+        'faults': (faults, 'Made up: sine waves with one fault after another.', TIGHT),
     }
-    for name, (make, origin) in sources.items():
+    for name, (make, origin, parameters) in sources.items():
         with tempfile.TemporaryDirectory() as folder:
             with BagWriter(Path(folder) / 'inputs') as writer:
                 for message in make(Path(folder)):
                     writer.write(*message)
-            play_live(Path(folder) / 'inputs', Path(folder) / name, free_domain(), 1.0)
+            play_live(Path(folder) / 'inputs', Path(folder) / name, free_domain(), 1.0, parameters)
             shutil.rmtree(BAGS / name, ignore_errors=True)
             shutil.copytree(Path(folder) / name, BAGS / name)
         digest = hashlib.sha256((BAGS / name / f'{name}_0.mcap').read_bytes()).hexdigest()

@@ -30,7 +30,7 @@ from seal_friction_ros.core.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
 from seal_friction_ros.core.validated import meanings
-from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
+from seal_friction_ros.nodes.parameters import InputOptions, RecordingOptions, StartOptions
 from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
 
 DOCS = Path(__file__).parents[1] / 'docs'
@@ -52,6 +52,7 @@ RECORDS = (
     Trapezoid,
     Chirp,
     PullTest,
+    InputOptions,
     RecordingOptions,
     SealGeometry,
     AreaDeformationGain,

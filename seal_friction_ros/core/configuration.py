@@ -6,19 +6,16 @@ So a bag carries what is needed to replay it, also when parameters changed on th
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, get_type_hints
 
 from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings, EstimatorState
 from seal_friction_ros.core.feedforward import FeedForwardSettings, FeedForwardState
-from seal_friction_ros.core.pipeline import PipelineParameters, PipelineState, init
-from seal_friction_ros.core.records import Force, FrictionEstimate, FrictionState, Pressure
+from seal_friction_ros.core.pipeline import PipelineParameters, PipelineState, Reference, init
+from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.core.seal_file import mount_seals
 from seal_friction_ros.core.validated import check, from_mapping, parameter
-from seal_friction_ros.core.wire import ServoReference
-
-Record = TypeVar('Record')
 
 
 @dataclass(frozen=True)
@@ -89,28 +86,12 @@ def first_snapshot(configuration: Configuration) -> Snapshot:
 def snapshot_text(snapshot: Snapshot) -> str:
     """Snapshot as JSON; equal ones give equal text. Measured values are hexadecimal, so also NaN and infinity pass."""
     configuration, state = snapshot
-    estimator, feedforward = state.estimator, state.feedforward
     document = {
         'selection': dataclasses.asdict(configuration.selection),
         'seal_documents': configuration.seal_documents,
         'settings': dataclasses.asdict(configuration.settings),
         'feedforward': dataclasses.asdict(configuration.feedforward),
-        'state': {
-            'estimator': {
-                'stamp': estimator.stamp,
-                'at_rest': estimator.at_rest,
-                'pressure': _text(estimator.pressure),
-                'force': _text(estimator.force),
-            },
-            'feedforward': {
-                'stamp': feedforward.stamp,
-                'values': _text((feedforward.force, feedforward.fade, feedforward.velocity)),
-                'estimate': _text(feedforward.estimate),
-            },
-            'pressure': _text(state.pressure),
-            'force': _text(state.force),
-            'reference': _text(state.reference[:4] if state.reference is not None else None),
-        },
+        'state': _plain(state),
     }
     return json.dumps(document, sort_keys=True, allow_nan=False)
 
@@ -129,51 +110,48 @@ def parse_snapshot(text: str) -> Snapshot:
             from_mapping(EstimatorSettings, document['settings'], 'configuration: settings'),
             from_mapping(FeedForwardSettings, document['feedforward'], 'configuration: feedforward'),
         )
-        state = document['state']
-        newest = (
-            _parse(Pressure, state['pressure']),
-            _parse(Force, state['force']),
-            _parse(ServoReference, state['reference']),
-        )
-        parsed = PipelineState(_parse_estimator(state['estimator']), _parse_feedforward(state['feedforward']), *newest)
-        return Snapshot(configuration, parsed)
+        state = _state(document['state'])
+        return Snapshot(configuration, state)
     except (TypeError, LookupError, OverflowError, RecursionError) as error:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
 
-def _parse_estimator(state: Any) -> EstimatorState:
-    usable = _parse(Pressure, state['pressure']), _parse(Force, state['force'])
-    _check_finite(*usable)
-    return EstimatorState(_parse_stamp(state['stamp']), bool(state['at_rest']), *usable)
+def _state(document: Any) -> PipelineState:
+    """State of the pipeline from what `_plain` made of it.
 
-
-def _parse_feedforward(state: Any) -> FeedForwardState:
-    force, fade, velocity = map(float.fromhex, state['values'])
-    estimate = _parse(FrictionEstimate, state['estimate'])
-    if estimate is not None:
-        kind = FrictionState(int(estimate.state))
-        estimate = estimate._replace(state=kind, direction=int(estimate.direction), status=int(estimate.status))
-    _check_finite((0, force, fade, velocity), estimate)
-    return FeedForwardState(_parse_stamp(state['stamp']), force, fade, estimate, velocity)
-
-
-def _check_finite(*samples: tuple[float, ...] | None) -> None:
-    if not all(math.isfinite(value) for sample in samples if sample is not None for value in sample):
+    Raises:
+        ValueError: A number that was computed here, or a sample that was found usable, is not finite.
+    """
+    seen: EstimatorState = _parsed(EstimatorState, document['estimator'])
+    fed: FeedForwardState = _parsed(FeedForwardState, document['feedforward'])
+    usable = (seen.pressure, seen.force, seen.velocity, seen.leapt_pressure, seen.leapt_force, seen.leapt_velocity)
+    computed = (fed.force, fed.fade, fed.velocity, *fed.estimate)
+    if not all(math.isfinite(value) for value in (*computed, *(number for sample in usable for number in sample))):
         raise ValueError('configuration: a number in the state is not finite')
+    return PipelineState(
+        seen,
+        fed,
+        _parsed(Pressure, document['pressure']),
+        _parsed(Force, document['force']),
+        _parsed(Reference, document['reference']),
+        bool(document['refused']),
+    )
 
 
-def _parse_stamp(stamp: Any) -> int | None:
-    return None if stamp is None else int(stamp)
+def _plain(value: Any) -> Any:
+    """Named tuples as mappings, whole numbers as they are, others as hexadecimal text."""
+    if isinstance(value, tuple) and hasattr(value, '_asdict'):
+        return {name: _plain(field) for name, field in value._asdict().items()}
+    return float(value).hex() if isinstance(value, float) else int(value)
 
 
-def _text(values: tuple[float, ...] | None) -> list[int | str] | None:
-    """Whole numbers as they are, others as hexadecimal text."""
-    return None if values is None else [int(v) if isinstance(v, int) else float(v).hex() for v in values]
+def _parsed(record_type: Any, document: Any) -> Any:
+    """Named tuple from what `_plain` made of it; each field of the type that it has to be of."""
+    hints = get_type_hints(record_type)
+    return record_type(**{name: _field(hints[name], document[name]) for name in record_type._fields})
 
 
-def _parse(record_type: Callable[..., Record], values: Any) -> Record | None:
-    """Named tuple from what `_text` made of it."""
-    if values is None:
-        return None
-    stamp, *rest = values
-    return record_type(int(stamp), *(float.fromhex(value) if isinstance(value, str) else int(value) for value in rest))
+def _field(kind: Any, value: Any) -> Any:
+    if hasattr(kind, '_fields'):
+        return _parsed(kind, value)
+    return float.fromhex(value) if kind is float else kind(int(value))

@@ -10,9 +10,20 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from seal_friction_ros.core.coulomb import MountedSeal, actuator_friction
-from seal_friction_ros.core.friction_state import is_at_rest, state_friction
-from seal_friction_ros.core.records import Force, FrictionEstimate, FrictionState, Pressure, RodSample, Status
+from seal_friction_ros.core.compilable import compilable
+from seal_friction_ros.core.coulomb import ActuatorFriction, MountedSeal, actuator_friction
+from seal_friction_ros.core.friction_state import StateFriction, is_at_rest, state_friction
+from seal_friction_ros.core.records import (
+    NEVER,
+    NO_FORCE,
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    FrictionState,
+    Pressure,
+    RodSample,
+    Status,
+)
 from seal_friction_ros.core.validated import check, parameter
 
 
@@ -52,6 +63,16 @@ class EstimatorSettings:
         1e6, unit='N', lower=1.0, upper=1e9, description='A force sum of a magnitude above this is a sensor fault.'
     )
 
+    pressure_rate_max: float = parameter(
+        1e10, unit='Pa/s', lower=1.0, upper=1e15, description='A pressure that leaps faster than this is not believed.'
+    )
+    force_rate_max: float = parameter(
+        1e8, unit='N/s', lower=1e-3, upper=1e15, description='A force sum that leaps faster than this is not believed.'
+    )
+    acceleration_max: float = parameter(
+        1e3, unit='m/s^2', lower=1e-3, upper=1e9, description='A velocity that leaps faster than this is not believed.'
+    )
+
     def __post_init__(self) -> None:
         check(self)
         if self.slip_velocity < self.stick_velocity:
@@ -77,22 +98,53 @@ class EstimatorParameters:
             raise ValueError('EstimatorParameters.seals is empty: name at least one seal')
 
 
+class Speed(NamedTuple):
+    """One rod velocity."""
+
+    stamp: int
+    """[ns]"""
+    velocity: float
+    """[m/s]"""
+
+
+NO_SPEED = Speed(NEVER, 0.0)
+
+
 class EstimatorState(NamedTuple):
     """What one step leaves for the next."""
 
-    stamp: int | None
-    """[ns] of the last velocity sample; None before the first"""
+    stamp: int
+    """[ns] of the last velocity sample; `NEVER` before the first"""
     at_rest: bool
-    pressure: Pressure | None
+    pressure: Pressure
     """last usable pressure"""
-    force: Force | None
+    force: Force
     """last usable force sum"""
+    velocity: Speed
+    """last usable velocity"""
+    leapt_pressure: Pressure
+    """pressure that leapt away from the last usable one, if that was the newest"""
+    leapt_force: Force
+    leapt_velocity: Speed
+
+
+class Observation(NamedTuple):
+    """What one sample says, before any friction is computed."""
+
+    stamp: int
+    """[ns]"""
+    velocity: float
+    """[m/s] at which the seals slide; 0 at rest and where it is not known"""
+    status: int
+    """bits of `Status`"""
+    input_age: float
+    """[s] as in `FrictionEstimate`"""
 
 
 def init(parameters: EstimatorParameters) -> EstimatorState:
     """State before the first sample: nothing is known, the rod counts as moving."""
     del parameters
-    return EstimatorState(None, False, None, None)
+    return EstimatorState(NEVER, False, NO_PRESSURE, NO_FORCE, NO_SPEED, NO_PRESSURE, NO_FORCE, NO_SPEED)
 
 
 # Status bits as plain integers: IntFlag arithmetic costs a microsecond each time.
@@ -108,6 +160,18 @@ _FORCE_OUT_OF_RANGE = int(Status.FORCE_OUT_OF_RANGE)
 _VELOCITY_OUT_OF_RANGE = int(Status.VELOCITY_OUT_OF_RANGE)
 _OUTSIDE_IDENTIFIED_RANGE = int(Status.OUTSIDE_IDENTIFIED_RANGE)
 _STAMP_NOT_INCREASING = int(Status.STAMP_NOT_INCREASING)
+_PRESSURE_LEAP = int(Status.PRESSURE_LEAP)
+_FORCE_LEAP = int(Status.FORCE_LEAP)
+_VELOCITY_LEAP = int(Status.VELOCITY_LEAP)
+_INPUT_REFUSED = int(Status.INPUT_REFUSED)
+
+_NO_MOTION = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
+_NO_STATE = _NO_MOTION | _INPUT_REFUSED | _PRESSURE_MISSING
+_NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE
+_NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
+_UNKNOWN = StateFriction(FrictionState.UNKNOWN, 0, 0.0)
+
+SHORTEST_INTERVAL = 1e-3  # [s] our choice: below it noise leaps, and stamps of some drivers are no finer
 
 
 def step(
@@ -115,10 +179,14 @@ def step(
 ) -> tuple[EstimatorState, FrictionEstimate]:
     """Estimate the friction of the seals at one rod-velocity sample.
 
-    A pressure or force sum that is not finite or out of range is never used: the last usable one is, for as long as
-    it is not stale, and the status says so. A velocity like that, or no usable pressure ever, makes the state UNKNOWN
-    with a friction force of 0 N; so does, at rest, a force sum that is missing or stale. A stale pressure leaves the
-    state and the last known friction, flagged.
+    A pressure or force sum that is not finite, out of range, or that leaps is never used: the last usable one is, for
+    as long as it is not stale, and the status says so. A velocity like that, inputs that are refused, or no usable
+    pressure ever, make the state UNKNOWN with a friction force of 0 N; so does, at rest, a force sum that is missing or
+    stale. A stale pressure leaves the state and the last known friction, flagged.
+
+    A sample leaps if it is further from the last usable one than the largest rate allows for the time between them, at
+    least `SHORTEST_INTERVAL`. The next sample is believed if it agrees with either: so a spike costs one sample, and so
+    does a step that is real.
 
     Args:
         parameters: Settings and seals.
@@ -130,74 +198,139 @@ def step(
 
     Source: thesis, chapter 7 (Figures 20 and 21); what is done with unusable inputs is our choice.
     """
-    settings = parameters.settings
-    status = 0
-    if state.stamp is not None and sample.stamp <= state.stamp:
+    state, seen = observe(parameters.settings, state, sample)
+    friction = _NO_FRICTION
+    if not seen.status & _PRESSURE_MISSING:
+        pressure = state.pressure
+        friction = actuator_friction(parameters.seals, pressure.chamber_a, pressure.chamber_b, seen.velocity)
+    return state, answer(parameters.settings, state, seen, friction)
+
+
+@compilable
+def observe(
+    settings: EstimatorSettings, state: EstimatorState, sample: RodSample
+) -> tuple[EstimatorState, Observation]:
+    """First half of a step: which inputs are in use, what is wrong with them, and whether the rod moves."""
+    status = _INPUT_REFUSED if sample.refused else 0
+    if state.stamp != NEVER and sample.stamp <= state.stamp:
         status |= _STAMP_NOT_INCREASING
 
-    pressure, fault = _usable_pressure(settings, sample.pressure, state.pressure)
+    pressure, leapt_pressure, fault = _usable_pressure(settings, sample.pressure, state.pressure, state.leapt_pressure)
     status |= fault
-    force, fault = _usable_force(settings, sample.force, state.force)
+    force, leapt_force, fault = _usable_force(settings, sample.force, state.force, state.leapt_force)
     status |= fault
-    pressure_age = 0.0 if pressure is None else (sample.stamp - pressure.stamp) * 1e-9
-    force_age = 0.0 if force is None else (sample.stamp - force.stamp) * 1e-9
+    pressure_age = 0.0 if pressure.stamp == NEVER else (sample.stamp - pressure.stamp) * 1e-9
+    force_age = 0.0 if force.stamp == NEVER else (sample.stamp - force.stamp) * 1e-9
     if abs(pressure_age) > settings.pressure_timeout:
         status |= _PRESSURE_STALE
     if abs(force_age) > settings.force_timeout:
         status |= _FORCE_STALE
-    input_age = -1.0 if pressure is None or force is None else max(pressure_age, force_age)
+    input_age = pressure_age if pressure_age >= force_age else force_age
+    if status & (_PRESSURE_MISSING | _FORCE_MISSING):
+        input_age = -1.0
 
-    fault = _velocity_fault(settings, sample.velocity)
+    newest = Speed(sample.stamp, sample.velocity)
+    velocity, leapt_velocity, fault = _usable_velocity(settings, newest, state.velocity, state.leapt_velocity)
     status |= fault
-    at_rest = state.at_rest
+    at_rest, sliding_velocity = state.at_rest, 0.0
     if not fault:
         at_rest = is_at_rest(sample.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
-
-    coulomb = std = breakaway = sliding = 0.0
-    if pressure is not None:
-        velocity = 0.0 if fault or at_rest else sample.velocity
-        friction = actuator_friction(parameters.seals, pressure.chamber_a, pressure.chamber_b, velocity)
-        coulomb, std = friction.coulomb_friction, friction.coulomb_friction_std
-        sliding = coulomb + friction.velocity_friction
-        breakaway = coulomb + friction.stiction if settings.use_stiction else coulomb
-        if not friction.in_identified_range:
-            status |= _OUTSIDE_IDENTIFIED_RANGE
-
-    force_known = force is not None and not status & _FORCE_STALE
-    if fault or pressure is None or (at_rest and not force_known):
-        acting = (FrictionState.UNKNOWN, 0, 0.0)
-    else:
-        force_sum = force.force if force is not None else 0.0
-        acting = state_friction(sample.velocity, force_sum, at_rest, sliding, breakaway)
-
-    estimate = FrictionEstimate(
-        sample.stamp, coulomb, std, breakaway, acting[2], acting[0], acting[1], status, input_age
+        if not at_rest:
+            sliding_velocity = sample.velocity
+    state = EstimatorState(
+        sample.stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity
     )
-    return EstimatorState(sample.stamp, at_rest, pressure, force), estimate
+    return state, Observation(sample.stamp, sliding_velocity, status, input_age)
 
 
+@compilable
+def answer(
+    settings: EstimatorSettings, state: EstimatorState, seen: Observation, friction: ActuatorFriction
+) -> FrictionEstimate:
+    """Second half of a step: what acts on the rod, given the friction of all seals at the pressure in use."""
+    status = seen.status
+    coulomb = friction.coulomb_friction
+    breakaway = coulomb + friction.stiction if settings.use_stiction else coulomb
+    if not friction.in_identified_range:
+        status |= _OUTSIDE_IDENTIFIED_RANGE
+    acting = _UNKNOWN
+    if not (status & _NO_STATE or (state.at_rest and status & _NO_FORCE_SUM)):
+        sliding = coulomb + friction.velocity_friction
+        acting = state_friction(state.velocity.velocity, state.force.force, state.at_rest, sliding, breakaway)
+    return FrictionEstimate(
+        seen.stamp,
+        coulomb,
+        friction.coulomb_friction_std,
+        breakaway,
+        acting.friction_force,
+        acting.state,
+        acting.direction,
+        status,
+        seen.input_age,
+    )
+
+
+@compilable
+def _leaps(change: float, elapsed: int, largest_rate: float) -> bool:
+    """Whether a change is faster than ``largest_rate`` [unit of change / s] over ``elapsed`` [ns]."""
+    return abs(change) > largest_rate * max(abs(elapsed) * 1e-9, SHORTEST_INTERVAL)
+
+
+@compilable
+def _pressure_leaps(settings: EstimatorSettings, newer: Pressure, older: Pressure) -> bool:
+    elapsed, fastest = newer.stamp - older.stamp, settings.pressure_rate_max
+    return _leaps(newer.chamber_a - older.chamber_a, elapsed, fastest) or _leaps(
+        newer.chamber_b - older.chamber_b, elapsed, fastest
+    )
+
+
+@compilable
 def _usable_pressure(
-    settings: EstimatorSettings, newest: Pressure | None, last: Pressure | None
-) -> tuple[Pressure | None, int]:
-    if newest is None:
-        return last, _PRESSURE_MISSING if last is None else 0
+    settings: EstimatorSettings, newest: Pressure, used: Pressure, leapt: Pressure
+) -> tuple[Pressure, Pressure, int]:
+    """Pressure to use, the one that leapt, and what is wrong."""
+    missing = _PRESSURE_MISSING if used.stamp == NEVER else 0
+    if newest.stamp == NEVER:
+        return used, leapt, missing
     a, b = newest.chamber_a, newest.chamber_b
-    if settings.pressure_min <= a <= settings.pressure_max and settings.pressure_min <= b <= settings.pressure_max:
-        return newest, 0
-    fault = _PRESSURE_OUT_OF_RANGE if math.isfinite(a) and math.isfinite(b) else _PRESSURE_NOT_FINITE
-    return last, fault | (_PRESSURE_MISSING if last is None else 0)
+    lowest, highest = settings.pressure_min, settings.pressure_max
+    if not (lowest <= a <= highest and lowest <= b <= highest):
+        finite = math.isfinite(a) and math.isfinite(b)
+        return used, leapt, missing | (_PRESSURE_OUT_OF_RANGE if finite else _PRESSURE_NOT_FINITE)
+    if missing or not _pressure_leaps(settings, newest, used):
+        return newest, NO_PRESSURE, 0
+    confirms = leapt.stamp not in (NEVER, newest.stamp)
+    if confirms and not _pressure_leaps(settings, newest, leapt):
+        return newest, NO_PRESSURE, 0
+    return used, newest, _PRESSURE_LEAP
 
 
-def _usable_force(settings: EstimatorSettings, newest: Force | None, last: Force | None) -> tuple[Force | None, int]:
-    if newest is None:
-        return last, _FORCE_MISSING if last is None else 0
-    if abs(newest.force) <= settings.force_max:
-        return newest, 0
-    fault = _FORCE_OUT_OF_RANGE if math.isfinite(newest.force) else _FORCE_NOT_FINITE
-    return last, fault | (_FORCE_MISSING if last is None else 0)
+@compilable
+def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt: Force) -> tuple[Force, Force, int]:
+    """Force sum to use, the one that leapt, and what is wrong."""
+    missing = _FORCE_MISSING if used.stamp == NEVER else 0
+    if newest.stamp == NEVER:
+        return used, leapt, missing
+    if not abs(newest.force) <= settings.force_max:
+        return used, leapt, missing | (_FORCE_OUT_OF_RANGE if math.isfinite(newest.force) else _FORCE_NOT_FINITE)
+    fastest = settings.force_rate_max
+    if missing or not _leaps(newest.force - used.force, newest.stamp - used.stamp, fastest):
+        return newest, NO_FORCE, 0
+    confirms = leapt.stamp not in (NEVER, newest.stamp)
+    if confirms and not _leaps(newest.force - leapt.force, newest.stamp - leapt.stamp, fastest):
+        return newest, NO_FORCE, 0
+    return used, newest, _FORCE_LEAP
 
 
-def _velocity_fault(settings: EstimatorSettings, velocity: float) -> int:
-    if abs(velocity) <= settings.velocity_max:
-        return 0
-    return _VELOCITY_OUT_OF_RANGE if math.isfinite(velocity) else _VELOCITY_NOT_FINITE
+@compilable
+def _usable_velocity(settings: EstimatorSettings, newest: Speed, used: Speed, leapt: Speed) -> tuple[Speed, Speed, int]:
+    """Velocity to use, the one that leapt, and what is wrong."""
+    if not abs(newest.velocity) <= settings.velocity_max:
+        return used, leapt, _VELOCITY_OUT_OF_RANGE if math.isfinite(newest.velocity) else _VELOCITY_NOT_FINITE
+    fastest = settings.acceleration_max
+    if used.stamp == NEVER or not _leaps(newest.velocity - used.velocity, newest.stamp - used.stamp, fastest):
+        return newest, NO_SPEED, 0
+    confirms = leapt.stamp not in (NEVER, newest.stamp)
+    if confirms and not _leaps(newest.velocity - leapt.velocity, newest.stamp - leapt.stamp, fastest):
+        return newest, NO_SPEED, 0
+    return used, newest, _VELOCITY_LEAP

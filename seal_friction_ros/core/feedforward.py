@@ -20,7 +20,8 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import NamedTuple
 
-from seal_friction_ros.core.records import FrictionEstimate, FrictionState, Status
+from seal_friction_ros.core.compilable import compilable
+from seal_friction_ros.core.records import NEVER, NO_ESTIMATE, FrictionEstimate, FrictionState, Status
 from seal_friction_ros.core.validated import check, parameter
 
 FASTEST = 100.0  # [m/s] no rod is faster
@@ -35,8 +36,15 @@ class Limited(IntFlag):
     FADE = 4
 
 
+_SLEW, _CLAMP, _FADE = int(Limited.SLEW), int(Limited.CLAMP), int(Limited.FADE)
+
 UNUSABLE = int(
-    Status.PRESSURE_MISSING | Status.PRESSURE_STALE | Status.PRESSURE_NOT_FINITE | Status.PRESSURE_OUT_OF_RANGE
+    Status.PRESSURE_MISSING
+    | Status.PRESSURE_STALE
+    | Status.PRESSURE_NOT_FINITE
+    | Status.PRESSURE_OUT_OF_RANGE
+    | Status.PRESSURE_LEAP
+    | Status.INPUT_REFUSED
 )
 """Status bits that take the Coulomb friction its ground. A bad force or velocity does not, see `usable`."""
 
@@ -116,14 +124,14 @@ class Motion(NamedTuple):
 class FeedForwardState(NamedTuple):
     """What one step leaves for the next."""
 
-    stamp: int | None
-    """[ns] of the last step; None before the first"""
+    stamp: int
+    """[ns] of the last step; `NEVER` before the first"""
     force: float
     """[N]"""
     fade: float
     """[-] 0: faded out, 1: not faded"""
-    estimate: FrictionEstimate | None
-    """last usable estimate"""
+    estimate: FrictionEstimate
+    """last usable estimate; `NO_ESTIMATE` before the first"""
     velocity: float
     """[m/s] last usable velocity"""
 
@@ -144,9 +152,10 @@ class FeedForward(NamedTuple):
 def init(settings: FeedForwardSettings) -> FeedForwardState:
     """Before the first estimate: faded out."""
     del settings
-    return FeedForwardState(None, 0.0, 0.0, None, 0.0)
+    return FeedForwardState(NEVER, 0.0, 0.0, NO_ESTIMATE, 0.0)
 
 
+@compilable
 def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
     """Whether the Coulomb friction of an estimate stands on a good pressure.
 
@@ -157,6 +166,7 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
     return not settings.use_measured_velocity or estimate.state != FrictionState.UNKNOWN
 
 
+@compilable
 def compensation(
     settings: FeedForwardSettings, estimate: FrictionEstimate, velocity: float, velocity_friction: float = 0.0
 ) -> float:
@@ -169,11 +179,12 @@ def compensation(
     return math.tanh(velocity / settings.smoothing_velocity) * coulomb + viscous
 
 
+@compilable
 def step(
     settings: FeedForwardSettings,
     state: FeedForwardState,
     stamp: int,
-    estimate: FrictionEstimate | None,
+    estimate: FrictionEstimate,
     motion: Motion,
 ) -> tuple[FeedForwardState, FeedForward]:
     """Feed-forward at one moment.
@@ -185,40 +196,48 @@ def step(
         settings: Settings.
         state: From `init` or the step before.
         stamp: Now [ns].
-        estimate: Newest estimate; None while there is none.
+        estimate: Newest estimate; `NO_ESTIMATE` while there is none.
         motion: Reference and measured motion. A velocity that is not finite is not usable.
     """
-    elapsed = 0.0 if state.stamp is None else min(max((stamp - state.stamp) * 1e-9, 0.0), LONGEST_STEP)
+    elapsed = 0.0 if state.stamp == NEVER else _between(0.0, (stamp - state.stamp) * 1e-9, LONGEST_STEP)
     good, valid = state.estimate, False
-    if estimate is not None and usable(settings, estimate):
+    if estimate.stamp != NEVER and usable(settings, estimate):
         good = estimate
         valid = abs(stamp - estimate.stamp) * 1e-9 <= settings.estimate_timeout
     velocity = wanted_velocity(settings, motion)
-    if velocity is None:
+    if math.isnan(velocity):
         velocity, valid = state.velocity, False
     change = elapsed / settings.fade_time
-    first = valid and state.estimate is None and state.stamp is None
-    fade = 1.0 if first else min(max(state.fade + (change if valid else -change), 0.0), 1.0)
+    first = valid and state.estimate.stamp == NEVER and state.stamp == NEVER
+    fade = 1.0 if first else _between(0.0, state.fade + (change if valid else -change), 1.0)
 
-    limited = int(Limited.FADE) if fade < 1.0 or not valid else 0
-    wanted = 0.0 if good is None else fade * compensation(settings, good, velocity, motion.velocity_friction)
-    clamped = min(max(wanted, -settings.force_limit), settings.force_limit)
+    limited = _FADE if fade < 1.0 or not valid else 0
+    wanted = 0.0 if good.stamp == NEVER else fade * compensation(settings, good, velocity, motion.velocity_friction)
+    clamped = _between(-settings.force_limit, wanted, settings.force_limit)
     if clamped != wanted:
-        limited |= int(Limited.CLAMP)
+        limited |= _CLAMP
     most = settings.slew_limit * elapsed
-    force = min(max(clamped, state.force - most), state.force + most)
+    force = _between(state.force - most, clamped, state.force + most)
     if force != clamped:
-        limited |= int(Limited.SLEW)
+        limited |= _SLEW
     feedforward = FeedForward(stamp, force, settings.coulomb_scale * fade, limited)
     return FeedForwardState(stamp, force, fade, good, velocity), feedforward
 
 
-def wanted_velocity(settings: FeedForwardSettings, motion: Motion) -> float | None:
-    """Velocity v [m/s] of the equation; None if it is not usable."""
+@compilable
+def wanted_velocity(settings: FeedForwardSettings, motion: Motion) -> float:
+    """Velocity v [m/s] of the equation; NaN if it is not usable."""
     if settings.use_measured_velocity:
         velocity = motion.measured_velocity
     elif abs(motion.reference_age) > settings.reference_timeout:
-        return None
+        return math.nan
     else:
         velocity = motion.reference_velocity + settings.lead_time * motion.reference_acceleration
-    return min(max(velocity, -FASTEST), FASTEST) if math.isfinite(velocity) else None
+    return _between(-FASTEST, velocity, FASTEST) if math.isfinite(velocity) else math.nan
+
+
+@compilable
+def _between(lowest: float, value: float, highest: float) -> float:
+    if value < lowest:
+        return lowest
+    return highest if value > highest else value

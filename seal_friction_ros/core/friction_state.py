@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from seal_friction_ros.core.compilable import compilable
 from seal_friction_ros.core.records import FrictionState
 
 
@@ -15,11 +16,13 @@ class StateFriction(NamedTuple):
     """[N] ``m a = force_sum - friction_force``"""
 
 
+@compilable
 def sign(x: float) -> int:
     """-1, 0 or 1."""
     return (x > 0.0) - (x < 0.0)
 
 
+@compilable
 def is_at_rest(velocity: float, was_at_rest: bool, stick_velocity: float, slip_velocity: float) -> bool:
     """Whether a measured velocity counts as V = 0, with hysteresis.
 
@@ -37,6 +40,7 @@ def is_at_rest(velocity: float, was_at_rest: bool, stick_velocity: float, slip_v
     return abs(velocity) <= (slip_velocity if was_at_rest else stick_velocity)
 
 
+@compilable
 def state_friction(
     velocity: float, force_sum: float, at_rest: bool, coulomb_friction: float, breakaway_force: float
 ) -> StateFriction:

@@ -4,6 +4,9 @@
 order of receipt. A velocity sample makes an estimate with the pressure and force sum that came last, and, once there
 has been a reference, a feed-forward. While velocity samples fail to come, references make the feed-forward, so that it
 fades out instead of standing still.
+
+Inputs that are refused, since several nodes publish them and nobody knows which one is right, still make estimates, so
+that everybody sees it, but these are marked and the feed-forward fades out.
 """
 
 import math
@@ -11,10 +14,20 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from seal_friction_ros.core import estimator, feedforward, wire
+from seal_friction_ros.core.compilable import compilable
 from seal_friction_ros.core.coulomb import actuator_friction
 from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.feedforward import FeedForward, FeedForwardSettings, FeedForwardState, Motion
-from seal_friction_ros.core.records import Force, FrictionEstimate, Pressure, RodSample
+from seal_friction_ros.core.records import (
+    NEVER,
+    NO_ESTIMATE,
+    NO_FORCE,
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    Pressure,
+    RodSample,
+)
 from seal_friction_ros.core.wire import Position, ServoReference, Velocity
 
 Input = Pressure | Force | ServoReference | Position | Velocity
@@ -28,14 +41,30 @@ class PipelineParameters(NamedTuple):
     feedforward: FeedForwardSettings
 
 
+class Reference(NamedTuple):
+    """How the rod shall move."""
+
+    stamp: int
+    """[ns] the moment it is for"""
+    velocity: float
+    """[m/s]"""
+    acceleration: float
+    """[m/s^2]"""
+
+
+NO_REFERENCE = Reference(NEVER, 0.0, 0.0)
+
+
 class PipelineState(NamedTuple):
-    """What one message leaves for the next; the newest inputs are None before the first."""
+    """What one message leaves for the next, the newest inputs among it."""
 
     estimator: EstimatorState
     feedforward: FeedForwardState
-    pressure: Pressure | None = None
-    force: Force | None = None
-    reference: ServoReference | None = None
+    pressure: Pressure = NO_PRESSURE
+    force: Force = NO_FORCE
+    reference: Reference = NO_REFERENCE
+    refused: bool = False
+    """whether inputs come from somebody who should not send them"""
 
 
 class Answer(NamedTuple):
@@ -74,12 +103,12 @@ def receive(parameters: PipelineParameters, state: PipelineState, message: Input
         return state._replace(force=message), NOTHING
     if isinstance(message, Position):  # nothing depends on it; it is kept in bags to show how the servo tracks
         return state, NOTHING
-    state = state._replace(reference=message._replace(frame_id=b''))
-    last = state.estimator.stamp
-    if last is not None and abs(message.stamp - last) * 1e-9 <= parameters.feedforward.estimate_timeout:
+    reference = Reference(message.stamp, message.velocity, message.acceleration)
+    state = state._replace(reference=reference)
+    if not is_fading(parameters.feedforward, state.estimator.stamp, message.stamp):
         return state, NOTHING
-    motion = Motion(message.velocity, message.acceleration)
-    fading, force = feedforward.step(parameters.feedforward, state.feedforward, message.stamp, None, motion)
+    motion = Motion(reference.velocity, reference.acceleration)
+    fading, force = feedforward.step(parameters.feedforward, state.feedforward, message.stamp, NO_ESTIMATE, motion)
     return state._replace(feedforward=fading), Answer(None, force, message.frame_id)
 
 
@@ -87,30 +116,39 @@ def _on_velocity(
     parameters: PipelineParameters, state: PipelineState, velocity: Velocity
 ) -> tuple[PipelineState, Answer]:
     stamp, measured, frame_id = velocity
-    _, force_state, pressure, force, reference = state
-    sample = RodSample(stamp, measured, pressure, force)
+    _, force_state, pressure, force, reference, refused = state
+    sample = RodSample(stamp, measured, pressure, force, refused)
     estimator_state, estimate = estimator.step(parameters.estimator, state.estimator, sample)
     compensation = None
-    if reference is not None or parameters.feedforward.use_measured_velocity:
-        motion = _motion(reference, stamp, measured)
+    if reference.stamp != NEVER or parameters.feedforward.use_measured_velocity:
+        motion = motion_at(reference, stamp, measured)
         motion = _with_velocity_friction(parameters, motion, estimator_state.pressure)
         force_state, compensation = feedforward.step(parameters.feedforward, force_state, stamp, estimate, motion)
     answer = Answer(estimate, compensation, frame_id)
-    return PipelineState(estimator_state, force_state, pressure, force, reference), answer
+    return PipelineState(estimator_state, force_state, pressure, force, reference, refused), answer
 
 
-def _motion(reference: ServoReference | None, stamp: int, measured: float) -> Motion:
-    if reference is None:
-        return Motion(0.0, 0.0, measured, math.inf)
-    return Motion(reference.velocity, reference.acceleration, measured, (stamp - reference.stamp) * 1e-9)
+@compilable
+def is_fading(settings: FeedForwardSettings, last_velocity: int, reference: int) -> bool:
+    """Whether a reference makes the feed-forward, since velocities fail to come. Stamps in [ns]."""
+    return last_velocity == NEVER or abs(reference - last_velocity) * 1e-9 > settings.estimate_timeout
 
 
-def _with_velocity_friction(parameters: PipelineParameters, motion: Motion, pressure: Pressure | None) -> Motion:
+@compilable
+def motion_at(reference: Reference, stamp: int, measured: float) -> Motion:
+    """Motion at a velocity sample of ``stamp`` [ns] and ``measured`` [m/s], without the velocity friction."""
+    if reference.stamp == NEVER:
+        return Motion(0.0, 0.0, measured, math.inf, 0.0)
+    age = (stamp - reference.stamp) * 1e-9
+    return Motion(reference.velocity, reference.acceleration, measured, age, 0.0)
+
+
+def _with_velocity_friction(parameters: PipelineParameters, motion: Motion, pressure: Pressure) -> Motion:
     seals = parameters.estimator.seals
-    if pressure is None or not any(mounted.seal.velocity_law for mounted in seals):
+    if pressure.stamp == NEVER or not any(mounted.seal.velocity_law for mounted in seals):
         return motion
     velocity = feedforward.wanted_velocity(parameters.feedforward, motion)
-    if velocity is None:
+    if math.isnan(velocity):
         return motion
     friction = actuator_friction(seals, pressure.chamber_a, pressure.chamber_b, velocity)
     return motion._replace(velocity_friction=friction.velocity_friction)

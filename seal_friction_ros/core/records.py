@@ -1,10 +1,14 @@
 """What goes into the estimator and what comes out of it.
 
 These are made for every sample, so they are named tuples: immutable, and three times cheaper than frozen dataclasses.
+What has not come yet is a record with the stamp `NEVER` and not None, so that each field has one type and the estimator
+can be compiled as it stands.
 """
 
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
+
+NEVER = -(2**63)  # [ns] stamp of a record that stands for none
 
 
 class FrictionState(IntEnum):
@@ -31,6 +35,10 @@ class Status(IntFlag):
     VELOCITY_OUT_OF_RANGE = 512
     OUTSIDE_IDENTIFIED_RANGE = 1024
     STAMP_NOT_INCREASING = 2048
+    PRESSURE_LEAP = 4096
+    FORCE_LEAP = 8192
+    VELOCITY_LEAP = 16384
+    INPUT_REFUSED = 32768
 
 
 class Pressure(NamedTuple):
@@ -53,15 +61,21 @@ class Force(NamedTuple):
     """[N] positive on extension"""
 
 
+NO_PRESSURE = Pressure(NEVER, 0.0, 0.0)
+NO_FORCE = Force(NEVER, 0.0)
+
+
 class RodSample(NamedTuple):
-    """One rod-velocity sample with the newest pressure and force sum that came before it (None: none came yet)."""
+    """One rod-velocity sample with the newest pressure and force sum that came before it."""
 
     stamp: int
     """[ns]"""
     velocity: float
     """[m/s] positive on extension"""
-    pressure: Pressure | None
-    force: Force | None
+    pressure: Pressure
+    force: Force
+    refused: bool = False
+    """whether nobody knows who sent them, so that they must not act"""
 
 
 class FrictionEstimate(NamedTuple):
@@ -84,3 +98,6 @@ class FrictionEstimate(NamedTuple):
     """bits of `Status`"""
     input_age: float
     """[s] age of the older of pressure and force in use; -1.0 while one is missing"""
+
+
+NO_ESTIMATE = FrictionEstimate(NEVER, 0.0, 0.0, 0.0, 0.0, FrictionState.UNKNOWN, 0, 0, -1.0)

@@ -1,6 +1,7 @@
 """How the nodes of this package are spun and how they stop."""
 
 import gc
+import os
 import signal
 import socket
 import sys
@@ -57,6 +58,7 @@ def run(
     for number in _SIGNALS:
         signal.signal(number, lambda *_: None)
     try:
+        keep_to_this_machine()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
     except (ValueError, RuntimeError) as error:  # RCLError, of a parameter file for example, is a RuntimeError
@@ -77,6 +79,16 @@ def run(
         node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def keep_to_this_machine() -> None:
+    """Look for no nodes on other machines, unless the environment says how far to look or a distribution is in use.
+
+    The Fast DDS of the wheels has no security plugins, so whoever is found can command. A distribution is left as its
+    user set it up.
+    """
+    if 'ROS_DISTRO' not in os.environ:
+        os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
 
 def _await_signal(heard: socket.socket, stopped: Future) -> None:

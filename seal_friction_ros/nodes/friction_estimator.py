@@ -21,7 +21,8 @@ from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.live_statistics import LiveStatistics
 from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
-from seal_friction_ros.nodes.parameters import Group, RecordingOptions
+from seal_friction_ros.nodes.parameters import Group, InputOptions, RecordingOptions
+from seal_friction_ros.nodes.publishers import full_name, offers_best_effort_only, publishers, why_unheard
 from seal_friction_ros.nodes.recording import Recording
 
 _SWITCH_INTERVAL = 2e-4  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
@@ -38,11 +39,12 @@ class FrictionEstimator(ManagedNode):
         Group(SealSelection),
         Group(EstimatorSettings),
         Group(FeedForwardSettings, FEEDFORWARD_PREFIX),
+        Group(InputOptions),
         Group(RecordingOptions),
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        self._failure_said = ''
+        self._said: dict[str, str] = {}
         self._recording = Recording()
         self._configuration: Configuration | None = None
         self._inputs: dict[str, Any] = {}
@@ -86,6 +88,7 @@ class FrictionEstimator(ManagedNode):
         self._known = self._configuration.parameters()
         self._state = init(self._known)
         self._statistics = LiveStatistics()
+        self._said.clear()
         self._now = self._ros_time if self.get_parameter('use_sim_time').value else time.time_ns
         if self.settings(RecordingOptions).record:
             self._start_recording()
@@ -132,7 +135,7 @@ class FrictionEstimator(ManagedNode):
             self._statistics.on_malformed(name)
             self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
             return
-        self._statistics.on_input(name)
+        self._statistics.on_input(name, message.stamp)
         self._recording.record(self._topics[name], type_name, self._now(), data)
         self._state, answer = receive(self._known, self._state, message)
         for answer_type, answer_data in encoded(answer):
@@ -150,6 +153,7 @@ class FrictionEstimator(ManagedNode):
 
     def on_change(self) -> None:
         """Take changed settings over, between two samples."""
+        self._look_at_publishers()
         settings, feedforward = self.settings(EstimatorSettings), self.settings(FeedForwardSettings)
         changed = replace(self._configuration, settings=settings, feedforward=feedforward)
         if changed == self._configuration:
@@ -196,30 +200,60 @@ class FrictionEstimator(ManagedNode):
 
     def diagnostics(self) -> dict[str, DiagnosticStatus]:
         """What comes in and goes out, and the recorder."""
-        publishers = {name: self._publisher_count(name) for name in wire.INPUTS}
-        estimate, recorder = self._statistics.report(self.active, publishers), self._recording.report()
-        if recorder.level == DiagnosticStatus.ERROR and recorder.message != self._failure_said:
-            self._failure_said = recorder.message
-            self.get_logger().error(self._failure_said)
-        for name in self._statistics.silent_inputs:
-            self._accept_best_effort(name)
+        crowd = self._look_at_publishers()
+        counts = {name: self._publisher_count(name) for name in wire.INPUTS}
+        recorder = self._recording.report()
+        unheard = self._listen_to_the_silent() if self.active else []
+        estimate = self._statistics.report(self.active, counts)
+        if crowd:
+            refused = self.active and self._state.refused
+            estimate.level = max(estimate.level, DiagnosticStatus.ERROR if refused else DiagnosticStatus.WARN)
+        estimate.message = '; '.join([*crowd, *unheard, estimate.message])
+        self._say_once('publishers', '; '.join(crowd))
+        self._say_once('unheard', '; '.join(unheard))
+        self._say_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
         return {'estimate': estimate, 'recorder': recorder}
+
+    def _say_once(self, what: str, words: str) -> None:
+        """Log an error when it comes up or changes, not each second."""
+        if words and words != self._said.get(what):
+            self.get_logger().error(words)
+        self._said[what] = words
 
     def _publisher_count(self, name: str) -> int:
         # Connected publishers; ROS 2 Jazzy only knows the discovered ones.
         count = getattr(self._inputs[name], 'get_publisher_count', None)
         return int(count()) if count is not None else self.count_publishers(self._topics[name])
 
-    def _accept_best_effort(self, name: str) -> None:
-        """Subscribe anew where nothing comes because the publisher offers only best effort."""
-        if self._inputs[name].qos_profile.reliability != ReliabilityPolicy.RELIABLE:
-            return
-        for publisher in self.get_publishers_info_by_topic(self._topics[name]):
-            if publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT:
-                who = f'{publisher.node_namespace}/{publisher.node_name}'.replace('//', '/')
-                self.get_logger().warning(f'{self._topics[name]}: {who} offers best effort only: taken as such')
-                self._subscribe(name, qos.best_effort(qos.STREAM))
-                return
+    def _look_at_publishers(self) -> list[str]:
+        """Topics with several publishers, in words; refuse the inputs if the parameter says so."""
+        crowded = [self._topics[name] for name in wire.INPUTS if self._publisher_count(name) > 1]
+        answers = [self._topics[type_name] for type_name in wire.OUTPUTS.values()]  # of a second estimator
+        crowded += [topic for topic in answers if self.count_publishers(topic) > 1]
+        crowd = []
+        for topic in crowded:
+            names = ', '.join(full_name(publisher) for publisher in publishers(self, topic))
+            crowd.append(f'{topic} has several publishers: {names}')
+        refused = bool(crowd) and self.settings(InputOptions).refuse_second_publisher
+        if self.active and refused != self._state.refused:
+            self._state = self._state._replace(refused=refused)
+            self._publish_configuration()  # so that a replay refuses from here on, too
+        return crowd
+
+    def _listen_to_the_silent(self) -> list[str]:
+        """Subscribe anew where a publisher offers only best effort; in words, why others cannot be heard."""
+        unheard = []
+        for name in self._statistics.silent_inputs:
+            topic, wanted = self._topics[name], self._inputs[name].qos_profile
+            for publisher in publishers(self, topic):
+                if offers_best_effort_only(publisher) and wanted.reliability == ReliabilityPolicy.RELIABLE:
+                    self.get_logger().warning(f'{topic}: {full_name(publisher)} offers best effort only: taken as such')
+                    self._subscribe(name, qos.best_effort(qos.STREAM))
+                    break
+                reason = why_unheard(publisher, wire.INPUTS[name], wanted)
+                if reason:
+                    unheard.append(f'{topic}: {reason}')
+        return unheard
 
 
 def main() -> int:

@@ -10,12 +10,36 @@ from seal_friction_ros.core.feedforward import FeedForward, Limited
 from seal_friction_ros.core.records import FrictionEstimate, Status
 
 
+class Gaps:
+    """Samples of one input that are missing, as the gaps between its stamps tell.
+
+    The middleware says nothing of samples that it throws away when the node is too slow. The period is learnt, so one
+    that changes counts as a few missing samples; our choice.
+    """
+
+    def __init__(self) -> None:
+        self.missing = 0
+        self._stamp = 0
+        self._period = 0.0
+
+    def on_stamp(self, stamp: int) -> None:
+        """Take the stamp [ns] of the next sample."""
+        step, self._stamp = stamp - self._stamp if self._stamp else 0, stamp
+        if step <= 0:
+            return
+        if self._period and step > 1.5 * self._period:
+            self.missing += round(step / self._period) - 1
+            step = min(step, int(2.0 * self._period))
+        self._period += (step - self._period) * (0.05 if self._period else 1.0)
+
+
 class LiveStatistics:
     """Counts since activation, and rates, ages and latencies since the last report."""
 
     def __init__(self) -> None:
         self._received: Counter[str] = Counter()
         self._malformed: Counter[str] = Counter()
+        self._gaps = {name: Gaps() for name in wire.INPUTS}
         self._by_status: Counter[int] = Counter()
         self._feedforwards_by_limit: Counter[int] = Counter()
         self._feedforward_force = 0.0
@@ -25,12 +49,14 @@ class LiveStatistics:
     def _start_interval(self) -> None:
         self._started = time.monotonic()
         self._received_before = self._received.copy()
-        self._recent_status = 0
+        self._malformed_before = self._malformed.copy()
+        self._recent_status = self._recent_limit = 0
         self._latencies: list[int] = []
 
-    def on_input(self, name: str) -> None:
-        """Count one message of an input."""
+    def on_input(self, name: str, stamp: int) -> None:
+        """Count one message of an input, of ``stamp`` [ns]."""
         self._received[name] += 1
+        self._gaps[name].on_stamp(stamp)
 
     def on_malformed(self, name: str) -> None:
         """Count one message of an input whose bytes make no sense."""
@@ -46,6 +72,7 @@ class LiveStatistics:
     def on_feedforward(self, feedforward: FeedForward) -> None:
         """Count one feed-forward."""
         self._feedforwards_by_limit[feedforward.limited] += 1
+        self._recent_limit |= feedforward.limited
         self._feedforward_force = feedforward.force
 
     @property
@@ -68,6 +95,7 @@ class LiveStatistics:
             values[f'{name} rate [Hz]'] = f'{recent / seconds:.1f}'
             values[f'{name} received'] = str(self._received[name])
             values[f'{name} malformed'] = str(self._malformed[name])
+            values[f'{name} missing'] = str(self._gaps[name].missing)
         values['estimate rate [Hz]'] = f'{len(self._latencies) / seconds:.1f}'
         values['estimates'] = str(self._by_status.total())
         values['estimates all good'] = str(self._by_status[0])
@@ -87,6 +115,11 @@ class LiveStatistics:
             status.level, status.message = DiagnosticStatus.STALE, 'no rod_velocity comes in'
         elif self._recent_status:
             status.level, status.message = DiagnosticStatus.WARN, str(Status(self._recent_status).name)
+        elif self._malformed != self._malformed_before:
+            names = ', '.join(sorted((self._malformed - self._malformed_before).keys()))
+            status.level, status.message = DiagnosticStatus.WARN, f'bytes that are no message come on {names}'
+        elif self._recent_limit & Limited.FADE:
+            status.level, status.message = DiagnosticStatus.WARN, 'the feed-forward fades: no usable reference'
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         self._start_interval()
         return status

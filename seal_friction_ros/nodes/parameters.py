@@ -28,6 +28,18 @@ class StartOptions:
 
 
 @dataclasses.dataclass(frozen=True)
+class InputOptions:
+    """Who may send inputs, one field per ROS parameter."""
+
+    refuse_second_publisher: bool = parameter(
+        False,
+        unit='',
+        description='While an input has more than one publisher its samples do not count: '
+        'the estimate is invalid and the feed-forward fades out.',
+    )
+
+
+@dataclasses.dataclass(frozen=True)
 class RecordingOptions:
     """What is recorded and where, one field per ROS parameter.
 

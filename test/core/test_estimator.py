@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.coulomb import MountedSeal, actuator_friction
 from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.records import Force, FrictionEstimate, FrictionState, Pressure, RodSample, Status
+from seal_friction_ros.core.records import (
+    NO_FORCE,
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    FrictionState,
+    Pressure,
+    RodSample,
+    Status,
+)
 from seal_friction_ros.core.seal_file import parse_seal
 from seal_friction_ros.files import read_yaml
 
@@ -27,10 +36,13 @@ MS = 1_000_000  # [ns]
 
 def sample(stamp=START, velocity=0.01, pressure=3e6, force=30.0, *, pressure_age=0, force_age=0) -> RodSample:
     """A good sample but for what is given; ages in [ms]; a pressure may be one for both chambers, a pair, or None."""
-    if pressure is not None:
-        a, b = pressure if isinstance(pressure, tuple) else (pressure, pressure)
-        pressure = Pressure(stamp - pressure_age * MS, a, b)
-    return RodSample(stamp, velocity, pressure, None if force is None else Force(stamp - force_age * MS, force))
+    a, b = pressure if isinstance(pressure, tuple) else (pressure, pressure)
+    return RodSample(
+        stamp,
+        velocity,
+        NO_PRESSURE if pressure is None else Pressure(stamp - pressure_age * MS, a, b),
+        NO_FORCE if force is None else Force(stamp - force_age * MS, force),
+    )
 
 
 def run(samples, parameters=PARAMETERS) -> list[FrictionEstimate]:
@@ -56,9 +68,9 @@ plausible = st.floats(-2e5, 5e7)
 any_stamp = st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1)
 near_stamp = st.integers(-200 * MS, 200 * MS).map(lambda offset: START + offset)
 stamps = any_stamp | near_stamp
-pressures = st.none() | st.builds(Pressure, stamps, anything | plausible, anything | plausible)
-forces = st.none() | st.builds(Force, stamps, anything | st.floats(-1e3, 1e3))
-any_sample = st.builds(RodSample, stamps, anything | st.floats(-0.01, 0.01), pressures, forces)
+pressures = st.just(NO_PRESSURE) | st.builds(Pressure, stamps, anything | plausible, anything | plausible)
+forces = st.just(NO_FORCE) | st.builds(Force, stamps, anything | st.floats(-1e3, 1e3))
+any_sample = st.builds(RodSample, stamps, anything | st.floats(-0.01, 0.01), pressures, forces, st.booleans())
 
 mounted = st.builds(MountedSeal, st.sampled_from(sorted(SEALS)).map(SEALS.__getitem__), st.sampled_from('ab'))
 all_settings = st.builds(
@@ -71,6 +83,9 @@ all_settings = st.builds(
     pressure_max=st.floats(1e4, 1e9),
     velocity_max=st.floats(1e-3, 100.0),
     force_max=st.floats(1.0, 1e9),
+    pressure_rate_max=st.floats(1.0, 1e15),
+    force_rate_max=st.floats(1e-3, 1e15),
+    acceleration_max=st.floats(1e-3, 1e9),
 )
 all_parameters = st.builds(EstimatorParameters, all_settings, st.lists(mounted, min_size=1, max_size=3).map(tuple))
 
@@ -125,8 +140,8 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was(parameters, first, secon
 
 good = st.builds(
     sample,
-    velocity=st.sampled_from([0.0, 1e-3, -1.5e-3]) | st.floats(-10.0, 10.0),
-    pressure=st.tuples(st.floats(-1e5, 2e7), st.floats(-1e5, 2e7)),
+    velocity=st.sampled_from([0.0, 1e-3, -1.5e-3]) | st.floats(-0.5, 0.5),
+    pressure=st.tuples(st.floats(-1e5, 9e6), st.floats(-1e5, 9e6)),
     force=st.sampled_from([0.0, 30.0, -30.0]) | st.floats(-200.0, 200.0),
 )
 seals_and_settings = st.builds(
@@ -163,8 +178,7 @@ def test_a_stuck_rod_feels_exactly_the_force_sum(parameters, samples):
 @given(seals_and_settings, st.lists(any_sample | good, min_size=1, max_size=6))
 def test_left_and_right_are_alike(parameters, samples):
     mirrored = [
-        one._replace(velocity=-one.velocity, force=one.force and one.force._replace(force=-one.force.force))
-        for one in samples
+        one._replace(velocity=-one.velocity, force=one.force._replace(force=-one.force.force)) for one in samples
     ]
     for here, there in zip(run(samples, parameters), run(mirrored, parameters), strict=True):
         assert there == here._replace(friction_force=-here.friction_force, direction=-here.direction)
@@ -218,6 +232,10 @@ PROVOKED = {
     'VELOCITY_OUT_OF_RANGE': ([GOOD], sample(START + MS, velocity=-10.1), Status.VELOCITY_OUT_OF_RANGE),
     'OUTSIDE_IDENTIFIED_RANGE': ([GOOD], sample(START + MS, pressure=(3e6, 7.1e6)), Status.OUTSIDE_IDENTIFIED_RANGE),
     'STAMP_NOT_INCREASING': ([GOOD], GOOD, Status.STAMP_NOT_INCREASING),
+    'PRESSURE_LEAP': ([GOOD], sample(START + MS, pressure=(3e6, 1.4e7)), Status.PRESSURE_LEAP),
+    'FORCE_LEAP': ([GOOD], sample(START + MS, force=-1.1e5), Status.FORCE_LEAP),
+    'VELOCITY_LEAP': ([GOOD], sample(START + MS, velocity=-1.1), Status.VELOCITY_LEAP),
+    'INPUT_REFUSED': ([GOOD], sample(START + MS)._replace(refused=True), Status.INPUT_REFUSED),
 }
 
 
@@ -299,6 +317,62 @@ def test_the_last_usable_pressure_grows_old_and_is_then_stale():
 def test_a_stale_pressure_keeps_state_and_friction_but_says_so():
     fresh, stale = only(sample()), only(sample(pressure_age=5000))
     assert stale[:8] == (*fresh[:7], Status.PRESSURE_STALE)
+
+
+# --- leaps ---
+
+LEAPS = {  # name: (a value far away, bit)
+    'pressure': (1.5e7, Status.PRESSURE_LEAP),
+    'force': (2e5, Status.FORCE_LEAP),
+    'velocity': (-1.2, Status.VELOCITY_LEAP),
+}
+
+
+@pytest.mark.parametrize('name', LEAPS)
+def test_a_spike_costs_one_sample_and_the_value_before_it_stays_in_use(name):
+    far, bit = LEAPS[name]
+    estimates = run([sample(), sample(START + MS, **{name: far}), sample(START + 2 * MS)])
+    assert [e.status for e in estimates] == [0, bit, 0]
+    assert estimates[1].coulomb_friction == estimates[0].coulomb_friction
+    assert estimates[1].input_age == pytest.approx(0.0 if name == 'velocity' else 1e-3)
+
+
+@pytest.mark.parametrize('name', LEAPS)
+def test_a_step_that_is_real_costs_one_sample_too(name):
+    far, bit = LEAPS[name]
+    stepped = [sample(START + i * MS, **{name: far}) for i in range(1, 4)]
+    extrapolated = Status.OUTSIDE_IDENTIFIED_RANGE if name == 'pressure' else 0
+    assert [e.status for e in run([sample(), *stepped])] == [0, bit, extrapolated, extrapolated]
+
+
+@pytest.mark.parametrize('name', LEAPS)
+def test_the_same_message_again_confirms_nothing(name):
+    far, bit = LEAPS[name]
+    leap = sample(START + MS, **{name: far})
+    if name == 'velocity':
+        again = leap  # the very stamp: a duplicate
+        assert Status(last(sample(), leap, again).status) == bit | Status.STAMP_NOT_INCREASING
+    else:  # held, since no newer one came
+        assert last(sample(), leap, leap._replace(stamp=START + 2 * MS)).status == bit
+
+
+@pytest.mark.parametrize('name', LEAPS)
+def test_after_a_pause_the_same_change_is_no_leap(name):
+    far, bit = LEAPS[name]
+    assert not last(sample(), sample(START + 100 * MS, **{name: far})).status & bit
+
+
+@given(st.lists(good, min_size=2, max_size=6))
+def test_a_rate_that_nothing_reaches_flags_nothing(samples):
+    slow = replace(PARAMETERS, settings=EstimatorSettings(pressure_rate_max=1e15, force_rate_max=1e15))
+    bits = Status.PRESSURE_LEAP | Status.FORCE_LEAP
+    assert not any(e.status & bits for e in run(samples, slow))
+
+
+def test_refused_inputs_leave_no_state_and_no_friction_force():
+    estimate = only(sample()._replace(refused=True))
+    assert (estimate.state, estimate.friction_force, estimate.direction) == (FrictionState.UNKNOWN, 0.0, 0)
+    assert estimate.coulomb_friction == only(sample()).coulomb_friction
 
 
 # --- unknown ---

@@ -14,7 +14,7 @@ from seal_friction_ros.core.feedforward import (
     init,
     step,
 )
-from seal_friction_ros.core.records import FrictionEstimate, FrictionState, Status
+from seal_friction_ros.core.records import NO_ESTIMATE, FrictionEstimate, FrictionState, Status
 
 MS = 1_000_000
 GOOD = FrictionEstimate(0, 42.0, 3.0, 47.0, 42.0, FrictionState.SLIDING, 1, 0, 0.0)
@@ -23,10 +23,10 @@ SHARP = FeedForwardSettings(slew_limit=1e9, lead_time=0.0)
 
 
 def run(settings, n, estimate=GOOD, motion=FORWARD, *, state=None, start=0):
-    """Take n steps of 1 ms with estimates that are always fresh (or None); all outputs."""
+    """Take n steps of 1 ms with estimates that are always fresh (or none); all outputs."""
     state, rows = state or init(settings), []
     for i in range(start, start + n):
-        now = None if estimate is None else estimate._replace(stamp=i * MS)
+        now = estimate if estimate is NO_ESTIMATE else estimate._replace(stamp=i * MS)
         state, out = step(settings, state, i * MS, now, motion)
         rows.append(out)
     return state, rows
@@ -94,7 +94,7 @@ def test_clamp_cuts_and_says_so():
 
 @pytest.mark.parametrize(
     'bad',
-    [GOOD._replace(status=int(Status.PRESSURE_STALE)), GOOD._replace(status=int(Status.PRESSURE_MISSING)), None],
+    [GOOD._replace(status=int(Status.PRESSURE_STALE)), GOOD._replace(status=int(Status.INPUT_REFUSED)), NO_ESTIMATE],
 )
 def test_fades_out_without_a_usable_estimate_and_back_in(bad):
     state, _ = run(SHARP, 10)
@@ -126,7 +126,7 @@ def test_bad_force_leaves_the_coulomb_friction_usable():
 
 
 def test_nothing_before_the_first_estimate():
-    _, rows = run(SHARP, 5, None)
+    _, rows = run(SHARP, 5, NO_ESTIMATE)
     assert [r.force for r in rows] == [0.0] * 5
     assert rows[0].limited == Limited.FADE
 
@@ -135,7 +135,7 @@ def test_nothing_before_the_first_estimate():
     st.lists(
         st.tuples(
             st.integers(-2 * MS, 20 * MS),
-            st.one_of(st.none(), st.tuples(st.floats(0.0, 1e3), st.integers(0, 4095))),
+            st.one_of(st.none(), st.tuples(st.floats(0.0, 1e3), st.integers(0, 2**16 - 1))),
             st.floats(),
             st.floats(),
         ),
@@ -147,7 +147,7 @@ def test_finite_bounded_and_slow_whatever_comes(events):
     state, stamp, last = init(settings), 0, 0.0
     for change, seen, velocity, acceleration in events:
         stamp += change
-        estimate = None
+        estimate = NO_ESTIMATE
         if seen is not None:
             estimate = GOOD._replace(
                 stamp=stamp, coulomb_friction=seen[0], breakaway_force=seen[0] + 5.0, status=seen[1]

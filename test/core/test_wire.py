@@ -273,8 +273,8 @@ def test_status_bits_in_the_message_definition_are_those_of_the_code():
     assert constants('uint32') == {bit.name: bit.value for bit in Status}
 
 
-def test_status_bits_are_twelve_different_powers_of_two():
-    assert [bit.value for bit in Status] == [2**i for i in range(12)]
+def test_status_bits_are_sixteen_different_powers_of_two():
+    assert [bit.value for bit in Status] == [2**i for i in range(16)]
 
 
 def test_the_generated_message_has_the_constants_of_the_code():

@@ -6,13 +6,17 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from live_graph import graph
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParametersAtomically
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy, qos_profile_sensor_data
-from seal_friction_msgs.msg import FrictionEstimate
+from seal_friction_msgs.msg import FrictionEstimate, RodVelocity
+from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from seal_friction_ros.core.coulomb import actuator_friction
@@ -21,16 +25,20 @@ from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
-from seal_friction_ros.nodes.parameters import RecordingOptions, StartOptions
+from seal_friction_ros.nodes.parameters import InputOptions, RecordingOptions, StartOptions
 from seal_friction_ros.offline.bag import bag_topics
 from seal_friction_ros.offline.replay import replay
 
 SECOND = 10**9  # [ns]
-DOUBLE, STRING_ARRAY = 3, 9  # rcl_interfaces/ParameterType
+BOOL, DOUBLE, STRING_ARRAY = 1, 3, 9  # rcl_interfaces/ParameterType
 
 
 def double(name: str, value: float) -> Parameter:
     return Parameter(name=name, value=ParameterValue(type=DOUBLE, double_value=value))
+
+
+def boolean(name: str, value: bool) -> Parameter:
+    return Parameter(name=name, value=ParameterValue(type=BOOL, bool_value=value))
 
 
 def transition(number: int) -> ChangeState.Request:
@@ -209,6 +217,48 @@ def test_a_best_effort_publisher_is_heard_too():
         assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
+def test_a_second_publisher_is_named_and_harmless_unless_it_is_refused(tmp_path: Path):
+    with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
+        g.connect()
+        assert g.estimate(SECOND, 0.1).status == 0
+        intruder = Node('intruder', namespace='/other', context=g.context)
+        publisher = intruder.create_publisher(RodVelocity, '/rod_velocity', 10)
+        words = '/rod_velocity has several publishers: /other/intruder, /probe'
+        assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''))
+        assert g.probe.values('estimate')['level'] == '1'
+        assert g.estimate(SECOND + 10**6, 0.1).status == 0
+
+        answer = g.call(
+            SetParametersAtomically,
+            'friction_estimator/set_parameters_atomically',
+            SetParametersAtomically.Request(parameters=[boolean('refuse_second_publisher', True)]),
+        )
+        assert answer.result.successful
+        refused = g.estimate(SECOND + 2 * 10**6, 0.1)
+        assert (refused.status, refused.state) == (FrictionEstimate.INPUT_REFUSED, FrictionEstimate.UNKNOWN)
+        assert g.spin_until(lambda: g.probe.values('estimate').get('level') == '2')
+
+        intruder.destroy_publisher(publisher)
+        assert g.spin_until(lambda: 'several' not in g.probe.values('estimate').get('message', ''))
+        assert g.estimate(SECOND + 3 * 10**6, 0.1).status == 0
+        intruder.destroy_node()
+    assert replay(tmp_path / 'bag').identical  # the refusal is in the recording
+
+
+def test_an_input_that_cannot_be_heard_is_said_with_the_node_and_the_reason():
+    with graph() as g:
+        context = Context()  # within one, the middleware itself refuses a second type
+        rclpy.init(context=context, domain_id=g.context.get_domain_id())
+        other = Node('other_driver', context=context)
+        other.create_publisher(Float64, '/servo_reference', 10)
+        words = (
+            '/servo_reference: /other_driver publishes std_msgs/msg/Float64, not seal_friction_msgs/msg/ServoReference'
+        )
+        assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''))
+        other.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
 def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_path: Path):
     with graph({'record_directory': str(tmp_path)}) as g:
         g.connect()
@@ -276,7 +326,8 @@ def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_
 def test_the_node_has_no_arithmetic_parameter_of_its_own():
     with graph() as g:
         declared = {name for name in g.estimator._parameters if not name.startswith(('qos_overrides', 'use_sim_time'))}
-        known = {'seals', 'seal_chambers', *meanings(StartOptions), *meanings(RecordingOptions)}
+        known = {'seals', 'seal_chambers', *meanings(StartOptions)}
+        known |= {*meanings(InputOptions), *meanings(RecordingOptions)}
         settings = {*meanings(EstimatorSettings), *(f'feedforward.{name}' for name in meanings(FeedForwardSettings))}
         assert declared - known - {'start_type_description_service'} == settings
         assert isinstance(g.estimator, FrictionEstimator)

@@ -1,0 +1,297 @@
+"""Every fault of a signal: what is sent, and what is then required of estimate, feed-forward and diagnostics.
+
+One row each; ``bench/faults.py`` tries them on the live node, and docs/degradation.md lists them.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from seal_friction_ros.core.records import Force, FrictionState, Pressure
+from seal_friction_ros.core.wire import ServoReference, Velocity
+
+MS = 1_000_000  # [ns] between two ticks: 1 kHz
+TIMEOUT = 0.02  # [s] of pressure, force sum, estimate and reference
+FADE_TIME = 0.04  # [s]
+BEFORE, FAULT, AFTER = (
+    60,
+    80,
+    60,
+)  # ticks without, with, and again without the fault: it is noticed, and fades, within it
+SPEED, PRESSURE, FORCE = 0.05, 3e6, 60.0  # [m/s], [Pa], [N]
+
+Message = Pressure | Force | ServoReference | Velocity | bytes
+Tick = dict[str, list[Message]]
+"""What is sent at one moment: topic -> messages; the velocity goes last."""
+
+
+def good(stamp: int) -> Tick:
+    """A moment at which all is well."""
+    return {
+        'cylinder_pressure': [Pressure(stamp, PRESSURE, PRESSURE)],
+        'force_sum': [Force(stamp, FORCE)],
+        'servo_reference': [ServoReference(stamp, 0.0, SPEED, 0.0)],
+        'rod_velocity': [Velocity(stamp, SPEED, b'')],
+    }
+
+
+@dataclass(frozen=True)
+class Row:
+    """One fault and what is required."""
+
+    fault: str
+    spoil: Callable[[Tick, int], Tick]
+    """the tick, spoilt; the number of ticks since the fault began"""
+    status: str = ''
+    """bits that are set while it lasts, these and no others"""
+    state: tuple[FrictionState, ...] = (FrictionState.SLIDING,)
+    """states that are published while it lasts"""
+    feedforward: str = 'as usual'
+    """``as usual``, ``fades`` (to 0 within the fade time), ``dips`` (for a sample) or ``nothing`` (none comes)"""
+    level: str = 'WARN'
+    """of the diagnostics"""
+    shift: int = 0
+    """[ns] by which time has moved for good when it ends"""
+    estimate: str = ''
+    """in words, for the documentation"""
+    recovery: str = 'with the next good sample'
+    """in words"""
+
+
+def without(topic: str) -> Callable[[Tick, int], Tick]:
+    """Nothing comes on a topic."""
+    return lambda tick, _: {**tick, topic: []}
+
+
+def with_value(topic: str, *values: float) -> Callable[[Tick, int], Tick]:
+    """Other values, on all ticks."""
+    return lambda tick, _: {**tick, topic: [_changed(tick[topic][0], *values)]}
+
+
+def spike(topic: str, *values: float) -> Callable[[Tick, int], Tick]:
+    """Other values on each tenth tick."""
+    return lambda tick, n: {**tick, topic: [_changed(tick[topic][0], *values)]} if n % 10 == 5 else tick
+
+
+def _changed(message: Message, *values: float) -> Message:
+    if isinstance(message, Velocity):
+        return message._replace(velocity=values[0])
+    if isinstance(message, ServoReference):
+        return message._replace(velocity=values[0])
+    if isinstance(message, Force):
+        return message._replace(force=values[0])
+    return Pressure(message.stamp, values[0], values[-1])
+
+
+def delayed(topic: str, delay: int) -> Callable[[Tick, int], Tick]:
+    """Stamps of one topic, or of all, ``delay`` [ns] off."""
+
+    def spoil(tick: Tick, _: int) -> Tick:
+        return {
+            name: [m._replace(stamp=m.stamp + delay) for m in messages] if topic in (name, 'all') else messages
+            for name, messages in tick.items()
+        }
+
+    return spoil
+
+
+def frozen(topic: str) -> Callable[[Tick, int], Tick]:
+    """The very same message again and again."""
+    return lambda tick, n: {**tick, topic: [m._replace(stamp=m.stamp - (n + 1) * MS) for m in tick[topic]]}
+
+
+def doubled(topic: str) -> Callable[[Tick, int], Tick]:
+    """Each message twice."""
+    return lambda tick, _: {**tick, topic: tick[topic] * 2}
+
+
+def swapped(topic: str) -> Callable[[Tick, int], Tick]:
+    """Pairs of messages in the wrong order."""
+    return lambda tick, n: {
+        **tick,
+        topic: [m._replace(stamp=m.stamp + (MS if n % 2 == 0 else -MS)) for m in tick[topic]],
+    }
+
+
+def garbage(topic: str) -> Callable[[Tick, int], Tick]:
+    """Bytes that are no message, beside good ones."""
+    return lambda tick, n: {**tick, topic: [bytes(range(n % 40)), *tick[topic]]}
+
+
+def everything(tick: Tick, n: int) -> Tick:
+    """All at once."""
+    bad = (math.nan, -math.inf, 1e308)[n % 3]
+    spoilt = tick
+    for topic in tick:
+        spoilt = with_value(topic, bad)(spoilt, n)
+    return spoilt
+
+
+UNKNOWN = (FrictionState.UNKNOWN,)
+BOTH = (FrictionState.UNKNOWN, FrictionState.SLIDING)
+LAST = 'the last usable {} stays in use'
+
+
+def _unusable() -> Iterator[Row]:
+    """NaN, infinite, out of range, for each input, all the time."""
+    for words, value in (('NaN', math.nan), ('infinite', math.inf), ('minus infinite', -math.inf), ('1e300', 1e300)):
+        bit = 'OUT_OF_RANGE' if math.isfinite(value) else 'NOT_FINITE'
+        yield Row(
+            f'pressure {words}',
+            with_value('cylinder_pressure', PRESSURE, value),
+            f'PRESSURE_{bit} PRESSURE_STALE',
+            feedforward='fades',
+            estimate=LAST.format('pressure') + ', stale after `pressure_timeout`',
+        )
+        yield Row(
+            f'force sum {words}',
+            with_value('force_sum', value),
+            f'FORCE_{bit} FORCE_STALE',
+            estimate='as usual while sliding; at rest UNKNOWN once stale',
+        )
+        yield Row(
+            f'velocity {words}',
+            with_value('rod_velocity', value),
+            f'VELOCITY_{bit}',
+            UNKNOWN,
+            estimate='UNKNOWN, Coulomb friction as usual',
+        )
+        if not math.isfinite(value):
+            yield Row(
+                f'reference {words}',
+                with_value('servo_reference', value),
+                feedforward='fades',
+                estimate='as usual',
+            )
+
+
+def _spikes() -> Iterator[Row]:
+    """One sample in ten far away, but inside its range."""
+    yield Row(
+        'pressure spikes',
+        spike('cylinder_pressure', 2e7),
+        'PRESSURE_LEAP',
+        feedforward='dips',
+        estimate=LAST.format('pressure'),
+    )
+    yield Row('force sum spikes', spike('force_sum', -4e5), 'FORCE_LEAP', estimate=LAST.format('force sum'))
+    yield Row('velocity spikes', spike('rod_velocity', -5.0), 'VELOCITY_LEAP', BOTH, estimate='UNKNOWN for that sample')
+
+
+SIGNAL_ROWS: tuple[Row, ...] = (
+    Row(
+        'pressure stops',
+        without('cylinder_pressure'),
+        'PRESSURE_STALE',
+        feedforward='fades',
+        estimate='last known friction, stale after `pressure_timeout`',
+    ),
+    Row(
+        'force sum stops',
+        without('force_sum'),
+        'FORCE_STALE',
+        estimate='as usual while sliding; at rest UNKNOWN',
+    ),
+    Row(
+        'velocity stops',
+        without('rod_velocity'),
+        state=(),
+        feedforward='fades',
+        level='STALE',
+        estimate='none: there is no sample to answer',
+    ),
+    Row('reference stops', without('servo_reference'), feedforward='fades', estimate='as usual'),
+    Row(
+        'everything stops',
+        lambda tick, _: {name: [] for name in tick},
+        state=(),
+        feedforward='nothing',
+        level='STALE',
+        estimate='none',
+        recovery='with the next good sample; a controller drops a feed-forward that is old by itself',
+    ),
+    Row(
+        'pressure frozen, its stamp too',
+        frozen('cylinder_pressure'),
+        'PRESSURE_STALE',
+        feedforward='fades',
+        estimate='last known friction, stale after `pressure_timeout`',
+    ),
+    Row(
+        'pressure frozen with new stamps',
+        with_value('cylinder_pressure', PRESSURE),
+        level='OK',
+        estimate='as usual: a value that stands still is no fault by itself',
+    ),
+    Row(
+        'pressure jumps to another level',
+        with_value('cylinder_pressure', 1.5e7),
+        'PRESSURE_LEAP OUTSIDE_IDENTIFIED_RANGE',
+        feedforward='dips',
+        estimate='one sample with the pressure before, then the new one is believed',
+        recovery='a jump back costs one sample, too',
+    ),
+    *_unusable(),
+    *_spikes(),
+    Row(
+        'denormal numbers',
+        with_value('cylinder_pressure', 5e-324),
+        level='OK',
+        estimate='as usual: they are numbers',
+    ),
+    Row(
+        'everything at once: NaN, infinite, 1e308', everything, 'any', UNKNOWN, feedforward='fades', estimate='UNKNOWN'
+    ),
+    Row(
+        'velocity duplicated',
+        doubled('rod_velocity'),
+        'STAMP_NOT_INCREASING',
+        estimate='one for each, the second marked',
+    ),
+    Row('pressure duplicated', doubled('cylinder_pressure'), level='OK', estimate='as usual'),
+    Row('velocity out of order', swapped('rod_velocity'), 'STAMP_NOT_INCREASING', estimate='as usual, marked'),
+    Row('pressure out of order', swapped('cylinder_pressure'), level='OK', estimate='with the one that came last'),
+    Row(
+        'pressure stamped 1 s in the past',
+        delayed('cylinder_pressure', -1000 * MS),
+        'PRESSURE_STALE',
+        feedforward='fades',
+        estimate='with that pressure, marked',
+    ),
+    Row(
+        'pressure stamped 1 s in the future',
+        delayed('cylinder_pressure', 1000 * MS),
+        'PRESSURE_STALE',
+        feedforward='fades',
+        estimate='with that pressure, marked',
+    ),
+    Row(
+        'velocity stamped 1 s in the past',
+        delayed('rod_velocity', -1000 * MS),
+        'PRESSURE_STALE FORCE_STALE STAMP_NOT_INCREASING',
+        feedforward='fades',
+        estimate='last known friction, marked',
+    ),
+    Row(
+        'velocity stamped 1 s in the future',
+        delayed('rod_velocity', 1000 * MS),
+        'PRESSURE_STALE FORCE_STALE',
+        feedforward='fades',
+        estimate='last known friction, marked',
+    ),
+    Row(
+        'the clock jumps back by 5 s',
+        delayed('all', -5000 * MS),
+        'STAMP_NOT_INCREASING',
+        shift=-5000 * MS,
+        estimate='as usual, the first one marked',
+    ),
+    Row(
+        'the clock jumps ahead by 5 s',
+        delayed('all', 5000 * MS),
+        shift=5000 * MS,
+        feedforward='dips',
+        estimate='as usual',
+    ),
+    Row('bytes that are no message', garbage('cylinder_pressure'), estimate='as usual; counted and logged'),
+)

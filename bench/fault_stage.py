@@ -1,0 +1,262 @@
+"""Where faults are tried: the live node on a graph of its own, and a driver that says what it is told to."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from itertools import pairwise
+from time import monotonic
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from fault_rows import AFTER, BEFORE, FADE_TIME, FAULT, MS, TIMEOUT, Message, Row, Tick, good
+from lifecycle_msgs.msg import Transition
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from seal_friction_ros.core import wire
+from seal_friction_ros.core.feedforward import LONGEST_STEP, FeedForward, FeedForwardSettings, Limited
+from seal_friction_ros.core.records import Force, FrictionEstimate, Pressure, Status
+from seal_friction_ros.core.wire import Velocity
+from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.managed_node import message_class
+from seal_friction_ros.nodes.processes import free_domain
+
+START = 1_000_000_000_000  # [ns]
+SETTINGS = {
+    'pressure_timeout': TIMEOUT,
+    'force_timeout': TIMEOUT,
+    'feedforward.estimate_timeout': TIMEOUT,
+    'feedforward.reference_timeout': TIMEOUT,
+    'feedforward.fade_time': FADE_TIME,
+}
+LEVELS = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN', DiagnosticStatus.ERROR: 'ERROR'}
+LEVELS[DiagnosticStatus.STALE] = 'STALE'
+Outputs = list[FrictionEstimate | FeedForward]
+
+
+def encoded(message: Message) -> bytes:
+    """Bytes of an input; what is bytes already stays as it is."""
+    if isinstance(message, bytes):
+        return message
+    if isinstance(message, Velocity):
+        return wire.encode_velocity(message)
+    if isinstance(message, Pressure):
+        return wire.encode_pressure(message)
+    if isinstance(message, Force):
+        return wire.encode_force(message)
+    return wire.encode_reference(message)
+
+
+class Driver(Node):
+    """Stands for drivers and controller: publishes inputs, keeps what comes out."""
+
+    def __init__(self, name: str = 'driver', **kwargs: Any) -> None:
+        super().__init__(name, **kwargs)
+        self.inputs = {
+            topic: self.create_publisher(message_class(type_name), topic, qos.STREAM)
+            for topic, type_name in wire.INPUTS.items()
+        }
+        self.estimates = self.feedforwards = 0
+        self.outputs: Outputs = []
+        self.levels: list[str] = []
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+        for topic, type_name in wire.OUTPUTS.items():
+            self.create_subscription(message_class(type_name), topic, self._listen(type_name), qos.STREAM, raw=True)
+
+    def _on_diagnostics(self, array: DiagnosticArray) -> None:
+        self.levels += [LEVELS[status.level] for status in array.status if status.name.endswith(': estimate')]
+
+    def _listen(self, type_name: str) -> Callable[[bytes], None]:
+        def hear(data: bytes) -> None:
+            self.estimates += type_name == wire.ESTIMATE_TYPE
+            self.feedforwards += type_name == wire.FEEDFORWARD_TYPE
+            self.outputs.append(wire.DECODERS[type_name](data))
+
+        return hear
+
+
+class Stage:
+    """Estimator and driver, spun together, so that what one of them raises comes up here."""
+
+    def __init__(self, context: Context, estimator: FrictionEstimator, driver: Driver) -> None:
+        self.context, self.estimator, self.driver = context, estimator, driver
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(estimator)
+        self.executor.add_node(driver)
+        self.now = START
+
+    def spin_until(self, condition: Callable[[], object], patience: float = 10.0) -> bool:
+        """Spin until it holds; False if it does not within ``patience`` [s]."""
+        deadline = monotonic() + patience
+        while not condition():
+            if monotonic() > deadline:
+                return False
+            self.executor.spin_once(timeout_sec=0.01)
+        return True
+
+    def spin(self, seconds: float) -> None:
+        """Spin for a while."""
+        self.spin_until(lambda: False, seconds)
+
+    def connect(self) -> None:
+        """Spin until each hears the other.
+
+        Raises:
+            RuntimeError: They do not.
+        """
+        inputs = self.driver.inputs.values()
+        estimator = self.estimator.get_fully_qualified_name()
+        heard = self.estimator.get_publisher_names_and_types_by_node
+        if not self.spin_until(lambda: all(publisher.get_subscription_count() for publisher in inputs)):
+            raise RuntimeError(f'{estimator} does not subscribe: {heard("friction_estimator", "/")}')
+        self.spin(0.2)
+
+    def restart(self) -> None:
+        """Let the estimator begin anew, knowing nothing.
+
+        Raises:
+            RuntimeError: A transition fails.
+        """
+        for number in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
+            done = self.estimator.trigger_deactivate() if number == 4 else self.estimator.trigger_activate()
+            if done.name != 'SUCCESS':
+                raise RuntimeError(f'transition {number}: {done.name}')
+        self.driver.outputs.clear()
+
+    def send(self, tick: Tick) -> None:
+        """Send a moment, wait for the answers to its velocities."""
+        driver = self.driver
+        estimates, feedforwards = driver.estimates, driver.feedforwards
+        for topic, messages in tick.items():
+            for message in messages:
+                driver.inputs[topic].publish(encoded(message))
+        expected = sum(isinstance(message, Velocity) for message in tick['rod_velocity'])
+        if expected:
+            answered = self.spin_until(lambda: driver.estimates >= estimates + expected)
+            if not answered:
+                raise RuntimeError(f'{expected} velocities, {driver.estimates - estimates} answers')
+            self.spin_until(lambda: driver.feedforwards >= feedforwards + expected, 0.02)
+        else:
+            self.spin(0.002)
+
+    def run(self, ticks: int, spoil: Callable[[Tick, int], Tick] | None = None, shift: int = 0) -> Outputs:
+        """Send so many moments of 1 ms, spoilt; what came out."""
+        first = len(self.driver.outputs)
+        for number in range(ticks):
+            self.now += MS
+            tick = good(self.now)
+            self.send(spoil(tick, number) if spoil else tick)
+        self.now += shift
+        self.spin(0.003)  # for what is still on its way
+        return self.driver.outputs[first:]
+
+    def level(self) -> str:
+        """Level of the diagnostics of the estimate since they were last asked for; STALE if nothing else was said."""
+        self.spin(0.003)
+        said = {*self.driver.levels, LEVELS[self.estimator.diagnostics()['estimate'].level]}
+        self.driver.levels.clear()
+        return next(level for level in ('ERROR', 'WARN', 'OK', 'STALE') if level in said)
+
+
+@contextmanager
+def stage(parameters: Mapping[str, Any] | None = None, *, autostart: bool = True) -> Iterator[Stage]:
+    """A graph that nobody else is on."""
+    context = Context()
+    rclpy.init(context=context, domain_id=free_domain())
+    values = {**SETTINGS, **(parameters or {})}
+    overrides = [Parameter(name, value=value) for name, value in values.items()]
+    estimator = FrictionEstimator(context=context, parameter_overrides=overrides)
+    driver = Driver(context=context)
+    try:
+        if autostart and not estimator.autostart():
+            raise RuntimeError('the estimator does not start')
+        made = Stage(context, estimator, driver)
+        if autostart:
+            made.connect()
+        yield made
+    finally:
+        estimator.finish()
+        estimator.destroy_node()
+        driver.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def complaints_at_any_time(outputs: Outputs) -> list[str]:
+    """What must never be: a number that is not finite, or a feed-forward that leaps."""
+    settings = FeedForwardSettings()
+    wrong = [f'not finite: {output}' for output in outputs if not all(map(math.isfinite, output))]
+    forces = [output for output in outputs if isinstance(output, FeedForward)]
+    for before, after in pairwise(forces):
+        elapsed = min(max((after.stamp - before.stamp) * 1e-9, 0.0), LONGEST_STEP)
+        if abs(after.force - before.force) > settings.slew_limit * elapsed + 1e-9:
+            wrong.append(f'feed-forward leaps from {before.force:.3f} to {after.force:.3f} N at {after.stamp} ns')
+        if abs(after.force) > settings.force_limit:
+            wrong.append(f'feed-forward of {after.force} N')
+    return wrong
+
+
+def try_row(place: Stage, row: Row) -> list[str]:
+    """Send good samples, the fault, good samples; what was not as required."""
+    place.restart()
+    before = place.run(BEFORE)
+    place.level()
+    during = place.run(FAULT, row.spoil, row.shift)
+    level = place.level()
+    settling = place.run(5)  # the last sample of the fault may cost the next one, too
+    place.level()
+    after = place.run(AFTER)
+    end_level = place.level()
+
+    wrong = complaints_at_any_time([*before, *during, *settling, *after])
+    estimates = [output for output in during if isinstance(output, FrictionEstimate)]
+    forces = [output for output in during if isinstance(output, FeedForward)]
+    seen = Status(0)
+    for estimate in estimates:
+        seen |= Status(estimate.status)
+    wanted = Status(0)
+    for name in row.status.split() if row.status != 'any' else []:
+        wanted |= Status[name]
+    if row.status != 'any' and seen != wanted:
+        wrong.append(f'status {seen!r}, not {wanted!r}')
+    states = {estimate.state for estimate in estimates}
+    if states != set(row.state):
+        wrong.append(f'states {states}, not {set(row.state)}')
+    if level != row.level:
+        wrong.append(f'diagnostics {level}, not {row.level}')
+    wrong += _complaints_of_force(row, estimates, forces)
+    wrong += _complaints_of_recovery(after, end_level)
+    return wrong
+
+
+def _complaints_of_force(row: Row, estimates: list[FrictionEstimate], forces: list[FeedForward]) -> list[str]:
+    scale = FeedForwardSettings().coulomb_scale
+    if row.feedforward == 'nothing':
+        return [f'{len(forces)} feed-forwards'] if forces else []
+    if not forces:
+        return ['no feed-forward']
+    last = forces[-1]
+    if row.feedforward == 'fades':
+        faded = last.force == 0.0 and last.limited & Limited.FADE
+        return [] if faded else [f'the feed-forward is still {last.force:.3f} N']
+    expected = scale * estimates[-1].coulomb_friction
+    lowest = 0.7 if row.feedforward == 'dips' else 1.0 - 1e-9
+    short = [force for force in forces[40:] if not lowest * expected <= force.force <= expected * (1.0 + 1e-9)]
+    return [f'a feed-forward of {short[0].force:.3f} N where {expected:.3f} N are right'] if short else []
+
+
+def _complaints_of_recovery(after: Outputs, level: str) -> list[str]:
+    wrong = []
+    estimates = [output for output in after if isinstance(output, FrictionEstimate)]
+    forces = [output for output in after if isinstance(output, FeedForward)]
+    bad = [estimate for estimate in estimates if estimate.status]
+    if bad:
+        wrong.append(f'after it: {Status(bad[0].status)!r}')
+    if len(estimates) != AFTER or not forces or forces[-1].limited:
+        wrong.append(f'after it: {len(estimates)} estimates of {AFTER}, the last feed-forward is {forces[-1:]}')
+    if level not in ('OK', 'WARN'):
+        wrong.append(f'after it: diagnostics {level}')
+    return wrong
