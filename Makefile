@@ -29,6 +29,7 @@ bench: setup
 	@$(python) bench/step.py
 	@$(python) bench/servo.py
 	@$(python) bench/oring.py lines --lines 17 25 33
+	@$(python) bench/ehl.py
 
 figures: setup
 	@$(python) tools/make_figures.py

@@ -25,6 +25,7 @@ setup(
         shared('config/security', '*.xml'),
         shared('config/rigs', '*.yaml'),
         shared('config/oring', '*.yaml'),
+        shared('config/ehl', '*.yaml'),
         shared('data/thesis', '*.csv'),
     ],
     package_data={NAME: ['py.typed']},

@@ -155,7 +155,12 @@ def heard_log(place: Stage) -> list[str]:
     """What is logged from now on."""
     lines: list[str] = []
     place.driver.create_subscription(Log, '/rosout', lambda log: lines.append(log.msg), 100)
-    place.spin(0.2)
+
+    def is_heard() -> bool:
+        place.estimator.get_logger().info('is the log heard?')
+        return bool(lines)
+
+    place.spin_until(is_heard)
     return lines
 
 
@@ -181,7 +186,9 @@ def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
                 said = place.spin_until(lambda words=words: any(words in line for line in lines))
                 wrong += unless(said, f'not said: {words}')
             unheard = '/odd_driver publishes std_msgs/msg/Float64'
-            wrong += unless(place.spin_until(lambda: unheard in message(place)), f'not said: {unheard}')
+            wrong += unless(
+                place.spin_until(lambda: unheard in message(place)), f'not said: {unheard}: {message(place)}'
+            )
         place.connect()
         return wrong + recovered(place)
 

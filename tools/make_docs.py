@@ -10,6 +10,14 @@ from pathlib import Path
 
 from seal_friction_ros.core.configuration import SealSelection
 from seal_friction_ros.core.coulomb import ConstantCoulomb, PressurePowerLaw, PriorArtChart, Uncertainty, VelocityTerms
+from seal_friction_ros.core.ehl import case as ehl
+from seal_friction_ros.core.ehl import groove as ehl_groove
+from seal_friction_ros.core.ehl.case import Air, MapGrid, Member, SealBody, Study, Viscoelasticity
+from seal_friction_ros.core.ehl.friction_law import FrictionMap
+from seal_friction_ros.core.ehl.grease import Grease
+from seal_friction_ros.core.ehl.kinematics import ConstantAcceleration
+from seal_friction_ros.core.ehl.topography import Topography
+from seal_friction_ros.core.ehl.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
@@ -69,6 +77,18 @@ RECORDS = (
     Numerics,
     OringCase,
     Measured,
+    FrictionMap,
+    SealBody,
+    Topography,
+    Grease,
+    Air,
+    ConstantAcceleration,
+    ControlEdge,
+    FilmSupply,
+    Viscoelasticity,
+    Study,
+    MapGrid,
+    Member,
     SavitzkyGolay,
     Sliding,
     SpoolEvaluation,
@@ -122,6 +142,10 @@ def other_faults() -> str:
 def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
     tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
+    tables |= {
+        'EhlGroove': table(ehl_groove.Groove),
+        'EhlNumerics': table(ehl.Numerics),
+    }  # the O-ring has these names, too
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(
         r'<!-- table: (\w+) -->\n.*?<!-- end -->',

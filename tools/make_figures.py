@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from seal_friction_ros.files import config_path
+from seal_friction_ros.offline.ehl_commands import map_command, run_command, study_command
 from seal_friction_ros.offline.import_thesis import import_thesis
 from seal_friction_ros.offline.oring import compute_case
 from seal_friction_ros.offline.oring_report import write_oring_report
@@ -18,7 +19,7 @@ FIGURES = Path(__file__).parents[1] / 'docs' / 'figures'
 
 
 def main() -> int:
-    """Replay the pull test, draw it and the seal's charts, and keep the pictures that are shown."""
+    """Draw a replay of the pull test, charts of its seal, the servo and the lubricated contact; keep what is shown."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         import_thesis(folder / 'inputs')
@@ -27,6 +28,10 @@ def main() -> int:
         write_seal_charts(config_path('seals', 'ms28775_114'), folder / 'seal.html')
         write_oring_report(compute_case(config_path('oring', 'ms28775_114')), folder / 'oring.html')
         write_servo_charts(folder / 'servo.html')
+        run_command('inner_seal', 1, folder / 'inner.html', None, None, 1)
+        run_command('inner_seal_groove', 1, folder / 'groove.html', None, None, 1)
+        study_command('inner_seal', 1, folder / 'study.html', None)
+        map_command('inner_seal', 1, folder / 'map.html', None, None)
         FIGURES.mkdir(parents=True, exist_ok=True)
         for source, target in {
             'report_figures/live_estimate.png': 'live_estimate.png',
@@ -34,6 +39,10 @@ def main() -> int:
             'seal_figures/fig23_states_2_and_3.png': 'friction_states.png',
             'oring_figures/contact_stress_profiles.png': 'oring_contact_stress.png',
             'oring_figures/deformed_shape.png': 'oring_shape.png',
+            'groove_figures/friction_over_position.png': 'ehl_friction.png',
+            'inner_figures/film.png': 'ehl_film.png',
+            'study_figures/solid_shear_stress.png': 'ehl_study.png',
+            'map_figures/friction_map.png': 'ehl_map.png',
             'servo_figures/fig25_servo_with_and_without_friction.png': 'fig25_servo_with_and_without_friction.png',
         }.items():
             shutil.copy(folder / source, FIGURES / target)

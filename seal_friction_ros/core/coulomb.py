@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
+from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.monotone import MonotoneTable
 from seal_friction_ros.core.normal_force import NormalForceLaw
@@ -173,8 +174,9 @@ class VelocityTerms:
     def __post_init__(self) -> None:
         check(self)
 
-    def added(self, coulomb_friction: float, velocity: float) -> float:
-        """Magnitude [N] that comes on top of ``coulomb_friction`` [N] at ``velocity`` [m/s]; may be negative."""
+    def added(self, coulomb_friction: float, pressure: float, velocity: float) -> float:
+        """Magnitude [N] on top of ``coulomb_friction`` [N] at ``velocity`` [m/s], at any pressure; may be negative."""
+        del pressure
         if velocity == 0.0:
             return 0.0
         speed = abs(velocity)
@@ -191,7 +193,8 @@ class Seal:
     Breakaway force is (1 + ``stiction_ratio``) f_c + ``stiction``.
 
     Raises:
-        ValueError: A value is out of bounds, or friction falls with pressure inside the identified range.
+        ValueError: A value is out of bounds, friction falls with pressure inside the identified range, or both the law
+            and the terms say what the velocity does.
     """
 
     name: str
@@ -206,9 +209,15 @@ class Seal:
     velocity_terms: VelocityTerms | None = None
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
+    velocity_law: VelocityTerms | FrictionMap | None = field(init=False, repr=False, compare=False)
+    """what the velocity adds to the Coulomb friction; None if nothing"""
 
     def __post_init__(self) -> None:
         check(self)
+        mapped = self.coulomb_law if isinstance(self.coulomb_law, FrictionMap) else None
+        if mapped and self.velocity_terms:
+            raise ValueError(f'Seal {self.name}: its friction_map has the velocity in it: leave out velocity_terms')
+        object.__setattr__(self, 'velocity_law', mapped or self.velocity_terms)
         if self.pressure_max <= self.pressure_min:
             raise ValueError(
                 f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa'
@@ -289,8 +298,8 @@ def actuator_friction(
         friction = coulomb_friction(seal, pressure)
         total += friction
         stiction += seal.stiction + seal.stiction_ratio * friction
-        if seal.velocity_terms is not None:
-            more = seal.velocity_terms.added(friction, velocity)
+        if seal.velocity_law is not None:
+            more = seal.velocity_law.added(friction, pressure, velocity)
             added += more
             friction += more
         std += seal.uncertainty.std(friction)

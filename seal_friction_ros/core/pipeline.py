@@ -145,7 +145,7 @@ def motion_at(reference: Reference, stamp: int, measured: float) -> Motion:
 
 def _with_velocity_friction(parameters: PipelineParameters, motion: Motion, pressure: Pressure) -> Motion:
     seals = parameters.estimator.seals
-    if pressure.stamp == NEVER or not any(mounted.seal.velocity_terms for mounted in seals):
+    if pressure.stamp == NEVER or not any(mounted.seal.velocity_law for mounted in seals):
         return motion
     velocity = feedforward.wanted_velocity(parameters.feedforward, motion)
     if math.isnan(velocity):

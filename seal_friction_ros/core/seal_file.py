@@ -5,7 +5,7 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     name: ms28775_114
     source: where the numbers are from
     geometry: {section_diameter: 2.69e-3, ...}
-    coulomb_law: physics_based          # or pressure_power_law, constant_coulomb, prior_art_chart
+    coulomb_law: physics_based          # or pressure_power_law, constant_coulomb, prior_art_chart, friction_map
     normal_force: {law: area_deformation_gain, area_deformation_gain: 0.39, radial_force: 9.3}
     friction_coefficient: {law: power_law, coefficient: 2.1, exponent: 0.56}
     stiction: 2.5
@@ -31,6 +31,7 @@ from seal_friction_ros.core.coulomb import (
     Uncertainty,
     VelocityTerms,
 )
+from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, FrictionCoefficientLaw, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
@@ -38,7 +39,7 @@ from seal_friction_ros.core.validated import from_mapping, plain
 
 NORMAL_FORCE_LAWS: dict[str, type] = {'area_deformation_gain': AreaDeformationGain, 'monotone_table': NormalForceTable}
 FRICTION_COEFFICIENT_LAWS: dict[str, type] = {'power_law': PowerLaw, 'monotone_table': CoefficientTable}
-COULOMB_LAWS = ('physics_based', 'prior_art_chart', 'pressure_power_law', 'constant_coulomb')
+COULOMB_LAWS = ('physics_based', 'prior_art_chart', 'pressure_power_law', 'constant_coulomb', 'friction_map')
 
 _COMMON = {
     'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
@@ -49,8 +50,11 @@ _PARTS = {
     'pressure_power_law': {'pressure_power_law'},
     'constant_coulomb': {'constant_coulomb'},
     'prior_art_chart': {'chart'},
+    'friction_map': {'friction_map'},
 }
-_WITHOUT_GEOMETRY = {'pressure_power_law': PressurePowerLaw, 'constant_coulomb': ConstantCoulomb}
+_WITHOUT_GEOMETRY = {
+    'pressure_power_law': PressurePowerLaw, 'constant_coulomb': ConstantCoulomb, 'friction_map': FrictionMap,
+}  # fmt: skip
 
 
 def parse_seal(document: Any) -> Seal:

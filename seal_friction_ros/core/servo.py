@@ -93,11 +93,11 @@ class ServoParameters:
             object.__setattr__(self, name, value)  # frozen: the only way to keep what was built from the fields
 
     def _check_seals(self) -> None:
-        moving = sorted({mounted.seal.name for mounted in self.seals if mounted.seal.velocity_terms is not None})
+        moving = sorted({mounted.seal.name for mounted in self.seals if mounted.seal.velocity_law})
         if moving:
             raise ValueError(
                 f'ServoParameters.seals: friction of {", ".join(moving)} depends on the velocity, which the simulated '
-                'servo does not have: take a seal file without velocity terms'
+                'servo does not have: take a seal file without velocity terms or friction map'
             )
 
     def _check_inner_step(self) -> None:

@@ -118,6 +118,29 @@ def _oring(arguments: argparse.Namespace) -> int:
     return _tell(arguments, computed.summary, numbers_text(computed))
 
 
+def _ehl_run(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.ehl_commands import run_command
+
+    return _tell(
+        arguments,
+        *run_command(arguments.case, arguments.jobs, arguments.out, arguments.bag, arguments.window, arguments.average),
+    )
+
+
+def _ehl_study(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.ehl_commands import study_command
+
+    return _tell(arguments, *study_command(arguments.case, arguments.jobs, arguments.out, arguments.work))
+
+
+def _ehl_map(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.ehl_commands import map_command
+
+    return _tell(
+        arguments, *map_command(arguments.case, arguments.jobs, arguments.out, arguments.work, arguments.seal_file)
+    )
+
+
 def _tune(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.replay import chosen_configuration
     from seal_friction_ros.offline.tune import tune_bag, tune_simulator
@@ -320,6 +343,7 @@ def make_parser() -> argparse.ArgumentParser:
         unit = f' [{meaning.unit}]' if meaning.unit else ''
         text = f'{where}{meaning.description}{unit}'.replace('%', '%%')
         tune.add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
+    _add_ehl(commands)
     return parser
 
 
@@ -400,6 +424,24 @@ def _chambers(text: str) -> tuple[str, ...]:
 def _pressures(text: str) -> tuple[float, float, int]:
     low, high, steps = text.split(':')
     return float(low), float(high), int(steps)
+
+
+def _add_ehl(commands: Any) -> None:
+    ehl = commands.add_parser('ehl', help='lubricated contact of a seal', description='Lubricated contact of a seal.')
+    steps = ehl.add_subparsers(title='commands', required=True, metavar='COMMAND')
+    run = _add(steps, 'run', _ehl_run, 'friction, film and contact over a motion')
+    run.add_argument('--bag', type=Path, help='run through the position of this bag, and compare with its force')
+    run.add_argument('--window', type=float, nargs=2, metavar=('FROM', 'TO'), help='part of the bag to take [s]')
+    run.add_argument('--average', type=int, default=50, metavar='SAMPLES', help='moving average, default 50')
+    study = _add(steps, 'study', _ehl_study, 'friction with other solid shear stresses')
+    chart = _add(steps, 'map', _ehl_map, 'friction map: steady friction over speed and pressure')
+    chart.add_argument('--seal-file', type=Path, metavar='FILE.yaml', help='write it as a seal file; must not exist')
+    for step in (run, study, chart):
+        step.add_argument('case', help='case file: a path, or the name of one in config/ehl')
+        step.add_argument('--jobs', type=int, default=os.cpu_count() or 1, help='processes; default: one for each core')
+        step.add_argument('--out', type=Path, metavar='FILE.html', help='write a page with figures')
+    for step in (study, chart):
+        step.add_argument('--work', type=Path, metavar='FOLDER', help='keep finished parts here, and go on from them')
 
 
 def _tolerance(text: str) -> float:

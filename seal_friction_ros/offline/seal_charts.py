@@ -70,9 +70,9 @@ class Charted:
     mounted: tuple[MountedSeal, ...]
     is_thesis_seal: bool
 
-    def friction(self, pressure: float) -> ActuatorFriction:
-        """Friction of the mounted seals, all under ``pressure`` [Pa, gauge]."""
-        return actuator_friction(self.mounted, pressure, pressure)
+    def friction(self, pressure: float, velocity: float = 0.0) -> ActuatorFriction:
+        """Friction of the mounted seals, all under ``pressure`` [Pa, gauge], at ``velocity`` [m/s]."""
+        return actuator_friction(self.mounted, pressure, pressure, velocity)
 
     @property
     def count_text(self) -> str:
@@ -122,13 +122,12 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
 
 def friction_over_velocity(shown: Charted, pressure: float, velocities: FloatArray) -> FloatArray:
     """State friction [N] at each velocity [m/s], with no force sum and a stick band of zero (Figure 22)."""
-    coulomb = shown.friction(pressure).coulomb_friction
-    return np.array(
-        [
-            state_friction(v, 0.0, is_at_rest(v, False, 0.0, 0.0), coulomb, coulomb).friction_force
-            for v in velocities.tolist()
-        ]
-    )
+    frictions = []
+    for v in velocities.tolist():
+        acting = shown.friction(pressure, v)
+        coulomb, sliding = acting.coulomb_friction, acting.coulomb_friction + acting.velocity_friction
+        frictions.append(state_friction(v, 0.0, is_at_rest(v, False, 0.0, 0.0), sliding, coulomb).friction_force)
+    return np.array(frictions)
 
 
 def friction_over_force_sum(
@@ -313,7 +312,8 @@ def sliding_figure(shown: Charted) -> Plot:
     velocity = np.linspace(-STATE_VELOCITY, STATE_VELOCITY, 2001)
     friction = friction_over_velocity(shown, pressure, velocity)
     unit, size = force_unit(float(friction[-1]))
-    figure, ax = new_figure(f'Sliding: {friction[-1] / size:.3g} {unit} against the motion, at any speed', 3.6)
+    where = 'at any speed' if shown.seal.velocity_law is None else f'at {STATE_VELOCITY * 1e3:.0f} mm/s'
+    figure, ax = new_figure(f'Sliding: {friction[-1] / size:.3g} {unit} against the motion, {where}', 3.6)
     ax.plot(velocity / INCH, friction / size, color=BLUE, lw=1.8, drawstyle='steps-mid')
     _cross(ax)
     ax.set_xlabel('rod velocity [in/s]')

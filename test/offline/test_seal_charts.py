@@ -1,5 +1,6 @@
 """The page of a seal file: Figures 22 and 23 of the thesis as numbers, and the page itself."""
 
+import dataclasses
 import re
 import shutil
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from seal_friction_ros.core.coulomb import MountedSeal, VelocityTerms
 from seal_friction_ros.core.seal_file import parse_seal
 from seal_friction_ros.core.units import INCH, LBF, PSI
 from seal_friction_ros.files import config_path, read_yaml
@@ -50,6 +52,15 @@ def test_figure_23_at_rest_friction_is_the_force_sum_between_the_thresholds_and_
     assert not inside.all()
     assert np.array_equal(friction[inside], force_sum[inside])
     assert np.array_equal(friction[~inside], COULOMB * np.sign(force_sum[~inside]))
+
+
+def test_figure_22_follows_the_velocity_where_the_friction_does():
+    terms = VelocityTerms(viscous_friction=100.0, asymmetry=0.1)
+    seal = dataclasses.replace(SHOWN.seal, velocity_terms=terms)
+    shown = dataclasses.replace(SHOWN, seal=seal, mounted=(MountedSeal(seal, 'a'),))
+    coulomb = shown.friction(STATE_PRESSURE).coulomb_friction
+    friction = friction_over_velocity(shown, STATE_PRESSURE, np.array([-0.1, 0.0, 0.05]))
+    assert friction == pytest.approx([-0.9 * (coulomb + 10.0), 0.0, 1.1 * (coulomb + 5.0)])
 
 
 def test_figure_23_with_stiction_has_its_thresholds_further_out():
