@@ -158,7 +158,7 @@ def heard_log(place: Stage) -> list[str]:
 
     def is_heard() -> bool:
         place.estimator.get_logger().info('is the log heard?')
-        return bool(lines)
+        return 'is the log heard?' in lines
 
     place.spin_until(is_heard)
     return lines
