@@ -27,7 +27,6 @@ from fault_rows import AFTER, MS, SIGNAL_ROWS, UNKNOWN, good
 from fault_stage import SETTINGS, Driver, Outputs, Stage, complaints_at_any_time, encoded, stage, try_row
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from rcl_interfaces.msg import Log
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -151,19 +150,6 @@ def second_publisher_refused(chance: random.Random, folder: Path) -> list[str]:
     return second_publisher(chance, folder, refuse=True)
 
 
-def heard_log(place: Stage) -> list[str]:
-    """What is logged from now on."""
-    lines: list[str] = []
-    place.driver.create_subscription(Log, '/rosout', lambda log: lines.append(log.msg), 100)
-
-    def is_heard() -> bool:
-        place.estimator.get_logger().info('is the log heard?')
-        return 'is the log heard?' in lines
-
-    place.spin_until(is_heard)
-    return lines
-
-
 def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
     """A publisher that offers best effort only, a subscriber that wants what was never kept, another type."""
     del chance, folder
@@ -172,7 +158,6 @@ def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
         place.driver.inputs['rod_velocity'] = place.driver.create_publisher(
             RodVelocity, 'rod_velocity', qos_profile_sensor_data
         )
-        lines = heard_log(place)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         if not place.estimator.autostart():
             return ['does not start']
@@ -180,15 +165,16 @@ def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
             other.create_subscription(FrictionEstimate, 'friction_estimate', lambda _: None, latched)
             odd.create_publisher(Float64, 'rod_position', 10)
             place.driver.destroy_publisher(place.driver.inputs.pop('rod_position'))
-            wanted = ('/driver offers best effort only: taken as such', '/logger wants incompatible quality of service')
             wrong = []
-            for words in wanted:
-                said = place.spin_until(lambda words=words: any(words in line for line in lines))
-                wrong += unless(said, f'not said: {words}')
-            unheard = '/odd_driver publishes std_msgs/msg/Float64'
-            wrong += unless(
-                place.spin_until(lambda: unheard in message(place)), f'not said: {unheard}: {message(place)}'
-            )
+            for words in (
+                '/logger wants incompatible quality of service (volatile where transient local is wanted)',
+                '/odd_driver publishes std_msgs/msg/Float64, not seal_friction_msgs/msg/RodPosition',
+            ):
+                said = place.spin_until(lambda words=words: words in message(place))
+                wrong += unless(said, f'not said: {words}, but: {message(place)}')
+            values = {value.key: value.value for value in place.estimator.diagnostics()['estimate'].values}
+            taken = values.get('rod_velocity best effort only, from')
+            wrong += unless(taken == '/driver', f'best effort taken from {taken}')
         place.connect()
         return wrong + recovered(place)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
@@ -54,6 +54,7 @@ class FrictionEstimator(ManagedNode):
         self._said: dict[str, str] = {}
         self._deaf_to: set[str] = set()
         self._unnamed: set[str] = set()
+        self._best_effort: dict[str, str] = {}
         self._recording = Recording()
         self._configuration: Configuration | None = None
         self._inputs: dict[str, Any] = {}
@@ -94,7 +95,8 @@ class FrictionEstimator(ManagedNode):
             self.destroy_publisher(publisher)
         self._inputs.clear()
         self._outputs.clear()
-        self._deaf_to.clear()
+        for noted in (self._deaf_to, self._unnamed, self._best_effort):
+            noted.clear()
         self._configuration = None
 
     def start(self) -> None:
@@ -237,6 +239,9 @@ class FrictionEstimator(ManagedNode):
             estimate.level = DiagnosticStatus.ERROR
         elif (crowd or unheard) and estimate.level == DiagnosticStatus.OK:
             estimate.level = DiagnosticStatus.WARN
+        estimate.values += [
+            KeyValue(key=f'{name} best effort only, from', value=who) for name, who in self._best_effort.items()
+        ]
         estimate.message = '; '.join([*crowd, *unheard, estimate.message])
         self._say_once('publishers', '; '.join(crowd))
         self._say_once('unheard', '; '.join(unheard))
@@ -279,7 +284,8 @@ class FrictionEstimator(ManagedNode):
                     if not is_named(publisher) and name not in self._unnamed:
                         self._unnamed.add(name)  # it may have a name by the next time
                         break
-                    self.get_logger().warning(f'{topic}: {full_name(publisher)} offers best effort only: taken as such')
+                    self._best_effort[name] = who = full_name(publisher)
+                    self.get_logger().warning(f'{topic}: {who} offers best effort only: taken as such')
                     self._subscribe(name, qos.best_effort(qos.STREAM))
                     break
                 reason = why_unheard(publisher, wire.INPUTS[name], wanted)
