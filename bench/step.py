@@ -1,18 +1,30 @@
 """What one sample costs, stage by stage: ``make bench``, or ``python bench/step.py [--json]``.
 
-Medians over batches, in one run; the ratio to a bare function call is what can be compared between machines.
+Medians over batches, in one run; the ratio to a bare function call is what can be compared between machines. The stages
+of the live path are marked; one sample without a feed-forward costs the sum of those, and what the executor adds.
 """
 
 import argparse
 import json
 import sys
+import tempfile
+import time
 import timeit
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
 from statistics import median
 
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+from seal_friction_msgs.msg import RodVelocity
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.estimator import step
@@ -20,13 +32,15 @@ from seal_friction_ros.core.pipeline import Reference, encoded, init, receive
 from seal_friction_ros.core.records import Force, Pressure, RodSample
 from seal_friction_ros.core.wire import Velocity
 from seal_friction_ros.files import default_configuration
+from seal_friction_ros.nodes.processes import free_domain
+from seal_friction_ros.offline.recorder import Recorder
 
 CALLS = 2000
 BATCHES = 15
 
 
 def stages() -> dict[str, Callable[[], object]]:
-    """Each stage of the live path but ROS's own, as a function without arguments."""
+    """Each stage of the live path but the middleware's, as a function without arguments."""
     parameters = default_configuration().parameters()
     pressure, force, velocity = Pressure(1, 3e6, 1e6), Force(1, 20.0), Velocity(1, 0.1, b'rod')
     sample = RodSample(1, 0.1, pressure, force)
@@ -48,24 +62,59 @@ def stages() -> dict[str, Callable[[], object]]:
     }
 
 
+@contextmanager
+def middleware() -> Iterator[dict[str, Callable[[], object]]]:
+    """Stages of the middleware and the recorder, and what rclpy has beside ours, as functions that do one message."""
+    context = Context()
+    rclpy.init(context=context, domain_id=free_domain())
+    node = Node('bench', context=context)
+    deep = QoSProfile(depth=4 * CALLS)
+    publisher = node.create_publisher(RodVelocity, 'rod_velocity', deep)
+    subscription = node.create_subscription(RodVelocity, 'rod_velocity', lambda _: None, deep, raw=True)
+    velocity_bytes = wire.encode_velocity(Velocity(1, 0.1, b'rod'))
+    message = deserialize_message(velocity_bytes, RodVelocity)
+    stamps = count()
+    with tempfile.TemporaryDirectory() as folder:
+        recorder = Recorder(Path(folder) / 'bag', queue_length=10**7)
+        try:
+            while not publisher.get_subscription_count():
+                time.sleep(0.01)
+            yield {
+                'publish': lambda: publisher.publish(velocity_bytes),
+                'take': lambda: subscription.handle.take_message(RodVelocity, True),
+                'record': lambda: recorder.record('/rod_velocity', wire.VELOCITY_TYPE, next(stamps), velocity_bytes),
+                'rclpy: deserialise': lambda: deserialize_message(velocity_bytes, RodVelocity),
+                'rclpy: serialise': lambda: serialize_message(message),
+            }
+        finally:
+            recorder.close()
+            node.destroy_node()
+            rclpy.try_shutdown(context=context)
+
+
+LIVE = ('take', 'decode velocity', 'receive velocity', 'encode estimate', 'publish', 'record')
+
+
 def main() -> int:
     """Time every stage and print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--json', action='store_true')
     as_json = parser.parse_args().json
-    batches: dict[str, list[float]] = {name: [] for name in stages()}
-    for _ in range(BATCHES):  # in turn, so that a slow moment of the machine hits all of them
-        for name, stage in stages().items():
-            batches[name].append(timeit.timeit(stage, number=CALLS) / CALLS * 1e6)
+    batches: dict[str, list[float]] = {}
+    with middleware() as ours:
+        for _ in range(BATCHES):  # in turn, so that a slow moment of the machine hits all of them
+            for name, stage in {**stages(), **ours}.items():
+                batches.setdefault(name, []).append(timeit.timeit(stage, number=CALLS) / CALLS * 1e6)
     figures = {name: median(times) for name, times in batches.items()}
     if as_json:
-        print(json.dumps({f'{name} [us]': time for name, time in figures.items()}))
+        print(json.dumps({f'{name} [us]': duration for name, duration in figures.items()}))
         return 0
     table = Table(title=f'One sample, median of {BATCHES} batches of {CALLS}')
     for heading in ('stage', 'time [us]', 'bare calls'):
         table.add_column(Text(heading), justify='left' if heading == 'stage' else 'right')
-    for name, time in figures.items():
-        table.add_row(name, f'{time:.2f}', f'{time / figures["bare call"]:.0f}')
+    for name, duration in figures.items():
+        table.add_row(name + ' *' * (name in LIVE), f'{duration:.2f}', f'{duration / figures["bare call"]:.0f}')
+    table.add_row('* one sample', f'{sum(figures[name] for name in LIVE):.2f}', '')
     Console().print(table)
     return 0
 

@@ -32,7 +32,7 @@ from seal_friction_ros.nodes.publishers import (
 )
 from seal_friction_ros.nodes.recording import Recording
 
-_SWITCH_INTERVAL = 2e-4  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
+_SWITCH_INTERVAL = 5e-5  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
 
 
 class FrictionEstimator(ManagedNode):
@@ -165,15 +165,23 @@ class FrictionEstimator(ManagedNode):
             self._statistics.on_malformed(name)
             self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
             return
-        self._statistics.on_input(name, message.stamp)
-        self._recording.record(self._topics[name], type_name, self._now(), data)
+        received = self._now()
         self._state, answer = receive(self._known, self._state, message)
-        for answer_type, answer_data in encoded(answer):
-            self._publish(answer_type, answer_data)
+        published = []
+        for answer_type, answer_data in encoded(answer):  # each is on its way before the next is made
+            self._outputs[answer_type].publish(answer_data)
+            published.append((answer_type, answer_data))
+        done = time.perf_counter_ns()
+
+        # Nobody waits for what follows.
+        self._recording.record(self._topics[name], type_name, received, data)
+        for answer_type, answer_data in published:
+            self._recording.record(self._topics[answer_type], answer_type, self._now(), answer_data)
+        self._statistics.on_input(name, message.stamp)
         if answer.feedforward is not None:
             self._statistics.on_feedforward(answer.feedforward)
         if answer.estimate is not None:
-            self._statistics.on_estimate(answer.estimate, time.perf_counter_ns() - taken)
+            self._statistics.on_estimate(answer.estimate, done - taken)
 
     def _publish(self, type_name: str, data: bytes) -> None:
         self._outputs[type_name].publish(data)
