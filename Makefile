@@ -23,7 +23,8 @@ test:
 	$(python) -m ruff check .
 	$(python) -m ruff format --check .
 	$(python) -m mypy
-	$(python) -m pytest
+	$(python) -m pytest --numprocesses auto --dist loadfile test/core test/offline
+	$(python) -m pytest --ignore test/core --ignore test/offline
 
 bench: setup
 	@$(python) bench/step.py
