@@ -97,19 +97,19 @@ def receive(parameters: PipelineParameters, state: PipelineState, message: Input
     """
     if isinstance(message, Velocity):
         return _on_velocity(parameters, state, message)
+    seen, fed, pressure, force, reference, refused = state  # _replace would take three times as long
     if isinstance(message, Pressure):
-        return state._replace(pressure=message), NOTHING
+        return PipelineState(seen, fed, message, force, reference, refused), NOTHING
     if isinstance(message, Force):
-        return state._replace(force=message), NOTHING
+        return PipelineState(seen, fed, pressure, message, reference, refused), NOTHING
     if isinstance(message, Position):  # nothing depends on it; it is kept in bags to show how the servo tracks
         return state, NOTHING
     reference = Reference(message.stamp, message.velocity, message.acceleration)
-    state = state._replace(reference=reference)
-    if not is_fading(parameters.feedforward, state.estimator.stamp, message.stamp):
-        return state, NOTHING
+    if not is_fading(parameters.feedforward, seen.stamp, message.stamp):
+        return PipelineState(seen, fed, pressure, force, reference, refused), NOTHING
     motion = Motion(reference.velocity, reference.acceleration)
-    fading, force = feedforward.step(parameters.feedforward, state.feedforward, message.stamp, NO_ESTIMATE, motion)
-    return state._replace(feedforward=fading), Answer(None, force, message.frame_id)
+    fed, compensation = feedforward.step(parameters.feedforward, fed, message.stamp, NO_ESTIMATE, motion)
+    return PipelineState(seen, fed, pressure, force, reference, refused), Answer(None, compensation, message.frame_id)
 
 
 def _on_velocity(

@@ -182,6 +182,7 @@ class FrictionEstimator(ManagedNode):
             self._statistics.on_feedforward(answer.feedforward)
         if answer.estimate is not None:
             self._statistics.on_estimate(answer.estimate, done - taken)
+            self._recording.now_is_a_good_time()
 
     def _publish(self, type_name: str, data: bytes) -> None:
         self._outputs[type_name].publish(data)

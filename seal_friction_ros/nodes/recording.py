@@ -46,6 +46,11 @@ class Recording:
         if self._recorder is not None:
             self._recorder.record(topic, type_name, log_time, data)
 
+    def now_is_a_good_time(self) -> None:
+        """To write: nobody waits for an answer right now."""
+        if self._recorder is not None:
+            self._recorder.now_is_a_good_time()
+
     def stop(self) -> str:
         """Have the bag finished, without making the estimate wait for the disk.
 

@@ -15,8 +15,11 @@ from seal_friction_ros.offline.bag import BagWriter
 
 QUEUE_LENGTH = 100_000  # [messages] fourteen seconds of seven topics at 1 kHz
 FLUSH_PERIOD = 0.3  # [s]
-_PERIOD = 0.01  # [s] between two looks at the queue: waking the thread for each message would slow the estimator
+_PERIOD = (
+    0.05  # [s] between two looks at the queue if nobody says when: waking for each message would slow the estimator
+)
 _HASTE = 0.002  # [s] the same while more messages wait than are written at a time
+_ENOUGH = 20  # messages to be woken up for
 _AT_A_TIME = 100  # messages written before the estimator has the processor again, so a backlog does not delay it
 
 
@@ -43,6 +46,7 @@ class Recorder:
         self._queue: deque[tuple[str, str, int, bytes]] = deque()  # plain tuples: the garbage collector lets go of them
         self._writer = BagWriter(path, split_size=split_size, split_duration=split_duration)
         self._stop = threading.Event()
+        self._wake = threading.Event()
         self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
         self._thread.start()
 
@@ -53,6 +57,14 @@ class Recorder:
             self._refused += 1
         else:
             self._queue.append((topic, type_name, log_time, data))
+
+    def now_is_a_good_time(self) -> None:
+        """Have the queue written now if it is long enough: the estimator says so when it has just answered.
+
+        Python runs one thread at a time, so what is written while a sample comes in makes it wait.
+        """
+        if len(self._queue) >= _ENOUGH:
+            self._wake.set()
 
     @property
     def written(self) -> int:
@@ -77,6 +89,7 @@ class Recorder:
     def stop(self) -> None:
         """Have what is queued written and the bag finished, without waiting for that."""
         self._stop.set()
+        self._wake.set()
 
     def close(self) -> None:
         """Write what is queued and finish the bag; how many messages were dropped is kept in its metadata."""
@@ -98,7 +111,10 @@ class Recorder:
             if time.monotonic() - flushed >= FLUSH_PERIOD:
                 self._writer.flush()
                 flushed = time.monotonic()
-            time.sleep(_HASTE if self._queue else _PERIOD)
+            if self._queue:
+                time.sleep(_HASTE)
+            elif self._wake.wait(_PERIOD):
+                self._wake.clear()
 
     def _rescue(self, failure: Exception) -> None:
         """Leave a valid bag of what was written, and say what happened."""
