@@ -67,7 +67,7 @@ def echo(kind: str) -> None:
 class Asker:
     """Publishes inputs and hears the answers, on the graph of one case."""
 
-    def __init__(self, case: str, domain: int, process: subprocess.Popen[bytes]) -> None:
+    def __init__(self, case: str, domain: int, process: subprocess.Popen[bytes] | None) -> None:
         self.case, self.process = case, process
         self.context = Context()
         rclpy.init(context=self.context, domain_id=domain)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 
 class MonotoneTable:
@@ -30,6 +29,8 @@ class MonotoneTable:
             raise ValueError(f'{name}: not every point is finite')
         if any(b <= a for a, b in pairwise(x)):
             raise ValueError(f'{name}: abscissae do not increase: {list(x)}')
+        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  half a second, for seals with a table only
+
         with np.errstate(all='ignore'):
             spline = PchipInterpolator(x, y)
         if not np.isfinite(spline.c).all():

@@ -1,0 +1,96 @@
+"""How long things take to start: ``python bench/start.py [--times 7] [--json]``.
+
+``seal_friction --help`` beside the bare interpreter, and the estimator from the start of its process to its first
+estimate, while inputs come at 1 kHz. Medians; the caches of the operating system are warm after the first round.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+from live import ALONE, Asker
+from rclpy.task import Future
+from rich.console import Console
+from rich.table import Table
+
+from seal_friction_ros.nodes.executor import spin
+from seal_friction_ros.nodes.processes import free_domain, running
+
+PATIENCE = 30.0  # [s]
+HELP = [sys.executable, '-m', 'seal_friction_ros.offline.cli', '--help']
+BARE = [sys.executable, '-c', 'pass']
+
+
+def run(command: list[str]) -> float:
+    """Time [s] that a command takes."""
+    start = time.perf_counter()
+    subprocess.run(command, check=True, capture_output=True)
+    return time.perf_counter() - start
+
+
+def first_estimate() -> float:
+    """Time [s] from the start of the node's process to its first estimate.
+
+    Raises:
+        RuntimeError: None comes.
+    """
+    domain = free_domain()
+    asker = Asker(ALONE, domain, None)
+    stopped = Future()
+    thread = threading.Thread(target=spin, args=(asker.node, stopped, asker.context), daemon=True)
+    thread.start()
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        with running('friction_estimator', domain, {}, Path(folder) / 'log'):
+            while not asker.round_trips:
+                if time.perf_counter() > start + PATIENCE:
+                    raise RuntimeError('no estimate comes')
+                asker.ask()
+                time.sleep(0.001)
+            found = time.perf_counter() - start
+    stopped.set_result(None)
+    thread.join()
+    asker.node.destroy_node()
+    asker.context.try_shutdown()
+    return found
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--times', type=int, default=7)
+    parser.add_argument('--json', action='store_true')
+    arguments = parser.parse_args()
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    measured: dict[str, Callable[[], float]] = {
+        'bare interpreter': lambda: run(BARE),
+        'seal_friction --help': lambda: run(HELP),
+        'estimator, to the first estimate': first_estimate,
+    }
+    times: dict[str, list[float]] = {name: [] for name in measured}
+    for number in range(arguments.times + 1):
+        for name, measure in measured.items():
+            duration = measure()
+            if number:  # the first round warms the caches
+                times[name].append(duration)
+    found = {name: round(median(durations), 3) for name, durations in times.items()}
+    if arguments.json:
+        print(json.dumps({f'{name} [s]': duration for name, duration in found.items()}))
+        return 0
+    table = Table('what', 'median', title='Start')
+    for name, duration in found.items():
+        table.add_row(name, f'{duration:.3f} s')
+    Console().print(table)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
