@@ -20,6 +20,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
         shared('config', '*.yaml'),
+        shared('config', '*.xml'),
         shared('config/seals', '*.yaml'),
         shared('config/programs', '*.yaml'),
         shared('config/security', '*.xml'),

@@ -22,6 +22,7 @@ from seal_friction_ros.core.feedforward import LONGEST_STEP, FeedForward, FeedFo
 from seal_friction_ros.core.records import Force, FrictionEstimate, Pressure, Status
 from seal_friction_ros.core.wire import Velocity
 from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.nodes.processes import free_domain
@@ -172,6 +173,7 @@ class Stage:
 @contextmanager
 def stage(parameters: Mapping[str, Any] | None = None, *, autostart: bool = True) -> Iterator[Stage]:
     """A graph that nobody else is on."""
+    set_up_discovery()
     context = Context()
     rclpy.init(context=context, domain_id=free_domain())
     values = {**SETTINGS, **(parameters or {})}

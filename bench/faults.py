@@ -43,6 +43,7 @@ from std_msgs.msg import Float64
 from seal_friction_ros.core import records
 from seal_friction_ros.core.feedforward import FeedForward
 from seal_friction_ros.core.records import Status
+from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.processes import free_domain, graph_environment
 from seal_friction_ros.offline import mcap_output
@@ -432,7 +433,7 @@ class Outside:
 def outside(folder: Path, directory: str = '', prefix: tuple[str, ...] = ()) -> Iterator[Outside]:
     """Run the estimator, recording to ``bag`` in a folder, behind a command that prepares its file system."""
     domain, log = free_domain(), folder / 'log'
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    set_up_discovery()
     values = {'record': 'true', 'record_directory': directory or str(folder), 'record_name': 'bag'}
     parameters = [f'-p {name}:={value}' for name, value in {**values, **SETTINGS}.items()]
     command = [*prefix, sys.executable, '-m', 'seal_friction_ros.nodes.friction_estimator', '--ros-args']

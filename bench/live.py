@@ -38,6 +38,7 @@ from seal_friction_ros.core import wire
 from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.core.wire import Velocity
 from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.executor import spin
 from seal_friction_ros.nodes.processes import free_domain, graph_environment, running
 
@@ -190,7 +191,7 @@ def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
 
 def measure(seconds: float, realtime: int, rates: tuple[int, ...]) -> dict[str, dict[int, Figures]]:
     """Ask all of them in turn."""
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    set_up_discovery()
     found = {case: {rate: Figures() for rate in rates} for case in CASES}
     with ExitStack() as stack, Progress(console=Console(stderr=True)) as progress:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))

@@ -8,7 +8,6 @@ or a sample was lost and not reported.
 
 import argparse
 import json
-import os
 import sys
 import tempfile
 import time
@@ -29,7 +28,8 @@ from rich.table import Table
 from rich.text import Text
 
 from seal_friction_ros.core import wire
-from seal_friction_ros.nodes.processes import free_domain, graph_environment, running
+from seal_friction_ros.nodes.discovery import set_up_discovery
+from seal_friction_ros.nodes.processes import free_domain, running
 from seal_friction_ros.offline.bag import VELOCITY_TOPIC, read_messages
 
 PERIOD = 1_000_000  # [ns] of the simulator
@@ -84,7 +84,7 @@ def soak(minutes: float, folder: Path) -> dict[str, Any]:
         RuntimeError: No estimate came within half a minute.
     """
     domain, log, bag = free_domain(), folder / 'log', folder / 'bag'
-    os.environ |= {key: graph_environment(domain)[key] for key in ('ROS_AUTOMATIC_DISCOVERY_RANGE',)}
+    set_up_discovery()
     recording = {
         'record': True,
         'record_directory': str(folder),

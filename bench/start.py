@@ -6,7 +6,6 @@ estimate, while inputs come at 1 kHz. Medians; the caches of the operating syste
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from rclpy.task import Future
 from rich.console import Console
 from rich.table import Table
 
+from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.executor import spin
 from seal_friction_ros.nodes.processes import free_domain, running
 
@@ -69,7 +69,7 @@ def main() -> int:
     parser.add_argument('--times', type=int, default=7)
     parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    set_up_discovery()
     measured: dict[str, Callable[[], float]] = {
         'bare interpreter': lambda: run(BARE),
         'seal_friction --help': lambda: run(HELP),

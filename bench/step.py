@@ -32,6 +32,7 @@ from seal_friction_ros.core.pipeline import Reference, encoded, init, receive
 from seal_friction_ros.core.records import Force, Pressure, RodSample
 from seal_friction_ros.core.wire import Velocity
 from seal_friction_ros.files import default_configuration
+from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.processes import free_domain
 from seal_friction_ros.offline.recorder import Recorder
 
@@ -65,6 +66,7 @@ def stages() -> dict[str, Callable[[], object]]:
 @contextmanager
 def middleware() -> Iterator[dict[str, Callable[[], object]]]:
     """Stages of the middleware and the recorder, and what rclpy has beside ours, as functions that do one message."""
+    set_up_discovery()
     context = Context()
     rclpy.init(context=context, domain_id=free_domain())
     node = Node('bench', context=context)

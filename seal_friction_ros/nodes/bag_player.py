@@ -18,7 +18,7 @@ from seal_friction_msgs.msg import FrictionEstimate
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.nodes import qos
-from seal_friction_ros.nodes.executor import keep_to_this_machine
+from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.live_statistics import latency_values
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bag import BagError, BagMessage, read_messages
@@ -131,7 +131,7 @@ def main() -> int:
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
     if not 0.0 <= arguments.rate < float('inf'):
         parser.error(f'--rate {arguments.rate}: not a rate')
-    keep_to_this_machine()
+    set_up_discovery()
     rclpy.init()
     player = BagPlayer()
     try:

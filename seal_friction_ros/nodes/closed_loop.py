@@ -1,6 +1,5 @@
 """The loop closed live: simulated servo and estimator on one graph, first without feed-forward, then with it."""
 
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +15,8 @@ from rclpy.parameter_client import AsyncParameterClient
 from seal_friction_msgs.msg import FrictionEstimate
 
 from seal_friction_ros.core.feedforward import FeedForwardSettings
-from seal_friction_ros.nodes.processes import graph_environment, running
+from seal_friction_ros.nodes.discovery import set_up_discovery
+from seal_friction_ros.nodes.processes import running
 
 _START = 60.0  # [s] for the simulator to compile and the first estimate to come
 _SCALE = 'feedforward.coulomb_scale'
@@ -63,7 +63,7 @@ class _Operator(Node):
 
 @contextmanager
 def _operator(domain: int) -> Iterator[_Operator]:
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = graph_environment(domain)['ROS_AUTOMATIC_DISCOVERY_RANGE']
+    set_up_discovery()
     context = Context()
     rclpy.init(context=context, domain_id=domain)
     node = _Operator(context)

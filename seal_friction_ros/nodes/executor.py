@@ -1,7 +1,6 @@
 """How the nodes of this package are spun and how they stop."""
 
 import gc
-import os
 import signal
 import socket
 import sys
@@ -15,6 +14,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+
+from seal_friction_ros.nodes.discovery import set_up_discovery
 
 try:
     from rclpy.experimental import EventsExecutor
@@ -59,7 +60,7 @@ def run(
     for number in _SIGNALS:
         signal.signal(number, lambda *_: None)
     try:
-        keep_to_this_machine()
+        set_up_discovery()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
     except (ValueError, RuntimeError) as error:  # RCLError, of a parameter file for example, is a RuntimeError
@@ -80,16 +81,6 @@ def run(
         node.destroy_node()
         rclpy.try_shutdown()
     return 0
-
-
-def keep_to_this_machine() -> None:
-    """Look for no nodes on other machines, unless the environment says how far to look or a distribution is in use.
-
-    The Fast DDS of the wheels has no security plugins, so whoever is found can command. A distribution is left as its
-    user set it up.
-    """
-    if 'ROS_DISTRO' not in os.environ:
-        os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
 
 def _await_signal(heard: socket.socket, stopped: Future) -> None:

@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from seal_friction_ros.nodes.discovery import set_up_discovery
+
 _domains = itertools.count(os.getpid())
 _PATIENCE = 15.0  # [s] for a node to stop in order before it is killed
 
@@ -34,6 +36,7 @@ def free_domain() -> int:
 
 def graph_environment(domain: int) -> dict[str, str]:
     """Environment of a graph that nobody else is on: own domain, nothing leaves this machine."""
+    set_up_discovery()
     return {**os.environ, 'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
 
 
