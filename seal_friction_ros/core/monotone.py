@@ -53,7 +53,7 @@ class MonotoneTable:
         return ((cubic * t + square) * t + slope) * t + value
 
     def at_each(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Value at each of ``x``, finite, shape (n,): the same bits as one by one, since it is sums and products only."""
+        """Value at each of ``x``, finite, shape (n,): the same bits as one by one, being sums and products."""
         knots = np.array(self._knots)
         inside = np.where(x < knots[0], knots[0], x)
         interval = np.minimum(np.searchsorted(knots, inside, side='right') - 1, len(self._cubics) - 1)

@@ -361,6 +361,14 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
                     yield message
 
 
+class Storage(NamedTuple):
+    """The files of a bag, and how messages are kept in them."""
+
+    files: tuple[Path, ...]
+    is_sqlite: bool
+    are_messages_packed: bool = False
+
+
 def storage(path: Path) -> Storage:
     """Find the files of a bag.
 
@@ -429,14 +437,6 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
     except (McapError, OSError, ValueError, struct.error, sqlite3.Error, zstandard.ZstdError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise BagError(f'{path}: not a readable bag: {reason}') from None
-
-
-class Storage(NamedTuple):
-    """The files of a bag, and how messages are kept in them."""
-
-    files: tuple[Path, ...]
-    is_sqlite: bool
-    are_messages_packed: bool = False
 
 
 def _storage(path: Path) -> Storage:

@@ -166,8 +166,10 @@ def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: _P
         count = len(kept.times)
         most = count + (size - start) // _SMALLEST
         pool = _Pool(Messages(data, np.empty(most, np.uint8), *np.empty((2, most), np.int64)), np.empty(most, np.int64))
-        for column, first in zip((*pool.messages[1:], pool.times), (*kept.messages[1:], kept.times), strict=True):
-            column[:count] = first
+        pool.messages.kinds[:count] = kept.messages.kinds
+        pool.messages.offsets[:count] = kept.messages.offsets
+        pool.messages.sizes[:count] = kept.messages.sizes
+        pool.times[:count] = kept.times
         for block, end in ends:
             count = _index(pool, count, start, end, block, channels)
             start = end
@@ -194,10 +196,10 @@ def _index(pool: _Pool, count: int, start: int, end: int, block: Block, channels
 @compiled
 def _whole_number(data: Bytes, offset: int) -> int:
     """Eight bytes, little endian; negative from 2^63 on."""
-    value = 0
+    value = np.int64(0)
     for i in range(8):
         value |= np.int64(data[offset + i]) << np.int64(8 * i)
-    return value
+    return int(value)
 
 
 @compiled
@@ -226,7 +228,7 @@ def _walk(
         opcode, length = data[start], _whole_number(data, start + 1)
         if length < 0 or length > end - start - 9:
             return start, count, -1
-        if opcode == _SCHEMA or opcode == _CHANNEL:  # noqa: PLR1714  faster to compile
+        if _SCHEMA <= opcode <= _CHANNEL:
             return start, count, opcode
         if opcode == _MESSAGE:
             if length < 22:

@@ -124,16 +124,14 @@ class _BulkStream(Stream):
         made = np.flatnonzero(places[1])
         offsets, sizes = places[0][made], places[1][made]
         recorded = np.flatnonzero(messages.kinds == kind)
-        available = np.searchsorted(made, recorded)  # answers before each recorded message
+        available = np.searchsorted(made, recorded).astype(np.int64)  # answers before each recorded message
+        ours = (answers.data, offsets, sizes)
+        theirs = (messages.data, messages.offsets[recorded], messages.sizes[recorded])
         taken = used = 0
         while taken < len(recorded):
             if not self.pending:
                 before = taken
-                taken, used, differing = _compare(
-                    *(taken, used, bool(self.first)),
-                    *(answers.data, offsets, sizes),
-                    *(messages.data, messages.offsets[recorded], messages.sizes[recorded], available),
-                )
+                taken, used, differing = _compare(taken, used, bool(self.first), ours, theirs, available)
                 self.recorded += taken - before
                 self.differing += differing
             if taken < len(recorded):
@@ -157,12 +155,8 @@ def _compare(
     taken: int,
     used: int,
     is_named: bool,
-    data: Bytes,
-    offsets: Integers,
-    sizes: Integers,
-    recorded: Bytes,
-    recorded_offsets: Integers,
-    recorded_sizes: Integers,
+    ours: tuple[Bytes, Integers, Integers],
+    theirs: tuple[Bytes, Integers, Integers],
     available: Integers,
 ) -> tuple[int, int, int]:
     """Compare recorded messages, from number ``taken`` on, with answers from number ``used`` on, while it is simple.
@@ -172,6 +166,8 @@ def _compare(
     Returns:
         The first recorded message that is not simple, the first answer that waits for it, and how many differed.
     """
+    data, offsets, sizes = ours
+    recorded, recorded_offsets, recorded_sizes = theirs
     differing = 0
     while taken < len(available) and used < available[taken]:
         size, first, second = sizes[used], offsets[used], recorded_offsets[taken]
