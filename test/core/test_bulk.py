@@ -32,7 +32,10 @@ from seal_friction_ros.core.seal_file import parse_seal
 from seal_friction_ros.core.wire import ServoReference, Velocity
 from seal_friction_ros.files import default_configuration, read_yaml
 
-SEALS = {path.stem: parse_seal(read_yaml(path)) for path in sorted((Path(__file__).parents[2] / 'config' / 'seals').glob('*.yaml'))}
+SEALS = {
+    path.stem: parse_seal(read_yaml(path))
+    for path in sorted((Path(__file__).parents[2] / 'config' / 'seals').glob('*.yaml'))
+}
 DEFAULT = default_configuration().parameters()
 MS = 1_000_000  # [ns]
 
