@@ -49,6 +49,12 @@ def read_in_bulk(path: Path, kind_of: KindOf) -> Iterator[Messages]:
                     yield messages.taken(first, first + MOST_MESSAGES)
 
 
+def compile_now() -> None:
+    """Compile what is compiled here, for processes to come."""
+    messages, times = _pool_of(bytes(1), 0)
+    _walk(*messages, times, 0, 0, 0, 0, 0, np.zeros(1, np.uint8))
+
+
 def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
     """Messages of the general reader in blocks."""
     source = iter(messages)
@@ -66,9 +72,13 @@ class _Pool(NamedTuple):
     times: Integers
 
 
-_EMPTY = _Pool(
-    Messages(np.zeros(0, np.uint8), np.zeros(0, np.uint8), *np.zeros((2, 0), np.int64)), np.zeros(0, np.int64)
-)
+def _pool_of(data: bytes, count: int) -> _Pool:
+    """Room for so many messages."""
+    columns: Integers = np.empty((3, count), np.int64)
+    return _Pool(Messages(np.frombuffer(data, np.uint8), np.empty(count, np.uint8), *columns[:2]), columns[2])
+
+
+_EMPTY = _pool_of(b'', 0)
 
 
 def _of_file(file: BinaryIO, layout: Layout, kind_of: KindOf) -> Iterator[Messages]:
@@ -160,12 +170,12 @@ def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: _P
             parts.append(mcap_file.unpacked(file, block))
             size += len(parts[-1])
             ends.append((block, size))
-        data = np.frombuffer(b''.join(parts), np.uint8)
+        data = b''.join(parts)
         start = len(parts[0])
         del parts
         count = len(kept.times)
         most = count + (size - start) // _SMALLEST
-        pool = _Pool(Messages(data, np.empty(most, np.uint8), *np.empty((2, most), np.int64)), np.empty(most, np.int64))
+        pool = _pool_of(data, most)
         pool.messages.kinds[:count] = kept.messages.kinds
         pool.messages.offsets[:count] = kept.messages.offsets
         pool.messages.sizes[:count] = kept.messages.sizes

@@ -15,6 +15,7 @@ from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.pipeline import init
 from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline import bulk_reading
 from seal_friction_ros.offline.bulk_reading import KindOf, read_in_bulk
 from seal_friction_ros.offline.mcap_file import ERRORS
 from seal_friction_ros.offline.topics import Topics
@@ -65,6 +66,15 @@ def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: 
             is_cut = bool(answered) or int(kinds[-1]) in (Kind.ESTIMATE, Kind.OTHER_ESTIMATE)
         advance(len(kinds))
     return verdict_of(velocities, streams, is_cut=is_cut)
+
+
+def compile_now() -> None:
+    """Compile all that is compiled, for processes to come."""
+    parameters = default_configuration().parameters()
+    none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((2, 0), np.int64))
+    _, answers = receive_all(parameters, init(parameters), none)
+    _compare(0, 0, False, (answers.data, none.offsets, none.sizes), (none.data, none.offsets, none.sizes), none.sizes)
+    bulk_reading.compile_now()
 
 
 def _kind_of(topics: Topics) -> KindOf:

@@ -1,6 +1,7 @@
 """A bag through the estimator, with no ROS graph and no clock: the same messages give the same bytes as live."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -49,6 +50,10 @@ def chosen_configuration(params: Path | None, seal: Path | None) -> Configuratio
     if seal:
         selection = SealSelection((str(seal),) * len(selection.seals), selection.seal_chambers)
     return load_configuration(selection, settings, feedforward)
+
+
+Show = Callable[[str, int], AbstractContextManager[Callable[[float], None]]]
+"""Shows progress: from what is done and how many messages it has, a context in which to say how many more are done."""
 
 
 class Step(NamedTuple):
@@ -105,7 +110,7 @@ def replay(
     namespace: str = '',
     *,
     bulk_from: int = BULK_FROM,
-    advance: Callable[[int], None] | None = None,
+    show: Show = progress,
 ) -> Verdict:
     """Replay a bag; compare with the estimates it holds; with ``out``, write inputs and new estimates as a new bag.
 
@@ -115,7 +120,7 @@ def replay(
         out: Bag to write.
         namespace: Only topics below it are looked at.
         bulk_from: Without ``out``, a bag of so many messages is replayed compiled, to the same verdict.
-        advance: Called with numbers of messages done; if None, progress is shown here.
+        show: What shows the progress: as `progress`.
 
     Raises:
         BagError: The bag cannot be read, or ``out`` exists already. Nothing is left at ``out`` then.
@@ -123,18 +128,24 @@ def replay(
     known = bag_topics(bag)
     topics = find_topics(bag, namespace, known)
     total = count_messages(known)
-    if advance is None:
-        with progress(f'replay {bag.name}', total) as shown:
-            return replay(bag, override, out, namespace, bulk_from=bulk_from, advance=shown)
-    if out is None:
+    with show(f'replay {bag.name}', total) as advance:
         verdict = None
-        if total >= bulk_from:
+        if out is None and total >= bulk_from:
             from seal_friction_ros.offline.bulk_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
 
             verdict = replay_in_bulk(bag, topics, override, advance)
-        return verdict or _compare(_counted(steps(read_messages(bag), topics, override), advance), topics)
+        if verdict is None:
+            verdict = _replay_one_by_one(bag, topics, override, out, advance)
+    return verdict
+
+
+def _replay_one_by_one(
+    bag: Path, topics: Topics, override: Configuration | None, out: Path | None, advance: Callable[[int], None]
+) -> Verdict:
+    replayed = _counted(steps(read_messages(bag), topics, override), advance)
+    if out is None:
+        return _compare(replayed, topics)
     with BagWriter(out) as writer:
-        replayed = _counted(steps(read_messages(bag), topics, override), advance)
         return _compare(_written(replayed, topics, writer), topics)
 
 
