@@ -145,19 +145,18 @@ class _BulkStream(Stream):
                 self.recorded += taken - before
                 self.differing += differing
             if taken < len(recorded):
-                self.pending.extend(_copies(answers.data, offsets[used : available[taken]], sizes[used:]))
+                self._wait_all(answers.data, offsets[used : available[taken]], sizes[used:])
                 used = int(available[taken])
                 self.take(messages.message(recorded[taken]))
                 taken += 1
                 if len(self.pending) <= used:  # they are all of this block
                     used -= len(self.pending)
                     self.pending.clear()
-        self.pending.extend(_copies(answers.data, offsets[used:], sizes[used:]))
+        self._wait_all(answers.data, offsets[used:], sizes[used:])
 
-
-def _copies(data: Bytes, offsets: Integers, sizes: Integers) -> Iterator[bytes]:
-    for offset, size in zip(offsets.tolist(), sizes.tolist(), strict=False):
-        yield data[offset : offset + size].tobytes()
+    def _wait_all(self, data: Bytes, offsets: Integers, sizes: Integers) -> None:
+        for offset, size in zip(offsets.tolist(), sizes.tolist(), strict=False):
+            self.wait(data[offset : offset + size].tobytes())
 
 
 @compiled

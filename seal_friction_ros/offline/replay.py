@@ -188,7 +188,7 @@ def _compare(replayed: Iterable[Step], topics: Topics) -> Verdict:
         velocities += message.topic == topics.velocity
         for type_name, data in answers:
             if type_name in streams:
-                streams[type_name].pending.append(data)
+                streams[type_name].wait(data)
         if message.topic and message.topic == compared.get(message.type_name):
             streams[message.type_name].take(message.data)
         cut = bool(answers) or message.type_name == wire.ESTIMATE_TYPE

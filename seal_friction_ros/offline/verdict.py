@@ -7,6 +7,8 @@ from itertools import islice
 
 from seal_friction_ros.core import wire
 
+MOST_WAITING = 100_000  # answers that a recording may be late by; it bounds memory where none are recorded any more
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -38,11 +40,22 @@ class Stream:
         self.pending: deque[bytes] = deque()
         self.recorded = self.differing = 0
         self.first = ''
+        self._given_up = 0
+
+    def wait(self, data: bytes) -> None:
+        """Have a new message wait; one that `MOST_WAITING` others came after waits no longer."""
+        self.pending.append(data)
+        if len(self.pending) > MOST_WAITING:
+            self.pending.popleft()
+            self._given_up += 1
 
     def take(self, data: bytes) -> None:
         """Compare one recorded message."""
         self.recorded += 1
         pending, name = self.pending, f'{_kind(self.type_name)} {self.recorded}'
+        if self._given_up:
+            self._differs(lambda: f'{name}: the ones before it were not recorded', self._given_up)
+            self._given_up = 0
         while data in islice(pending, 1, None) and data != pending[0]:  # some were not recorded
             pending.popleft()
             self._differs(lambda: f'{name}: the ones before it were not recorded')
@@ -52,9 +65,10 @@ class Stream:
 
     def finish(self, may_lack: int) -> None:
         """Count what was never recorded, if it is more than what may be missing."""
-        if len(self.pending) > may_lack:
-            words = f'{len(self.pending)} at the end have no recorded {_kind(self.type_name)}'
-            self._differs(lambda: f'velocity samples: {words}', len(self.pending))
+        lacking = len(self.pending) + self._given_up
+        if lacking > may_lack:
+            words = f'{lacking} at the end have no recorded {_kind(self.type_name)}'
+            self._differs(lambda: f'velocity samples: {words}', lacking)
 
     def _differs(self, words: Callable[[], str], count: int = 1) -> None:
         self.differing += count

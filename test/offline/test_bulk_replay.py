@@ -184,6 +184,17 @@ def test_a_recording_that_was_cut_off_between_a_sample_and_its_answer_is_no_diff
         assert assert_same_verdict(rewrite(recorded, tmp_path / str(count), lambda n, m, c=count: m if n < c else None))
 
 
+def test_estimates_that_are_not_recorded_any_more_wait_in_bounded_memory(recorded: Path, tmp_path: Path, monkeypatch):
+    monkeypatch.setattr('seal_friction_ros.offline.verdict.MOST_WAITING', 20)
+    numbers = [n for n, message in enumerate(read_messages(recorded)) if message.topic == ESTIMATE_TOPIC]
+    lost = set(numbers[100:200])
+    with_gap = rewrite(recorded, tmp_path / 'gap', lambda n, m: None if n in lost else m)
+    assert assert_same_verdict(with_gap).differing == 100
+    lost = set(numbers[100:])
+    cut = rewrite(recorded, tmp_path / 'cut', lambda n, m: None if n in lost else m)
+    assert assert_same_verdict(cut).first_difference == 'velocity samples: 200 at the end have no recorded estimate'
+
+
 def test_two_actuators_are_told_apart(recorded: Path, tmp_path: Path):
     with BagWriter(tmp_path / 'two') as writer:
         for message in read_messages(recorded):
