@@ -28,6 +28,7 @@ test:
 bench: setup
 	@$(python) bench/step.py
 	@$(python) bench/servo.py
+	@$(python) bench/offline.py
 
 figures: setup
 	@$(python) tools/make_figures.py

@@ -227,7 +227,7 @@ def _decode(
         values[i, 0] = np.int64(_integer(data, body, 8)).view(np.float64)
         if _PRESSURE <= kind <= _REFERENCE:
             values[i, 1] = np.int64(_integer(data, body + 8, 8)).view(np.float64)
-        heads[i] = _head_size(length if length > 0 else 1)
+        heads[i] = _head_size(length)  # an answer to a name of no bytes has one of one byte, with the same padding
         if kind == _VELOCITY:
             room += 8 + heads[i] + 48
         if kind >= _REFERENCE:

@@ -224,6 +224,8 @@ def test_what_the_decoder_refuses_is_refused_and_what_it_takes_is_taken(kind):
     bad = [good[:n] for n in range(len(good))] + [good + bytes(n) for n in range(6)]
     for place in range(16):
         bad += [good[:place] + bytes([value]) + good[place + 1 :] for value in (0, 1, 4, 5, 127, 128, 255)]
+    bad += [good[:8] + nanoseconds.to_bytes(4, 'little') + good[12:] for nanoseconds in (999_999_999, 1_000_000_000)]
+    bad += [serialised(DECODERS[kind](good), b'x' * length)[1] for length in (1023, 1024)]
     refused = 0
     for data in bad:
         try:
