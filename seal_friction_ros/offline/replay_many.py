@@ -4,7 +4,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -48,7 +48,8 @@ def replay_many(
 
     def work(bag: Path, pipe: Connection) -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # ends it without a word; the words are the parent's
-        pipe.send(_outcome(bag, override, namespace, bulk_from, pipe.send))
+        with suppress(BrokenPipeError):  # the parent is gone
+            pipe.send(_outcome(bag, override, namespace, bulk_from, pipe.send))
 
     outcomes: dict[int, Outcome] = {}
     waiting = list(enumerate(bags))[::-1]
