@@ -31,6 +31,7 @@ bench: setup
 	@$(python) bench/servo.py
 	@$(python) bench/oring.py lines --lines 17 25 33
 	@$(python) bench/ehl.py
+	@$(python) bench/offline.py
 
 figures: setup
 	@$(python) tools/make_figures.py

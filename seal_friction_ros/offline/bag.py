@@ -351,14 +351,32 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
         BagError: There is no bag, or it is damaged (found out when the damage is reached).
     """
     with _as_bag_errors(path):
-        storage = _storage(path)
-        for file in storage.files:
-            for message in _read_file(file, storage.is_sqlite):
-                if storage.are_messages_packed:
+        found = _storage(path)
+        for file in found.files:
+            for message in _read_file(file, found.is_sqlite):
+                if found.are_messages_packed:
                     data = mcap_file.unpack_zstd(message.data, mcap_file.LARGEST_CHUNK)
                     yield message._replace(data=data)
                 else:
                     yield message
+
+
+class Storage(NamedTuple):
+    """The files of a bag, and how messages are kept in them."""
+
+    files: tuple[Path, ...]
+    is_sqlite: bool
+    are_messages_packed: bool = False
+
+
+def storage(path: Path) -> Storage:
+    """Find the files of a bag.
+
+    Raises:
+        BagError: There is no bag.
+    """
+    with _as_bag_errors(path):
+        return _storage(path)
 
 
 def _read_file(path: Path, is_sqlite: bool) -> Iterator[BagMessage]:
@@ -385,9 +403,9 @@ def bag_topics(path: Path) -> dict[str, TopicInfo]:
     """
     found: dict[str, TopicInfo] = {}
     with _as_bag_errors(path):
-        storage = _storage(path)
-        for file in storage.files:
-            for topic, type_name, count in _count_file(file, storage.is_sqlite):
+        stored = _storage(path)
+        for file in stored.files:
+            for topic, type_name, count in _count_file(file, stored.is_sqlite):
                 before = found.get(topic)
                 if before is not None and before.type_name != type_name:
                     raise ValueError(f'{topic} has messages of {before.type_name} and of {type_name}')
@@ -421,15 +439,7 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
         raise BagError(f'{path}: not a readable bag: {reason}') from None
 
 
-class _Storage(NamedTuple):
-    """The files of a bag."""
-
-    files: tuple[Path, ...]
-    is_sqlite: bool
-    are_messages_packed: bool = False
-
-
-def _storage(path: Path) -> _Storage:
+def _storage(path: Path) -> Storage:
     """Find the files of a bag.
 
     Raises:
@@ -438,7 +448,7 @@ def _storage(path: Path) -> _Storage:
     if not path.is_dir():
         if not path.is_file():
             raise ValueError('there is no such file' if not path.exists() else 'neither a file nor a folder')
-        return _Storage((path,), path.suffix == '.db3')
+        return Storage((path,), path.suffix == '.db3')
     metadata = path / 'metadata.yaml'
     if not metadata.is_file():
         raise BagError(f'{path}: no metadata.yaml in it, so not a rosbag2 bag')
@@ -454,7 +464,7 @@ def _storage(path: Path) -> _Storage:
     mode = str(information.get('compression_mode') or 'none').lower()
     if mode not in ('none', 'message'):
         raise ValueError(f'its files are compressed as a whole (compression_mode = {mode!r}): unpack them first')
-    return _Storage(tuple(_inside(path, name) for name in names), kind == 'sqlite3', mode == 'message')
+    return Storage(tuple(_inside(path, name) for name in names), kind == 'sqlite3', mode == 'message')
 
 
 def _inside(folder: Path, name: str) -> Path:

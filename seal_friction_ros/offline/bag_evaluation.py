@@ -24,7 +24,7 @@ from seal_friction_ros.core.records import FrictionEstimate, FrictionState, Stat
 from seal_friction_ros.core.wire import DECODERS, Velocity
 from seal_friction_ros.offline.bag import BagError, BagMessage, bag_topics, read_messages
 from seal_friction_ros.offline.progress import progress
-from seal_friction_ros.offline.replay import Topics, find_topics
+from seal_friction_ros.offline.topics import Topics, find_topics
 
 TRIMMED_SHARE = 0.2  # of the samples of a stroke, at each end: starting and stopping
 SPEED_TOLERANCE = 0.2  # of the median speed of what is left: within it the rod slides steadily

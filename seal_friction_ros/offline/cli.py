@@ -43,17 +43,45 @@ def _replay(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.replay import chosen_configuration, replay
 
     override = chosen_configuration(arguments.params, arguments.seal)
-    verdict = replay(arguments.bag, override, arguments.out, arguments.namespace)
-    figures = {**dataclasses.asdict(verdict), 'identical': verdict.identical}
-    if not arguments.verify:
-        return _tell(arguments, figures, f'{verdict.velocity_samples} velocity samples replayed')
+    if len(arguments.bags) > 1:
+        return _replay_many(arguments, override)
+    verdict = replay(arguments.bags[0], override, arguments.out, arguments.namespace)
+    _tell(arguments, _with_identical(verdict), _in_words(verdict, verify=arguments.verify))
+    return DIFFERENT if arguments.verify and not verdict.identical else 0
+
+
+def _replay_many(arguments: argparse.Namespace, override: Any) -> int:
+    """Several bags: a line and an exit code for all of them, whatever becomes of one."""
+    from seal_friction_ros.offline.replay_many import available_cores, replay_many
+
+    if arguments.out:
+        raise ValueError('--out is for one bag: give several one after the other')
+    outcomes = replay_many(arguments.bags, override, arguments.namespace, arguments.workers or available_cores())
+    bags, lines, failed = [], [], [outcome for outcome in outcomes if outcome.verdict is None]
+    for bag, verdict, error in outcomes:
+        bags.append({'bag': bag, **(_with_identical(verdict) if verdict else {'error': error})})
+        lines += [f'{bag}: {_in_words(verdict, verify=arguments.verify)}'] if verdict else []
+    identical = all(outcome.verdict and outcome.verdict.identical for outcome in outcomes)
+    _tell(arguments, {'bags': bags, 'identical': identical}, '\n'.join(lines))
+    for outcome in failed:
+        print(f'seal_friction: {outcome.error}', file=sys.stderr)
+    return UNUSABLE if failed else DIFFERENT if arguments.verify and not identical else 0
+
+
+def _with_identical(verdict: Any) -> dict[str, Any]:
+    return {**dataclasses.asdict(verdict), 'identical': verdict.identical}
+
+
+def _in_words(verdict: Any, *, verify: bool) -> str:
+    if not verify:
+        return f'{verdict.velocity_samples} velocity samples replayed'
     if verdict.identical:
         counts = f'{verdict.recorded_estimates} estimates and {verdict.recorded_feedforwards} feed-forwards'
-        return _tell(arguments, figures, f'{counts}, identical to the byte')
+        return f'{counts}, identical to the byte'
+    if not verdict.recorded_estimates:
+        return 'no estimates in the bag to compare with'
     recorded = verdict.recorded_estimates + verdict.recorded_feedforwards
-    what = f'{verdict.differing} of {recorded} recorded messages differ; {verdict.first_difference}'
-    _tell(arguments, figures, what if verdict.recorded_estimates else 'no estimates in the bag to compare with')
-    return DIFFERENT
+    return f'{verdict.differing} of {recorded} recorded messages differ; {verdict.first_difference}'
 
 
 def _compare(arguments: argparse.Namespace) -> int:
@@ -283,17 +311,12 @@ def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog='seal_friction', description='Seal friction from bags and logs, without ROS.')
     commands = parser.add_subparsers(title='commands', required=True, metavar='COMMAND')
 
-    importing = commands.add_parser('import', help='make a bag from measurements', description='Make a bag.')
-    sources = importing.add_subparsers(title='sources', required=True, metavar='SOURCE')
-    log = _add(sources, 'log', _import_log, 'a measured log, CSV or white space, to a bag')
-    log.add_argument('log', type=Path, help='the log')
-    log.add_argument('--rig', required=True, help='rig file: a path, or the name of one in config/rigs')
-    thesis = _add(sources, 'thesis', _import_thesis, 'the pull test of the thesis, Tables A-1 to A-3, to a bag')
-    for source in (log, thesis):
-        source.add_argument('--out', type=Path, required=True, metavar='BAG', help='bag to make; must not exist')
-
-    replay = _add(commands, 'replay', _replay, 'a bag through the estimator, as fast as it goes')
-    replay.add_argument('bag', type=Path)
+    _add_import(commands)
+    replay = _add(commands, 'replay', _replay, 'bags through the estimator, as fast as it goes')
+    replay.add_argument('bags', type=Path, nargs='+', metavar='BAG')
+    replay.add_argument(
+        '--workers', type=_at_least_one, metavar='N', help='bags at a time, one core each; default: all cores'
+    )
     replay.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file instead of what the bag says')
     replay.add_argument(
         '--seal', type=Path, metavar='FILE', help='seal file for every seal instead of what the bag says'
@@ -426,6 +449,17 @@ def _pressures(text: str) -> tuple[float, float, int]:
     return float(low), float(high), int(steps)
 
 
+def _add_import(commands: Any) -> None:
+    importing = commands.add_parser('import', help='make a bag from measurements', description='Make a bag.')
+    sources = importing.add_subparsers(title='sources', required=True, metavar='SOURCE')
+    log = _add(sources, 'log', _import_log, 'a measured log, CSV or white space, to a bag')
+    log.add_argument('log', type=Path, help='the log')
+    log.add_argument('--rig', required=True, help='rig file: a path, or the name of one in config/rigs')
+    thesis = _add(sources, 'thesis', _import_thesis, 'the pull test of the thesis, Tables A-1 to A-3, to a bag')
+    for source in (log, thesis):
+        source.add_argument('--out', type=Path, required=True, metavar='BAG', help='bag to make; must not exist')
+
+
 def _add_ehl(commands: Any) -> None:
     ehl = commands.add_parser('ehl', help='lubricated contact of a seal', description='Lubricated contact of a seal.')
     steps = ehl.add_subparsers(title='commands', required=True, metavar='COMMAND')
@@ -448,6 +482,13 @@ def _tolerance(text: str) -> float:
     value = float(text)
     if not 0.0 <= value < float('inf'):
         raise argparse.ArgumentTypeError(f'{text} is not a tolerance')
+    return value
+
+
+def _at_least_one(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f'{text} is below 1')
     return value
 
 

@@ -30,8 +30,8 @@ from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bag import BagMessage, bag_topics, read_messages
 from seal_friction_ros.offline.import_log import Rig, read_rig, read_samples
 from seal_friction_ros.offline.progress import progress
-from seal_friction_ros.offline.replay import Topics, find_topics
 from seal_friction_ros.offline.test_plan import is_data_sheet, read_data_sheet
+from seal_friction_ros.offline.topics import Topics, find_topics
 
 DIRECTIONS = {'extend': 1, 'ext': 1, '1': 1, '+1': 1, 'retract': -1, 'ret': -1, '-1': -1}
 KINDS = ('dynamic', 'static')

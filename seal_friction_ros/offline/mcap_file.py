@@ -24,19 +24,19 @@ from mcap.opcode import Opcode
 
 MAGIC = b'\x89MCAP0\r\n'
 LARGEST_CHUNK = 1 << 25  # [bytes] packed or not, and of any other record that is read; rosbag2 makes chunks of 0.8 MB
-_MOST_AT_ONCE = 2 * LARGEST_CHUNK  # [bytes] of chunks that overlap in time
+MOST_AT_ONCE = 2 * LARGEST_CHUNK  # [bytes] of chunks that overlap in time
 _MOST_BLOCKS = 500_000  # 30 GB of our own chunks
 _BLOCK_SIZE = 1 << 20  # [bytes] messages outside of chunks are read in such portions
 _LONGEST_NAME = 1024  # characters of a topic or a type; ROS has 255
-_LAST_TIME = 1 << 62  # [ns] in the year 2116
-_NO_TIME = (1 << 64) - 1  # [ns] first log time of a block without messages
+LAST_TIME = 1 << 62  # [ns] in the year 2116
+NO_TIME = (1 << 64) - 1  # [ns] first log time of a block without messages
 
-_RECORD = struct.Struct('<BQ')  # opcode, length
+RECORD = struct.Struct('<BQ')  # opcode, length
 _CHUNK = struct.Struct('<QQQII')  # first and last log time, unpacked size, checksum, length of the compression's name
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log time, publish time
 _SIZE = struct.Struct('<Q')
 _SHORT = 'a record is shorter than what it claims to hold'  # the library says nothing
-_ERRORS = (ValueError, McapError, struct.error, EOFError, RuntimeError, zstandard.ZstdError)  # RuntimeError: of lz4
+ERRORS = (ValueError, McapError, struct.error, EOFError, RuntimeError, zstandard.ZstdError)  # RuntimeError: of lz4
 
 
 class Channel(NamedTuple):
@@ -100,7 +100,7 @@ def scan(file: BinaryIO) -> Layout:
     damage = ''
     try:
         walk.to_the_end()
-    except _ERRORS as error:
+    except ERRORS as error:
         damage = str(error) or _SHORT
     walk.finish_bare()
     return Layout(tuple(walk.blocks), walk.names.channels, walk.counts, damage, walk.position)
@@ -127,7 +127,7 @@ class _Walk:
         self._bare: Block | None = None
         self._in_summary = False
         self.blocks: list[Block] = []
-        self.names = _Names()
+        self.names = Names()
         self.counts: dict[int, int] = {}
         self.position = 0
 
@@ -141,9 +141,9 @@ class _Walk:
             raise ValueError('it does not begin as an MCAP file does')
         self.position, opcode = len(MAGIC), 0
         while opcode != Opcode.FOOTER:
-            head = self._read(self.position, _RECORD.size)
-            opcode, length = _RECORD.unpack(head) if len(head) == _RECORD.size else (0, self._size)
-            end = self.position + _RECORD.size + length
+            head = self._read(self.position, RECORD.size)
+            opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, self._size)
+            end = self.position + RECORD.size + length
             if end > self._size:
                 raise ValueError(f'it was not finished, or truncated: no whole record at byte {self.position}')
             self._take(opcode, length)
@@ -160,8 +160,8 @@ class _Walk:
             self._bare = None
 
     def _take(self, opcode: int, length: int) -> None:
-        content = self.position + _RECORD.size
-        if opcode in _OF_MESSAGES and not self._in_summary:
+        content = self.position + RECORD.size
+        if opcode in OF_MESSAGES and not self._in_summary:
             self._extend_bare(opcode, length)
             return
         self.finish_bare()
@@ -180,14 +180,14 @@ class _Walk:
     def _extend_bare(self, opcode: int, length: int) -> None:
         if self._bare is None or self._bare.unpacked_size > _BLOCK_SIZE:
             self.finish_bare()
-            self._bare = Block(self.position, 0, _NO_TIME, 0, 0)
+            self._bare = Block(self.position, 0, NO_TIME, 0, 0)
         bare = self._bare
         time_range = (bare.first, bare.last)
         if opcode == Opcode.MESSAGE:
             head = self._read(self.position, _MESSAGE.size)
             time = _MESSAGE.unpack(head)[4]
             time_range = (min(bare.first, time), max(bare.last, time))
-        size = bare.unpacked_size + _RECORD.size + length
+        size = bare.unpacked_size + RECORD.size + length
         self._bare = bare._replace(first=time_range[0], last=time_range[1], unpacked_size=size)
 
     def _chunk(self, offset: int, length: int) -> None:
@@ -222,7 +222,7 @@ class _Walk:
         return self._file.read(size)
 
 
-_OF_MESSAGES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+OF_MESSAGES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 
 def _too_large(size: int) -> str:
@@ -233,7 +233,7 @@ def _stream(data: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(data))
 
 
-class _Names:
+class Names:
     """What is known of schemas and channels."""
 
     def __init__(self, channels: dict[int, Channel] | None = None) -> None:
@@ -287,11 +287,11 @@ def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], No
     Raises:
         ValueError: A block cannot be read, or too many overlap in time.
     """
-    names = _Names(layout.channels)
+    names = Names(layout.channels)
     blocks: Sequence[Block] = layout.blocks
     if names.channels:  # else each channel has to be met before its messages
         blocks = sorted(blocks, key=lambda block: block.first)
-    earliest = _earliest(blocks)
+    earliest = earliest_times(blocks)
     heap: list[tuple[int, int, int, _Contents, Iterator[int]]] = []
     at_once = upcoming = 0
     while heap or upcoming < len(blocks):
@@ -302,8 +302,8 @@ def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], No
             if number is not None:
                 heapq.heappush(heap, (contents.times[number], upcoming, number, contents, numbers))
                 at_once += len(contents.data)
-            if at_once > _MOST_AT_ONCE:
-                raise ValueError(f'chunks of more than {_MOST_AT_ONCE >> 20} MiB overlap in time: sort it first')
+            if at_once > MOST_AT_ONCE:
+                raise ValueError(f'chunks of more than {MOST_AT_ONCE >> 20} MiB overlap in time: sort it first')
             upcoming += 1
             continue
         _, place, number, contents, numbers = heap[0]
@@ -316,7 +316,7 @@ def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], No
             heapq.heapreplace(heap, (contents.times[following], place, following, contents, numbers))
 
 
-def _earliest(blocks: Sequence[Block]) -> 'array[int]':
+def earliest_times(blocks: Sequence[Block]) -> 'array[int]':
     """Smallest log time [ns] in each block and all that follow it."""
     earliest = array('Q', [block.first for block in blocks])
     for place in reversed(range(len(earliest) - 1)):
@@ -343,16 +343,16 @@ class _Contents(NamedTuple):
         """One message."""
         offset = self.offsets[number]
         _, length, channel, _, log_time, _ = _MESSAGE.unpack_from(self.data, offset)
-        return Message(channels[channel], log_time, self.data[offset + _MESSAGE.size : offset + _RECORD.size + length])
+        return Message(channels[channel], log_time, self.data[offset + _MESSAGE.size : offset + RECORD.size + length])
 
 
 _NOTHING = _Contents(b'', array('Q'), array('Q'))
 
 
-def _contents(file: BinaryIO, block: Block, names: _Names, on_fault: Callable[[Block, str], None] | None) -> _Contents:
+def _contents(file: BinaryIO, block: Block, names: Names, on_fault: Callable[[Block, str], None] | None) -> _Contents:
     try:
-        return _indexed(_unpacked(file, block), block, names)
-    except _ERRORS as error:
+        return _indexed(unpacked(file, block), block, names)
+    except ERRORS as error:
         reason = str(error) or _SHORT
         if on_fault is None:
             raise ValueError(f'chunk at byte {block.offset}: {reason}') from None
@@ -360,7 +360,12 @@ def _contents(file: BinaryIO, block: Block, names: _Names, on_fault: Callable[[B
         return _NOTHING
 
 
-def _unpacked(file: BinaryIO, block: Block) -> bytes:
+def unpacked(file: BinaryIO, block: Block) -> bytes:
+    """Records of a block, as large as it claims and with the right checksum.
+
+    Raises:
+        ValueError: It cannot be read (or another of `ERRORS`).
+    """
     if block.fault:
         raise ValueError(block.fault)
     file.seek(block.offset)
@@ -372,24 +377,24 @@ def _unpacked(file: BinaryIO, block: Block) -> bytes:
     return data
 
 
-def _indexed(data: bytes, block: Block, names: _Names) -> _Contents:
+def _indexed(data: bytes, block: Block, names: Names) -> _Contents:
     times, offsets = array('Q'), array('Q')
     offset = 0
     while offset < len(data):
-        opcode, length = _RECORD.unpack_from(data, offset)
-        end = offset + _RECORD.size + length
+        opcode, length = RECORD.unpack_from(data, offset)
+        end = offset + RECORD.size + length
         if end > len(data):
             raise ValueError(f'a record of {length} bytes reaches beyond its end')
         if opcode == Opcode.MESSAGE:
             _, length, channel, _, log_time, _ = _MESSAGE.unpack_from(data, offset)
-            if length < _MESSAGE.size - _RECORD.size or channel not in names.channels:
+            if length < _MESSAGE.size - RECORD.size or channel not in names.channels:
                 raise ValueError(f'a message of {length} bytes on channel {channel} makes no sense')
-            if not block.first <= log_time <= block.last or log_time > _LAST_TIME:
+            if not block.first <= log_time <= block.last or log_time > LAST_TIME:
                 raise ValueError(f'a message at {log_time} ns is not within the times that it claims')
             times.append(log_time)
             offsets.append(offset)
-        elif opcode in _OF_MESSAGES:
-            names.learn(opcode, data[offset + _RECORD.size : end])
+        elif opcode in OF_MESSAGES:
+            names.learn(opcode, data[offset + RECORD.size : end])
         offset = end
     return _Contents(data, times, offsets)
 

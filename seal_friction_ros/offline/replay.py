@@ -1,9 +1,7 @@
 """A bag through the estimator, with no ROS graph and no clock: the same messages give the same bytes as live."""
 
-from collections import Counter, deque
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,60 +25,15 @@ from seal_friction_ros.offline.bag import (
     BagError,
     BagMessage,
     BagWriter,
+    TopicInfo,
     bag_topics,
     read_messages,
 )
 from seal_friction_ros.offline.progress import progress
+from seal_friction_ros.offline.topics import Topics, find_topics
+from seal_friction_ros.offline.verdict import Stream, Verdict, verdict_of
 
-
-class Topics(NamedTuple):
-    """Names of the estimator's topics in a bag; an empty name where there is no such topic."""
-
-    pressure: str
-    velocity: str
-    force: str
-    reference: str
-    position: str
-    estimate: str
-    feedforward: str
-    configuration: str
-
-
-_TYPES = Topics(
-    wire.PRESSURE_TYPE,
-    wire.VELOCITY_TYPE,
-    wire.FORCE_TYPE,
-    wire.REFERENCE_TYPE,
-    wire.POSITION_TYPE,
-    wire.ESTIMATE_TYPE,
-    wire.FEEDFORWARD_TYPE,
-    wire.CONFIGURATION_TYPE,
-)
 _DEFAULT_NAMES = {wire.ESTIMATE_TYPE: ESTIMATE_TOPIC, wire.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
-
-
-def find_topics(bag: Path, namespace: str = '') -> Topics:
-    """The estimator's topics in a bag, found by message type, so that names and remapping do not matter.
-
-    Args:
-        bag: The bag.
-        namespace: Only topics below it are looked at; for bags of several actuators.
-
-    Raises:
-        BagError: There is no velocity, or a type has several topics.
-    """
-    names = []
-    below = f'/{namespace.strip("/")}/'.replace('//', '/')
-    topics = {topic: info for topic, info in bag_topics(bag).items() if topic.startswith(below)}
-    for wanted in _TYPES:
-        found = sorted(topic for topic, info in topics.items() if info.type_name == wanted and info.message_count)
-        if len(found) > 1:
-            raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
-        names.append(found[0] if found else '')
-    result = Topics(*names)
-    if not result.velocity:
-        raise BagError(f'{bag}: no message of {wire.VELOCITY_TYPE} in it, so nothing to estimate from')
-    return result
 
 
 def chosen_configuration(params: Path | None, seal: Path | None) -> Configuration | None:
@@ -97,6 +50,10 @@ def chosen_configuration(params: Path | None, seal: Path | None) -> Configuratio
     if seal:
         selection = SealSelection((str(seal),) * len(selection.seals), selection.seal_chambers)
     return load_configuration(selection, settings, feedforward)
+
+
+Show = Callable[[str, int], AbstractContextManager[Callable[[float], None]]]
+"""Shows progress: from what is done and how many messages it has, a context in which to say how many more are done."""
 
 
 class Step(NamedTuple):
@@ -142,44 +99,66 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
         yield Step(used, answers)
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What a replay found."""
-
-    velocity_samples: int
-    recorded_estimates: int
-    recorded_feedforwards: int
-    differing: int
-    """estimates and feed-forwards whose bytes differ from the recorded ones, missing and surplus ones included"""
-    first_difference: str
-    """in words; empty if there is none"""
-
-    @property
-    def identical(self) -> bool:
-        """Whether all that was recorded was reproduced to the byte, and there was an estimate."""
-        return self.recorded_estimates > 0 and not self.differing
+BULK_FROM = 500_000
+"""Messages from which on a bag is replayed compiled: to compile takes as long as this many messages one by one."""
 
 
-def replay(bag: Path, override: Configuration | None = None, out: Path | None = None, namespace: str = '') -> Verdict:
+def replay(
+    bag: Path,
+    override: Configuration | None = None,
+    out: Path | None = None,
+    namespace: str = '',
+    *,
+    bulk_from: int = BULK_FROM,
+    show: Show = progress,
+) -> Verdict:
     """Replay a bag; compare with the estimates it holds; with ``out``, write inputs and new estimates as a new bag.
+
+    Args:
+        bag: The bag.
+        override: Configuration instead of what the bag says.
+        out: Bag to write.
+        namespace: Only topics below it are looked at.
+        bulk_from: Without ``out``, a bag of so many messages is replayed compiled, to the same verdict.
+        show: What shows the progress: as `progress`.
 
     Raises:
         BagError: The bag cannot be read, or ``out`` exists already. Nothing is left at ``out`` then.
     """
-    topics = find_topics(bag, namespace)
+    known = bag_topics(bag)
+    topics = find_topics(bag, namespace, known)
+    total = count_messages(known)
+    with show(f'replay {bag.name}', total) as advance:
+        verdict = None
+        if out is None and total >= bulk_from:
+            from seal_friction_ros.offline.bulk_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
+
+            verdict = replay_in_bulk(bag, topics, override, advance)
+        if verdict is None:
+            verdict = _replay_one_by_one(bag, topics, override, out, advance)
+    return verdict
+
+
+def _replay_one_by_one(
+    bag: Path, topics: Topics, override: Configuration | None, out: Path | None, advance: Callable[[int], None]
+) -> Verdict:
+    replayed = _counted(steps(read_messages(bag), topics, override), advance)
     if out is None:
-        return _compare(_with_progress(bag, topics, override), topics)
+        return _compare(replayed, topics)
     with BagWriter(out) as writer:
-        return _compare(_written(_with_progress(bag, topics, override), topics, writer), topics)
+        return _compare(_written(replayed, topics, writer), topics)
 
 
-def _with_progress(bag: Path, topics: Topics, override: Configuration | None) -> Iterator[Step]:
-    total = sum(info.message_count for info in bag_topics(bag).values())
-    with progress(f'replay {bag.name}', total) as advance:
-        for count, step in enumerate(steps(read_messages(bag), topics, override), start=1):
-            if count % 1000 == 0:
-                advance(1000)
-            yield step
+def count_messages(topics: Mapping[str, TopicInfo]) -> int:
+    """Number of messages on all topics."""
+    return sum(info.message_count for info in topics.values())
+
+
+def _counted(replayed: Iterable[Step], advance: Callable[[int], None]) -> Iterator[Step]:
+    for count, step in enumerate(replayed, start=1):
+        if count % 1000 == 0:
+            advance(1000)
+        yield step
 
 
 def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter) -> Iterator[Step]:
@@ -204,68 +183,13 @@ def _compare(replayed: Iterable[Step], topics: Topics) -> Verdict:
     velocities = 0
     cut = False
     compared = {wire.ESTIMATE_TYPE: topics.estimate, wire.FEEDFORWARD_TYPE: topics.feedforward}
-    streams = {type_name: _Stream() for type_name, topic in compared.items() if topic}
+    streams = {type_name: Stream(type_name) for type_name, topic in compared.items() if topic}
     for message, answers in replayed:
         velocities += message.topic == topics.velocity
         for type_name, data in answers:
             if type_name in streams:
-                streams[type_name].pending.append(data)
+                streams[type_name].wait(data)
         if message.topic and message.topic == compared.get(message.type_name):
-            streams[message.type_name].take(message)
+            streams[message.type_name].take(message.data)
         cut = bool(answers) or message.type_name == wire.ESTIMATE_TYPE
-    for type_name, stream in streams.items():
-        stream.finish(type_name, may_lack=int(cut))
-    recorded = Counter({type_name: stream.recorded for type_name, stream in streams.items()})
-    return Verdict(
-        velocities,
-        recorded[wire.ESTIMATE_TYPE],
-        recorded[wire.FEEDFORWARD_TYPE],
-        sum(stream.differing for stream in streams.values()),
-        next((stream.first for stream in streams.values() if stream.first), ''),
-    )
-
-
-class _Stream:
-    """Recorded messages of one topic against the new ones that wait for them."""
-
-    def __init__(self) -> None:
-        self.pending: deque[bytes] = deque()
-        self.recorded = self.differing = 0
-        self.first = ''
-
-    def take(self, message: BagMessage) -> None:
-        """Compare one recorded message."""
-        self.recorded += 1
-        pending, name = self.pending, f'{_kind(message.type_name)} {self.recorded}'
-        while message.data in islice(pending, 1, None) and message.data != pending[0]:  # some were not recorded
-            pending.popleft()
-            self._differs(f'{name}: the ones before it were not recorded')
-        expected = pending.popleft() if pending else b''
-        if expected != message.data:
-            self._differs(_difference(name, message, expected))
-
-    def finish(self, type_name: str, may_lack: int) -> None:
-        """Count what was never recorded, if it is more than what may be missing."""
-        if len(self.pending) > may_lack:
-            words = f'{len(self.pending)} at the end have no recorded {_kind(type_name)}'
-            self._differs(f'velocity samples: {words}', len(self.pending))
-
-    def _differs(self, words: str, count: int = 1) -> None:
-        self.differing += count
-        self.first = self.first or words
-
-
-def _kind(type_name: str) -> str:
-    return {wire.ESTIMATE_TYPE: 'estimate', wire.FEEDFORWARD_TYPE: 'feed-forward'}[type_name]
-
-
-def _difference(name: str, recorded: BagMessage, expected: bytes) -> str:
-    if not expected:
-        return f'{name}: recorded, but no velocity sample before it'
-    decode = wire.DECODERS[recorded.type_name]
-    try:
-        was, now = decode(recorded.data), decode(expected)
-    except ValueError as error:
-        return f'{name}: {error}'
-    fields = [f'{field} {a!r} -> {b!r}' for field, a, b in zip(was._fields, was, now, strict=True) if a != b]
-    return f'{name} at {was.stamp} ns: recorded -> replayed: {", ".join(fields) or "frame or padding"}'
+    return verdict_of(velocities, streams, is_cut=cut)

@@ -29,8 +29,9 @@ from seal_friction_ros.offline.bag import BagError, bag_topics, read_messages
 from seal_friction_ros.offline.bag_evaluation import FloatArray
 from seal_friction_ros.offline.figures import house_style
 from seal_friction_ros.offline.progress import progress
-from seal_friction_ros.offline.replay import Step, Topics, find_topics, steps
+from seal_friction_ros.offline.replay import Step, steps
 from seal_friction_ros.offline.report import write_page, write_whole
+from seal_friction_ros.offline.topics import Topics, find_topics
 from seal_friction_ros.offline.tune_report import (
     Task,
     Track,

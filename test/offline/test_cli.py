@@ -142,3 +142,17 @@ def test_every_command_has_help(command: list[str], capsys):
         main([*command, '--help'])
     assert stopped.value.code == 0
     assert 'usage: seal_friction' in capsys.readouterr().out
+
+
+def test_help_loads_no_numerics_no_compiler_and_no_ros():
+    program = (
+        'import json, sys\n'
+        'from seal_friction_ros.offline.cli import main\n'
+        'try:\n    main(sys.argv[1:])\n'
+        'except SystemExit:\n    print(json.dumps(sorted(sys.modules)))\n'
+    )
+    for arguments in (['--help'], ['replay', '--help'], ['tune', '--help']):
+        found = subprocess.run([sys.executable, '-c', program, *arguments], capture_output=True, text=True, check=True)
+        loaded = set(json.loads(found.stdout.splitlines()[-1]))
+        assert 'usage: seal_friction' in found.stdout
+        assert not loaded & {'numpy', 'scipy', 'matplotlib', 'numba', 'rclpy', 'rosbags', 'mcap', 'rich', 'yaml'}

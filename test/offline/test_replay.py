@@ -10,7 +10,8 @@ from example_bags import default_configuration, write_inputs
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.records import Status
 from seal_friction_ros.offline.bag import ESTIMATE_TOPIC, BagError, BagMessage, BagWriter, read_messages
-from seal_friction_ros.offline.replay import chosen_configuration, find_topics, replay
+from seal_friction_ros.offline.replay import chosen_configuration, replay
+from seal_friction_ros.offline.topics import find_topics
 
 
 def rewrite(source: Path, out: Path, change: Callable[[int, BagMessage], BagMessage | None]) -> Path:

@@ -1,0 +1,259 @@
+"""What files cost against size: ``python bench/offline.py [--largest N] [--json]``.
+
+A synthetic log of a cylinder (pressure, force sum and velocity at 1 kHz) is imported, replayed, identified from and
+reported on, in sizes a factor of ten apart, each in a process of its own. Beside them the same bag is merely decoded,
+with ``rosbags`` and with ``mcap-ros2-support`` where that is installed. Times are those of the processor, so that
+others on the machine count less; what is loaded and compiled first has a row of its own. The exponent is the slope of
+log time over log size, here from the two largest sizes. The last row replays eight bags by one process and by two, in
+time on the wall: the machine has to be idle for that one.
+"""
+
+import argparse
+import json
+import math
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+SMALLEST = 10_000  # [samples]
+RATE = 1000  # [Hz]
+COPIES = 8  # bags of the comparison of workers
+RIG = """
+name: bench
+source: synthetic
+frame_id: rod
+header: none
+skip_rows: 0
+start: 1.0
+time: {column: 0, unit: s}
+chamber_a: {terms: [{column: 1, unit: Pa}]}
+chamber_b: {terms: [{column: 2, unit: Pa}]}
+force_sum: {terms: [{column: 3, unit: N}]}
+velocity: {terms: [{column: 4, unit: m/s}]}
+"""
+
+
+def write_log(path: Path, samples: int) -> None:
+    """A rod that is driven to and fro at five pressures, 2 s each, with noise on all."""
+    random = np.random.default_rng(1)
+    with path.open('w') as file:
+        for first in range(0, samples, 100_000):
+            at = np.arange(first, min(first + 100_000, samples)) / RATE
+            pressure = 1e6 * (1.0 + at // 2.0 % 5.0)
+            velocity = 0.05 * np.clip(3.0 * np.sin(2.0 * np.pi * at), -1.0, 1.0)
+            force = np.sign(velocity) * (10.0 + 2.0 * (pressure / 1e5) ** (2.0 / 3.0))
+            noise = random.normal(size=(4, len(at))) * [[1e3], [1e3], [0.5], [1e-5]]
+            columns = [at, *(np.array([pressure, pressure, force, velocity]) + noise)]
+            np.savetxt(file, np.column_stack(columns), fmt='%.9g', delimiter=',')
+
+
+# -- tasks, each a function of the log, of the bag and of a folder for what it makes ----------------------------------
+
+
+def _import() -> Callable[[Path], object]:
+    from seal_friction_ros.offline.import_log import import_log
+
+    return lambda folder: import_log(folder / 'log.csv', folder / 'rig.yaml', folder / 'bag')
+
+
+def _replay() -> Callable[[Path], object]:
+    from seal_friction_ros.offline.bulk_replay import compile_now
+    from seal_friction_ros.offline.replay import replay
+
+    compile_now()
+    return lambda folder: replay(folder / 'bag', bulk_from=0)
+
+
+def _replay_one_by_one() -> Callable[[Path], object]:
+    from seal_friction_ros.offline.replay import replay
+
+    return lambda folder: replay(folder / 'bag', bulk_from=sys.maxsize)
+
+
+def _replay_to_a_bag() -> Callable[[Path], object]:
+    from seal_friction_ros.offline.replay import replay
+
+    return lambda folder: replay(folder / 'bag', out=folder / 'replayed')
+
+
+def _verify() -> Callable[[Path], object]:
+    from seal_friction_ros.offline.bulk_replay import compile_now
+    from seal_friction_ros.offline.replay import replay
+
+    def verify(folder: Path) -> None:
+        if not replay(folder / 'replayed', bulk_from=0).identical:
+            raise SystemExit('replay --verify found a difference')
+
+    compile_now()
+    return verify
+
+
+def _identify() -> Callable[[Path], object]:
+    from seal_friction_ros.offline.friction_sources import Choices
+    from seal_friction_ros.offline.identify import Wishes, identify
+
+    return lambda folder: identify([folder / 'bag'], Wishes(sources=Choices(chambers=('a', 'b'))), 'bench')
+
+
+def _report() -> Callable[[Path], object]:
+    from seal_friction_ros.offline.report import write_report
+
+    return lambda folder: write_report(folder / 'replayed', folder / 'report.html', '')
+
+
+def _rosbags() -> Callable[[Path], object]:
+    from rosbags.highlevel import AnyReader
+
+    def decode(folder: Path) -> None:
+        with AnyReader([folder / 'bag']) as reader:
+            for connection, _, data in reader.messages():
+                reader.deserialize(data, connection.msgtype)
+
+    return decode
+
+
+def _mcap_ros2() -> Callable[[Path], object]:
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    def decode(folder: Path) -> None:
+        for path in (folder / 'bag').glob('*.mcap'):
+            with path.open('rb') as file:
+                for _ in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+                    pass
+
+    return decode
+
+
+TASKS: dict[str, tuple[Callable[[], Callable[[Path], object]], int]] = {
+    'import': (_import, 10_000_000),
+    'replay': (_replay, 10_000_000),
+    'replay, message by message': (_replay_one_by_one, 1_000_000),
+    'replay to a new bag': (_replay_to_a_bag, 1_000_000),
+    'replay --verify of it': (_verify, 1_000_000),
+    'identify': (_identify, 1_000_000),
+    'report': (_report, 1_000_000),
+    'decoded by rosbags': (_rosbags, 10_000_000),
+    'decoded by mcap-ros2-support': (_mcap_ros2, 1_000_000),
+}
+"""Name -> what makes ready and gives the task, and the largest size [samples] that it is worth the time for."""
+
+
+def run_task(name: str, folder: Path) -> dict[str, float]:
+    """Do a task in this process; processor time [s] to make ready and to do it, and the memory of the process [MB]."""
+    task = TASKS[name][0]()
+    ready = time.process_time()
+    task(folder)
+    done = time.process_time()
+    return {'ready': ready, 'time': done - ready, 'memory': resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3}
+
+
+def timed(name: str, folder: Path) -> dict[str, float]:
+    """Do a task in a process of its own."""
+    words = [sys.executable, __file__, '--task', name, str(folder)]
+    found = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
+    figures: dict[str, float] = json.loads(found.stdout.splitlines()[-1])
+    return figures
+
+
+def measure_workers(bag: Path) -> dict[str, float]:
+    """Wall time [s] of eight bags by one process and by two."""
+    figures = {}
+    for workers in (1, 2):
+        words = ['replay', *[str(bag)] * COPIES, '--workers', str(workers), '--json']
+        start = time.monotonic()
+        command = [sys.executable, '-m', 'seal_friction_ros.offline.cli', *words]
+        subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
+        figures[f'{workers}'] = time.monotonic() - start
+    return figures | {'ratio': figures['1'] / figures['2']}
+
+
+def exponent(times: dict[int, float]) -> float:
+    """Slope of log time over log size between the two largest sizes; NaN if there are not two."""
+    if len(times) < 2:
+        return math.nan
+    (small, before), (large, after) = sorted(times.items())[-2:]
+    return math.log(after / before) / math.log(large / small)
+
+
+def measure(largest: int, folder: Path) -> dict[str, Any]:
+    """All figures, by task and size."""
+    sizes = [SMALLEST * 10**k for k in range(1 + int(math.log10(max(largest, SMALLEST) / SMALLEST) + 1e-9))]
+    tasks: dict[str, dict[int, dict[str, float]]] = {name: {} for name in TASKS}
+    workers: dict[str, float] = {}
+    for samples in sizes:
+        with tempfile.TemporaryDirectory(dir=folder) as name:
+            place = Path(name)
+            write_log(place / 'log.csv', samples)
+            (place / 'rig.yaml').write_text(RIG)
+            for task, (_, most) in TASKS.items():
+                if samples <= most and (task != 'decoded by mcap-ros2-support' or find_spec('mcap_ros2')):
+                    tasks[task][samples] = timed(task, place)
+            if samples == min(sizes[-1], 1_000_000):
+                workers = measure_workers(place / 'bag')
+    found = {
+        task: {
+            'time [s]': {samples: figures['time'] for samples, figures in rows.items()},
+            'ready [s]': max((figures['ready'] for figures in rows.values()), default=math.nan),
+            'memory [MB]': max((figures['memory'] for figures in rows.values()), default=math.nan),
+            'exponent': exponent({samples: figures['time'] for samples, figures in rows.items()}),
+        }
+        for task, rows in tasks.items()
+    }
+    return {'sizes': sizes, 'tasks': found, 'workers [s]': workers}
+
+
+def show(figures: dict[str, Any]) -> None:
+    """Print the table."""
+    table = Table(title=Text('Processor time [s] against samples; a sample is three messages'))
+    for heading in (
+        '',
+        *(f'{samples:.0e}' for samples in figures['sizes']),
+        'exponent',
+        'to make ready [s]',
+        'most [MB]',
+    ):
+        table.add_column(Text(heading), justify='right' if heading else 'left')
+    for task, row in figures['tasks'].items():
+        times = [row['time [s]'].get(samples) for samples in figures['sizes']]
+        cells = [f'{value:.3g}' if value is not None else '-' for value in times]
+        table.add_row(task, *cells, f'{row["exponent"]:.2f}', f'{row["ready [s]"]:.2f}', f'{row["memory [MB]"]:.0f}')
+    Console().print(table)
+    if not find_spec('mcap_ros2'):
+        print('mcap-ros2-support is not installed, so its row is empty: make test installs it')
+    one, two, ratio = figures['workers [s]'].values()
+    print(f'{COPIES} bags: {one:.1f} s by one process, {two:.1f} s by two on the wall, so {ratio:.2f} times as fast')
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--largest', type=int, default=100_000, metavar='N', help='samples, default 100000')
+    parser.add_argument('--folder', type=Path, help='for bags; default: that of temporary files')
+    parser.add_argument('--json', action='store_true')
+    parser.add_argument('--task', nargs=2, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.task:
+        print(json.dumps(run_task(arguments.task[0], Path(arguments.task[1]))))
+        return 0
+    figures = measure(arguments.largest, arguments.folder or Path(tempfile.gettempdir()))
+    if arguments.json:
+        print(json.dumps(figures))
+    else:
+        show(figures)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,59 @@
+"""Which topic of a bag is what to the estimator."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from seal_friction_ros.core import wire
+from seal_friction_ros.offline.bag import BagError, TopicInfo, bag_topics
+
+
+class Topics(NamedTuple):
+    """Names of the estimator's topics in a bag; an empty name where there is no such topic."""
+
+    pressure: str
+    velocity: str
+    force: str
+    reference: str
+    position: str
+    estimate: str
+    feedforward: str
+    configuration: str
+
+
+_TYPES = Topics(
+    wire.PRESSURE_TYPE,
+    wire.VELOCITY_TYPE,
+    wire.FORCE_TYPE,
+    wire.REFERENCE_TYPE,
+    wire.POSITION_TYPE,
+    wire.ESTIMATE_TYPE,
+    wire.FEEDFORWARD_TYPE,
+    wire.CONFIGURATION_TYPE,
+)
+
+
+def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] | None = None) -> Topics:
+    """The estimator's topics in a bag, found by message type, so that names and remapping do not matter.
+
+    Args:
+        bag: The bag.
+        namespace: Only topics below it are looked at; for bags of several actuators.
+        known: From `bag_topics`, if it was asked already.
+
+    Raises:
+        BagError: There is no velocity, or a type has several topics.
+    """
+    names = []
+    below = f'/{namespace.strip("/")}/'.replace('//', '/')
+    known = bag_topics(bag) if known is None else known
+    topics = {topic: info for topic, info in known.items() if topic.startswith(below)}
+    for wanted in _TYPES:
+        found = sorted(topic for topic, info in topics.items() if info.type_name == wanted and info.message_count)
+        if len(found) > 1:
+            raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
+        names.append(found[0] if found else '')
+    result = Topics(*names)
+    if not result.velocity:
+        raise BagError(f'{bag}: no message of {wire.VELOCITY_TYPE} in it, so nothing to estimate from')
+    return result
