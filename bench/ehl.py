@@ -14,6 +14,7 @@ import math
 import time
 import timeit
 from collections.abc import Callable
+from functools import partial
 
 from seal_friction_ros.core.coulomb import MountedSeal, Seal, Uncertainty
 from seal_friction_ros.core.ehl.case import Case
@@ -90,8 +91,7 @@ def estimator_steps(law: FrictionMap) -> dict[str, float]:
     times: dict[str, list[float]] = {name: [] for name in laws}
     for _ in range(9):  # in turn, so that a slow moment of the machine hits both
         for name, parameters in laws.items():
-            state = init(parameters)
-            times[name].append(_fastest(lambda p=parameters, s=state: step(p, s, sample), 3))  # type: ignore[misc]
+            times[name].append(_fastest(partial(step, parameters, init(parameters), sample), 3))
     return {name: 1e6 * min(values) for name, values in times.items()}
 
 

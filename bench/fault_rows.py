@@ -87,6 +87,7 @@ def delayed(topic: str, delay: int) -> Callable[[Tick, int], Tick]:
     """Stamps of one topic, or of all, ``delay`` [ns] off."""
 
     def spoil(tick: Tick, _: int) -> Tick:
+        """Shift the stamps."""
         return {
             name: [m._replace(stamp=m.stamp + delay) for m in messages] if topic in (name, 'all') else messages
             for name, messages in tick.items()

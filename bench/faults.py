@@ -247,6 +247,7 @@ def lifecycle_in_any_order(chance: random.Random, folder: Path) -> list[str]:
         state, wrong = 'active', []
 
         def change(number: int) -> bool:
+            """Ask for a transition while inputs come; whether it succeeded."""
             for _ in range(chance.randrange(4)):
                 place.now += MS
                 for topic, messages in good(place.now).items():
@@ -279,6 +280,7 @@ def simulated_time_is_reset(chance: random.Random, folder: Path) -> list[str]:
         clock = place.driver.create_publisher(Clock, '/clock', 10)
 
         def tick(ticks: int) -> Outputs:
+            """Move the clock and send, so many times."""
             outputs: Outputs = []
             for _ in range(ticks):
                 now = Clock()

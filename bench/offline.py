@@ -128,6 +128,7 @@ def _mcap_ros2() -> Callable[[Path], object]:
     from mcap_ros2.decoder import DecoderFactory
 
     def decode(folder: Path) -> None:
+        """Decode every message, keep none."""
         for path in (folder / 'bag').glob('*.mcap'):
             with path.open('rb') as file:
                 for _ in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():

@@ -33,6 +33,7 @@ class _PlainLoader(yaml.CSafeLoader):
     """Safe loader that takes no duplicate keys."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+        """Mapping of a node, unless a key stands in it twice."""
         keys = Counter(str(key.value) for key, _ in node.value)
         doubled = sorted(key for key, count in keys.items() if count > 1)
         if doubled:

@@ -236,6 +236,20 @@ def _decode(
 
 
 @compiled
+def _newest(
+    kind: int, stamp: int, values: Array, pressure: Pressure, force: Force, reference: Reference
+) -> tuple[Pressure, Force, Reference]:
+    """Inputs in use after a message."""
+    if kind == _PRESSURE:
+        pressure = Pressure(stamp, values[0], values[1])
+    elif kind == _FORCE:
+        force = Force(stamp, values[0])
+    elif kind == _REFERENCE:
+        reference = Reference(stamp, values[0], values[1])
+    return pressure, force, reference
+
+
+@compiled
 def _ask(
     settings: Any, guiding: Any, state: PipelineState, kinds: Bytes, stamps: Integers, values: Array, asked: Array
 ) -> None:
@@ -244,13 +258,8 @@ def _ask(
     answers = 0
     for i in range(len(kinds)):
         stamp, kind = stamps[i], kinds[i]
-        if kind == _PRESSURE:
-            pressure = Pressure(stamp, values[i, 0], values[i, 1])
-        elif kind == _FORCE:
-            force = Force(stamp, values[i, 0])
-        elif kind == _REFERENCE:
-            reference = Reference(stamp, values[i, 0], values[i, 1])
-        elif kind == _VELOCITY:
+        pressure, force, reference = _newest(kind, stamp, values[i], pressure, force, reference)
+        if kind == _VELOCITY:
             known, seen = _observe(settings, known, RodSample(stamp, values[i, 0], pressure, force, refused))
             asked[0, answers] = known.pressure.chamber_a
             asked[1, answers] = known.pressure.chamber_b
@@ -280,12 +289,8 @@ def _make_answers(
         motion = Motion(0.0, 0.0, 0.0, 0.0, 0.0)
         estimate = NO_ESTIMATE
         makes_feedforward = False
-        if kind == _PRESSURE:
-            pressure = Pressure(stamp, values[i, 0], values[i, 1])
-        elif kind == _FORCE:
-            force = Force(stamp, values[i, 0])
-        elif kind == _REFERENCE:
-            reference = Reference(stamp, values[i, 0], values[i, 1])
+        pressure, force, reference = _newest(kind, stamp, values[i], pressure, force, reference)
+        if kind == _REFERENCE:
             makes_feedforward = is_fading(guiding, known.stamp, stamp)
             motion = Motion(reference.velocity, reference.acceleration, 0.0, 0.0, 0.0)
         elif kind == _VELOCITY:

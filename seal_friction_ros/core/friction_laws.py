@@ -78,9 +78,14 @@ def physics_based(at: Conditions, value: Values) -> Array:
 
     Source: thesis, chapter 7.
     """
-    assert at.normal_force is not None  # noqa: S101  what `Rung.needs_geometry` is for
-    friction = value['coefficient'] * at.normal_force ** (1.0 - value['exponent'])
+    friction = value['coefficient'] * _known_normal_force(at) ** (1.0 - value['exponent'])
     return np.asarray(friction.sum(axis=1))
+
+
+def _known_normal_force(at: Conditions) -> Array:
+    if at.normal_force is None:
+        raise ValueError('Conditions.normal_force is not given: this law needs the geometry of the seals')
+    return at.normal_force
 
 
 def viscous(at: Conditions, value: Values) -> Array:
@@ -147,8 +152,7 @@ def _fastest(at: Conditions) -> float:
 
 
 def _mean_normal_force(at: Conditions) -> float:
-    assert at.normal_force is not None  # noqa: S101
-    return float(at.normal_force.mean())
+    return float(_known_normal_force(at).mean())
 
 
 _CONSTANT = (Parameter('coulomb_friction', 'N', 0.0, 1e6, lambda mean, _: mean, 'f_0'),)

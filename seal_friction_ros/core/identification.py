@@ -644,6 +644,7 @@ def compare_with_law(found: Fit, fitted: Readings, other: Readings) -> Change:
     friction = found.friction(other.at)
 
     def ratio(index: BoolArray) -> float:
+        """Slope of measured over predicted friction among some samples."""
         x = other.at.direction[index] * friction[index]
         y = other.force[index]
         x = x - x.mean()

@@ -95,6 +95,7 @@ def _kind_of(topics: Topics) -> KindOf:
     known.pop('', None)
 
     def kind_of(topic: str, type_name: str) -> Kind:
+        """What the messages of a topic are to the estimator."""
         other = Kind.OTHER_ESTIMATE if type_name == wire.ESTIMATE_TYPE else Kind.OTHER
         wanted, kind = known.get(topic, (type_name, other))
         if type_name != wanted:

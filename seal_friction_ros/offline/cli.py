@@ -312,18 +312,7 @@ def make_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title='commands', required=True, metavar='COMMAND')
 
     _add_import(commands)
-    replay = _add(commands, 'replay', _replay, 'bags through the estimator, as fast as it goes')
-    replay.add_argument('bags', type=Path, nargs='+', metavar='BAG')
-    replay.add_argument(
-        '--workers', type=_at_least_one, metavar='N', help='bags at a time, one core each; default: all cores'
-    )
-    replay.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file instead of what the bag says')
-    replay.add_argument(
-        '--seal', type=Path, metavar='FILE', help='seal file for every seal instead of what the bag says'
-    )
-    replay.add_argument('--out', type=Path, metavar='BAG', help='write inputs and new estimates to this bag')
-    replay.add_argument('--namespace', default='', help='look only at topics below it')
-    replay.add_argument('--verify', action='store_true', help='compare with the estimates in the bag byte for byte')
+    _add_replay(commands)
 
     compare = _add(commands, 'compare', _compare, 'a topic of two bags: first, largest and RMS difference')
     compare.add_argument('a', type=Path, metavar='A')
@@ -354,6 +343,27 @@ def make_parser() -> argparse.ArgumentParser:
     for page in (report, charts, servo):
         page.add_argument('--out', type=Path, required=True, metavar='FILE.html')
 
+    _add_tune(commands)
+    _add_ehl(commands)
+    return parser
+
+
+def _add_replay(commands: Any) -> None:
+    replay = _add(commands, 'replay', _replay, 'bags through the estimator, as fast as it goes')
+    replay.add_argument('bags', type=Path, nargs='+', metavar='BAG')
+    replay.add_argument(
+        '--workers', type=_at_least_one, metavar='N', help='bags at a time, one core each; default: all cores'
+    )
+    replay.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file instead of what the bag says')
+    replay.add_argument(
+        '--seal', type=Path, metavar='FILE', help='seal file for every seal instead of what the bag says'
+    )
+    replay.add_argument('--out', type=Path, metavar='BAG', help='write inputs and new estimates to this bag')
+    replay.add_argument('--namespace', default='', help='look only at topics below it')
+    replay.add_argument('--verify', action='store_true', help='compare with the estimates in the bag byte for byte')
+
+
+def _add_tune(commands: Any) -> None:
     tune = _add(commands, 'tune', _tune, 'parameters of the feed-forward for the simulated servo or a recorded axis')
     tune.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
     tune.add_argument('--out', type=Path, required=True, metavar='FILE', help='parameter file; a report goes beside it')
@@ -366,8 +376,6 @@ def make_parser() -> argparse.ArgumentParser:
         unit = f' [{meaning.unit}]' if meaning.unit else ''
         text = f'{where}{meaning.description}{unit}'.replace('%', '%%')
         tune.add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
-    _add_ehl(commands)
-    return parser
 
 
 def _add_oring(commands: Any) -> None:

@@ -241,6 +241,7 @@ def run_map(case: Case, jobs: int, work: Path | None = None) -> MapRuns:
         memory.append(Memory(**kept_memory))
 
     def keep(name: str, result: Any) -> None:
+        """Take a finished part, and put it into the store."""
         if name == 'memory':
             memory.append(result)
             store.put(_key('memory', case), result._asdict())

@@ -144,6 +144,7 @@ class _Stream:
         self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
 
     def write(self, data: bytes) -> int:
+        """Write all of it, as the library expects of a file."""
         view = memoryview(data)
         while view:
             try:

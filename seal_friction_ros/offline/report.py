@@ -177,6 +177,7 @@ def write_page(
     captions = {plot.name: plot.caption for plot in plots}
 
     def figure(name: str) -> str:
+        """Figure element with the picture inside; empty if there is no such figure."""
         if name not in rendered:
             return ''
         data = base64.b64encode(rendered[name]['svg']).decode()

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl import contact as contact_module
 from seal_friction_ros.core.ehl.contact import (
     Contact,
@@ -21,7 +22,7 @@ from seal_friction_ros.core.ehl.contact import (
 )
 from seal_friction_ros.core.ehl.elasticity import HalfPlane
 from seal_friction_ros.core.ehl.grease import Grease
-from seal_friction_ros.core.ehl.reynolds import FilmEnds, NotConvergedError
+from seal_friction_ros.core.ehl.reynolds import FilmEnds
 from seal_friction_ros.core.ehl.shear import fluid_shear, real_area_share, shear, solid_shear
 from seal_friction_ros.core.ehl.topography import Topography
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.coulomb import actuator_friction
 from seal_friction_ros.core.ehl import friction_map as module
 from seal_friction_ros.core.ehl.case import Case, MapGrid, Numerics
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.ehl.friction_map import friction_map, memory_length, steady_friction
-from seal_friction_ros.core.ehl.reynolds import NotConvergedError
 from seal_friction_ros.core.ehl.transient import Model, rest
 from seal_friction_ros.core.estimator import EstimatorParameters, EstimatorSettings, init, step
 from seal_friction_ros.core.records import Force, Pressure, RodSample

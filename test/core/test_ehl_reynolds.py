@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl import reynolds
-from seal_friction_ros.core.ehl.reynolds import FilmEnds, NotConvergedError, film_of_gap
+from seal_friction_ros.core.ehl.reynolds import FilmEnds, film_of_gap
 
 VISCOSITY = 0.01  # [Pa s]
 MEAN_VELOCITY = 0.5  # [m/s]

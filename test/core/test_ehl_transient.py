@@ -9,12 +9,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl import transient
 from seal_friction_ros.core.ehl.case import Air, Case, Member, Numerics, Viscoelasticity, parse_case
 from seal_friction_ros.core.ehl.findings import discretisation_errors, findings
 from seal_friction_ros.core.ehl.groove import Groove
 from seal_friction_ros.core.ehl.kinematics import ConstantAcceleration, MeasuredMotion
-from seal_friction_ros.core.ehl.reynolds import NotConvergedError
 from seal_friction_ros.core.ehl.spool import MemberMotion, superposed
 from seal_friction_ros.core.ehl.study import study_table
 from seal_friction_ros.core.ehl.transient import RunResult, rest, run, with_solid_shear_stress

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.normal_force import area_deformation_gain_from_points
 from seal_friction_ros.core.oring_contact import continuation, loading
 from seal_friction_ros.core.oring_contact.case import (
@@ -21,7 +22,6 @@ from seal_friction_ros.core.oring_contact.case import (
     stretched_section_diameter,
 )
 from seal_friction_ros.core.oring_contact.case_file import parse_case
-from seal_friction_ros.core.oring_contact.equilibrium import NotConverged
 from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.hertz import LineContact, cylinder_between_plates, force_of_profile
 from seal_friction_ros.core.oring_contact.loading import model_of, squeeze
@@ -304,11 +304,11 @@ def test_a_wider_clearance_and_a_softer_rubber_extrude_sooner():
 
 def test_no_equilibrium_is_an_error_and_not_a_number(monkeypatch: pytest.MonkeyPatch):
     def never(*_):
-        raise NotConverged('1.0e-03 2 pi R E d out of balance after 25 Newton steps')
+        raise NotConvergedError('1.0e-03 2 pi R E d out of balance after 25 Newton steps')
 
     monkeypatch.setattr(continuation, 'solve', never)
     with pytest.raises(
-        NotConverged, match=r'case mine: the squeezed ring finds no equilibrium: 0 % of the way: 1.0e-03'
+        NotConvergedError, match=r'case mine: the squeezed ring finds no equilibrium: 0 % of the way: 1.0e-03'
     ):
         next(contact_results(ring(), (0.0,)))
 
@@ -319,7 +319,7 @@ def test_a_step_that_fails_is_tried_again_shorter(monkeypatch: pytest.MonkeyPatc
     def sometimes(model, assembly, surroundings, start):
         if len(failures) < 2 and surroundings.pressure > 1e6:
             failures.append(surroundings.pressure)
-            raise NotConverged('made to fail')
+            raise NotConvergedError('made to fail')
         return solve(model, assembly, surroundings, start)
 
     (plain,) = contact_results(ring(), (2e6,))

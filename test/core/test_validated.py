@@ -1,7 +1,7 @@
 """Parameters that cannot exist wrong."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import pytest
 from hypothesis import given
@@ -175,7 +175,13 @@ def test_every_parameter_has_a_sentence_of_meaning_and_bounds_in_order(record):
 
 @pytest.mark.parametrize('record', [EstimatorSettings, SealSelection], ids=lambda record: record.__name__)
 def test_defaults_lie_inside_their_bounds_and_make_a_valid_record(record):
-    check(record())
+    made = record()
+    check(made)
+    assert from_mapping(record, asdict(made), 'defaults') == made
+    for name, meaning in meanings(record).items():
+        default = getattr(made, name)
+        if meaning.lower is not None:
+            assert meaning.lower <= default <= meaning.upper, name
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,11 @@
 """Every row of docs/degradation.md, tried once on the live node; ``bench/faults.py`` tries them twenty times."""
 
-import random
 from collections.abc import Iterator
 
 import pytest
 from fault_rows import SIGNAL_ROWS, Row
 from fault_stage import Stage, stage, try_row
-from faults import TRIALS, Trial
+from faults import TRIALS, Trial, attempt
 
 
 @pytest.fixture(scope='module')
@@ -21,8 +20,8 @@ def test_a_signal_that_fails_does_what_the_table_says_and_comes_back(place: Stag
 
 
 @pytest.mark.parametrize('trial', TRIALS, ids=lambda trial: trial.fault)
-def test_graph_process_and_disk_do_what_the_table_says(trial: Trial, tmp_path):
-    assert trial.attempt(random.Random(7), tmp_path) == []
+def test_graph_process_and_disk_do_what_the_table_says(trial: Trial):
+    assert attempt(trial, seed=7) == []
 
 
 def test_a_row_that_requires_what_does_not_happen_fails(place: Stage):

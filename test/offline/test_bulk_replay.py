@@ -44,6 +44,10 @@ ROOT = Path(__file__).parents[2]
 CORPUS = ROOT / 'test' / 'corpus'
 
 
+def chances(seed: int) -> random.Random:
+    return random.Random(seed)  # noqa: S311  no secret depends on it
+
+
 def in_bulk(bag: Path, override: Configuration | None = None) -> Verdict | None:
     return bulk_replay.replay_in_bulk(bag, find_topics(bag), override, lambda _: None)
 
@@ -136,7 +140,7 @@ def test_velocity_terms_are_the_same_to_the_byte_in_estimate_and_feed_forward(cl
 def test_whatever_is_lost_doubled_or_flipped_the_difference_found_is_the_same(
     seed: int, closed_loop: Path, tmp_path: Path
 ):
-    chance = random.Random(seed)
+    chance = chances(seed)
     share = chance.choice([0.01, 0.05, 0.3])
     hit = chance.choice([(ESTIMATE_TOPIC,), (FEEDFORWARD_TOPIC,), (ESTIMATE_TOPIC, FEEDFORWARD_TOPIC), ()])
     held: list[BagMessage] = []
@@ -222,7 +226,7 @@ def test_a_malformed_message_is_left_to_the_general_way_which_names_it(recorded:
 @hypothesis_settings(max_examples=25)
 @given(st.integers(0, 2**32), st.integers(10, 120))
 def test_any_order_of_messages_and_any_rubbish_gets_the_same_verdict(folder: Path, seed: int, count: int):
-    chance = random.Random(seed)
+    chance = chances(seed)
     messages = list(read_messages(ROOT / 'bags' / 'faults'))
     velocity = next(message for message in messages if message.type_name == wire.VELOCITY_TYPE)
     shutil.rmtree(folder / 'any', ignore_errors=True)
@@ -282,13 +286,13 @@ def test_chunks_in_any_order_of_time_are_read_as_the_general_reader_does(
         monkeypatch.setattr('seal_friction_ros.offline.bulk_reading._AT_ONCE', at_once)
         for seed in range(4):
             path = tmp_path / f'{at_once}_{seed}.mcap'
-            write_mcap(path, random.Random(seed), overlap=overlap, compression=compression)
+            write_mcap(path, chances(seed), overlap=overlap, compression=compression)
             assert_same_messages(path)
 
 
 def test_a_flipped_bit_is_read_alike_or_left_to_the_general_reader(tmp_path: Path):
     path = tmp_path / 'flipped.mcap'
-    write_mcap(path, random.Random(2), overlap=2, compression=CompressionType.NONE)
+    write_mcap(path, chances(2), overlap=2, compression=CompressionType.NONE)
     good = path.read_bytes()
     refused = 0
     for bit in range(0, 8 * len(good), 8 * len(good) // 400):

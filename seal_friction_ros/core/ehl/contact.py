@@ -22,11 +22,12 @@ import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core.compiled import compiled
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl.elasticity import HalfPlane
 from seal_friction_ros.core.ehl.flow_factors import flow_factor_coefficients, pressure_flow_factor, shear_flow_factor
 from seal_friction_ros.core.ehl.grease import Grease, apparent_viscosity
 from seal_friction_ros.core.ehl.krylov import StalledError, gmres
-from seal_friction_ros.core.ehl.reynolds import FilmEnds, NotConvergedError, complementarity, reynolds_rows
+from seal_friction_ros.core.ehl.reynolds import FilmEnds, complementarity, reynolds_rows
 from seal_friction_ros.core.ehl.topography import Topography, contact_pressure
 
 FloatArray = npt.NDArray[np.float64]

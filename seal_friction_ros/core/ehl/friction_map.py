@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl.case import Case, MapGrid
 from seal_friction_ros.core.ehl.contact import ContactState, contact_step
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
-from seal_friction_ros.core.ehl.reynolds import NotConvergedError
 from seal_friction_ros.core.ehl.shear import fluid_shear, solid_shear
 from seal_friction_ros.core.ehl.transient import Model, rest
 

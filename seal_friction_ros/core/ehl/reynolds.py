@@ -21,15 +21,12 @@ import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core.compiled import compiled
+from seal_friction_ros.core.convergence import NotConvergedError
 
 FloatArray = npt.NDArray[np.float64]
 
 _ITERATIONS = 100
 _TOLERANCE = 1e-14  # of the largest flow, and of the complementarity
-
-
-class NotConvergedError(ValueError):
-    """A solution was not found; there is no result."""
 
 
 class FilmEnds(NamedTuple):
@@ -43,6 +40,9 @@ class FilmEnds(NamedTuple):
     """of what flows in"""
     saturation_right: float = 1.0
     """of what flows in"""
+
+
+FLOODED = FilmEnds()
 
 
 class Film(NamedTuple):
@@ -182,7 +182,7 @@ def film_of_gap(
     cell_width: float,
     mean_velocity: float,
     viscosity: float,
-    ends: FilmEnds = FilmEnds(),  # noqa: B008  (immutable)
+    ends: FilmEnds = FLOODED,
     old_thickness: FloatArray | None = None,
     time_step: float | None = None,
 ) -> Film:

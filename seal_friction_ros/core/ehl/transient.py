@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.contact import (
     Contact,
@@ -26,7 +27,7 @@ from seal_friction_ros.core.ehl.contact import (
 )
 from seal_friction_ros.core.ehl.elasticity import HalfPlane
 from seal_friction_ros.core.ehl.kinematics import Motion
-from seal_friction_ros.core.ehl.reynolds import FilmEnds, NotConvergedError
+from seal_friction_ros.core.ehl.reynolds import FilmEnds
 from seal_friction_ros.core.ehl.shear import fluid_shear, sliding_velocity, solid_shear
 from seal_friction_ros.core.ehl.wall import WallFilm
 

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from seal_friction_ros.core.oring_contact.equilibrium import Assembly, Model, NotConverged, State, solve
+from seal_friction_ros.core.convergence import NotConvergedError
+from seal_friction_ros.core.oring_contact.equilibrium import Assembly, Model, State, solve
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings
 
 _EASY = 6  # Newton steps of an easy step
@@ -42,7 +43,7 @@ def follow(
             shall be at; by default the straight line through the last two.
 
     Raises:
-        NotConverged: The way ends before 1; the message says where.
+        NotConvergedError: The way ends before 1; the message says where.
     """
     done, state, before, total = 0.0, start, (0.0, start), 0
     surroundings = path(0.0, start)
@@ -53,10 +54,10 @@ def follow(
         around = path(wanted, state)
         try:
             after, steps = solve(model, assembly, around, first)
-        except NotConverged as error:
+        except NotConvergedError as error:
             stride = _SHRINK * (wanted - done)
             if stride < _SMALLEST:
-                raise NotConverged(f'{100.0 * done:.3g} % of the way: {error}') from None
+                raise NotConvergedError(f'{100.0 * done:.3g} % of the way: {error}') from None
             before = done, state  # next time from where it is
             continue
         if steps <= _EASY:

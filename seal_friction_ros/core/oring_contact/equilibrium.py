@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.oring_contact.arrays import FloatArray, IntArray
 from seal_friction_ros.core.oring_contact.elements import (
     Elements,
@@ -24,10 +25,6 @@ MAX_ITERATIONS = 25
 """Newton steps before giving up (own choice: good load steps take 3 to 8)."""
 _SHORTEST_STEP = 1.0 / 64.0  # of Newton's, before a fold is taken for final
 _PIVOT = 0.01  # entry on the diagonal over the largest of its column, from which on it is taken: little fill
-
-
-class NotConverged(ValueError):  # noqa: N818  (what happened, as SciPy's NoConvergence has it)
-    """No equilibrium was found; the message says where and how far it came."""
 
 
 class Model(NamedTuple):
@@ -158,11 +155,11 @@ def solve(model: Model, assembly: Assembly, surroundings: Surroundings, start: S
     """State in equilibrium, from one to start with, and the Newton steps it took.
 
     Raises:
-        NotConverged: None was found.
+        NotConvergedError: None was found.
     """
     state, now = start, balance(model, surroundings, start)
     if now is None:
-        raise NotConverged('an element is inside out at the start')
+        raise NotConvergedError('an element is inside out at the start')
     imbalance = np.inf
     for step in range(MAX_ITERATIONS + 1):
         residual = now.residual[assembly.free]
@@ -177,9 +174,9 @@ def solve(model: Model, assembly: Assembly, surroundings: Surroundings, start: S
                 matrix, permc_spec='MMD_AT_PLUS_A', diag_pivot_thresh=_PIVOT, options={'SymmetricMode': True}
             )
         except RuntimeError as error:
-            raise NotConverged(f'the stiffness is singular: {error}') from None
+            raise NotConvergedError(f'the stiffness is singular: {error}') from None
         state, now = _take(model, surroundings, state, now, assembly.free, factors.solve(residual))
-    raise NotConverged(f'{imbalance:.1e} 2 pi R E d out of balance after {MAX_ITERATIONS} Newton steps')
+    raise NotConvergedError(f'{imbalance:.1e} 2 pi R E d out of balance after {MAX_ITERATIONS} Newton steps')
 
 
 def _take(
@@ -196,4 +193,4 @@ def _take(
         if after is not None:
             return trial, after
         length /= 2.0
-    raise NotConverged('an element turns inside out')
+    raise NotConvergedError('an element turns inside out')

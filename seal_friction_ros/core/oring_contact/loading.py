@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.oring_contact.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.oring_contact.case import OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.continuation import follow
 from seal_friction_ros.core.oring_contact.equilibrium import (
     Assembly,
     Model,
-    NotConverged,
     State,
     at_rest,
     make_assembly,
@@ -63,7 +63,7 @@ def loaded_states(case: OringCase, model: Model, pressures: tuple[float, ...]) -
 
     Raises:
         ValueError: The pressures make no sense, the squeezed ring is longer than the groove, or fluid passes the ring.
-        NotConverged: No equilibrium was found.
+        NotConvergedError: No equilibrium was found.
     """
     check_pressures(case, pressures)
     now = squeeze(case, model)
@@ -92,7 +92,7 @@ def squeeze(case: OringCase, model: Model) -> Loaded:
 
     Raises:
         ValueError: The squeezed ring is longer than the groove is wide.
-        NotConverged: No equilibrium was found.
+        NotConvergedError: No equilibrium was found.
     """
     assembly, walls = make_assembly(model, _held(model)), _walls(case, model)
     inner = case.geometry.ring_inner_diameter / 2.0
@@ -113,8 +113,8 @@ def squeeze(case: OringCase, model: Model) -> Loaded:
     try:
         closed = follow(model, assembly, closing, at_rest(model), _SQUEEZE_STRIDE, drawn)
         reached = follow(model, assembly, stiffening, closed.state, _STIFFEN_STRIDE)
-    except NotConverged as error:
-        raise NotConverged(f'case {case.name}: the squeezed ring finds no equilibrium: {error}') from None
+    except NotConvergedError as error:
+        raise NotConvergedError(f'case {case.name}: the squeezed ring finds no equilibrium: {error}') from None
     length = float(np.ptp(outline(model, reached.state)[:, 1]))
     if length >= case.groove.width:
         raise ValueError(
@@ -131,7 +131,7 @@ def seat(case: OringCase, model: Model, free: Assembly, squeezed: Loaded) -> Loa
     wall holds it, and let go under the pressure that balances what the wall then bears.
 
     Raises:
-        NotConverged: No equilibrium was found.
+        NotConvergedError: No equilibrium was found.
     """
     top = float(outline(model, squeezed.state)[:, 1].max())
     wall = squeezed.surroundings._replace(
@@ -145,8 +145,8 @@ def seat(case: OringCase, model: Model, free: Assembly, squeezed: Loaded) -> Loa
         pressure = float(axial[position[:, 1] > 0.0].sum()) / projected_area(case.geometry)
         surroundings = wall._replace(pressure=pressure, wetted=wetted_nodes(wall, position))
         state, more = solve(model, free, surroundings, state)
-    except NotConverged as error:
-        raise NotConverged(f'case {case.name}: the ring does not come to rest on the wall: {error}') from None
+    except NotConvergedError as error:
+        raise NotConvergedError(f'case {case.name}: the ring does not come to rest on the wall: {error}') from None
     return Loaded(pressure, surroundings, state, squeezed.newton_steps + steps + more)
 
 
@@ -175,8 +175,8 @@ def _raised(
     way = abs(target - now.pressure)
     try:
         reached = follow(model, free, rising, now.state, min(rise / way, 1.0))
-    except NotConverged as error:
-        raise NotConverged(
+    except NotConvergedError as error:
+        raise NotConvergedError(
             f'case {case.name}: no equilibrium on the way from {now.pressure:.6g} to {target:.6g} Pa: {error}'
         ) from None
     newton_steps = now.newton_steps + reached.newton_steps
@@ -193,8 +193,8 @@ def _held_back(case: OringCase, model: Model, free: Assembly, loaded: Loaded) ->
 
     try:
         reached = follow(model, free, rubbing, loaded.state, _FRICTION_STRIDE)
-    except NotConverged as error:
-        raise NotConverged(
+    except NotConvergedError as error:
+        raise NotConvergedError(
             f'case {case.name}: no equilibrium at {loaded.pressure:.6g} Pa with wall_friction = {case.wall_friction}: '
             f'{error}'
         ) from None

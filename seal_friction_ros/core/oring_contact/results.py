@@ -78,7 +78,7 @@ def contact_results(case: OringCase, pressures: tuple[float, ...]) -> Iterator[C
 
     Raises:
         ValueError: The pressures make no sense, or the ring does not fit or does not seal.
-        NotConverged: No equilibrium was found.
+        NotConvergedError: No equilibrium was found.
     """
     model = model_of(case)
     for loaded in loaded_states(case, model, pressures):
