@@ -162,7 +162,8 @@ class Stage:
     def level(self) -> str:
         """Level of the diagnostics of the estimate since they were last asked for; STALE if nothing else was said."""
         before = self.driver.get_clock().now().nanoseconds
-        self.estimator.on_matched(None)  # says it at once
+        self.estimator.publish_diagnostics()
+        self.estimator.end_interval()
         if not self.spin_until(lambda: self.driver.diagnosed >= before):
             raise RuntimeError('no diagnostics')
         said = set(self.driver.levels)
@@ -214,6 +215,8 @@ def try_row(place: Stage, row: Row) -> list[str]:
     before = place.run(BEFORE)
     place.level()
     during = place.run(FAULT, row.spoil, row.shift)
+    if row.level == 'STALE':
+        place.level()  # silence shows once a whole interval was silent
     level = place.level()
     settling = place.run(5)  # the last sample of the fault may cost the next one, too
     place.level()

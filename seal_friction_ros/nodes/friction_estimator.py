@@ -102,7 +102,7 @@ class FrictionEstimator(ManagedNode):
     def start(self) -> None:
         """Start estimating, from a state in which nothing is known, and recording if asked to."""
         self._known = self._configuration.parameters()
-        self._state = init(self._known)
+        self._state = init(self._known)._replace(refused=self._is_refused(self._crowd()))
         self._statistics = LiveStatistics()
         self._said.clear()
         self._now = self._ros_time if self.get_parameter('use_sim_time').value else time.time_ns
@@ -257,6 +257,10 @@ class FrictionEstimator(ManagedNode):
         self._say_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
         return {'estimate': estimate, 'recorder': recorder}
 
+    def end_interval(self) -> None:
+        """Count anew what is told of the last second."""
+        self._statistics.start_interval()
+
     def _say_once(self, what: str, words: str) -> None:
         """Log an error when it comes up or changes, not each second."""
         if words and words != self._said.get(what):
@@ -268,8 +272,8 @@ class FrictionEstimator(ManagedNode):
         count = getattr(self._inputs[name], 'get_publisher_count', None)
         return int(count()) if count is not None else self.count_publishers(self._topics[name])
 
-    def _look_at_publishers(self) -> list[str]:
-        """Topics with several publishers, in words; refuse the inputs if the parameter says so."""
+    def _crowd(self) -> list[str]:
+        """Topics with several publishers, in words."""
         crowded = [self._topics[name] for name in wire.INPUTS if self._publisher_count(name) > 1]
         answers = [self._topics[type_name] for type_name in wire.OUTPUTS.values()]  # of a second estimator
         crowded += [topic for topic in answers if self.count_publishers(topic) > 1]
@@ -277,15 +281,27 @@ class FrictionEstimator(ManagedNode):
         for topic in crowded:
             names = ', '.join(full_name(publisher) for publisher in publishers(self, topic))
             crowd.append(f'{topic} has several publishers: {names}')
-        refused = bool(crowd) and self.settings(InputOptions).refuse_second_publisher
+        return crowd
+
+    def _is_refused(self, crowd: list[str]) -> bool:
+        return bool(crowd) and self.settings(InputOptions).refuse_second_publisher
+
+    def _look_at_publishers(self) -> list[str]:
+        """Topics with several publishers, in words; refuse the inputs if the parameter says so."""
+        crowd = self._crowd()
+        refused = self._is_refused(crowd)
         if self.active and refused != self._state.refused:
             self._state = self._state._replace(refused=refused)
             self._publish_configuration()  # so that a replay refuses from here on, too
         return crowd
 
     def _listen_to_the_silent(self) -> list[str]:
-        """Subscribe anew where a publisher offers only best effort; in words, why others cannot be heard."""
+        """Subscribe anew where a publisher offers only best effort, or no longer; why others cannot be heard."""
         unheard = []
+        for name in list(self._best_effort):
+            if not any(map(offers_best_effort_only, publishers(self, self._topics[name]))):
+                del self._best_effort[name]
+                self._subscribe(name, qos.STREAM)
         for name in self._statistics.silent_inputs:
             topic, wanted = self._topics[name], self._inputs[name].qos_profile
             for publisher in publishers(self, topic):

@@ -10,12 +10,17 @@ from seal_friction_ros.core import wire
 from seal_friction_ros.core.feedforward import FeedForward, Limited
 from seal_friction_ros.core.records import FrictionEstimate, Status
 
+_SETTLED = 0.9  # [s] a shorter interval without an estimate says nothing, if there was one before it
+_LATEST = 1_000_000_000  # [ns] a sample that comes later than this is not late: its clock was set
+
 
 class Gaps:
     """Samples of one input that are missing, as the gaps between its stamps tell.
 
     The middleware says nothing of samples that it throws away when the node is too slow. The period is the median of
-    the last steps, so a rate that falls counts as a few missing samples; our choice.
+    the last steps, so what looks like a gap counts as one: a clock that leaps ahead, stamps that jitter by a third of
+    the period and more, the first eight steps at a lower rate. A stamp a little back is one that was counted as
+    missing and came late; one far back is a clock that was set, and all begins anew. Our choice.
     """
 
     def __init__(self) -> None:
@@ -26,8 +31,13 @@ class Gaps:
 
     def on_stamp(self, stamp: int) -> None:
         """Take the stamp [ns] of the next sample."""
-        step, self._stamp = stamp - self._stamp if self._stamp else 0, stamp
+        step = stamp - self._stamp if self._stamp else 0
+        if -_LATEST <= step < 0:
+            self.missing = max(self.missing - 1, 0)
+            return
+        self._stamp = stamp
         if step <= 0:
+            self._steps.clear()
             return
         if self._steps and not 0.7 * self._period < step < 1.5 * self._period:  # seldom: the median takes time
             self._period = median(self._steps)
@@ -47,14 +57,17 @@ class LiveStatistics:
         self._feedforwards_by_limit: Counter[int] = Counter()
         self._feedforward_force = 0.0
         self._input_age = -1.0
-        self._start_interval()
+        self._latencies: list[int] = []
+        self.start_interval()
 
-    def _start_interval(self) -> None:
+    def start_interval(self) -> None:
+        """Count anew what is told of the time since the last report."""
+        self._estimated_before = bool(self._latencies)
         self._started = time.monotonic()
         self._received_before = self._received.copy()
         self._malformed_before = self._malformed.copy()
         self._recent_status = self._recent_limit = 0
-        self._latencies: list[int] = []
+        self._latencies = []
 
     def on_input(self, name: str, stamp: int) -> None:
         """Count one message of an input, of ``stamp`` [ns]."""
@@ -80,11 +93,11 @@ class LiveStatistics:
 
     @property
     def silent_inputs(self) -> list[str]:
-        """Inputs of which nothing has come since activation."""
-        return [name for name in wire.INPUTS if not self._received[name]]
+        """Inputs of which nothing has come in this interval."""
+        return [name for name in wire.INPUTS if self._received[name] == self._received_before[name]]
 
     def report(self, active: bool, publishers: dict[str, int]) -> DiagnosticStatus:
-        """State of the estimate since the last report; starts the next interval.
+        """State of the estimate in this interval, which began a second ago at most.
 
         Args:
             active: Whether the node estimates.
@@ -114,7 +127,7 @@ class LiveStatistics:
         status = DiagnosticStatus(level=DiagnosticStatus.OK, message='estimating')
         if not active:
             status.message = 'inactive'
-        elif not self._latencies:
+        elif not self._latencies and (seconds > _SETTLED or not self._estimated_before):
             status.level, status.message = DiagnosticStatus.STALE, 'no rod_velocity comes in'
         elif self._recent_status:
             status.level, status.message = DiagnosticStatus.WARN, str(Status(self._recent_status).name)
@@ -124,7 +137,6 @@ class LiveStatistics:
         elif self._recent_limit & Limited.FADE:
             status.level, status.message = DiagnosticStatus.WARN, 'the feed-forward fades: no usable reference'
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
-        self._start_interval()
         return status
 
 

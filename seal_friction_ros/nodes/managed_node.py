@@ -75,6 +75,9 @@ class ManagedNode(LifecycleNode):
         """State of each part of the node, by the name of the part."""
         return {}
 
+    def end_interval(self) -> None:
+        """Begin a new interval of what is counted between two diagnostics; called once a second."""
+
     def check_change(self, changed: dict[type, Any]) -> None:
         """Refuse, by a ValueError, a change of parameters that makes no sense with the others."""
 
@@ -135,7 +138,7 @@ class ManagedNode(LifecycleNode):
             take_realtime_priority(self.settings(StartOptions).realtime_priority)
             # By steady time diagnostics go on while simulated time stands still.
             steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self._diagnostics_timer = self.create_timer(_DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
+            self._diagnostics_timer = self.create_timer(_DIAGNOSTICS_PERIOD, self._on_timer, clock=steady)
         except Exception as error:  # noqa: BLE001  rclpy swallows what a transition raises, so it is said here
             self.get_logger().error(str(error))
             self._release()
@@ -182,9 +185,14 @@ class ManagedNode(LifecycleNode):
     def on_matched(self, _: Any) -> None:
         """Say at once, in diagnostics, that a publisher came or went."""
         if self._diagnostics_timer is not None:
-            self._on_diagnostics()
+            self.publish_diagnostics()
 
-    def _on_diagnostics(self) -> None:
+    def _on_timer(self) -> None:
+        self.publish_diagnostics()
+        self.end_interval()
+
+    def publish_diagnostics(self) -> None:
+        """Say now how the node is."""
         message = DiagnosticArray()
         for part, status in self.diagnostics().items():
             status.name = f'{self.get_fully_qualified_name()}: {part}'

@@ -16,7 +16,7 @@ from seal_friction_ros.nodes.servo_simulator import ServoSimulator
 POLICY = Path(__file__).parents[2] / 'config' / 'security' / 'policy.xml'
 # Every way a node can be wired: the policy has to allow each, and nothing beyond all of them.
 WIRINGS = {
-    'friction_estimator': (FrictionEstimator, [{}]),
+    'friction_estimator': (FrictionEstimator, [{}, {'use_sim_time': True}]),
     'servo_simulator': (ServoSimulator, [{}, {'wave': 'topic', 'publish_clock': True}]),
 }
 
