@@ -48,7 +48,8 @@ from seal_friction_ros.nodes.executor import spin
 from seal_friction_ros.nodes.processes import free_domain, graph_environment, running
 
 RATES = (100, 500, 1000)  # [Hz]
-ROUND, SAMPLES = 0.3, 300  # [s], samples: a round of one case is no shorter
+ROUND, SAMPLES = 0.5, 300  # [s], samples: a round of one case is no shorter
+WARM_UP = 20  # samples at the beginning of a round that are not counted: the node has slept while others were asked
 BARE, EVENTS = 'bare echo, SingleThreadedExecutor', 'bare echo, events executor'
 ALONE, RECORDING = 'estimator', 'estimator, recording'
 CASES = (BARE, EVENTS, ALONE, RECORDING)
@@ -169,11 +170,13 @@ def ask(asker: Asker, rate: int, number: int, figures: Figures) -> None:
     Raises:
         RuntimeError: Nothing is answered.
     """
-    asker.round_trips.clear()
-    asker.sent.clear()
-    cpu, wakes, start = asker.cpu(), asker.wakes(), time.perf_counter_ns()
-    for index in range(number):
+    start = time.perf_counter_ns()
+    for index in range(WARM_UP + number):
         time.sleep(max(start + index * 10**9 // rate - time.perf_counter_ns(), 0) * 1e-9)
+        if index == WARM_UP:
+            asker.sent.clear()
+            asker.round_trips.clear()
+            cpu, wakes = asker.cpu(), asker.wakes()
         asker.ask()
     time.sleep(0.05)  # for the last answer
     if not asker.round_trips:

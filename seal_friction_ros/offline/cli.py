@@ -502,7 +502,12 @@ def _at_least_one(text: str) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; return its exit code."""
-    parsed = make_parser().parse_args(arguments)
+    parser = make_parser()
+    if '_ARGCOMPLETE' in os.environ:  # a shell asks what may come next
+        from argcomplete import autocomplete
+
+        autocomplete(parser)
+    parsed = parser.parse_args(arguments)
     try:
         return int(parsed.run(parsed))
     except ValueError as error:
