@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core import ehl
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.ehl.case import Case, Spool, parse_case
 from seal_friction_ros.core.ehl.findings import Findings, discretisation_errors, findings
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
@@ -40,7 +41,7 @@ from seal_friction_ros.core.spool_evaluation import (
     without_resonance,
 )
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.bag_evaluation import FloatArray, read_run
+from seal_friction_ros.offline.bag_evaluation import read_run
 from seal_friction_ros.offline.progress import progress
 
 _PROFILES = ('gap', 'film_pressure', 'contact_pressure', 'saturation')

@@ -12,13 +12,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.ticker import FuncFormatter
 from PIL import Image
 
+from seal_friction_ros.core.arrays import FloatArray, IntArray
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.findings import REFERENCE_HALF_WIDTH
 from seal_friction_ros.core.ehl.spool import SpoolResult
 from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.core.validated import meanings
-from seal_friction_ros.offline.bag_evaluation import FloatArray, IntArray
 from seal_friction_ros.offline.ehl import CaseRun, Comparison, MapRuns, StudyRuns
 from seal_friction_ros.offline.figures import (
     BLACK,

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.coulomb import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction_laws import Rung, ladder, normal_forces, squeeze_force
 from seal_friction_ros.core.friction_readings import Prepared, Readings, level_friction
@@ -50,7 +51,7 @@ from seal_friction_ros.core.identification import (
 from seal_friction_ros.core.normal_force import NormalForceLaw
 from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.seal_file import NORMAL_FORCE_LAWS, parse_seal
-from seal_friction_ros.core.signal_preparation import Array, OffsetLine, offset_line
+from seal_friction_ros.core.signal_preparation import OffsetLine, offset_line
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.core.validated import from_mapping
 from seal_friction_ros.files import config_path, read_yaml
@@ -586,7 +587,9 @@ def _levels(data: Data, choice: Choice, worth: Worth, document: Mapping[str, Any
     return tuple(found)
 
 
-def fitted_readings(mounted: tuple[MountedSeal, ...], chambers: Array, velocity: Array) -> tuple[Array, Array]:
+def fitted_readings(
+    mounted: tuple[MountedSeal, ...], chambers: FloatArray, velocity: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Friction and its standard deviation [N] by mounted seals, as the node has them, shape (n,) each.
 
     Args:

@@ -14,12 +14,12 @@ from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.oring_contact.case import gland_fill
 from seal_friction_ros.core.oring_contact.case_file import Measured
 from seal_friction_ros.core.oring_contact.results import Contact, ContactResult
 from seal_friction_ros.core.seal import projected_area, squeeze, stretch
 from seal_friction_ros.core.units import BAR, INCH, LBF, PSI
-from seal_friction_ros.offline.bag_evaluation import FloatArray
 from seal_friction_ros.offline.figures import (
     BLACK,
     BLUE,

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.coulomb import (
     ActuatorFriction,
     MountedSeal,
@@ -25,7 +26,7 @@ from seal_friction_ros.core.seal import contact_length, projected_area, squeeze,
 from seal_friction_ros.core.seal_file import parse_seal
 from seal_friction_ros.core.units import BAR, INCH, LBF, PSI
 from seal_friction_ros.files import read_yaml, share_directory
-from seal_friction_ros.offline.bag_evaluation import BAND_95, FloatArray
+from seal_friction_ros.offline.bag_evaluation import BAND_95
 from seal_friction_ros.offline.figures import (
     BLACK,
     BLUE,

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.configuration import SealSelection
 from seal_friction_ros.core.reference import Sine
 from seal_friction_ros.core.servo import ServoParameters, Trajectory, init, simulate
@@ -15,7 +16,6 @@ from seal_friction_ros.core.tracking import dwell_per_reversal, tracking_peak, t
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.files import load_seals
-from seal_friction_ros.offline.bag_evaluation import FloatArray
 from seal_friction_ros.offline.figures import (
     BLACK,
     BLUE,

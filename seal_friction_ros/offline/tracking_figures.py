@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.records import FrictionState
-from seal_friction_ros.offline.bag_evaluation import BoolArray, FloatArray, RecordedRun
+from seal_friction_ros.offline.bag_evaluation import RecordedRun
 from seal_friction_ros.offline.figures import (
     BLUE,
     GREY,

@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 
 from seal_friction_ros.core import wire
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.closed_loop import Axis
 from seal_friction_ros.core.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.feedforward import FeedForwardSettings, Motion
@@ -26,7 +27,6 @@ from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.core.wire import Position, ServoReference, Velocity
 from seal_friction_ros.files import FEEDFORWARD_PREFIX, default_configuration
 from seal_friction_ros.offline.bag import BagError, bag_topics, read_messages
-from seal_friction_ros.offline.bag_evaluation import FloatArray
 from seal_friction_ros.offline.figures import house_style
 from seal_friction_ros.offline.progress import progress
 from seal_friction_ros.offline.replay import Step, steps

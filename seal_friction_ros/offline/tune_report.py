@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.closed_loop import (
     JUDGED_PERIODS,
     SETTLED_PERIODS,
@@ -21,7 +22,6 @@ from seal_friction_ros.core.matching import NEAR_REVERSAL, Match, Recording
 from seal_friction_ros.core.tracking import tracking_peak, tracking_rms
 from seal_friction_ros.core.tuning import Problem, Tuning
 from seal_friction_ros.core.validated import meanings
-from seal_friction_ros.offline.bag_evaluation import BoolArray, FloatArray
 from seal_friction_ros.offline.figures import (
     BLACK,
     BLUE,

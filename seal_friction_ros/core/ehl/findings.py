@@ -6,13 +6,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 REFERENCE_HALF_WIDTH = 0.5e-3
 """[m] about the middle: where the paper takes its mean friction (chapter 6)"""

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl.case import Case, MapGrid
 from seal_friction_ros.core.ehl.contact import ContactState, contact_step
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.ehl.shear import fluid_shear, solid_shear
 from seal_friction_ros.core.ehl.transient import Model, rest
-
-FloatArray = npt.NDArray[np.float64]
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
 _MOST_RETRIES = 20

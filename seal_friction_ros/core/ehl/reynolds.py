@@ -18,12 +18,10 @@ L. Floberg 1957; K.-O. Olsson 1965.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.convergence import NotConvergedError
-
-FloatArray = npt.NDArray[np.float64]
 
 _ITERATIONS = 100
 _TOLERANCE = 1e-14  # of the largest flow, and of the complementarity

@@ -5,15 +5,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import erf
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.ehl.contact import Contact, ContactState, asperity_pressure
 from seal_friction_ros.core.ehl.grease import apparent_viscosity
 from seal_friction_ros.core.ehl.reynolds import FilmEnds
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Shear(NamedTuple):

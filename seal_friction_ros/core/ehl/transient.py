@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.contact import (
@@ -30,8 +30,6 @@ from seal_friction_ros.core.ehl.kinematics import Motion
 from seal_friction_ros.core.ehl.reynolds import FilmEnds
 from seal_friction_ros.core.ehl.shear import fluid_shear, sliding_velocity, solid_shear
 from seal_friction_ros.core.ehl.wall import WallFilm
-
-FloatArray = npt.NDArray[np.float64]
 
 _MOST_HALVINGS = 10
 _LONGEST_WALL = 1_000_000  # cells of its film
@@ -158,7 +156,7 @@ class RunResult(NamedTuple):
     """largest difference between lubricant in and out and that in the film, over that in the film, of any step"""
 
 
-def last_cycle(result: RunResult) -> npt.NDArray[np.bool_]:
+def last_cycle(result: RunResult) -> BoolArray:
     """Whether each step is in the last cycle of the motion of the case, shape (steps,)."""
     begin = result.time[-1] * (1.0 - 1.0 / result.case.motion.cycles)
     return np.asarray(result.time > begin + 1e-12)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.oring_contact.arrays import FloatArray
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.validated import check, parameter
 
 
