@@ -37,10 +37,10 @@ from seal_friction_ros.offline.identify import (
     Ring,
     fitted_readings,
     normal_force_law,
-    seal_text,
     worst_left_out,
 )
 from seal_friction_ros.offline.report import number, table, tiles, write_page
+from seal_friction_ros.offline.seal_output import seal_text
 
 PRIOR_ART_SEAL = 'ms28775_114_prior_art'  # the one ring whose charts are known
 DOTS = 1500  # in a scatter; more hide each other

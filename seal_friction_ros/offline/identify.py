@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
 from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.coulomb import MountedSeal, actuator_friction
@@ -57,6 +56,7 @@ from seal_friction_ros.core.validated import from_mapping
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.friction_sources import Choices, Sources, read_sources
 from seal_friction_ros.offline.progress import progress
+from seal_friction_ros.offline.seal_output import rounded
 
 DIGITS = 6  # that a number in a seal file has
 PRESSURES_FOR_AN_EXPONENT = 6  # fewer do not tell one, once each is left out in turn (our choice)
@@ -441,7 +441,7 @@ def _offset_line(readings: Readings) -> OffsetLine | None:
 
 
 def _rounded(value: float) -> float:
-    return float(f'{value:.{DIGITS}g}')
+    return rounded(value, DIGITS)
 
 
 def _rounded_or_none(value: float) -> float | None:
@@ -525,27 +525,6 @@ def _identification_part(
         'data': [data.sources.files[i]._asdict() for i in data.kept],
         'warnings': list(warnings),
     }
-
-
-def seal_text(document: Mapping[str, Any]) -> str:
-    """YAML of a seal file."""
-    text: str = yaml.safe_dump(dict(document), sort_keys=False, allow_unicode=True, width=110)
-    return text
-
-
-def write_seal(document: Mapping[str, Any], out: Path) -> None:
-    """Write a seal file, whole or not at all; one that is there is replaced.
-
-    Raises:
-        ValueError: It cannot be written.
-    """
-    partial = out.with_name(f'.{out.name}.partial')
-    try:
-        partial.write_text(seal_text(document), encoding='utf-8')
-        partial.replace(out)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise ValueError(f'{out}: cannot write the seal file: {error.strerror}') from None
 
 
 # -- pressure by pressure ---------------------------------------------------------------------------------------------

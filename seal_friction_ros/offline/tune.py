@@ -30,7 +30,7 @@ from seal_friction_ros.offline.bag import BagError, bag_topics, read_messages
 from seal_friction_ros.offline.figures import house_style
 from seal_friction_ros.offline.progress import progress
 from seal_friction_ros.offline.replay import Step, steps
-from seal_friction_ros.offline.report import write_page, write_whole
+from seal_friction_ros.offline.report import write_page
 from seal_friction_ros.offline.topics import Topics, find_topics
 from seal_friction_ros.offline.tune_report import (
     Task,
@@ -40,6 +40,7 @@ from seal_friction_ros.offline.tune_report import (
     tuning_figures,
     tuning_sections,
 )
+from seal_friction_ros.offline.whole_file import write_whole
 
 CONTROL_PERIOD, INNER_STEP = 1e-3, 1e-4  # [s] of the simulated servo, as servo_simulator runs it
 NOISE_LENGTH = 8192  # samples of noise, which then repeats

@@ -249,13 +249,13 @@ def _edge_force(model: Model, moment: Moment) -> float:
     return -model.circumference * axial
 
 
-def _fluid_force(model: Model, state: ContactState, velocity: float) -> float:
+def fluid_force(model: Model, state: ContactState, velocity: float) -> float:
     """Fluid friction [N] at a sliding ``velocity`` [m/s]."""
     numbers, width = model.case.grease.numbers, model.contact.half_plane.cell_width
     return -model.circumference * float(fluid_shear(*state, -velocity, numbers, width, model.ends()))
 
 
-def _solid_limit(model: Model, state: ContactState) -> float:
+def solid_limit(model: Model, state: ContactState) -> float:
     """Magnitude of the solid friction [N] of a sliding contact."""
     return model.circumference * solid_shear(model.contact, state.gap, model.case.seal.solid_shear_stress)
 
@@ -265,15 +265,15 @@ def _slide(model: Model, moment: Moment, step: float, position: float) -> tuple[
     groove = model.case.seated_groove
     stuck_lag = moment.lag + position - moment.position
     edge = _edge_force(model, moment)
-    fluid_at_rest = _fluid_force(model, moment.state, 0.0)
-    solid = _solid_limit(model, moment.state)
+    fluid_at_rest = fluid_force(model, moment.state, 0.0)
+    solid = solid_limit(model, moment.state)
     drive = groove.force(stuck_lag) - edge - fluid_at_rest
     if abs(drive) <= solid:
         return 0.0, stuck_lag
     velocity = sliding_velocity(
         drive,
         solid,
-        lambda v: _fluid_force(model, moment.state, v) - fluid_at_rest,
+        lambda v: fluid_force(model, moment.state, v) - fluid_at_rest,
         lambda v: groove.force(stuck_lag - v * step) - edge - fluid_at_rest,
         max(abs(position - moment.position), (abs(drive) - solid) / groove.stiffness) / step,
     )
@@ -281,9 +281,9 @@ def _slide(model: Model, moment: Moment, step: float, position: float) -> tuple[
 
 
 def _forces(model: Model, moment: Moment, velocity: float) -> Forces:
-    fluid = _fluid_force(model, moment.state, velocity)
+    fluid = fluid_force(model, moment.state, velocity)
     edge = _edge_force(model, moment)
-    limit = _solid_limit(model, moment.state)
+    limit = solid_limit(model, moment.state)
     if velocity:
         solid = math.copysign(limit, velocity)
     else:  # stuck: the asperities hold what the spring asks, up to their limit

@@ -105,13 +105,6 @@ def element_forces(
     return ElementForces(force, matrix, true_tension, tension_rows)
 
 
-def strain_energy(elements: Elements, rubber: Rubber, gradient: FloatArray) -> float:
-    """Energy of the whole ring [J]."""
-    shear = shear_response(rubber, gradient)
-    bulk = 0.5 * rubber.bulk_modulus * (volume_ratios(elements, gradient) - 1.0) ** 2 @ elements.weights.sum(axis=1)
-    return float((elements.weights * shear.energy).sum() + bulk)
-
-
 def volume_ratios(elements: Elements, gradient: FloatArray) -> FloatArray:
     """Theta of each element [-], shape (e,)."""
     volume = (elements.weights * volume_response(gradient).energy).sum(axis=1)
