@@ -375,7 +375,7 @@ _TITLES = {
     'second_lobe': ('position at which friction falls again while the seal sticks', 'mm', MM),
     'edge_peak': ('peak on meeting the control edge over the friction after it', '1', 1.0),
     'edge_assist': ('push of the chamfer on leaving the seat', 'N', 1.0),
-    'friction_on_leaving': ('all friction at that moment', 'N', 1.0),
+    'friction_on_leaving': ('least of all friction meanwhile', 'N', 1.0),
     'after_edge': ('friction in the seat after the control edge', 'N', 1.0),
 }
 

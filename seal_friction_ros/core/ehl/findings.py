@@ -45,7 +45,7 @@ class Findings(NamedTuple):
     edge_assist: float | None
     """[N] largest push of the chamfer along the motion, on leaving the seat"""
     friction_on_leaving: float | None
-    """[N] all friction at that moment; negative pushes along"""
+    """[N] least of all friction while that push is above half of it; negative pushes along"""
     after_edge: float | None
     """[N] mean friction well inside the seat, after the control edge"""
 
@@ -68,7 +68,8 @@ def findings(result: RunResult) -> Findings:
     slowing = [i for i, _ in slow]
     assisted, elastic = _assisted(result, last)
     edge = case.control_edge
-    leaving = int(np.argmin(np.where(last & (result.velocity > 0.0), result.edge, np.inf)))
+    pushed = np.where(last & (result.velocity > 0.0), result.edge, 0.0)
+    leaving = pushed <= 0.5 * pushed.min()
     return Findings(
         friction=float(np.abs(result.friction[middle]).mean()),
         solid_share=float(solid[sliding].sum() / (solid[sliding] + fluid[sliding]).sum()),
@@ -83,8 +84,8 @@ def findings(result: RunResult) -> Findings:
         elastic_length=elastic,
         second_lobe=_second_lobe(result, last),
         edge_peak=_edge_peak(result, last) if edge else None,
-        edge_assist=max(0.0, -float(result.edge[leaving])) if edge else None,
-        friction_on_leaving=float(result.friction[leaving]) if edge else None,
+        edge_assist=max(0.0, -float(pushed.min())) if edge else None,
+        friction_on_leaving=float(result.friction[leaving].min()) if edge else None,
         after_edge=_after_edge(result, last) if edge else None,
     )
 
