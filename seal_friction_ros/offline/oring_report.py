@@ -218,9 +218,8 @@ def profile_figure(computed: Computed) -> Plot:
         if thesis:
             compared = True
             ax.plot(thesis.position / MM, thesis.stress / MPA, 'o', ms=4.5, color=BLACK, label='thesis, cells')
-        ax.set_ylim(bottom=0.0)
         ax.set_title(_pressure_text(result.pressure))
-    axes[0].set_xlim(left=0.0)  # of all: they share it
+    axes[0].set(xlim=(0.0, None), ylim=(0.0, None))  # of all: they share them
     for ax in axes[-_COLUMNS:]:
         ax.set_xlabel('from the upstream end [mm]')
         ax.tick_params(labelbottom=True)
