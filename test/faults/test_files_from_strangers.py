@@ -56,7 +56,7 @@ def test_two_thousand_mutations_of_the_corpus_crash_no_reader():
     environment = {**os.environ, 'PYTHONPATH': str(ROOT)}
     result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     readers = json.loads(result.stdout)['readers']
-    assert len(readers) == 10
+    assert len(readers) == 11
     for reader in readers:
         assert reader['cases'] == 2000
         assert (reader['crashes'], reader['kept']) == (0, [])
