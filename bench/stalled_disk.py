@@ -14,7 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from kill_recorder import OUTPUTS, PERIOD, inputs
+from kill_recorder import PERIOD, inputs
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -23,6 +23,7 @@ from seal_friction_ros.core.pipeline import encoded, init, receive
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline import mcap_output
 from seal_friction_ros.offline.recorder import Recorder
+from seal_friction_ros.offline.topics import ANSWER_TOPICS
 
 
 class StallingDisk:
@@ -58,7 +59,7 @@ def latencies(bag: Path, seconds: float, disk: StallingDisk) -> tuple[list[float
             recorder.record(topic, type_name, time.time_ns(), data)
             state, answer = receive(parameters, state, message)
             for answer_type, answer_data in encoded(answer):
-                recorder.record(OUTPUTS[answer_type], answer_type, time.time_ns(), answer_data)
+                recorder.record(ANSWER_TOPICS[answer_type], answer_type, time.time_ns(), answer_data)
         found.append((time.perf_counter_ns() - due) * 1e-9)
     recorder.close()
     return found, recorder

@@ -1,20 +1,6 @@
 """The benches of the live node run, and what they count is counted; how fast it is, they say and no test."""
 
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
-
-ROOT = Path(__file__).parents[2]
-
-
-def bench(name: str, *arguments: str) -> dict:
-    command = [sys.executable, str(ROOT / 'bench' / f'{name}.py'), *arguments, '--json']
-    environment = {**os.environ, 'PYTHONPATH': str(ROOT)}
-    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert result.stdout, result.stderr
-    return json.loads(result.stdout)
+from benches import bench
 
 
 def test_every_round_trip_is_answered_by_every_node_asked():
