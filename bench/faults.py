@@ -24,11 +24,10 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from fault_rows import AFTER, MS, SIGNAL_ROWS, UNKNOWN, good
-from fault_stage import SETTINGS, Driver, Outputs, Stage, complaints_at_any_time, encoded, stage, try_row
+from fault_stage import SETTINGS, Driver, Outputs, Stage, complaints_at_any_time, stage, try_row
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
@@ -37,6 +36,7 @@ from rich.progress import track
 from rich.table import Table
 from rosgraph_msgs.msg import Clock
 from seal_friction_msgs.msg import CylinderPressure, FrictionEstimate, RodVelocity
+from spun import Spun
 from stalled_disk import StallingDisk
 from std_msgs.msg import Float64
 
@@ -45,7 +45,7 @@ from seal_friction_ros.core.feedforward import FeedForward
 from seal_friction_ros.core.records import Status
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
-from seal_friction_ros.nodes.processes import free_domain, graph_environment
+from seal_friction_ros.nodes.processes import free_domain, running
 from seal_friction_ros.offline import mcap_output
 from seal_friction_ros.offline.bag import read_messages
 from seal_friction_ros.offline.recover import recover
@@ -250,9 +250,7 @@ def lifecycle_in_any_order(chance: random.Random, folder: Path) -> list[str]:
             """Ask for a transition while inputs come; whether it succeeded."""
             for _ in range(chance.randrange(4)):
                 place.now += MS
-                for topic, messages in good(place.now).items():
-                    for one in messages:
-                        place.driver.inputs[topic].publish(encoded(one))
+                place.driver.publish(good(place.now))
             future = client.call_async(ChangeState.Request(transition=Transition(id=number)))
             return place.spin_until(future.done) and future.result().success
 
@@ -363,19 +361,17 @@ def verified(bag: Path) -> list[str]:
 # --- the process ---
 
 
-class Outside:
+class Outside(Spun):
     """The estimator in a process of its own, and a driver here."""
 
     def __init__(self, process: subprocess.Popen[bytes], log: Path, domain: int) -> None:
-        self.process, self.log = process, log
-        self.context = Context()
-        rclpy.init(context=self.context, domain_id=domain)
-        self.driver = Driver(context=self.context)
+        context = Context()
+        rclpy.init(context=context, domain_id=domain)
+        self.process, self.log, self.driver = process, log, Driver(context=context)
+        super().__init__(context, self.driver)
         self.recorder: list[str] = []
         self.values: dict[str, str] = {}
         self.driver.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
-        self.executor = SingleThreadedExecutor(context=self.context)
-        self.executor.add_node(self.driver)
         self.now = time.time_ns()
         self.sent = 0
 
@@ -386,35 +382,23 @@ class Outside:
             else:
                 self.values = {value.key: value.value for value in status.values}
 
-    def spin_until(self, condition: Callable[[], object], patience: float = PATIENCE) -> bool:
-        """Spin until it holds; False if it does not within ``patience`` [s]."""
-        deadline = time.monotonic() + patience
-        while not condition():
-            if time.monotonic() > deadline:
-                return False
-            self.executor.spin_once(timeout_sec=0.002)
-        return True
-
     def connect(self) -> None:
         """Spin until the estimator hears the driver.
 
         Raises:
             RuntimeError: It does not.
         """
-        inputs = self.driver.inputs.values()
-        if not self.spin_until(lambda: all(p.get_subscription_count() for p in inputs) and self.values):
+        if not self.spin_until(lambda: self.values, PATIENCE):
             raise RuntimeError(f'no estimator: {self.log.read_text()}')
-        self.spin_until(lambda: False, 0.2)
+        self.connect_to(self.driver.inputs.values())
 
     def send(self, seconds: float, rate: float = 1000.0) -> None:
         """Send inputs at a rate [Hz], whether they are answered or not."""
         start = time.monotonic()
         for number in range(round(seconds * rate)):
-            self.spin_until(lambda due=start + number / rate: time.monotonic() >= due)
+            self.spin(start + number / rate - time.monotonic())
             self.now += round(1e9 / rate)
-            for topic, messages in good(self.now).items():
-                for one in messages:
-                    self.driver.inputs[topic].publish(encoded(one))
+            self.driver.publish(good(self.now))
             self.sent += 1
 
     def complaints(self) -> list[str]:
@@ -424,7 +408,7 @@ class Outside:
         while latest != {0} and time.monotonic() < deadline:
             before = len(self.driver.outputs)
             self.send(0.5)
-            self.spin_until(lambda: False, 0.1)
+            self.spin(0.1)
             seen = [o for o in self.driver.outputs[before:] if isinstance(o, records.FrictionEstimate)]
             latest = statuses(seen[-20:])
         wrong = unless(latest == {0}, f'at the end: {latest}')
@@ -440,12 +424,8 @@ def outside(folder: Path, directory: str = '', prefix: tuple[str, ...] = ()) -> 
     """Run the estimator, recording to ``bag`` in a folder, behind a command that prepares its file system."""
     domain, log = free_domain(), folder / 'log'
     set_up_discovery()
-    values = {'record': 'true', 'record_directory': directory or str(folder), 'record_name': 'bag'}
-    parameters = [f'-p {name}:={value}' for name, value in {**values, **SETTINGS}.items()]
-    command = [*prefix, sys.executable, '-m', 'seal_friction_ros.nodes.friction_estimator', '--ros-args']
-    command += ' '.join(parameters).split()
-    with log.open('wb') as output:
-        process = subprocess.Popen(command, env=graph_environment(domain), stdout=output, stderr=output)
+    recording = {'record': True, 'record_directory': directory or str(folder), 'record_name': 'bag'}
+    with running('friction_estimator', domain, {**recording, **SETTINGS}, log, prefix=prefix) as process:
         made = Outside(process, log, domain)
         try:
             made.connect()
@@ -453,14 +433,6 @@ def outside(folder: Path, directory: str = '', prefix: tuple[str, ...] = ()) -> 
         finally:
             made.driver.destroy_node()
             rclpy.try_shutdown(context=made.context)
-            if process.poll() is None:
-                process.send_signal(signal.SIGCONT)
-                process.terminate()
-                try:
-                    process.wait(PATIENCE)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
 
 
 def ends_by(number: signal.Signals, chance: random.Random, folder: Path) -> list[str]:
