@@ -43,6 +43,7 @@ from std_msgs.msg import Float64
 from seal_friction_ros.core import records
 from seal_friction_ros.core.feedforward import FeedForward
 from seal_friction_ros.core.records import Status
+from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.processes import free_domain, running
@@ -52,6 +53,7 @@ from seal_friction_ros.offline.recover import recover
 from seal_friction_ros.offline.replay import replay
 
 PATIENCE = 20.0  # [s]
+REQUIRED = ('estimate', 'feed-forward', 'status and diagnostics', 'recording')
 OWN_MOUNTS = ('unshare', '--map-root-user', '--mount')
 
 
@@ -60,9 +62,19 @@ class Trial:
     """A fault of graph, process or disk."""
 
     fault: str
-    required: str
+    estimate: str
+    feedforward: str
+    said: str
+    """status bits, and what diagnostics say"""
+    recording: str
+    """``-`` where nothing is recorded"""
     attempt: Callable[[random.Random, Path], list[str]]
     """one try, with a folder of its own; what was not as required"""
+
+    @property
+    def required(self) -> tuple[str, ...]:
+        """What is required, column by column."""
+        return self.estimate, self.feedforward, self.said, self.recording
 
 
 def statuses(outputs: Outputs) -> set[int]:
@@ -76,17 +88,24 @@ def unless(holds: object, words: str) -> list[str]:
 
 
 def recovered(place: Stage) -> list[str]:
-    """Good samples for a while; what is not as if nothing had been."""
+    """Good samples for a while; what is not as if nothing had been, and what must never be, since the start."""
     place.run(AFTER)
     outputs = place.run(AFTER)
     forces = [output for output in outputs if isinstance(output, FeedForward)]
     wrong = unless(statuses(outputs) == {0}, f'after it: statuses {statuses(outputs)}')
-    return wrong + unless(forces and not forces[-1].limited, f'after it: feed-forward {forces[-1:]}')
+    wrong += unless(forces and not forces[-1].limited, f'after it: feed-forward {forces[-1:]}')
+    return wrong + complaints_at_any_time(place.driver.outputs)
 
 
 def message(place: Stage) -> str:
     """Message of the newest diagnostics of the estimate."""
     return str(place.estimator.diagnostics()['estimate'].message)
+
+
+def best_effort(place: Stage) -> str | None:
+    """Who offers the velocity as best effort only, as the diagnostics have it."""
+    values = {value.key: value.value for value in place.estimator.diagnostics()['estimate'].values}
+    return values.get('rod_velocity best effort only, from')
 
 
 # --- graph ---
@@ -106,6 +125,8 @@ def topic_comes_late(chance: random.Random, folder: Path) -> list[str]:
         wrong = unless(statuses(early) == {Status.PRESSURE_MISSING}, f'before: {statuses(early)}')
         estimates = [o for o in early if isinstance(o, records.FrictionEstimate)]
         wrong += unless({e.state for e in estimates} == set(UNKNOWN), 'before: a state without pressure')
+        forces = {o.force for o in early if isinstance(o, FeedForward)}
+        wrong += unless(forces == {0.0}, f'before: feed-forward {forces}')
         return wrong + recovered(place)
 
 
@@ -128,22 +149,26 @@ def second_publisher(chance: random.Random, folder: Path, *, refuse: bool = Fals
     topic, kind = chance.choice([('rod_velocity', RodVelocity), ('cylinder_pressure', CylinderPressure)])
     words = f'/{topic} has several publishers: /driver, /intruder'
     with stage({'refuse_second_publisher': refuse}) as place:
-        before = place.run(60)
+        wrong = []
+        place.run(60)
         with intruder(place) as other:
             other.create_publisher(kind, topic, 10)
-            wrong = unless(place.spin_until(lambda: words in message(place)), f'not named: {message(place)}')
-            place.level()
-            during = place.run(60)
-            level = place.level()
+            wrong += unless(place.spin_until(lambda: words in message(place)), f'not named: {message(place)}')
+            for _ in range(2):
+                place.level()
+                during = place.run(60)
+                level = place.level()
+                forces = [output for output in during if isinstance(output, FeedForward)]
+                if refuse:
+                    wrong += unless(statuses(during) == {Status.INPUT_REFUSED}, f'{statuses(during)} while refused')
+                    wrong += unless(forces[-1].force == 0.0, f'still {forces[-1].force} N')
+                    wrong += unless(level == 'ERROR', level)
+                else:
+                    wrong += unless(statuses(during) == {0}, f'{statuses(during)}') + unless(level == 'WARN', level)
+                wrong += complaints_at_any_time(place.driver.outputs)
+                place.restart()  # and once more: what was refused stays so
         wrong += unless(place.spin_until(lambda: 'several' not in message(place)), 'still there when it is gone')
-        forces = [output for output in during if isinstance(output, FeedForward)]
-        if refuse:
-            wrong += unless(statuses(during) == {Status.INPUT_REFUSED}, f'{statuses(during)} while refused')
-            wrong += unless(forces[-1].force == 0.0, f'still {forces[-1].force} N') + unless(level == 'ERROR', level)
-        else:
-            wrong += unless(statuses(during) == {0}, f'{statuses(during)}') + unless(level == 'WARN', level)
-        after = place.run(1)
-        return wrong + complaints_at_any_time([*before, *during, *after]) + recovered(place)
+        return wrong + recovered(place)
 
 
 def second_publisher_refused(chance: random.Random, folder: Path) -> list[str]:
@@ -173,11 +198,17 @@ def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
             ):
                 said = place.spin_until(lambda words=words: words in message(place))
                 wrong += unless(said, f'not said: {words}, but: {message(place)}')
-            values = {value.key: value.value for value in place.estimator.diagnostics()['estimate'].values}
-            taken = values.get('rod_velocity best effort only, from')
-            wrong += unless(taken == '/driver', f'best effort taken from {taken}')
+            wrong += unless(best_effort(place) == '/driver', f'best effort taken from {best_effort(place)}')
         place.connect()
-        return wrong + recovered(place)
+        wrong += recovered(place)
+        for quality, taken in ((qos.STREAM, None), (qos_profile_sensor_data, '/driver')):  # it comes back otherwise
+            place.driver.destroy_publisher(place.driver.inputs['rod_velocity'])
+            place.driver.inputs['rod_velocity'] = place.driver.create_publisher(RodVelocity, 'rod_velocity', quality)
+            said = place.spin_until(lambda taken=taken: best_effort(place) == taken)
+            wrong += unless(said, f'best effort from {best_effort(place)}, not {taken}')
+            place.connect()
+            wrong += recovered(place)
+        return wrong
 
 
 def second_estimator(chance: random.Random, folder: Path) -> list[str]:
@@ -257,6 +288,10 @@ def lifecycle_in_any_order(chance: random.Random, folder: Path) -> list[str]:
         for _ in range(20):
             number = chance.choice([number for _, number in LEGAL])
             succeeded = change(number)
+            place.spin(0.01)
+            wrong += complaints_at_any_time(place.driver.outputs)
+            if succeeded:
+                place.driver.outputs.clear()  # what is active again begins anew
             wrong += unless(succeeded == ((state, number) in LEGAL), f'transition {number} while {state}: {succeeded}')
             state = LEGAL.get((state, number), state)
         for at, number in (
@@ -287,12 +322,12 @@ def simulated_time_is_reset(chance: random.Random, folder: Path) -> list[str]:
                 outputs += place.run(1)
             return outputs
 
-        before = tick(60)
+        tick(60)
         place.now = 0
         after = tick(60)
         marked = [o.status for o in after if isinstance(o, records.FrictionEstimate)]
         wrong = unless(marked == [Status.STAMP_NOT_INCREASING] + [0] * 59, f'{marked[:5]}')
-        wrong += complaints_at_any_time([*before, *after]) + recovered(place)
+        wrong += recovered(place)
         place.estimator.finish()
     return wrong + verified(folder / 'bag')
 
@@ -311,14 +346,15 @@ def fifty_more_topics(chance: random.Random, folder: Path) -> list[str]:
 
         outputs = place.run(200, busy)
         answered = sum(isinstance(output, records.FrictionEstimate) for output in outputs)
-        return unless(answered == 200, f'{answered} of 200') + unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+        wrong = unless(answered == 200, f'{answered} of 200') + unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+        return wrong + recovered(place)
 
 
 # --- disk ---
 
 
 def slow_disk(chance: random.Random, folder: Path) -> list[str]:
-    """Each write of the recorder blocks for a second, once."""
+    """One write of the recorder blocks for a second; what is recorded meanwhile waits for it."""
     recording = {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
     mcap_output.os = disk = StallingDisk(1.0, chance.uniform(0.0, 0.5))
     try:
@@ -331,6 +367,7 @@ def slow_disk(chance: random.Random, folder: Path) -> list[str]:
             outputs += place.run(100)
             wrong = unless(statuses(outputs) <= {0}, f'{statuses(outputs)}')
             wrong += unless(slowest < 0.7, f'ten estimates took {slowest:.2f} s')  # they would wait for 1 s
+            wrong += complaints_at_any_time(place.driver.outputs)
             place.estimator.finish()
     finally:
         mcap_output.os = os
@@ -542,40 +579,80 @@ def read_only(chance: random.Random, folder: Path) -> list[str]:
 
 
 TRIALS = (
-    Trial('an input has no publisher at first', 'PRESSURE_MISSING and UNKNOWN, then as usual', topic_comes_late),
-    Trial('an input has a second publisher', 'named, WARN; estimates as usual', second_publisher),
+    Trial(
+        'an input has no publisher at first',
+        'UNKNOWN, then as usual',
+        '0, then as usual',
+        '`PRESSURE_MISSING`, then as usual',
+        '-',
+        topic_comes_late,
+    ),
+    Trial('an input has a second publisher', 'as usual', 'as usual', 'both named; WARN', '-', second_publisher),
     Trial(
         'an input has a second publisher, refused',
-        'named, ERROR, INPUT_REFUSED, feed-forward fades; as usual once it is gone',
+        'UNKNOWN',
+        'fades to 0',
+        'both named; `INPUT_REFUSED`, ERROR; as usual once it is gone',
+        '-',
         second_publisher_refused,
     ),
     Trial(
         'incompatible quality of service or type',
-        'said by name of the node; best effort is taken',
+        'as usual: best effort is taken',
+        'as usual',
+        'said by name of the node',
+        '-',
         incompatible_quality,
     ),
-    Trial('a second estimator of the same name', 'named, WARN; estimates as usual', second_estimator),
-    Trial('parameters change in motion', 'nonsense refused, no leap, the recording verifies', parameters_change),
-    Trial('lifecycle transitions in any order', 'legal ones succeed, others are refused', lifecycle_in_any_order),
+    Trial('a second estimator of the same name', 'as usual', 'as usual', 'both named; WARN', '-', second_estimator),
+    Trial('parameters change in motion', 'as usual', 'no leap', 'nonsense is refused', 'verifies', parameters_change),
+    Trial(
+        'lifecycle transitions in any order',
+        'as usual when active again',
+        'no leap while active',
+        'legal ones succeed, others are refused',
+        '-',
+        lifecycle_in_any_order,
+    ),
     Trial(
         'simulated time is reset',
-        'the first sample marked, then as usual; the recording verifies',
+        'as usual, the first one marked',
+        'as usual',
+        '`STAMP_NOT_INCREASING` once',
+        'verifies',
         simulated_time_is_reset,
     ),
-    Trial('50 more topics on the graph', 'every sample answered', fifty_more_topics),
+    Trial('50 more topics on the graph', 'every sample answered', 'as usual', 'as usual', '-', fifty_more_topics),
     Trial(
         '10 kHz on a node made for 1 kHz',
-        'every sample that is taken answered, missing ones reported; the recording verifies',
+        'one for every sample that is taken',
+        'no leap',
+        'samples missed are counted',
+        'verifies',
         burst,
     ),
-    Trial('SIGINT', 'exit code 0, the recording verifies', interrupted),
-    Trial('SIGTERM', 'exit code 0, the recording verifies', terminated),
-    Trial('SIGKILL', 'the recording is recovered up to 1 s before, and verifies', killed),
-    Trial('SIGSTOP and SIGCONT', 'goes on; every sample answered or reported missing', stopped_and_continued),
-    Trial('disk full', 'said, estimates go on, the bag is valid and verifies', disk_full),
-    Trial('disk read-only', 'said, estimates go on', read_only),
-    Trial('folder of the bag removed', 'said, estimates go on', directory_removed),
-    Trial('a disk that stalls', 'no estimate waits, nothing is lost, the recording verifies', slow_disk),
+    Trial('SIGINT', 'ends', 'ends', 'exit code 0', 'finished, verifies', interrupted),
+    Trial('SIGTERM', 'ends', 'ends', 'exit code 0', 'finished, verifies', terminated),
+    Trial('SIGKILL', 'ends', 'ends', 'nothing: it is gone', 'recovered up to 1 s before, verifies', killed),
+    Trial(
+        'SIGSTOP and SIGCONT',
+        'goes on',
+        'goes on without a leap',
+        'every sample answered or counted as missing',
+        'verifies',
+        stopped_and_continued,
+    ),
+    Trial('disk full', 'as usual', 'as usual', 'recorder: the error of the disk', 'valid; verifies', disk_full),
+    Trial('disk read-only', 'as usual', 'as usual', 'recorder: the error of the disk', 'none', read_only),
+    Trial(
+        'folder of the bag removed',
+        'as usual',
+        'as usual',
+        'recorder: ERROR, recording stopped',
+        'gone',
+        directory_removed,
+    ),
+    Trial('a disk that stalls', 'as usual, none waits', 'as usual', 'as usual', 'whole, verifies', slow_disk),
 )
 
 
@@ -600,8 +677,8 @@ def main() -> int:
     with stage() as place:
         for row in track([r for r in SIGNAL_ROWS if arguments.only in r.fault], 'signals', console=said):
             happened = [try_row(place, row) for _ in range(arguments.times)]
-            required = f'{row.status or "no bit"}; feed-forward {row.feedforward}; {row.level}'
-            results[row.fault] = (required, happened)
+            said = f'{row.status or "no bit"}; {row.level}'
+            results[row.fault] = ((row.estimate, row.feedforward, said, '-'), happened)
     for trial in track([t for t in TRIALS if arguments.only in t.fault], 'graph, process, disk', console=said):
         happened = [attempt(trial, arguments.seed + number) for number in range(arguments.times)]
         results[trial.fault] = (trial.required, happened)
@@ -612,12 +689,12 @@ def main() -> int:
     return int(any(wrong for _, happened in results.values() for wrong in happened))
 
 
-def _table(results: dict[str, tuple[str, list[list[str]]]]) -> Table:
-    table = Table('fault', 'tried', 'required', 'happened', title='Fault campaign')
+def _table(results: dict[str, tuple[tuple[str, ...], list[list[str]]]]) -> Table:
+    table = Table('fault', *REQUIRED, 'tried', 'happened', title='Fault campaign')
     for fault, (required, happened) in results.items():
         bad = [words for wrong in happened for words in wrong[:1]]
         said = 'as required' if not bad else f'{len(bad)} not: {bad[0]}'
-        table.add_row(fault, str(len(happened)), required, said)
+        table.add_row(fault, *required, str(len(happened)), said)
     return table
 
 
