@@ -8,7 +8,7 @@ import pytest
 import yaml
 from example_bags import write_inputs, write_recorded
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
@@ -21,6 +21,7 @@ from seal_friction_ros.offline.bag import (
     message_definition,
     read_messages,
 )
+from seal_friction_ros.offline.mcap_output import Description, McapOutput
 from seal_friction_ros.offline.replay import replay
 
 MESSAGES = Path(__file__).parents[2] / 'msg_defs' / 'msg'
@@ -226,3 +227,32 @@ def test_what_is_no_bag_is_said_in_one_line(tmp_path: Path):
             list(read_messages(path))
         assert '\n' not in str(error.value)
         assert str(path) in str(error.value)
+
+
+def test_a_file_is_byte_for_byte_what_the_writer_of_the_mcap_library_makes(tmp_path: Path):
+    ours = McapOutput(tmp_path / 'ours.mcap')
+    with (tmp_path / 'library.mcap').open('wb') as stream:
+        theirs = Writer(stream, chunk_size=1 << 40, compression=CompressionType.NONE)
+        theirs.start('ros2', 'seal_friction_ros')
+        channels: dict[str, int] = {}
+        for number in range(3000):
+            topic = f'/{"abc"[number % 3 if number > 1000 else 0]}'  # two come late
+            description = Description(
+                f'x/msg/{topic[1].upper()}', 'ros2msg', b'float64 ' + topic[1:].encode(), {'qos': topic}
+            )
+            if topic not in channels:
+                schema = theirs.register_schema(*description[:3])
+                channels[topic] = theirs.register_channel(topic, 'cdr', schema, description.metadata)
+            data = bytes(number % 50)
+            ours.write(topic, description, 10**9 + number, data)
+            theirs.add_message(channels[topic], 10**9 + number, data, publish_time=10**9 + number)
+            if number % 700 == 699:
+                ours.flush()
+                theirs.flush()
+        ours.flush()
+        theirs.flush()
+        ours.finish('about')
+        theirs.add_metadata('rosbag2', {'serialized_metadata': 'about'})
+        theirs.finish()
+    ours.close()
+    assert (tmp_path / 'ours.mcap').read_bytes() == (tmp_path / 'library.mcap').read_bytes()
