@@ -47,7 +47,8 @@ class Row:
     state: tuple[FrictionState, ...] = (FrictionState.SLIDING,)
     """states that are published while it lasts"""
     feedforward: str = 'as usual'
-    """``as usual``, ``fades`` (to 0 within the fade time), ``dips`` (for a sample) or ``nothing`` (none comes)"""
+    """``as usual``, ``fades`` (to 0 within the fade time), ``dips`` (by less than a third), ``halves`` (once, and comes
+    back within the fade time) or ``nothing`` (none comes)"""
     level: str = 'WARN'
     """of the diagnostics"""
     shift: int = 0
@@ -298,8 +299,9 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         'the clock jumps ahead by 5 s',
         delayed('all', 5000 * MS),
         shift=5000 * MS,
-        feedforward='dips',
+        feedforward='halves',
         estimate='as usual',
+        recovery='within `feedforward.fade_time`',
     ),
     Row('bytes that are no message', garbage('cylinder_pressure'), estimate='as usual; counted and logged'),
 )

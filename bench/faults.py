@@ -24,11 +24,10 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from fault_rows import AFTER, MS, SIGNAL_ROWS, UNKNOWN, good
-from fault_stage import SETTINGS, Driver, Outputs, Stage, complaints_at_any_time, encoded, stage, try_row
+from fault_stage import SETTINGS, Driver, Outputs, Stage, complaints_at_any_time, stage, try_row
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
@@ -37,21 +36,24 @@ from rich.progress import track
 from rich.table import Table
 from rosgraph_msgs.msg import Clock
 from seal_friction_msgs.msg import CylinderPressure, FrictionEstimate, RodVelocity
+from spun import Spun
 from stalled_disk import StallingDisk
 from std_msgs.msg import Float64
 
 from seal_friction_ros.core import records
 from seal_friction_ros.core.feedforward import FeedForward
 from seal_friction_ros.core.records import Status
+from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
-from seal_friction_ros.nodes.processes import free_domain, graph_environment
+from seal_friction_ros.nodes.processes import free_domain, running
 from seal_friction_ros.offline import mcap_output
 from seal_friction_ros.offline.bag import read_messages
 from seal_friction_ros.offline.recover import recover
 from seal_friction_ros.offline.replay import replay
 
 PATIENCE = 20.0  # [s]
+REQUIRED = ('estimate', 'feed-forward', 'status and diagnostics', 'recording')
 OWN_MOUNTS = ('unshare', '--map-root-user', '--mount')
 
 
@@ -60,9 +62,19 @@ class Trial:
     """A fault of graph, process or disk."""
 
     fault: str
-    required: str
+    estimate: str
+    feedforward: str
+    said: str
+    """status bits, and what diagnostics say"""
+    recording: str
+    """``-`` where nothing is recorded"""
     attempt: Callable[[random.Random, Path], list[str]]
     """one try, with a folder of its own; what was not as required"""
+
+    @property
+    def required(self) -> tuple[str, ...]:
+        """What is required, column by column."""
+        return self.estimate, self.feedforward, self.said, self.recording
 
 
 def statuses(outputs: Outputs) -> set[int]:
@@ -76,17 +88,24 @@ def unless(holds: object, words: str) -> list[str]:
 
 
 def recovered(place: Stage) -> list[str]:
-    """Good samples for a while; what is not as if nothing had been."""
+    """Good samples for a while; what is not as if nothing had been, and what must never be, since the start."""
     place.run(AFTER)
     outputs = place.run(AFTER)
     forces = [output for output in outputs if isinstance(output, FeedForward)]
     wrong = unless(statuses(outputs) == {0}, f'after it: statuses {statuses(outputs)}')
-    return wrong + unless(forces and not forces[-1].limited, f'after it: feed-forward {forces[-1:]}')
+    wrong += unless(forces and not forces[-1].limited, f'after it: feed-forward {forces[-1:]}')
+    return wrong + complaints_at_any_time(place.driver.outputs)
 
 
 def message(place: Stage) -> str:
     """Message of the newest diagnostics of the estimate."""
     return str(place.estimator.diagnostics()['estimate'].message)
+
+
+def best_effort(place: Stage) -> str | None:
+    """Who offers the velocity as best effort only, as the diagnostics have it."""
+    values = {value.key: value.value for value in place.estimator.diagnostics()['estimate'].values}
+    return values.get('rod_velocity best effort only, from')
 
 
 # --- graph ---
@@ -106,6 +125,8 @@ def topic_comes_late(chance: random.Random, folder: Path) -> list[str]:
         wrong = unless(statuses(early) == {Status.PRESSURE_MISSING}, f'before: {statuses(early)}')
         estimates = [o for o in early if isinstance(o, records.FrictionEstimate)]
         wrong += unless({e.state for e in estimates} == set(UNKNOWN), 'before: a state without pressure')
+        forces = {o.force for o in early if isinstance(o, FeedForward)}
+        wrong += unless(forces == {0.0}, f'before: feed-forward {forces}')
         return wrong + recovered(place)
 
 
@@ -128,22 +149,26 @@ def second_publisher(chance: random.Random, folder: Path, *, refuse: bool = Fals
     topic, kind = chance.choice([('rod_velocity', RodVelocity), ('cylinder_pressure', CylinderPressure)])
     words = f'/{topic} has several publishers: /driver, /intruder'
     with stage({'refuse_second_publisher': refuse}) as place:
-        before = place.run(60)
+        wrong = []
+        place.run(60)
         with intruder(place) as other:
             other.create_publisher(kind, topic, 10)
-            wrong = unless(place.spin_until(lambda: words in message(place)), f'not named: {message(place)}')
-            place.level()
-            during = place.run(60)
-            level = place.level()
+            wrong += unless(place.spin_until(lambda: words in message(place)), f'not named: {message(place)}')
+            for _ in range(2):
+                place.level()
+                during = place.run(60)
+                level = place.level()
+                forces = [output for output in during if isinstance(output, FeedForward)]
+                if refuse:
+                    wrong += unless(statuses(during) == {Status.INPUT_REFUSED}, f'{statuses(during)} while refused')
+                    wrong += unless(forces[-1].force == 0.0, f'still {forces[-1].force} N')
+                    wrong += unless(level == 'ERROR', level)
+                else:
+                    wrong += unless(statuses(during) == {0}, f'{statuses(during)}') + unless(level == 'WARN', level)
+                wrong += complaints_at_any_time(place.driver.outputs)
+                place.restart()  # and once more: what was refused stays so
         wrong += unless(place.spin_until(lambda: 'several' not in message(place)), 'still there when it is gone')
-        forces = [output for output in during if isinstance(output, FeedForward)]
-        if refuse:
-            wrong += unless(statuses(during) == {Status.INPUT_REFUSED}, f'{statuses(during)} while refused')
-            wrong += unless(forces[-1].force == 0.0, f'still {forces[-1].force} N') + unless(level == 'ERROR', level)
-        else:
-            wrong += unless(statuses(during) == {0}, f'{statuses(during)}') + unless(level == 'WARN', level)
-        after = place.run(1)
-        return wrong + complaints_at_any_time([*before, *during, *after]) + recovered(place)
+        return wrong + recovered(place)
 
 
 def second_publisher_refused(chance: random.Random, folder: Path) -> list[str]:
@@ -173,11 +198,17 @@ def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
             ):
                 said = place.spin_until(lambda words=words: words in message(place))
                 wrong += unless(said, f'not said: {words}, but: {message(place)}')
-            values = {value.key: value.value for value in place.estimator.diagnostics()['estimate'].values}
-            taken = values.get('rod_velocity best effort only, from')
-            wrong += unless(taken == '/driver', f'best effort taken from {taken}')
+            wrong += unless(best_effort(place) == '/driver', f'best effort taken from {best_effort(place)}')
         place.connect()
-        return wrong + recovered(place)
+        wrong += recovered(place)
+        for quality, taken in ((qos.STREAM, None), (qos_profile_sensor_data, '/driver')):  # it comes back otherwise
+            place.driver.destroy_publisher(place.driver.inputs['rod_velocity'])
+            place.driver.inputs['rod_velocity'] = place.driver.create_publisher(RodVelocity, 'rod_velocity', quality)
+            said = place.spin_until(lambda taken=taken: best_effort(place) == taken)
+            wrong += unless(said, f'best effort from {best_effort(place)}, not {taken}')
+            place.connect()
+            wrong += recovered(place)
+        return wrong
 
 
 def second_estimator(chance: random.Random, folder: Path) -> list[str]:
@@ -250,15 +281,17 @@ def lifecycle_in_any_order(chance: random.Random, folder: Path) -> list[str]:
             """Ask for a transition while inputs come; whether it succeeded."""
             for _ in range(chance.randrange(4)):
                 place.now += MS
-                for topic, messages in good(place.now).items():
-                    for one in messages:
-                        place.driver.inputs[topic].publish(encoded(one))
+                place.driver.publish(good(place.now))
             future = client.call_async(ChangeState.Request(transition=Transition(id=number)))
             return place.spin_until(future.done) and future.result().success
 
         for _ in range(20):
             number = chance.choice([number for _, number in LEGAL])
             succeeded = change(number)
+            place.spin(0.01)
+            wrong += complaints_at_any_time(place.driver.outputs)
+            if succeeded:
+                place.driver.outputs.clear()  # what is active again begins anew
             wrong += unless(succeeded == ((state, number) in LEGAL), f'transition {number} while {state}: {succeeded}')
             state = LEGAL.get((state, number), state)
         for at, number in (
@@ -289,12 +322,12 @@ def simulated_time_is_reset(chance: random.Random, folder: Path) -> list[str]:
                 outputs += place.run(1)
             return outputs
 
-        before = tick(60)
+        tick(60)
         place.now = 0
         after = tick(60)
         marked = [o.status for o in after if isinstance(o, records.FrictionEstimate)]
         wrong = unless(marked == [Status.STAMP_NOT_INCREASING] + [0] * 59, f'{marked[:5]}')
-        wrong += complaints_at_any_time([*before, *after]) + recovered(place)
+        wrong += recovered(place)
         place.estimator.finish()
     return wrong + verified(folder / 'bag')
 
@@ -313,14 +346,15 @@ def fifty_more_topics(chance: random.Random, folder: Path) -> list[str]:
 
         outputs = place.run(200, busy)
         answered = sum(isinstance(output, records.FrictionEstimate) for output in outputs)
-        return unless(answered == 200, f'{answered} of 200') + unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+        wrong = unless(answered == 200, f'{answered} of 200') + unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+        return wrong + recovered(place)
 
 
 # --- disk ---
 
 
 def slow_disk(chance: random.Random, folder: Path) -> list[str]:
-    """Each write of the recorder blocks for a second, once."""
+    """One write of the recorder blocks for a second; what is recorded meanwhile waits for it."""
     recording = {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
     mcap_output.os = disk = StallingDisk(1.0, chance.uniform(0.0, 0.5))
     try:
@@ -333,6 +367,7 @@ def slow_disk(chance: random.Random, folder: Path) -> list[str]:
             outputs += place.run(100)
             wrong = unless(statuses(outputs) <= {0}, f'{statuses(outputs)}')
             wrong += unless(slowest < 0.7, f'ten estimates took {slowest:.2f} s')  # they would wait for 1 s
+            wrong += complaints_at_any_time(place.driver.outputs)
             place.estimator.finish()
     finally:
         mcap_output.os = os
@@ -363,19 +398,17 @@ def verified(bag: Path) -> list[str]:
 # --- the process ---
 
 
-class Outside:
+class Outside(Spun):
     """The estimator in a process of its own, and a driver here."""
 
     def __init__(self, process: subprocess.Popen[bytes], log: Path, domain: int) -> None:
-        self.process, self.log = process, log
-        self.context = Context()
-        rclpy.init(context=self.context, domain_id=domain)
-        self.driver = Driver(context=self.context)
+        context = Context()
+        rclpy.init(context=context, domain_id=domain)
+        self.process, self.log, self.driver = process, log, Driver(context=context)
+        super().__init__(context, self.driver)
         self.recorder: list[str] = []
         self.values: dict[str, str] = {}
         self.driver.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
-        self.executor = SingleThreadedExecutor(context=self.context)
-        self.executor.add_node(self.driver)
         self.now = time.time_ns()
         self.sent = 0
 
@@ -386,35 +419,23 @@ class Outside:
             else:
                 self.values = {value.key: value.value for value in status.values}
 
-    def spin_until(self, condition: Callable[[], object], patience: float = PATIENCE) -> bool:
-        """Spin until it holds; False if it does not within ``patience`` [s]."""
-        deadline = time.monotonic() + patience
-        while not condition():
-            if time.monotonic() > deadline:
-                return False
-            self.executor.spin_once(timeout_sec=0.002)
-        return True
-
     def connect(self) -> None:
         """Spin until the estimator hears the driver.
 
         Raises:
             RuntimeError: It does not.
         """
-        inputs = self.driver.inputs.values()
-        if not self.spin_until(lambda: all(p.get_subscription_count() for p in inputs) and self.values):
+        if not self.spin_until(lambda: self.values, PATIENCE):
             raise RuntimeError(f'no estimator: {self.log.read_text()}')
-        self.spin_until(lambda: False, 0.2)
+        self.connect_to(self.driver.inputs.values())
 
     def send(self, seconds: float, rate: float = 1000.0) -> None:
         """Send inputs at a rate [Hz], whether they are answered or not."""
         start = time.monotonic()
         for number in range(round(seconds * rate)):
-            self.spin_until(lambda due=start + number / rate: time.monotonic() >= due)
+            self.spin(start + number / rate - time.monotonic())
             self.now += round(1e9 / rate)
-            for topic, messages in good(self.now).items():
-                for one in messages:
-                    self.driver.inputs[topic].publish(encoded(one))
+            self.driver.publish(good(self.now))
             self.sent += 1
 
     def complaints(self) -> list[str]:
@@ -424,7 +445,7 @@ class Outside:
         while latest != {0} and time.monotonic() < deadline:
             before = len(self.driver.outputs)
             self.send(0.5)
-            self.spin_until(lambda: False, 0.1)
+            self.spin(0.1)
             seen = [o for o in self.driver.outputs[before:] if isinstance(o, records.FrictionEstimate)]
             latest = statuses(seen[-20:])
         wrong = unless(latest == {0}, f'at the end: {latest}')
@@ -440,12 +461,8 @@ def outside(folder: Path, directory: str = '', prefix: tuple[str, ...] = ()) -> 
     """Run the estimator, recording to ``bag`` in a folder, behind a command that prepares its file system."""
     domain, log = free_domain(), folder / 'log'
     set_up_discovery()
-    values = {'record': 'true', 'record_directory': directory or str(folder), 'record_name': 'bag'}
-    parameters = [f'-p {name}:={value}' for name, value in {**values, **SETTINGS}.items()]
-    command = [*prefix, sys.executable, '-m', 'seal_friction_ros.nodes.friction_estimator', '--ros-args']
-    command += ' '.join(parameters).split()
-    with log.open('wb') as output:
-        process = subprocess.Popen(command, env=graph_environment(domain), stdout=output, stderr=output)
+    recording = {'record': True, 'record_directory': directory or str(folder), 'record_name': 'bag'}
+    with running('friction_estimator', domain, {**recording, **SETTINGS}, log, prefix=prefix) as process:
         made = Outside(process, log, domain)
         try:
             made.connect()
@@ -453,14 +470,6 @@ def outside(folder: Path, directory: str = '', prefix: tuple[str, ...] = ()) -> 
         finally:
             made.driver.destroy_node()
             rclpy.try_shutdown(context=made.context)
-            if process.poll() is None:
-                process.send_signal(signal.SIGCONT)
-                process.terminate()
-                try:
-                    process.wait(PATIENCE)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
 
 
 def ends_by(number: signal.Signals, chance: random.Random, folder: Path) -> list[str]:
@@ -570,40 +579,80 @@ def read_only(chance: random.Random, folder: Path) -> list[str]:
 
 
 TRIALS = (
-    Trial('an input has no publisher at first', 'PRESSURE_MISSING and UNKNOWN, then as usual', topic_comes_late),
-    Trial('an input has a second publisher', 'named, WARN; estimates as usual', second_publisher),
+    Trial(
+        'an input has no publisher at first',
+        'UNKNOWN, then as usual',
+        '0, then as usual',
+        '`PRESSURE_MISSING`, then as usual',
+        '-',
+        topic_comes_late,
+    ),
+    Trial('an input has a second publisher', 'as usual', 'as usual', 'both named; WARN', '-', second_publisher),
     Trial(
         'an input has a second publisher, refused',
-        'named, ERROR, INPUT_REFUSED, feed-forward fades; as usual once it is gone',
+        'UNKNOWN',
+        'fades to 0',
+        'both named; `INPUT_REFUSED`, ERROR; as usual once it is gone',
+        '-',
         second_publisher_refused,
     ),
     Trial(
         'incompatible quality of service or type',
-        'said by name of the node; best effort is taken',
+        'as usual: best effort is taken',
+        'as usual',
+        'said by name of the node',
+        '-',
         incompatible_quality,
     ),
-    Trial('a second estimator of the same name', 'named, WARN; estimates as usual', second_estimator),
-    Trial('parameters change in motion', 'nonsense refused, no leap, the recording verifies', parameters_change),
-    Trial('lifecycle transitions in any order', 'legal ones succeed, others are refused', lifecycle_in_any_order),
+    Trial('a second estimator of the same name', 'as usual', 'as usual', 'both named; WARN', '-', second_estimator),
+    Trial('parameters change in motion', 'as usual', 'no leap', 'nonsense is refused', 'verifies', parameters_change),
+    Trial(
+        'lifecycle transitions in any order',
+        'as usual when active again',
+        'no leap while active',
+        'legal ones succeed, others are refused',
+        '-',
+        lifecycle_in_any_order,
+    ),
     Trial(
         'simulated time is reset',
-        'the first sample marked, then as usual; the recording verifies',
+        'as usual, the first one marked',
+        'as usual',
+        '`STAMP_NOT_INCREASING` once',
+        'verifies',
         simulated_time_is_reset,
     ),
-    Trial('50 more topics on the graph', 'every sample answered', fifty_more_topics),
+    Trial('50 more topics on the graph', 'every sample answered', 'as usual', 'as usual', '-', fifty_more_topics),
     Trial(
         '10 kHz on a node made for 1 kHz',
-        'every sample that is taken answered, missing ones reported; the recording verifies',
+        'one for every sample that is taken',
+        'no leap',
+        'samples missed are counted',
+        'verifies',
         burst,
     ),
-    Trial('SIGINT', 'exit code 0, the recording verifies', interrupted),
-    Trial('SIGTERM', 'exit code 0, the recording verifies', terminated),
-    Trial('SIGKILL', 'the recording is recovered up to 1 s before, and verifies', killed),
-    Trial('SIGSTOP and SIGCONT', 'goes on; every sample answered or reported missing', stopped_and_continued),
-    Trial('disk full', 'said, estimates go on, the bag is valid and verifies', disk_full),
-    Trial('disk read-only', 'said, estimates go on', read_only),
-    Trial('folder of the bag removed', 'said, estimates go on', directory_removed),
-    Trial('a disk that stalls', 'no estimate waits, nothing is lost, the recording verifies', slow_disk),
+    Trial('SIGINT', 'ends', 'ends', 'exit code 0', 'finished, verifies', interrupted),
+    Trial('SIGTERM', 'ends', 'ends', 'exit code 0', 'finished, verifies', terminated),
+    Trial('SIGKILL', 'ends', 'ends', 'nothing: it is gone', 'recovered up to 1 s before, verifies', killed),
+    Trial(
+        'SIGSTOP and SIGCONT',
+        'goes on',
+        'goes on without a leap',
+        'every sample answered or counted as missing',
+        'verifies',
+        stopped_and_continued,
+    ),
+    Trial('disk full', 'as usual', 'as usual', 'recorder: the error of the disk', 'valid; verifies', disk_full),
+    Trial('disk read-only', 'as usual', 'as usual', 'recorder: the error of the disk', 'none', read_only),
+    Trial(
+        'folder of the bag removed',
+        'as usual',
+        'as usual',
+        'recorder: ERROR, recording stopped',
+        'gone',
+        directory_removed,
+    ),
+    Trial('a disk that stalls', 'as usual, none waits', 'as usual', 'as usual', 'whole, verifies', slow_disk),
 )
 
 
@@ -628,8 +677,8 @@ def main() -> int:
     with stage() as place:
         for row in track([r for r in SIGNAL_ROWS if arguments.only in r.fault], 'signals', console=said):
             happened = [try_row(place, row) for _ in range(arguments.times)]
-            required = f'{row.status or "no bit"}; feed-forward {row.feedforward}; {row.level}'
-            results[row.fault] = (required, happened)
+            said = f'{row.status or "no bit"}; {row.level}'
+            results[row.fault] = ((row.estimate, row.feedforward, said, '-'), happened)
     for trial in track([t for t in TRIALS if arguments.only in t.fault], 'graph, process, disk', console=said):
         happened = [attempt(trial, arguments.seed + number) for number in range(arguments.times)]
         results[trial.fault] = (trial.required, happened)
@@ -640,12 +689,12 @@ def main() -> int:
     return int(any(wrong for _, happened in results.values() for wrong in happened))
 
 
-def _table(results: dict[str, tuple[str, list[list[str]]]]) -> Table:
-    table = Table('fault', 'tried', 'required', 'happened', title='Fault campaign')
+def _table(results: dict[str, tuple[tuple[str, ...], list[list[str]]]]) -> Table:
+    table = Table('fault', *REQUIRED, 'tried', 'happened', title='Fault campaign')
     for fault, (required, happened) in results.items():
         bad = [words for wrong in happened for words in wrong[:1]]
         said = 'as required' if not bad else f'{len(bad)} not: {bad[0]}'
-        table.add_row(fault, str(len(happened)), required, said)
+        table.add_row(fault, *required, str(len(happened)), said)
     return table
 
 

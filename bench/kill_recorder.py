@@ -27,18 +27,18 @@ from rich.text import Text
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.configuration import first_snapshot, snapshot_text
-from seal_friction_ros.core.pipeline import Input, encoded, init, receive
+from seal_friction_ros.core.pipeline import encoded, init, receive
 from seal_friction_ros.core.records import Force, Pressure
-from seal_friction_ros.core.wire import Position, ServoReference, Velocity
+from seal_friction_ros.core.wire import Input, Position, ServoReference, Velocity
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline import bag as b
 from seal_friction_ros.offline.recorder import Recorder
 from seal_friction_ros.offline.recover import recover
 from seal_friction_ros.offline.replay import replay
+from seal_friction_ros.offline.topics import ANSWER_TOPICS
 
 PERIOD = 1_000_000  # [ns]
 LARGEST_LOSS = 1.0  # [s]
-OUTPUTS = {wire.ESTIMATE_TYPE: b.ESTIMATE_TOPIC, wire.FEEDFORWARD_TYPE: b.FEEDFORWARD_TOPIC}
 _OFFERED = struct.Struct('<q')  # log time [ns] of one message
 _MOST_OFFERED = 1_000_000  # messages of one run
 
@@ -46,15 +46,15 @@ _MOST_OFFERED = 1_000_000  # messages of one run
 def inputs(stamp: int, number: int) -> Iterator[tuple[str, str, Input, bytes]]:
     """Topic, type, record and bytes of the five inputs of one moment."""
     velocity = 0.05 * sin(number / 200)
-    pressure = Pressure(stamp, 2e6 + 1e6 * sin(number / 700), 5e5)
-    force = Force(stamp, 60.0 * sin(number / 200 + 0.3))
-    reference = ServoReference(stamp, 0.001 * number, velocity, 0.0, b'rod')
-    position, measured = Position(stamp, 0.001 * number), Velocity(stamp, velocity, b'rod')
-    yield b.PRESSURE_TOPIC, wire.PRESSURE_TYPE, pressure, wire.encode_pressure(pressure, b'rod')
-    yield b.FORCE_TOPIC, wire.FORCE_TYPE, force, wire.encode_force(force, b'rod')
-    yield b.REFERENCE_TOPIC, wire.REFERENCE_TYPE, reference, wire.encode_reference(reference)
-    yield b.POSITION_TOPIC, wire.POSITION_TYPE, position, wire.encode_position(position, b'rod')
-    yield b.VELOCITY_TOPIC, wire.VELOCITY_TYPE, measured, wire.encode_velocity(measured)
+    records: dict[str, Input] = {
+        'cylinder_pressure': Pressure(stamp, 2e6 + 1e6 * sin(number / 700), 5e5),
+        'force_sum': Force(stamp, 60.0 * sin(number / 200 + 0.3)),
+        'servo_reference': ServoReference(stamp, 0.001 * number, velocity, 0.0, b'rod'),
+        'rod_position': Position(stamp, 0.001 * number),
+        'rod_velocity': Velocity(stamp, velocity, b'rod'),
+    }
+    for topic, record in records.items():
+        yield f'/{topic}', wire.INPUTS[topic], record, wire.encode_input(record, b'rod')
 
 
 def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
@@ -82,7 +82,7 @@ def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
             record(topic, type_name, data)
             state, answer = receive(parameters, state, message)
             for answer_type, answer_data in encoded(answer):
-                record(OUTPUTS[answer_type], answer_type, answer_data)
+                record(ANSWER_TOPICS[answer_type], answer_type, answer_data)
 
 
 @dataclass(frozen=True)

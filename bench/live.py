@@ -72,7 +72,7 @@ def echo(kind: str) -> None:
 
 
 class Asker:
-    """Publishes inputs and hears the answers, on the graph of one case."""
+    """Publishes inputs and hears the answers, on the graph of one case, while its block runs."""
 
     def __init__(self, case: str, domain: int, process: subprocess.Popen[bytes] | None) -> None:
         self.case, self.process = case, process
@@ -97,6 +97,18 @@ class Asker:
                 FrictionFeedForward, 'friction_feedforward', lambda _: None, qos.STREAM, raw=True
             )
         self.stamp = time.time_ns()
+
+    def __enter__(self) -> 'Asker':
+        self._stopped = Future()
+        self._thread = threading.Thread(target=spin, args=(self.node, self._stopped, self.context), daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopped.set_result(None)
+        self._thread.join()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
 
     def _hear(self, data: bytes) -> None:
         now = time.perf_counter_ns()
@@ -208,21 +220,12 @@ def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
             process = stack.enter_context(running('friction_estimator', domain, values, log))
         for name in PROFILES:
             os.environ.pop(name, None)
-        asker = Asker(case, domain, process)
-        stopped = Future()
-        thread = threading.Thread(target=spin, args=(asker.node, stopped, asker.context), daemon=True)
-        thread.start()
-        try:
-            deadline = time.monotonic() + _PATIENCE
-            while not asker.is_answered():
-                if time.monotonic() > deadline:
-                    raise RuntimeError(f'{case} does not answer')
-            yield asker
-        finally:
-            stopped.set_result(None)
-            thread.join()
-            asker.node.destroy_node()
-            rclpy.try_shutdown(context=asker.context)
+        asker = stack.enter_context(Asker(case, domain, process))
+        deadline = time.monotonic() + _PATIENCE
+        while not asker.is_answered():
+            if time.monotonic() > deadline:
+                raise RuntimeError(f'{case} does not answer')
+        yield asker
 
 
 def measure(seconds: float, realtime: int, rates: tuple[int, ...]) -> dict[str, dict[int, Figures]]:

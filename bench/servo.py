@@ -1,6 +1,6 @@
 """Real-time factor of the servo by inner step: seconds of servo per second of computer, friction and all, no ROS graph.
 
-    python bench/servo.py [--json]
+    python bench/servo.py [--seconds 5] [--json]
 
 ``step``: one call a sample, as the simulator node does. ``simulate``: many samples in one call, as the tuning does.
 """
@@ -39,12 +39,13 @@ def main() -> None:
     """Print the table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--json', action='store_true', help='print JSON')
+    parser.add_argument('--seconds', type=float, default=5.0, help='of the servo')
     arguments = parser.parse_args()
     seals = default_configuration().parameters().estimator.seals
     rows = []
     for inner_step in INNER_STEPS:
         servo = ServoParameters(seals=seals, inner_step=inner_step, control_period=PERIOD)
-        by_step, by_simulate = factors(servo, 5.0)
+        by_step, by_simulate = factors(servo, arguments.seconds)
         rows.append({'inner_step': inner_step, 'step': by_step, 'simulate': by_simulate})
     if arguments.json:
         print(json.dumps({'control_period': PERIOD, 'rows': rows}))

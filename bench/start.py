@@ -9,19 +9,16 @@ import json
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 
 from live import ALONE, Asker
-from rclpy.task import Future
 from rich.console import Console
 from rich.table import Table
 
 from seal_friction_ros.nodes.discovery import set_up_discovery
-from seal_friction_ros.nodes.executor import spin
 from seal_friction_ros.nodes.processes import free_domain, running
 
 PATIENCE = 30.0  # [s]
@@ -43,11 +40,7 @@ def first_estimate() -> float:
         RuntimeError: None comes.
     """
     domain = free_domain()
-    asker = Asker(ALONE, domain, None)
-    stopped = Future()
-    thread = threading.Thread(target=spin, args=(asker.node, stopped, asker.context), daemon=True)
-    thread.start()
-    with tempfile.TemporaryDirectory() as folder:
+    with Asker(ALONE, domain, None) as asker, tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         with running('friction_estimator', domain, {}, Path(folder) / 'log'):
             while not asker.round_trips:
@@ -55,12 +48,7 @@ def first_estimate() -> float:
                     raise RuntimeError('no estimate comes')
                 asker.ask()
                 time.sleep(0.001)
-            found = time.perf_counter() - start
-    stopped.set_result(None)
-    thread.join()
-    asker.node.destroy_node()
-    asker.context.try_shutdown()
-    return found
+            return time.perf_counter() - start
 
 
 def main() -> int:

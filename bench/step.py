@@ -1,4 +1,4 @@
-"""What one sample costs, stage by stage: ``make bench``, or ``python bench/step.py [--json]``.
+"""What one sample costs, stage by stage: ``make bench``, or ``python bench/step.py [--batches 15] [--json]``.
 
 Medians over batches, in one run; the ratio to a bare function call is what can be compared between machines. The stages
 of the live path are marked; one sample without a feed-forward costs the sum of those, and what the executor adds.
@@ -37,7 +37,6 @@ from seal_friction_ros.nodes.processes import free_domain
 from seal_friction_ros.offline.recorder import Recorder
 
 CALLS = 2000
-BATCHES = 15
 
 
 def stages() -> dict[str, Callable[[], object]]:
@@ -101,17 +100,18 @@ def main() -> int:
     """Time every stage and print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--json', action='store_true')
-    as_json = parser.parse_args().json
+    parser.add_argument('--batches', type=int, default=15)
+    arguments = parser.parse_args()
     batches: dict[str, list[float]] = {}
     with middleware() as ours:
-        for _ in range(BATCHES):  # in turn, so that a slow moment of the machine hits all of them
+        for _ in range(arguments.batches):  # in turn, so that a slow moment of the machine hits all of them
             for name, stage in {**stages(), **ours}.items():
                 batches.setdefault(name, []).append(timeit.timeit(stage, number=CALLS) / CALLS * 1e6)
     figures = {name: median(times) for name, times in batches.items()}
-    if as_json:
+    if arguments.json:
         print(json.dumps({f'{name} [us]': duration for name, duration in figures.items()}))
         return 0
-    table = Table(title=f'One sample, median of {BATCHES} batches of {CALLS}')
+    table = Table(title=f'One sample, median of {arguments.batches} batches of {CALLS}')
     for heading in ('stage', 'time [us]', 'bare calls'):
         table.add_column(Text(heading), justify='left' if heading == 'stage' else 'right')
     for name, duration in figures.items():

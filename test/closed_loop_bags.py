@@ -11,10 +11,10 @@ from seal_friction_ros.core.servo import ServoParameters, init, outputs, step
 from seal_friction_ros.core.wire import Position, ServoReference, Velocity
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline import bag as b
+from seal_friction_ros.offline.topics import ANSWER_TOPICS
 
 RATE = 1000  # [Hz]
 START = 1_700_000_000_000_000_000  # [ns]
-ANSWER_TOPICS = {wire.ESTIMATE_TYPE: b.ESTIMATE_TOPIC, wire.FEEDFORWARD_TYPE: b.FEEDFORWARD_TOPIC}
 
 
 def with_coulomb_scale(scale: float) -> Configuration:
@@ -45,14 +45,14 @@ def write_closed_loop(
             for i in range(stretch * samples, (stretch + 1) * samples):
                 stamp, wanted, force = START + i * (1_000_000_000 // RATE), wave.at(i / RATE), 0.0
                 inputs = (
-                    (b.REFERENCE_TOPIC, ServoReference(stamp, *wanted, b'rod'), wire.encode_reference),
-                    (b.PRESSURE_TOPIC, Pressure(stamp, now.pressure_a, now.pressure_b), wire.encode_pressure),
-                    (b.FORCE_TOPIC, Force(stamp, now.force_sum), wire.encode_force),
-                    (b.POSITION_TOPIC, Position(stamp, now.position), wire.encode_position),
-                    (b.VELOCITY_TOPIC, Velocity(stamp, now.velocity, b'rod'), wire.encode_velocity),
+                    (b.REFERENCE_TOPIC, ServoReference(stamp, *wanted, b'rod')),
+                    (b.PRESSURE_TOPIC, Pressure(stamp, now.pressure_a, now.pressure_b)),
+                    (b.FORCE_TOPIC, Force(stamp, now.force_sum)),
+                    (b.POSITION_TOPIC, Position(stamp, now.position)),
+                    (b.VELOCITY_TOPIC, Velocity(stamp, now.velocity, b'rod')),
                 )
-                for topic, record, encode in inputs:
-                    writer.write(topic, wire.INPUTS[topic.strip('/')], stamp, encode(record))
+                for topic, record in inputs:
+                    writer.write(topic, wire.INPUTS[topic.strip('/')], stamp, wire.encode_input(record))
                     known, answer = pipeline.receive(parameters, known, record)
                     for kind, data in pipeline.encoded(answer):
                         writer.write(ANSWER_TOPICS[kind], kind, stamp, data)

@@ -1,6 +1,7 @@
 """Small bags for tests, made by the code under test's own writer."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 from seal_friction_ros.core import wire
@@ -10,6 +11,7 @@ from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.core.wire import Position, ServoReference, Velocity
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline import bag as b
+from seal_friction_ros.offline.replay import replay
 
 STEP = 10_000_000  # [ns]
 
@@ -36,6 +38,22 @@ def write_inputs(path: Path, samples: int = 300, configuration: Configuration | 
             data = wire.encode_velocity(Velocity(stamp, velocity, b'rod'))
             writer.write(b.VELOCITY_TOPIC, wire.VELOCITY_TYPE, stamp, data)
     return path
+
+
+def write_recorded(folder: Path, configuration: Configuration | None = None) -> Path:
+    """The same with the answers to it, as a replay gives them."""
+    replay(write_inputs(folder / 'inputs', configuration=configuration), out=folder / 'recorded')
+    return folder / 'recorded'
+
+
+def rewrite(source: Path, out: Path, change: Callable[[int, b.BagMessage], b.BagMessage | None]) -> Path:
+    """Copy a bag, message by message; None leaves one out."""
+    with b.BagWriter(out) as writer:
+        for number, message in enumerate(b.read_messages(source)):
+            changed = change(number, message)
+            if changed is not None:
+                writer.write(*changed)
+    return out
 
 
 def default_configuration(**settings: float) -> Configuration:

@@ -1,14 +1,12 @@
 """A graph of one test: the node under test and a probe that publishes inputs and collects what comes out."""
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -19,6 +17,7 @@ from seal_friction_msgs.msg import (
     FrictionEstimate,
     RodVelocity,
 )
+from spun import Spun
 
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.processes import free_domain
@@ -74,37 +73,17 @@ def _stamped(message: Any, stamp: int) -> Any:
     return message
 
 
-class Graph:
+class Graph(Spun):
     """Estimator and probe on a domain of their own, spun together."""
 
     def __init__(self, context: Context, probe: Probe, estimator: FrictionEstimator) -> None:
-        self.context, self.probe, self.estimator = context, probe, estimator
-        self._executor = SingleThreadedExecutor(context=context)
-        self._executor.add_node(estimator)
-        self._executor.add_node(probe)
-
-    def spin_until(self, condition: Callable[[], object], timeout: float = 10.0) -> bool:
-        """Spin until ``condition`` holds; False if it does not within ``timeout`` [s]."""
-        deadline = time.monotonic() + timeout
-        while not condition():
-            if time.monotonic() > deadline:
-                return False
-            self._executor.spin_once(timeout_sec=0.02)
-        return True
-
-    def spin(self, seconds: float) -> None:
-        """Spin for a while."""
-        self.spin_until(lambda: False, seconds)
+        super().__init__(context, estimator, probe)
+        self.probe, self.estimator = probe, estimator
 
     def connect(self) -> None:
         """Spin until the estimator hears the probe and the probe the estimator."""
-        publishers = (self.probe.pressure, self.probe.force, self.probe.velocity)
-        assert self.spin_until(
-            lambda: (
-                all(p.get_subscription_count() for p in publishers) and self.probe.count_publishers('friction_estimate')
-            )
-        )
-        self.spin(0.3)
+        assert self.spin_until(lambda: self.probe.count_publishers('friction_estimate'))
+        self.connect_to((self.probe.pressure, self.probe.force, self.probe.velocity))
 
     def estimate(self, stamp: int, velocity: float, pressure: float = 1e6, force: float = 0.0) -> FrictionEstimate:
         """Send inputs of one moment; the estimate that answers."""

@@ -39,7 +39,7 @@ from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'bench'))
 from fault_rows import SIGNAL_ROWS, Row
-from faults import TRIALS
+from faults import REQUIRED, TRIALS
 
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
@@ -116,6 +116,7 @@ def _yaml(value: object) -> str:
 _FEEDFORWARD = {
     'fades': 'fades to 0 within `feedforward.fade_time`',
     'dips': 'fades for that sample',
+    'halves': 'falls by 0.02 s of `feedforward.fade_time`, here to half',
     'nothing': 'none is published',
 }
 
@@ -135,8 +136,8 @@ def signal_faults() -> str:
 
 def other_faults() -> str:
     """Markdown table of the faults of graph, process and disk."""
-    rows = [f'| {trial.fault} | {trial.required} |' for trial in TRIALS]
-    return '\n'.join(['| fault | what happens |', '|---|---|', *rows])
+    rows = [f'| {" | ".join((trial.fault, *trial.required))} |' for trial in TRIALS]
+    return '\n'.join([f'| fault | {" | ".join(REQUIRED)} |', '|---' * 5 + '|', *rows])
 
 
 def filled(text: str) -> str:

@@ -28,10 +28,7 @@ from seal_friction_ros.core.records import (
     Pressure,
     RodSample,
 )
-from seal_friction_ros.core.wire import Position, ServoReference, Velocity
-
-Input = Pressure | Force | ServoReference | Position | Velocity
-"""A message that comes in."""
+from seal_friction_ros.core.wire import Input, Position, Velocity
 
 
 class PipelineParameters(NamedTuple):

@@ -76,6 +76,10 @@ class Position(NamedTuple):
     """[m]"""
 
 
+Input = Pressure | Force | ServoReference | Position | Velocity
+"""A message that the estimator takes."""
+
+
 @lru_cache(maxsize=64)
 def _body(frame_length: int, body: str) -> struct.Struct:
     """Layout of a stamped message: encapsulation, stamp, frame name of ``frame_length`` bytes with its end, body."""
@@ -167,6 +171,21 @@ def decode_reference(data: bytes) -> ServoReference:
     """ServoReference from bytes."""
     stamp, frame_id, values = _decode(data, 'ddd')
     return ServoReference(stamp, values[0], values[1], values[2], frame_id)
+
+
+def encode_input(record: Input, frame_id: bytes = b'') -> bytes:
+    """Any input as bytes; ``frame_id`` is for those that name no frame themselves."""
+    match record:
+        case Velocity():
+            return encode_velocity(record)
+        case ServoReference():
+            return encode_reference(record)
+        case Pressure():
+            return encode_pressure(record, frame_id)
+        case Force():
+            return encode_force(record, frame_id)
+        case Position():
+            return encode_position(record, frame_id)
 
 
 def encode_estimate(estimate: FrictionEstimate, frame_id: bytes = b'') -> bytes:

@@ -32,7 +32,7 @@ from seal_friction_ros.nodes.publishers import (
 )
 from seal_friction_ros.nodes.recording import Recording
 
-_SWITCH_INTERVAL = 5e-5  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
+SWITCH_INTERVAL = 5e-5  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
 
 
 class FrictionEstimator(ManagedNode):
@@ -328,7 +328,7 @@ class FrictionEstimator(ManagedNode):
 
 def main() -> int:
     """Run the node: ``friction_estimator --ros-args -p seals:=[...] --params-file FILE``."""
-    sys.setswitchinterval(_SWITCH_INTERVAL)
+    sys.setswitchinterval(SWITCH_INTERVAL)
     return run(FrictionEstimator, FrictionEstimator.autostart, FrictionEstimator.finish)
 
 

@@ -48,6 +48,7 @@ def running(
     log: Path,
     remap: tuple[str, ...] = (),
     parameter_file: Path | None = None,
+    prefix: tuple[str, ...] = (),
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Run a node while the block runs, then stop it by SIGINT and wait.
 
@@ -58,8 +59,9 @@ def running(
         log: File for what it prints.
         remap: Remapping rules, ``FROM:=TO``.
         parameter_file: ROS parameter file; ``parameters`` come after it.
+        prefix: Command to run it by, which prepares its file system, say; has to exec it.
     """
-    command = [sys.executable, '-m', f'seal_friction_ros.nodes.{module}', '--ros-args']
+    command = [*prefix, sys.executable, '-m', f'seal_friction_ros.nodes.{module}', '--ros-args']
     if parameter_file is not None:
         command += ['--params-file', str(parameter_file)]
     for name, value in parameters.items():
@@ -71,6 +73,7 @@ def running(
         try:
             yield process
         finally:
+            process.send_signal(signal.SIGCONT)  # else one that was stopped would not hear of its end
             process.send_signal(signal.SIGINT)
             try:
                 process.wait(_PATIENCE)

@@ -20,8 +20,6 @@ from seal_friction_ros.core.pipeline import encoded, init, receive
 from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file
 from seal_friction_ros.offline.bag import (
     CONFIGURATION_TOPIC,
-    ESTIMATE_TOPIC,
-    FEEDFORWARD_TOPIC,
     BagError,
     BagMessage,
     BagWriter,
@@ -30,10 +28,8 @@ from seal_friction_ros.offline.bag import (
     read_messages,
 )
 from seal_friction_ros.offline.progress import progress
-from seal_friction_ros.offline.topics import Topics, find_topics
+from seal_friction_ros.offline.topics import ANSWER_TOPICS, Topics, find_topics
 from seal_friction_ros.offline.verdict import Stream, Verdict, verdict_of
-
-_DEFAULT_NAMES = {wire.ESTIMATE_TYPE: ESTIMATE_TOPIC, wire.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
 
 
 def chosen_configuration(params: Path | None, seal: Path | None) -> Configuration | None:
@@ -170,7 +166,7 @@ def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter) -> Ite
         if used and message.type_name not in answered:
             log_time = writer.write(*message)
             for type_name, data in step.answers:
-                writer.write(answered[type_name] or _DEFAULT_NAMES[type_name], type_name, log_time, data)
+                writer.write(answered[type_name] or ANSWER_TOPICS[type_name], type_name, log_time, data)
         yield step
 
 

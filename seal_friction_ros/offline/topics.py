@@ -5,7 +5,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core import wire
-from seal_friction_ros.offline.bag import BagError, TopicInfo, bag_topics
+from seal_friction_ros.offline.bag import ESTIMATE_TOPIC, FEEDFORWARD_TOPIC, BagError, TopicInfo, bag_topics
+
+ANSWER_TOPICS = {wire.ESTIMATE_TYPE: ESTIMATE_TOPIC, wire.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
+"""Message type of an answer -> topic, where the bag has no name for it."""
 
 
 class Topics(NamedTuple):

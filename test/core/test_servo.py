@@ -1,13 +1,16 @@
 """The servo as a whole: rest, Figure 25, feed-forward, and references that are no good."""
 
 import dataclasses
+import json
 import math
+import sys
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from servo import main as time_servo
 
 from seal_friction_ros.core import estimator, feedforward
 from seal_friction_ros.core.coulomb import MountedSeal, VelocityTerms, actuator_friction
@@ -222,3 +225,11 @@ def test_a_seal_whose_friction_depends_on_the_velocity_is_refused():
     seal = dataclasses.replace(SEAL, velocity_terms=VelocityTerms(viscous_friction=10.0))
     with pytest.raises(ValueError, match='depends on the velocity'):
         ServoParameters(seals=(MountedSeal(seal, 'a'),))
+
+
+def test_the_bench_says_how_much_faster_than_time_it_runs(monkeypatch, capsys):
+    monkeypatch.setattr(sys, 'argv', ['servo.py', '--seconds', '0.2', '--json'])
+    time_servo()
+    rows = json.loads(capsys.readouterr().out)['rows']
+    assert len(rows) == 4
+    assert all(min(row['step'], row['simulate']) > 0.0 for row in rows)

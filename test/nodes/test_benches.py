@@ -1,20 +1,6 @@
 """The benches of the live node run, and what they count is counted; how fast it is, they say and no test."""
 
-import json
-import os
-import subprocess
-import sys
-from pathlib import Path
-
-ROOT = Path(__file__).parents[2]
-
-
-def bench(name: str, *arguments: str) -> dict:
-    command = [sys.executable, str(ROOT / 'bench' / f'{name}.py'), *arguments, '--json']
-    environment = {**os.environ, 'PYTHONPATH': str(ROOT)}
-    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert result.stdout, result.stderr
-    return json.loads(result.stdout)
+from benches import bench
 
 
 def test_every_round_trip_is_answered_by_every_node_asked():
@@ -38,3 +24,24 @@ def test_a_short_soak_leaves_nothing_behind_and_loses_nothing_unreported():
     assert found['received'] > 1000
     assert found['lost'] <= found['reported missing']
     assert {value for name, value in found.items() if name.endswith(' more')} == {0}
+
+
+def test_a_fault_that_does_as_required_is_reported_so():
+    assert bench('faults', '--only', 'SIGINT', '--times', '1') == {'SIGINT': [[]]}
+
+
+def test_a_sample_is_timed_stage_by_stage():
+    found = bench('step', '--batches', '1')
+    assert (
+        0.0
+        < found['bare call [us]']
+        < found['receive velocity [us]']
+        < found['receive velocity, with feed-forward [us]']
+    )
+    assert min(found.values()) > 0.0
+
+
+def test_files_are_timed_by_size():
+    found = bench('offline', '--largest', '10000', '--tasks', 'import', 'replay, message by message')
+    assert found['sizes'] == [10_000]
+    assert [task['time [s]']['10000'] > 0.0 for task in found['tasks'].values()] == [True, True]

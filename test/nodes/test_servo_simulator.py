@@ -9,7 +9,6 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -22,6 +21,7 @@ from seal_friction_msgs.msg import (
     RodVelocity,
     ServoReference,
 )
+from spun import Spun
 
 from seal_friction_ros.core.reference import Sine
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
@@ -64,24 +64,15 @@ class Listener(Node):
         return {}
 
 
-class Stage:
+class Stage(Spun):
     """Simulator, listener and, if asked for, estimator on a domain of their own."""
 
     def __init__(self, context, nodes):
+        super().__init__(context, *nodes)
         self.simulator, self.listener = nodes[0], nodes[1]
-        self._executor = SingleThreadedExecutor(context=context)
-        for node in nodes:
-            self._executor.add_node(node)
 
-    def spin_until(self, condition, timeout=15.0):
-        deadline = time.monotonic() + timeout
-        while not condition():
-            assert time.monotonic() < deadline
-            self._executor.spin_once(timeout_sec=0.02)
-
-    def spin(self, seconds):
-        until = time.monotonic() + seconds
-        self.spin_until(lambda: time.monotonic() > until, seconds + 5.0)
+    def wait(self, condition):
+        assert self.spin_until(condition, 15.0)
 
     def set(self, **values):
         named = {name.replace('__', '.'): value for name, value in values.items()}
@@ -121,7 +112,7 @@ def nanoseconds(stamp):
 
 def test_every_topic_comes_at_every_sample_and_the_reference_is_the_wave_asked_for():
     with stage({'sine.amplitude': 0.002, 'sine.frequency': 3.0}) as s:
-        s.spin_until(lambda: len(s.listener.heard['rod_velocity']) > 100)
+        s.wait(lambda: len(s.listener.heard['rod_velocity']) > 100)
         heard = s.listener.heard
         assert {min(len(messages), 90) for messages in heard.values()} == {90}
         stamps = [nanoseconds(m.header.stamp) for m in heard['servo_reference']]
@@ -157,7 +148,7 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
 
 def test_a_bad_reference_is_limited_and_named():
     with stage({'wave': 'topic', 'reference_timeout': 10.0}) as s:
-        s.spin_until(lambda: s.listener.heard['rod_position'] and s.listener.reference.get_subscription_count())
+        s.wait(lambda: s.listener.heard['rod_position'] and s.listener.reference.get_subscription_count())
         for position, velocity, name in (
             (math.nan, 0.0, 'REFERENCE_NOT_FINITE'),
             (0.0, math.inf, 'REFERENCE_NOT_FINITE'),
@@ -167,7 +158,7 @@ def test_a_bad_reference_is_limited_and_named():
             message = ServoReference(position=position, velocity=velocity)
             message.header.stamp = s.simulator.get_clock().now().to_msg()
             s.listener.reference.publish(message)
-            s.spin_until(lambda name=name: name in s.listener.values().get('message', ''))
+            s.wait(lambda name=name: name in s.listener.values().get('message', ''))
             assert s.listener.values()['level'] == b'\x01'
         positions = [m.position for m in s.listener.heard['rod_position']]
         assert all(abs(p) <= 0.025 for p in positions)  # [m] end stops; references go to 24 mm
@@ -176,26 +167,26 @@ def test_a_bad_reference_is_limited_and_named():
 
 def test_a_feed_forward_that_is_old_or_no_number_counts_as_nothing():
     with stage() as s:
-        s.spin_until(s.listener.feedforward.get_subscription_count)
+        s.wait(s.listener.feedforward.get_subscription_count)
         message = FrictionFeedForward(force=1000.0)
         message.header.stamp.sec = 5
         s.listener.feedforward.publish(message)
-        s.spin_until(lambda: 'feed-forwards too old' in s.listener.values().get('message', ''))
+        s.wait(lambda: 'feed-forwards too old' in s.listener.values().get('message', ''))
         for _ in range(100):
             message = FrictionFeedForward(force=math.nan)
             message.header.stamp = s.simulator.get_clock().now().to_msg()
             s.listener.feedforward.publish(message)
             s.spin(0.02)
-        s.spin_until(lambda: 'FEEDFORWARD_NOT_FINITE' in s.listener.values()['message'])
+        s.wait(lambda: 'FEEDFORWARD_NOT_FINITE' in s.listener.values()['message'])
         assert all(abs(m.position) < 0.002 for m in s.listener.heard['rod_position'])
 
 
 def test_the_wave_changes_while_it_runs_and_the_plant_does_not():
     with stage() as s:
-        s.spin_until(lambda: len(s.listener.heard['servo_reference']) > 20)
+        s.wait(lambda: len(s.listener.heard['servo_reference']) > 20)
         assert s.set(wave='step', step__size=0.004).successful
-        s.spin_until(lambda: s.listener.heard['servo_reference'][-1].position == 0.004)
-        s.spin_until(lambda: abs(s.listener.heard['rod_position'][-1].position - 0.004) < 1e-3)
+        s.wait(lambda: s.listener.heard['servo_reference'][-1].position == 0.004)
+        s.wait(lambda: abs(s.listener.heard['rod_position'][-1].position - 0.004) < 1e-3)
         refused = s.set(load__mass=3.0)
         assert not refused.successful
         assert 'load.mass' in refused.reason
@@ -230,7 +221,7 @@ def test_a_plant_without_sense_from_the_start_stays_unconfigured():
 
 def test_time_runs_faster_with_a_clock_for_the_others():
     with stage({'publish_clock': True, 'time_factor': 5.0}) as s:
-        s.spin_until(lambda: len(s.listener.clocks) > 50)
+        s.wait(lambda: len(s.listener.clocks) > 50)
         first, began = nanoseconds(s.listener.clocks[0].clock), time.monotonic()
         assert first < 10**9  # from 0 s
         s.spin(1.0)
@@ -244,7 +235,7 @@ def test_sensors_of_the_same_seed_say_the_same_and_a_delay_keeps_the_stamp_of_th
     velocities = []
     for delay in (0.0, 0.1):
         with stage({**values, 'sensors.delay': delay}) as s:
-            s.spin_until(lambda s=s: len(s.listener.heard['rod_velocity']) > 100)
+            s.wait(lambda s=s: len(s.listener.heard['rod_velocity']) > 100)
             heard = s.listener.heard
             first = nanoseconds(heard['servo_reference'][0].header.stamp)
             late = nanoseconds(heard['servo_reference'][-1].header.stamp) - nanoseconds(
@@ -258,14 +249,14 @@ def test_sensors_of_the_same_seed_say_the_same_and_a_delay_keeps_the_stamp_of_th
 
 def test_deactivated_it_is_silent_and_starts_again_from_the_beginning():
     with stage() as s:
-        s.spin_until(lambda: len(s.listener.heard['rod_velocity']) > 20)
+        s.wait(lambda: len(s.listener.heard['rod_velocity']) > 20)
         s.simulator.trigger_deactivate()
         s.spin(0.3)
         count = len(s.listener.heard['rod_velocity'])
         s.spin(0.3)
         assert len(s.listener.heard['rod_velocity']) == count
         s.simulator.trigger_activate()
-        s.spin_until(lambda: len(s.listener.heard['rod_velocity']) > count + 20)
+        s.wait(lambda: len(s.listener.heard['rod_velocity']) > count + 20)
         s.simulator.trigger_deactivate()
         s.simulator.trigger_cleanup()
         assert s.simulator.autostart()

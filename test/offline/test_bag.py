@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 import yaml
-from example_bags import write_inputs
+from example_bags import write_inputs, write_recorded
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
@@ -29,8 +29,7 @@ MESSAGES = Path(__file__).parents[2] / 'msg_defs' / 'msg'
 
 @pytest.fixture
 def recorded(tmp_path: Path) -> Path:
-    replay(write_inputs(tmp_path / 'inputs'), out=tmp_path / 'recorded')
-    return tmp_path / 'recorded'
+    return write_recorded(tmp_path)
 
 
 def test_rosbags_decodes_every_message_with_nothing_but_the_bag(recorded: Path):

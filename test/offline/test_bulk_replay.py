@@ -4,14 +4,13 @@ import dataclasses
 import random
 import shutil
 import sqlite3
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import yaml
 import zstandard
 from closed_loop_bags import write_closed_loop
-from example_bags import default_configuration, write_inputs
+from example_bags import default_configuration, rewrite, write_recorded
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -75,16 +74,6 @@ def assert_same_messages(path: Path) -> None:
     assert read_back(path) == expected
 
 
-def rewrite(source: Path, out: Path, change: Callable[[int, BagMessage], BagMessage | None]) -> Path:
-    """Copy a bag, message by message; None leaves one out."""
-    with BagWriter(out) as writer:
-        for number, message in enumerate(read_messages(source)):
-            changed = change(number, message)
-            if changed is not None:
-                writer.write(*changed)
-    return out
-
-
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp('bulk')
@@ -92,9 +81,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope='module')
 def recorded(folder: Path) -> Path:
-    configuration = default_configuration(stick_velocity=2e-3, slip_velocity=5e-3)
-    replay(write_inputs(folder / 'inputs', configuration=configuration), out=folder / 'recorded')
-    return folder / 'recorded'
+    return write_recorded(folder, default_configuration(stick_velocity=2e-3, slip_velocity=5e-3))
 
 
 @pytest.fixture(scope='module')

@@ -1,11 +1,10 @@
 """Replay: the same messages give the same bytes, and every difference is found and named."""
 
 import hashlib
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from example_bags import default_configuration, write_inputs
+from example_bags import default_configuration, rewrite, write_inputs, write_recorded
 
 from seal_friction_ros.core import wire
 from seal_friction_ros.core.records import Status
@@ -14,23 +13,9 @@ from seal_friction_ros.offline.replay import chosen_configuration, replay
 from seal_friction_ros.offline.topics import find_topics
 
 
-def rewrite(source: Path, out: Path, change: Callable[[int, BagMessage], BagMessage | None]) -> Path:
-    """Copy a bag, message by message; None leaves one out."""
-    with BagWriter(out) as writer:
-        for number, message in enumerate(read_messages(source)):
-            changed = change(number, message)
-            if changed is not None:
-                writer.write(*changed)
-    return out
-
-
 @pytest.fixture
 def recorded(tmp_path: Path) -> Path:
-    bag = write_inputs(
-        tmp_path / 'inputs', configuration=default_configuration(stick_velocity=2e-3, slip_velocity=5e-3)
-    )
-    replay(bag, out=tmp_path / 'recorded')
-    return tmp_path / 'recorded'
+    return write_recorded(tmp_path, default_configuration(stick_velocity=2e-3, slip_velocity=5e-3))
 
 
 def estimates(bag: Path) -> list[bytes]:
