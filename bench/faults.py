@@ -677,8 +677,8 @@ def main() -> int:
     with stage() as place:
         for row in track([r for r in SIGNAL_ROWS if arguments.only in r.fault], 'signals', console=said):
             happened = [try_row(place, row) for _ in range(arguments.times)]
-            said = f'{row.status or "no bit"}; {row.level}'
-            results[row.fault] = ((row.estimate, row.feedforward, said, '-'), happened)
+            diagnosed = f'{row.status or "no bit"}; {row.level}'
+            results[row.fault] = ((row.estimate, row.feedforward, diagnosed, '-'), happened)
     for trial in track([t for t in TRIALS if arguments.only in t.fault], 'graph, process, disk', console=said):
         happened = [attempt(trial, arguments.seed + number) for number in range(arguments.times)]
         results[trial.fault] = (trial.required, happened)

@@ -9,6 +9,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 _LONGEST_WAIT = 0.01  # [s] until a condition is looked at again
+_STANDSTILL = 1.0  # [s] one turn does not take longer, unless all processes were stopped
 
 
 class Spun:
@@ -21,13 +22,14 @@ class Spun:
             self._executor.add_node(node)
 
     def spin_until(self, condition: Callable[[], object], patience: float = 10.0) -> bool:
-        """Spin until it holds; False if it does not within ``patience`` [s]."""
-        deadline = monotonic() + patience
+        """Spin until it holds; False if it does not within ``patience`` [s] of a machine that runs."""
+        left = patience
         while not condition():
-            left = deadline - monotonic()
             if left <= 0.0:
                 return False
+            start = monotonic()
             self._executor.spin_once(timeout_sec=min(left, _LONGEST_WAIT))
+            left -= min(monotonic() - start, _STANDSTILL)
         return True
 
     def spin(self, seconds: float) -> None:
