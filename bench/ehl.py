@@ -11,10 +11,11 @@ import argparse
 import dataclasses
 import json
 import math
-import time
 import timeit
 from collections.abc import Callable
 from functools import partial
+
+from one_core import processor_time
 
 from seal_friction_ros.core.coulomb import MountedSeal, Seal, Uncertainty
 from seal_friction_ros.core.ehl.case import Case
@@ -29,18 +30,31 @@ from seal_friction_ros.offline.ehl import run_case, run_study, single_case
 
 CELLS = (226, 452, 1000)
 STEPS = (1e-3, 5e-4, 2.5e-4)  # [s]
-OURS = (  # part, field: what the paper does not give
-    ('seal', 'crown_radius'),
-    ('seal', 'interference'),
-    ('seal', 'section_height'),
-    ('topography', 'rms_height'),
-    ('topography', 'rms_slope'),
-    ('topography', 'roll_off_length'),
-    ('topography', 'wall_share'),
-    ('groove', 'stiffness'),
-    ('grease', 'shear_rate_floor'),
-    ('numerics', 'film_width'),
-)
+OURS = {  # case: what the paper does not give, where it acts
+    'inner_seal': (
+        'seal.crown_radius',
+        'seal.interference',
+        'seal.section_height',
+        'topography.rms_height',
+        'topography.rms_slope',
+        'topography.roll_off_length',
+        'topography.wall_share',
+        'groove.stiffness',
+        'grease.shear_rate_floor',
+        'numerics.film_width',
+    ),
+    'inner_seal_groove': ('groove.half_clearance',),
+    'inner_seal_pressure': ('air.pressure_interference',),
+    'inner_seal_control_edge': (
+        'control_edge.position',
+        'control_edge.slope',
+        'control_edge.depth',
+        'control_edge.rounding',
+    ),
+    'inner_seal_viscoelastic': ('viscoelasticity.stiffening', 'viscoelasticity.relaxation_time'),
+    'inner_seal_starved': ('film_supply.initial_film',),
+}
+COMPARED = ('friction', 'solid_share', 'rise_on_deceleration', 'edge_peak', 'after_edge')
 CHANGE = 0.2
 CALLS = 5_000
 SINGLE = (
@@ -55,9 +69,9 @@ def one_cycle(case: Case, cells: int = 226, time_step: float = 5e-4) -> float:
     once = dataclasses.replace(case, numerics=numerics, motion=dataclasses.replace(case.motion, cycles=1))
     times = []
     for _ in range(2):
-        start = time.process_time()
+        start = processor_time()
         run(once)
-        times.append(time.process_time() - start)
+        times.append(processor_time() - start)
     return min(times)
 
 
@@ -66,10 +80,10 @@ def times(case: Case) -> dict[str, float]:
     one_cycle(case, 64, 5e-3)  # compiles
     by_cells = [one_cycle(case, cells) for cells in CELLS]
     by_steps = [one_cycle(case, time_step=step) for step in STEPS]
-    start = time.process_time()
+    start = processor_time()
     rows = [steady_friction(case, float(pressure)) for pressure in map_pressures(case.map)]
     law = friction_map(case, rows, memory_length(case).length)
-    map_time = time.process_time() - start
+    map_time = processor_time() - start
     return {
         **{f'cycle, {cells} cells [s]': value for cells, value in zip(CELLS, by_cells, strict=True)},
         'exponent in cells': math.log(by_cells[-1] / by_cells[0]) / math.log(CELLS[-1] / CELLS[0]),
@@ -126,13 +140,11 @@ def all_findings() -> list[Row]:
 
 
 def study_rows(case: Case) -> list[Row]:
-    """Deviation of friction over tau_c from its mean, with its errors; the study's runs are one cycle each."""
-    once = dataclasses.replace(case, motion=dataclasses.replace(case.motion, cycles=1))
-    n = once.numerics
+    """Deviation of friction over tau_c from its mean, with its errors."""
+    n = case.numerics
     longer = dataclasses.replace(n, time_step=2.0 * n.time_step)
     coarser = dataclasses.replace(n, cells=max(32, n.cells // 2))
-    grids = (n, longer, coarser)
-    fine, step_, grid = (run_study(dataclasses.replace(once, numerics=g), 1).table for g in grids)
+    fine, step_, grid = (run_study(dataclasses.replace(case, numerics=g), 1).table for g in (n, longer, coarser))
     return [
         Row(
             f'tau_c = {stress / 1e6:g} MPa',
@@ -146,30 +158,33 @@ def study_rows(case: Case) -> list[Row]:
     ]
 
 
-def influence(case: Case) -> dict[str, list[float]]:
-    """Relative change of friction, and changes of solid share and of the rise on deceleration, down and up."""
-    base = findings(run(case))
+def influence() -> dict[str, dict[str, list[float]]]:
+    """Relative changes of the findings with each parameter of ours 20 % down and up; shares and rise: differences."""
     rows = {}
-    for part, name in OURS:
-        changes = [
-            _changed(base, findings(run(_with(case, part, name, factor)))) for factor in (1 - CHANGE, 1 + CHANGE)
-        ]
-        rows[f'{part}.{name}'] = [value for pair in zip(*changes, strict=True) for value in pair]
+    for name, parameters in OURS.items():
+        case = single_case(name, 'influence')
+        base = findings(run(case))
+        for parameter in parameters:
+            down, up = (_changes(base, findings(run(_with(case, parameter, f)))) for f in (1 - CHANGE, 1 + CHANGE))
+            rows[parameter] = {finding: [down[finding], up[finding]] for finding in down}
     return rows
 
 
-def _with(case: Case, part: str, name: str, factor: float) -> Case:
+def _with(case: Case, parameter: str, factor: float) -> Case:
+    part, name = parameter.split('.')
     record = getattr(case, part)
     names = [f'{name}_left', f'{name}_right'] if name == 'crown_radius' else [name]
-    values = {n: getattr(record, n) * factor for n in names}
-    if part == 'seal' and name == 'section_height' and factor < 1.0:
-        values[name] = max(values[name], case.numerics.film_width)
-    return dataclasses.replace(case, **{part: dataclasses.replace(record, **values)})
+    changed = dataclasses.replace(record, **{n: getattr(record, n) * factor for n in names})
+    return dataclasses.replace(case, **{part: changed})
 
 
-def _changed(base: Findings, other: Findings) -> tuple[float, float, float]:
-    rise, base_rise = other.rise_on_deceleration or 0.0, base.rise_on_deceleration or 0.0
-    return other.friction / base.friction - 1.0, other.solid_share - base.solid_share, rise - base_rise
+def _changes(base: Findings, other: Findings) -> dict[str, float]:
+    was, now = base._asdict(), other._asdict()
+    return {
+        name: now[name] - was[name] if name in ('solid_share', 'rise_on_deceleration') else now[name] / was[name] - 1.0
+        for name in COMPARED
+        if was[name] is not None
+    }
 
 
 def main() -> None:
@@ -198,13 +213,14 @@ def main() -> None:
         for name, value in figures.items():
             print(f'{name:36} {value:8.3f}')
         return
-    rows = influence(case)
+    rows = influence()
     if arguments.json:
         print(json.dumps(rows))
         return
-    print('changes in % for -20 % and +20 % of        friction      solid share   rise on deceleration')
-    for name, values in rows.items():
-        print(f'{name:36}' + ''.join(f'{100.0 * value:+9.2f}' for value in values))
+    print(f'{"changes in % for -20 %, +20 % of":34}' + ''.join(f'{name:>22}' for name in COMPARED))
+    for name, found in rows.items():
+        cells = (', '.join(f'{100.0 * c:+.2f}' for c in found.get(finding, ())) for finding in COMPARED)
+        print(f'{name:34}' + ''.join(f'{cell:>22}' for cell in cells))
 
 
 if __name__ == '__main__':

@@ -1,9 +1,13 @@
 """Round trip through the live node beside that of bare echo nodes: ``python bench/live.py [--json]``.
 
-Four nodes, each a process and a graph of its own, are asked in turn, round by round, so that a slow moment of the
-machine hits all of them: an rclpy node that sends each message back, with the SingleThreadedExecutor and with the
-events executor, and the estimator without and with recording. The echo has one topic; the estimator three in and two
-out, all recorded. A round trip is from the publishing of a velocity to the arrival of the answer in this process.
+Four nodes, each a process and a graph of its own, are asked in turn, in many short rounds: an rclpy node that sends
+each message back, with the SingleThreadedExecutor and with the events executor, and the estimator without and with
+recording. The echo has one topic; the estimator three in and two out, all recorded. A round trip is from the publishing
+of a velocity to the arrival of the answer in this process. The bare nodes and who asks have Fast DDS as it comes, the
+estimator as this package sets it up.
+
+Percentiles are those of a round, and of them the median over all rounds; so is the ratio to the bare echo, taken round
+by round: a slow moment of the machine is one bad round, not a wrong result. The maximum and what is missed are of all.
 
 ``--busy 2 --realtime 50`` keeps both cores of a small machine busy and gives all processes real-time priority.
 """
@@ -21,6 +25,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import rclpy
@@ -38,12 +43,13 @@ from seal_friction_ros.core import wire
 from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.core.wire import Velocity
 from seal_friction_ros.nodes import qos
-from seal_friction_ros.nodes.discovery import set_up_discovery
+from seal_friction_ros.nodes.discovery import PROFILES
 from seal_friction_ros.nodes.executor import spin
 from seal_friction_ros.nodes.processes import free_domain, graph_environment, running
 
 RATES = (100, 500, 1000)  # [Hz]
-ROUNDS = 3
+ROUND, SAMPLES = 0.5, 300  # [s], samples: a round of one case is no shorter
+WARM_UP = 20  # samples at the beginning of a round that are not counted: the node has slept while others were asked
 BARE, EVENTS = 'bare echo, SingleThreadedExecutor', 'bare echo, events executor'
 ALONE, RECORDING = 'estimator', 'estimator, recording'
 CASES = (BARE, EVENTS, ALONE, RECORDING)
@@ -128,42 +134,69 @@ class Asker:
 
     def cpu(self) -> float:
         """Processor time of the node under test [s]."""
-        values = Path(f'/proc/{self.process.pid}/stat').read_text().rpartition(')')[2].split()
-        return (int(values[11]) + int(values[12])) / os.sysconf('SC_CLK_TCK')
+        threads = Path(f'/proc/{self.process.pid}/task').glob('*/schedstat')
+        return sum(int(thread.read_text().split()[0]) for thread in threads) * 1e-9
+
+    def wakes(self) -> int:
+        """How often the event thread of Fast DDS in the node under test has gone to sleep."""
+        for thread in Path(f'/proc/{self.process.pid}/task').iterdir():
+            if (thread / 'comm').read_text().startswith('dds.ev'):
+                return int((thread / 'status').read_text().partition('\nvoluntary_ctxt_switches:')[2].split()[0])
+        return 0
+
+
+PERCENTILES = {'p50': 0.5, 'p90': 0.9, 'p99': 0.99}
 
 
 @dataclass
 class Figures:
     """What was measured of one case at one rate."""
 
-    round_trips: list[int] = field(default_factory=list)
-    """[ns]"""
+    round_trips: list[list[int]] = field(default_factory=list)
+    """of each round, sorted [ns]"""
+    cpu: list[float] = field(default_factory=list)
+    """processor time per sample of each round [s]"""
     sent: int = 0
-    cpu: float = 0.0
-    """[s]"""
+    wakes: int = 0
+    """of the event thread of the middleware"""
+
+    def of_rounds(self) -> dict[str, list[float]]:
+        """Percentiles and processor time per sample of each round [us]."""
+        found = {
+            name: [times[int(share * len(times))] * 1e-3 for times in self.round_trips]
+            for name, share in PERCENTILES.items()
+        }
+        return {**found, 'CPU per sample': [each * 1e6 for each in self.cpu]}
 
     def summary(self) -> dict[str, float]:
-        """Percentiles, processor time, missed."""
-        ordered = sorted(self.round_trips)
-        at = {'p50 [us]': 0.5, 'p90 [us]': 0.9, 'p99 [us]': 0.99}
-        found = {name: ordered[int(share * len(ordered))] / 1e3 for name, share in at.items()}
-        found |= {'max [us]': ordered[-1] / 1e3, 'CPU per sample [us]': self.cpu / self.sent * 1e6}
-        return {**{name: round(value, 1) for name, value in found.items()}, 'missed': self.sent - len(ordered)}
+        """Of all rounds."""
+        found = {f'{name} [us]': round(median(values), 1) for name, values in self.of_rounds().items()}
+        found['max [us]'] = round(max(times[-1] for times in self.round_trips) / 1e3, 1)
+        found['event thread woken per sample'] = round(self.wakes / self.sent, 2)
+        return {**found, 'missed': self.sent - sum(map(len, self.round_trips))}
 
 
-def ask(asker: Asker, rate: int, seconds: float, figures: Figures) -> None:
-    """Ask at a rate [Hz] for a while."""
-    asker.round_trips.clear()
-    asker.sent.clear()
-    cpu, start = asker.cpu(), time.perf_counter_ns()
-    number = round(rate * seconds)
-    for index in range(number):
+def ask(asker: Asker, rate: int, number: int, figures: Figures) -> None:
+    """Ask at a rate [Hz] so many times.
+
+    Raises:
+        RuntimeError: Nothing is answered.
+    """
+    start = time.perf_counter_ns()
+    for index in range(WARM_UP + number):
         time.sleep(max(start + index * 10**9 // rate - time.perf_counter_ns(), 0) * 1e-9)
+        if index == WARM_UP:
+            asker.sent.clear()
+            asker.round_trips.clear()
+            cpu, wakes = asker.cpu(), asker.wakes()
         asker.ask()
-    time.sleep(0.2)
-    figures.round_trips += asker.round_trips
+    time.sleep(0.05)  # for the last answer
+    if not asker.round_trips:
+        raise RuntimeError(f'{asker.case} answers no more')
+    figures.round_trips.append(sorted(asker.round_trips))
+    figures.cpu.append((asker.cpu() - cpu) / number)
+    figures.wakes += asker.wakes() - wakes
     figures.sent += number
-    figures.cpu += asker.cpu() - cpu
 
 
 @contextmanager
@@ -177,13 +210,16 @@ def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
     with ExitStack() as stack:
         if case in (BARE, EVENTS):
             command = [sys.executable, __file__, '--echo', case, '--realtime', str(realtime)]
-            process = stack.enter_context(subprocess.Popen(command, env=graph_environment(domain)))
+            environment = {name: value for name, value in graph_environment(domain).items() if name not in PROFILES}
+            process = stack.enter_context(subprocess.Popen(command, env=environment))
             stack.callback(process.kill)
         else:
             values: dict[str, Any] = {'feedforward.use_measured_velocity': True, 'realtime_priority': realtime}
             if case == RECORDING:
                 values |= {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
             process = stack.enter_context(running('friction_estimator', domain, values, log))
+        for name in PROFILES:
+            os.environ.pop(name, None)
         asker = stack.enter_context(Asker(case, domain, process))
         deadline = time.monotonic() + _PATIENCE
         while not asker.is_answered():
@@ -194,16 +230,18 @@ def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
 
 def measure(seconds: float, realtime: int, rates: tuple[int, ...]) -> dict[str, dict[int, Figures]]:
     """Ask all of them in turn."""
-    set_up_discovery()
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     found = {case: {rate: Figures() for rate in rates} for case in CASES}
     with ExitStack() as stack, Progress(console=Console(stderr=True)) as progress:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         askers = [stack.enter_context(node(case, folder, realtime)) for case in CASES]
-        task = progress.add_task('round trips', total=ROUNDS * len(rates) * len(askers))
-        for _ in range(ROUNDS):
-            for rate in rates:
+        number = {rate: max(round(ROUND * rate), SAMPLES) for rate in rates}
+        rounds = {rate: max(round(seconds * rate / number[rate]), 1) for rate in rates}
+        task = progress.add_task('round trips', total=sum(rounds.values()) * len(askers))
+        for rate in rates:
+            for _ in range(rounds[rate]):
                 for asker in askers:
-                    ask(asker, rate, seconds / ROUNDS, found[asker.case][rate])
+                    ask(asker, rate, number[rate], found[asker.case][rate])
                     progress.advance(task)
     return found
 
@@ -213,10 +251,10 @@ def ratios(found: dict[str, dict[int, Figures]]) -> dict[str, dict[str, float]]:
     result = {}
     for case in CASES[1:]:
         for rate, figures in found[case].items():
-            ours, bare = figures.summary(), found[BARE][rate].summary()
-            names = ('p50 [us]', 'p90 [us]', 'p99 [us]', 'CPU per sample [us]')
+            bare = found[BARE][rate].of_rounds()
             result[f'{case}, {rate} Hz'] = {
-                name.rpartition(' [')[0]: round(ours[name] / bare[name], 2) for name in names
+                name: round(median(own / other for own, other in zip(values, bare[name], strict=True)), 2)
+                for name, values in figures.of_rounds().items()
             }
     return result
 
@@ -224,7 +262,7 @@ def ratios(found: dict[str, dict[int, Figures]]) -> dict[str, dict[str, float]]:
 def main() -> int:
     """Measure; print tables or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--seconds', type=float, default=6.0, help='of each case at each rate')
+    parser.add_argument('--seconds', type=float, default=12.0, help='of each case at each rate')
     parser.add_argument('--rates', type=int, nargs='+', default=list(RATES), help='[Hz]')
     parser.add_argument('--realtime', type=int, default=0, help='SCHED_FIFO priority of all processes; 0: none')
     parser.add_argument('--busy', type=int, default=0, help='processes that compute without end beside them')

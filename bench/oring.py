@@ -17,9 +17,9 @@ import dataclasses
 import json
 import math
 import sys
-import time
 from collections.abc import Callable
 
+from one_core import processor_time
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -34,7 +34,7 @@ from seal_friction_ros.core.seal import SealGeometry, projected_area
 from seal_friction_ros.core.units import BAR, INCH, LBF, PSI
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.oring import compute_case
-from seal_friction_ros.offline.oring_report import friction_deviation, thesis_case
+from seal_friction_ros.offline.oring_report import appendix_b, friction_deviation, thesis_case
 
 Rows = list[dict[str, float | str]]
 SQUEEZES = (0.02, 0.04, 0.06, 0.08)
@@ -42,16 +42,15 @@ HERTZ_LINES = (33, 65)
 LINES = (13, 17, 25, 33, 41, 49)
 PENALTIES = (200.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 TRANSITIONS = (0.01, 0.02, 0.05, 0.1)
-APPENDIX_B = {0: 4.07, 500: 44.48, 1000: 91.1}  # [psi] -> [lbf], sums over the cells
 
 
 def measure(numerics: Numerics) -> dict[str, float]:
     """Normal force and peak stress at each pressure, what off pressure times area is, and what it cost."""
     file = parse_case(read_yaml(config_path('oring', 'ms28775_114')))
     case = dataclasses.replace(file.case, numerics=numerics)
-    begin = time.process_time()
+    begin = processor_time()
     results = list(contact_results(case, file.pressures))
-    figures = {'time [s]': time.process_time() - begin}
+    figures = {'time [s]': processor_time() - begin}
     model = model_of(case)
     figures['unknowns'] = float(model.mesh.nodes.size)
     figures['Newton steps'] = float(sum(result.newton_steps for result in results))
@@ -169,13 +168,13 @@ def sensitivities() -> Rows:
             wall_friction=0.05,
         ),
     }
+    compared = {psi: case.normal_force for psi, case in appendix_b().items() if psi in (0.0, 500.0, 1000.0)}
     rows: Rows = []
     for name, variant in variants.items():
         row: dict[str, float | str] = {'variant': name}
-        for result in contact_results(variant, tuple(psi * PSI for psi in APPENDIX_B)):
-            psi = round(result.pressure / PSI)
-            row[f'F_n at {psi} psi [N]'] = result.rod.force
-            row[f'off at {psi} psi [%]'] = 100.0 * (result.rod.force / (APPENDIX_B[psi] * LBF) - 1.0)
+        for psi, result in zip(compared, contact_results(variant, tuple(p * PSI for p in compared)), strict=True):
+            row[f'F_n at {psi:.0f} psi [N]'] = result.rod.force
+            row[f'off at {psi:.0f} psi [%]'] = 100.0 * (result.rod.force / compared[psi] - 1.0)
         rows.append(row)
     return rows
 

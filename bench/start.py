@@ -1,18 +1,21 @@
 """How long things take to start: ``python bench/start.py [--times 7] [--json]``.
 
-``seal_friction --help`` beside the bare interpreter, and the estimator from the start of its process to its first
-estimate, while inputs come at 1 kHz. Medians; the caches of the operating system are warm after the first round.
+``seal_friction --help`` and the completion of a command beside the bare interpreter, and the estimator from the start
+of its process to its first estimate, while inputs come at 1 kHz. Medians; the caches of the operating system are warm
+after the first round.
 """
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from statistics import median
+from types import MappingProxyType
 
 from live import ALONE, Asker
 from rich.console import Console
@@ -22,14 +25,21 @@ from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.processes import free_domain, running
 
 PATIENCE = 30.0  # [s]
-HELP = [sys.executable, '-m', 'seal_friction_ros.offline.cli', '--help']
+COMMAND = [sys.executable, '-m', 'seal_friction_ros.offline.cli']
+TYPED = 'seal_friction rep'
+ASKED = {
+    '_ARGCOMPLETE': '1',
+    '_ARGCOMPLETE_STDOUT_FILENAME': os.devnull,
+    'COMP_LINE': TYPED,
+    'COMP_POINT': str(len(TYPED)),
+}
 BARE = [sys.executable, '-c', 'pass']
 
 
-def run(command: list[str]) -> float:
+def run(command: list[str], environment: Mapping[str, str] = MappingProxyType({})) -> float:
     """Time [s] that a command takes."""
     start = time.perf_counter()
-    subprocess.run(command, check=True, capture_output=True)
+    subprocess.run(command, check=True, capture_output=True, env={**os.environ, **environment})
     return time.perf_counter() - start
 
 
@@ -60,7 +70,8 @@ def main() -> int:
     set_up_discovery()
     measured: dict[str, Callable[[], float]] = {
         'bare interpreter': lambda: run(BARE),
-        'seal_friction --help': lambda: run(HELP),
+        'seal_friction --help': lambda: run([*COMMAND, '--help']),
+        'completion of a command': lambda: run(COMMAND, ASKED),
         'estimator, to the first estimate': first_estimate,
     }
     times: dict[str, list[float]] = {name: [] for name in measured}

@@ -75,17 +75,17 @@ def read_yaml(path: Path, largest: int = _LARGEST_YAML) -> Any:
             data = file.read(largest + 1)
     except OSError as error:
         raise ValueError(f'{path}: {error.strerror}') from None
-    if len(data) > largest:
-        raise ValueError(f'{path}: larger than {largest} bytes, not a file of this kind')
-    return parse_yaml(data, str(path))
+    return parse_yaml(data, str(path), largest)
 
 
-def parse_yaml(data: bytes, where: str) -> Any:
+def parse_yaml(data: bytes, where: str, largest: int = _LARGEST_YAML) -> Any:
     """Document in YAML, plain data only; ``where`` it is from is for the error message.
 
     Raises:
-        ValueError: It is not plain YAML.
+        ValueError: It is larger than ``largest`` bytes, or not plain YAML.
     """
+    if len(data) > largest:
+        raise ValueError(f'{where}: larger than {largest} bytes, not a file of this kind')
     try:
         text = data.decode('utf-8')
         _check_plain(text)

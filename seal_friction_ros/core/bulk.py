@@ -20,7 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core import estimator, feedforward
-from seal_friction_ros.core.bulk_friction import ActuatorFrictions, Array, actuator_frictions
+from seal_friction_ros.core.arrays import FloatArray
+from seal_friction_ros.core.bulk_friction import ActuatorFrictions, actuator_frictions
 from seal_friction_ros.core.compilable import COMPILABLE
 from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.coulomb import ActuatorFriction
@@ -158,7 +159,7 @@ def _record(name: str, fields: tuple[str, ...]) -> Any:
     return namedtuple(name, fields)
 
 
-def _frictions(parameters: PipelineParameters, asked: Array) -> tuple[ActuatorFrictions, Array]:
+def _frictions(parameters: PipelineParameters, asked: FloatArray) -> tuple[ActuatorFrictions, FloatArray]:
     """Friction for each answer, and the velocity friction [N] at the velocity that the feed-forward is for."""
     seals = parameters.estimator.seals
     pressure_a, pressure_b, velocity, wanted = asked
@@ -199,7 +200,7 @@ def _decode(
     offsets: Integers,
     sizes: Integers,
     stamps: Integers,
-    values: Array,
+    values: FloatArray,
     heads: Integers,
 ) -> tuple[int, int]:
     """As `wire` decodes inputs: stamps [ns], the values that count, and sizes of the heads that their answers have.
@@ -237,7 +238,7 @@ def _decode(
 
 @compiled
 def _newest(
-    kind: int, stamp: int, values: Array, pressure: Pressure, force: Force, reference: Reference
+    kind: int, stamp: int, values: FloatArray, pressure: Pressure, force: Force, reference: Reference
 ) -> tuple[Pressure, Force, Reference]:
     """Inputs in use after a message."""
     if kind == _PRESSURE:
@@ -251,7 +252,13 @@ def _newest(
 
 @compiled
 def _ask(
-    settings: Any, guiding: Any, state: PipelineState, kinds: Bytes, stamps: Integers, values: Array, asked: Array
+    settings: Any,
+    guiding: Any,
+    state: PipelineState,
+    kinds: Bytes,
+    stamps: Integers,
+    values: FloatArray,
+    asked: FloatArray,
 ) -> None:
     """First pass: pressures [Pa] and velocity [m/s] of each answer, and the velocity of its feed-forward (or NaN)."""
     known, _, pressure, force, reference, refused = state
@@ -275,7 +282,7 @@ def _make_answers(
     state: PipelineState,
     inputs: Any,
     frictions: ActuatorFrictions,
-    guiding_friction: Array,
+    guiding_friction: FloatArray,
     views: Any,
     places: Any,
 ) -> PipelineState:

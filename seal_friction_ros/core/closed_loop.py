@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seal_friction_ros.core import pipeline, servo
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.coulomb import CoulombLaw, MountedSeal
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.pipeline import PipelineParameters
@@ -30,8 +30,6 @@ SETTLED_PERIODS, JUDGED_PERIODS = 2, 4  # of the sine: first the start is forgot
 SETTLING_TIME = 0.1  # [s] of rest after a motion before reversals count as a limit cycle
 STEP_START = 0.02  # [s]
 
-Samples = NDArray[np.float64]
-
 
 class Axis(NamedTuple):
     """A servo and what runs beside it."""
@@ -43,17 +41,17 @@ class Axis(NamedTuple):
 class Run(NamedTuple):
     """What a loop did; every array of shape (n,), one entry per sample, at its end."""
 
-    time: Samples
+    time: FloatArray
     """[s]"""
-    reference: Samples
+    reference: FloatArray
     """[m]"""
-    position: Samples
+    position: FloatArray
     """[m]"""
-    velocity: Samples
+    velocity: FloatArray
     """[m/s]"""
-    friction_force: Samples
+    friction_force: FloatArray
     """[N] that the seals really had"""
-    feedforward: Samples
+    feedforward: FloatArray
     """[N] that the controller added"""
 
 
@@ -121,7 +119,7 @@ def whole_delay(parameters: ServoParameters, delay: float) -> float:
     return delay + 1.0 / parameters.controller.force_bandwidth + parameters.gains.valve_delay
 
 
-def closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: Samples | None = None) -> Run:
+def closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: FloatArray | None = None) -> Run:
     """Run the loop from rest at the start of the wave.
 
     The sensors are there a sample before the first reference, so that the feed-forward has no need to fade in.
@@ -193,7 +191,7 @@ class TestMotions:
             offset=self.sine.offset - amplitude,
         )
 
-    def runs(self, axis: Axis, delay: float, noise: Samples | None = None) -> tuple[Run, Run, Run]:
+    def runs(self, axis: Axis, delay: float, noise: FloatArray | None = None) -> tuple[Run, Run, Run]:
         """Sine, move and step; arguments as `closed_loop`."""
         period, rest = axis.servo.control_period, SETTLING_TIME + self.hold_time
         motions: tuple[tuple[Wave, float], ...] = (
@@ -233,7 +231,7 @@ class Performance(NamedTuple):
     """[N/s] likewise"""
 
 
-def dwell(velocity: Samples, period: float, turns: int) -> float:
+def dwell(velocity: FloatArray, period: float, turns: int) -> float:
     """Time at rest per reversal that was asked for [s].
 
     Rest anywhere counts, also where the rod stops a second time on its way, and where it does not reverse at all: a rod

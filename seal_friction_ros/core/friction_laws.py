@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.arrays import FloatArray, IntArray
 from seal_friction_ros.core.normal_force import NormalForceLaw
 from seal_friction_ros.core.seal import SealGeometry, projected_area, squeeze
-from seal_friction_ros.core.signal_preparation import Array, IntArray
 from seal_friction_ros.core.units import BAR
 
 ELASTIC_EXPONENT = 2.0 / 3.0  # of the normal force: friction of an elastic contact [Schallamach1958]_
@@ -22,13 +22,13 @@ ELASTIC_EXPONENT = 2.0 / 3.0  # of the normal force: friction of an elastic cont
 class Conditions(NamedTuple):
     """Under what each reading was taken; n readings, k seals."""
 
-    pressure: Array
+    pressure: FloatArray
     """[Pa, gauge, >= 0] that each seal sees, shape (n, k)"""
-    normal_force: Array | None
+    normal_force: FloatArray | None
     """[N] of each seal, shape (n, k); None where the geometry is not known"""
-    velocity: Array
+    velocity: FloatArray
     """[m/s] shape (n,); NaN where it was not measured"""
-    direction: Array
+    direction: FloatArray
     """-1.0 or 1.0, shape (n,)"""
 
     def taken(self, index: IntArray) -> 'Conditions':
@@ -38,7 +38,7 @@ class Conditions(NamedTuple):
 
 
 Values = Mapping[str, float]
-Law = Callable[[Conditions, Values], Array]
+Law = Callable[[Conditions, Values], FloatArray]
 
 
 class Parameter(NamedTuple):
@@ -56,7 +56,7 @@ class Parameter(NamedTuple):
 # -- the laws ---------------------------------------------------------------------------------------------------------
 
 
-def constant_coulomb(at: Conditions, value: Values) -> Array:
+def constant_coulomb(at: Conditions, value: Values) -> FloatArray:
     """f_c = f_0: friction that does not depend on pressure [N], shape (n,).
 
     Source: thesis, chapter 1, as what is mostly assumed.
@@ -64,14 +64,14 @@ def constant_coulomb(at: Conditions, value: Values) -> Array:
     return np.full(len(at.direction), value['coulomb_friction'] * at.pressure.shape[1])
 
 
-def pressure_power_law(at: Conditions, value: Values) -> Array:
+def pressure_power_law(at: Conditions, value: Values) -> FloatArray:
     """f_c = f_0 + k (P / 1 bar)^m, summed over the seals [N], shape (n,). Our choice; m = 2/3 is an elastic contact."""
     risen = (at.pressure / BAR) ** value['pressure_exponent']
     friction = value['friction_at_no_pressure'] + value['friction_at_one_bar'] * risen
     return np.asarray(friction.sum(axis=1))
 
 
-def physics_based(at: Conditions, value: Values) -> Array:
+def physics_based(at: Conditions, value: Values) -> FloatArray:
     """f_c = mu(F_n) F_n with mu = c (F_n / 1 N)^-n, summed over the seals [N], shape (n,).
 
     The normal force F_n = G P A_r + F_rad is computed, not fitted: friction alone does not tell it from mu.
@@ -82,18 +82,18 @@ def physics_based(at: Conditions, value: Values) -> Array:
     return np.asarray(friction.sum(axis=1))
 
 
-def _known_normal_force(at: Conditions) -> Array:
+def _known_normal_force(at: Conditions) -> FloatArray:
     if at.normal_force is None:
         raise ValueError('Conditions.normal_force is not given: this law needs the geometry of the seals')
     return at.normal_force
 
 
-def viscous(at: Conditions, value: Values) -> Array:
+def viscous(at: Conditions, value: Values) -> FloatArray:
     """Viscous friction sigma |v| per seal, summed over the seals [N], shape (n,)."""
     return np.asarray(at.pressure.shape[1] * value['viscous_friction'] * np.abs(at.velocity))
 
 
-def stribeck(at: Conditions, value: Values) -> Array:
+def stribeck(at: Conditions, value: Values) -> FloatArray:
     """f_S exp(-|v| / v_S) per seal, summed over the seals [N], shape (n,).
 
     Source: [Armstrong1994]_ eq. (5); an exponent of 1 is our choice.
@@ -102,7 +102,7 @@ def stribeck(at: Conditions, value: Values) -> Array:
     return np.asarray(at.pressure.shape[1] * value['stribeck_friction'] * faded)
 
 
-def asymmetry(at: Conditions, value: Values) -> Array:
+def asymmetry(at: Conditions, value: Values) -> FloatArray:
     """1 + a sgn(v): factor on it all, shape (n,). One factor for every term is our choice."""
     return 1.0 + value['asymmetry'] * at.direction
 
@@ -135,7 +135,7 @@ class Rung:
         """Whether its Coulomb friction does."""
         return self.coulomb is not constant_coulomb
 
-    def friction(self, at: Conditions, value: Values) -> Array:
+    def friction(self, at: Conditions, value: Values) -> FloatArray:
         """Magnitude of the friction of all seals [N], shape (n,)."""
         total = self.coulomb(at, value)
         for term in self.velocity_terms:
@@ -230,7 +230,7 @@ def _asymmetric(base: Rung, name: str) -> Rung:
     )
 
 
-def values_of(rung: Rung, vector: Sequence[float] | Array) -> dict[str, float]:
+def values_of(rung: Rung, vector: Sequence[float] | FloatArray) -> dict[str, float]:
     """Parameters by name, the fixed ones too, from the values of the fitted ones in the order of the rung."""
     return {**{p.name: float(x) for p, x in zip(rung.parameters, vector, strict=True)}, **rung.fixed}
 
@@ -238,12 +238,12 @@ def values_of(rung: Rung, vector: Sequence[float] | Array) -> dict[str, float]:
 # -- the normal force -------------------------------------------------------------------------------------------------
 
 
-def normal_forces(pressure: Array, geometry: SealGeometry, law: NormalForceLaw) -> Array:
+def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForceLaw) -> FloatArray:
     """Normal force of each seal [N], shape (n, k), at pressures [Pa, gauge] of that shape."""
     area = projected_area(geometry)
     distinct, back = np.unique(pressure, return_inverse=True)
     forces = np.array([law.normal_force(float(p), area) for p in distinct])
-    result: Array = forces[back].reshape(pressure.shape)
+    result: FloatArray = forces[back].reshape(pressure.shape)
     return result
 
 

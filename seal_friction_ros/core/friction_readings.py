@@ -11,13 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction_laws import Conditions
 from seal_friction_ros.core.signal_preparation import (
     LONGEST_GAP,
-    Array,
-    BoolArray,
     HalfRange,
-    IntArray,
     Signals,
     Sliding,
     Stroke,
@@ -51,7 +49,7 @@ class Readings:
     """Friction readings of one rig, n of them, from one or several sources."""
 
     at: Conditions
-    force: Array
+    force: FloatArray
     """[N] force sum, signed, shape (n,)"""
     source: IntArray
     """index into ``names``, shape (n,)"""
@@ -64,7 +62,7 @@ class Readings:
     """test, pressure, file or block: what ``group`` is"""
     are_samples: bool
     """samples of a swept log, and not strokes or noted readings at held pressures"""
-    samples: tuple[Array, ...] = ()
+    samples: tuple[FloatArray, ...] = ()
     """[N] force sums behind each reading; empty where the reading is all there is"""
 
     @property
@@ -73,7 +71,7 @@ class Readings:
         return len(self.force)
 
     @property
-    def seal_pressure(self) -> Array:
+    def seal_pressure(self) -> FloatArray:
         """Mean pressure of the seals [Pa, gauge, >= 0], shape (n,)."""
         return np.asarray(self.at.pressure.mean(axis=1))
 
@@ -91,7 +89,7 @@ class Readings:
         )
 
     @cached_property
-    def scale(self) -> Array:
+    def scale(self) -> FloatArray:
         """What a deviation counts relative to [N], shape (n,).
 
         Samples of a swept log count alike. Readings count by the mean friction at their pressure, since there the
@@ -152,13 +150,13 @@ class Noted(NamedTuple):
 
     name: str
     test: IntArray
-    pressure: Array
+    pressure: FloatArray
     """[Pa, gauge]"""
     direction: IntArray
     """-1 or 1"""
-    friction: Array
+    friction: FloatArray
     """[N] magnitude, of all seals"""
-    velocity: Array
+    velocity: FloatArray
     """[m/s] magnitude; NaN where it was not noted"""
 
 
@@ -166,7 +164,7 @@ class Prepared(NamedTuple):
     """Readings, and what was made of the sources."""
 
     readings: Readings
-    chamber_pressures: Array
+    chamber_pressures: FloatArray
     """[Pa] of chambers a and b at each reading, shape (n, 2)"""
     breakaway: Readings | None
     """None where nothing started from rest"""
@@ -214,19 +212,19 @@ def prepare_signals(measurements: Sequence[Measurement], chambers: Sequence[str]
     )
 
 
-def _seal_pressures(pressure_a: Array, pressure_b: Array, chambers: Sequence[str]) -> Array:
+def _seal_pressures(pressure_a: FloatArray, pressure_b: FloatArray, chambers: Sequence[str]) -> FloatArray:
     """Pressure that each seal sees [Pa, gauge, >= 0], shape (n, k); negative gauge pressure counts as zero."""
     both = {'a': pressure_a, 'b': pressure_b}
     return np.maximum(np.column_stack([both[chamber] for chamber in chambers]), 0.0)
 
 
-def _conditions(pressure: Array, velocity: Array, direction: Array) -> Conditions:
+def _conditions(pressure: FloatArray, velocity: FloatArray, direction: FloatArray) -> Conditions:
     return Conditions(pressure, None, velocity, direction)
 
 
 def _held(
     measurements: Sequence[Measurement], found: Sequence[Sequence[Stroke]], chambers: Sequence[str]
-) -> tuple[Readings, Array]:
+) -> tuple[Readings, FloatArray]:
     rows = [(number, stroke) for number, of_source in enumerate(found) for stroke in of_source]
     column = {name: np.array([getattr(s, name) for _, s in rows]) for name in Stroke._fields if name != 'samples'}
     pressure = _seal_pressures(column['pressure_a'], column['pressure_b'], chambers)
@@ -257,7 +255,7 @@ def _held_groups(level: IntArray, part: IntArray, kind: str = 'file') -> tuple[I
 
 def _swept(
     measurements: Sequence[Measurement], even: Sequence[BoolArray], chambers: Sequence[str]
-) -> tuple[Readings, Array]:
+) -> tuple[Readings, FloatArray]:
     parts = [m.signals.taken(index) for m, index in zip(measurements, even, strict=True)]
     for measurement, part in zip(measurements, parts, strict=True):
         if len(part.time) < FEWEST_SWEPT:
@@ -304,7 +302,7 @@ def _breakaway(measurements: Sequence[Measurement], chambers: Sequence[str], dyn
     )
 
 
-def _nearest_level(pressure: Array, dynamic: Readings) -> IntArray:
+def _nearest_level(pressure: FloatArray, dynamic: Readings) -> IntArray:
     """Level of the sliding readings that is nearest to each pressure [Pa], shape (n,)."""
     levels = np.unique(dynamic.level)
     means = np.array([dynamic.seal_pressure[dynamic.level == level].mean() for level in levels])
@@ -454,7 +452,7 @@ def check_signals(measurement: Measurement) -> None:
         check_clipping(name, what, column[moving])
 
 
-def check_clipping(name: str, what: str, column: Array) -> None:
+def check_clipping(name: str, what: str, column: FloatArray) -> None:
     """Refuse a signal that stands at the end of its sensor's range.
 
     Args:
@@ -474,7 +472,7 @@ def check_clipping(name: str, what: str, column: Array) -> None:
         )
 
 
-def _check_finite(name: str, what: str, time: Array, column: Array) -> None:
+def _check_finite(name: str, what: str, time: FloatArray, column: FloatArray) -> None:
     wrong = ~np.isfinite(column)
     if wrong.all():
         raise ValueError(f'{name}: no {what} is a number: record it')
@@ -487,7 +485,9 @@ def _check_finite(name: str, what: str, time: Array, column: Array) -> None:
         )
 
 
-def _check_bounds(name: str, pressure_a: Array, pressure_b: Array, speed: Array, force: Array) -> None:
+def _check_bounds(
+    name: str, pressure_a: FloatArray, pressure_b: FloatArray, speed: FloatArray, force: FloatArray
+) -> None:
     low, high = PRESSURE_BOUNDS
     for pressure in (pressure_a, pressure_b):
         lowest, highest = float(np.nanmin(pressure)), float(np.nanmax(pressure))

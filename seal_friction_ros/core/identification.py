@@ -15,9 +15,10 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 from scipy.stats import t as student_t
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction_laws import Conditions, Rung, Values, values_of
 from seal_friction_ros.core.friction_readings import Readings, level_friction
-from seal_friction_ros.core.signal_preparation import Array, BoolArray, IntArray, half_range
+from seal_friction_ros.core.signal_preparation import half_range
 
 BAND_95 = 1.96  # standard deviations on each side that hold 95 % of a normal distribution
 COLLINEAR = 0.9  # correlation of two regressors from which on they are called collinear (our choice)
@@ -42,12 +43,12 @@ class Fit:
     rung: Rung
     values: dict[str, float]
     """parameters of one seal"""
-    offsets: Array
+    offsets: FloatArray
     """[N] of each source's force sum, shape (sources,)"""
-    jacobian: Array
+    jacobian: FloatArray
     """derivative of the weighted deviations by the parameters, offsets taken out, shape (n, parameters)"""
 
-    def friction(self, at: Conditions) -> Array:
+    def friction(self, at: Conditions) -> FloatArray:
         """Magnitude of the friction of all seals [N], shape (n,)."""
         return self.rung.friction(at, self.values)
 
@@ -60,7 +61,7 @@ class Fit:
         return float(np.linalg.cond(self.jacobian / lengths))
 
     @property
-    def correlation(self) -> Array:
+    def correlation(self) -> FloatArray:
         """Correlation of the parameters, shape (parameters, parameters); NaN where the data do not tell them at all."""
         normal = self.jacobian.T @ self.jacobian
         size = np.sqrt(np.diag(normal))
@@ -68,11 +69,11 @@ class Fit:
             return np.full(normal.shape, np.nan)
         covariance = np.linalg.inv(normal / np.outer(size, size))
         std = np.sqrt(np.diag(covariance))
-        result: Array = covariance / np.outer(std, std)
+        result: FloatArray = covariance / np.outer(std, std)
         return result
 
 
-def offsets_of(readings: Readings, friction: Array) -> Array:
+def offsets_of(readings: Readings, friction: FloatArray) -> FloatArray:
     """Offset of each source's force sum that leaves the least squares [N], shape (sources,).
 
     0 N where a source has one direction only: there it cannot be told from friction.
@@ -86,7 +87,7 @@ def offsets_of(readings: Readings, friction: Array) -> Array:
     return result
 
 
-def deviations(readings: Readings, friction: Array, offsets: Array) -> Array:
+def deviations(readings: Readings, friction: FloatArray, offsets: FloatArray) -> FloatArray:
     """Measured magnitude less a law's, offset removed [N], shape (n,)."""
     return readings.at.direction * (readings.force - offsets[readings.source]) - friction
 
@@ -110,7 +111,7 @@ def fit(rung: Rung, readings: Readings, known: Values | None = None, *, is_close
     upper = np.array([p.upper for p in rung.parameters])
     scale = readings.scale
 
-    def left(vector: Array) -> Array:
+    def left(vector: FloatArray) -> FloatArray:
         friction = rung.friction(readings.at, values_of(rung, vector))
         return deviations(readings, friction, offsets_of(readings, friction)) / scale
 
@@ -128,7 +129,7 @@ def fit(rung: Rung, readings: Readings, known: Values | None = None, *, is_close
     size = np.abs([p.start(_mean_friction(readings), readings.at) for p in rung.parameters])
     at_zero = (lower == 0.0) & (np.abs(best.x) < 1e-6 * size)
     values = values_of(rung, np.where(at_zero, 0.0, best.x))  # a term that does not pay is nothing, not 1e-18
-    jacobian: Array = np.asarray(best.jac)
+    jacobian: FloatArray = np.asarray(best.jac)
     return Fit(rung, values, offsets_of(readings, rung.friction(readings.at, values)), jacobian)
 
 
@@ -140,7 +141,7 @@ def _mean_friction(readings: Readings) -> float:
 _TRIED = (0.2, 1.0, 4.0)  # Stribeck velocities that a fit begins from, as factors on the first guess
 
 
-def _starts(rung: Rung, readings: Readings, known: Values) -> Iterator[Array]:
+def _starts(rung: Rung, readings: Readings, known: Values) -> Iterator[FloatArray]:
     """First guesses: what is known from a lower rung, and several Stribeck velocities."""
     guess = {p.name: p.start(_mean_friction(readings), readings.at) for p in rung.parameters}
     guess |= {name: value for name, value in known.items() if name in guess}
@@ -156,13 +157,13 @@ def _starts(rung: Rung, readings: Readings, known: Values) -> Iterator[Array]:
 class CrossValidation:
     """How a rung predicts readings that it has not seen: each group from all others."""
 
-    predicted: Array
+    predicted: FloatArray
     """[N] shape (n,)"""
-    deviation: Array
+    deviation: FloatArray
     """[N] measured less predicted, shape (n,)"""
-    losses: Array
+    losses: FloatArray
     """root mean square of the weighted deviation in each group [-], shape (groups,)"""
-    parameters: Array
+    parameters: FloatArray
     """fitted without each group, shape (groups, parameters)"""
 
     @property
@@ -212,7 +213,7 @@ def cross_validate(rung: Rung, readings: Readings, near: Values, tick: Ticks = l
     return CrossValidation(predicted, deviation, np.array(losses), np.array(parameters))
 
 
-def _own_offsets(readings: Readings, friction: Array) -> Array:
+def _own_offsets(readings: Readings, friction: FloatArray) -> FloatArray:
     """Offset of each source from readings that no law was fitted to: half the sum of the two directions."""
     signed = readings.force - readings.at.direction * friction
     result = np.zeros(len(readings.names))
@@ -244,11 +245,11 @@ def plain_mean(readings: Readings) -> CrossValidation | None:
     return CrossValidation(predicted, left, np.array(losses), np.empty((len(groups), 0)))
 
 
-def _rms(values: Array) -> float:
+def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def standard_errors(validation: CrossValidation) -> Array:
+def standard_errors(validation: CrossValidation) -> FloatArray:
     """Standard error of each parameter by the jackknife over the groups, shape (parameters,).
 
     What the readings of a group have in common (a test, a pressure, a minute) counts once and not with every reading.
@@ -257,7 +258,7 @@ def standard_errors(validation: CrossValidation) -> Array:
     """
     groups = len(validation.parameters)
     spread = validation.parameters - validation.parameters.mean(axis=0)
-    result: Array = np.sqrt((groups - 1) / groups * np.sum(spread**2, axis=0))
+    result: FloatArray = np.sqrt((groups - 1) / groups * np.sum(spread**2, axis=0))
     return result
 
 
@@ -329,7 +330,7 @@ def recommended(scores: Sequence[Score]) -> Score:
     return next(score for score, validation in scored if not is_beaten(validation.losses, best.losses))
 
 
-def is_beaten(losses: Array, others: Array) -> bool:
+def is_beaten(losses: FloatArray, others: FloatArray) -> bool:
     """Whether ``others`` are lower than ``losses`` beyond the noise, and by enough to be worth a term.
 
     Beyond the noise: by a one-sided paired t-test at `BEATEN`. Enough: `WORTHWHILE` of the mean loss.
@@ -356,12 +357,12 @@ class Spread(NamedTuple):
     absolute: float
     """[N]"""
 
-    def std(self, friction: Array) -> Array:
+    def std(self, friction: FloatArray) -> FloatArray:
         """Standard deviation [N] at a friction [N], shape (n,)."""
         return np.sqrt((self.relative * friction) ** 2 + self.absolute**2)
 
 
-def spread_of(predicted: Array, deviation: Array, groups: int, in_addition: float = 0.0) -> Spread:
+def spread_of(predicted: FloatArray, deviation: FloatArray, groups: int, in_addition: float = 0.0) -> Spread:
     """Standard deviation for new readings, from deviations of readings that were left out.
 
     Its form comes from non-negative least squares of the squared deviations over the squared friction and one, weighted
@@ -416,7 +417,7 @@ def band_coverage(
     return inside / readings.count
 
 
-def repeatability(readings: Readings, offsets: Array) -> float:
+def repeatability(readings: Readings, offsets: FloatArray) -> float:
     """Scatter of readings taken under the same conditions, as a share of the friction [-]: no law can do better.
 
     Readings at one pressure level, or samples in one cell of a grid of 12 speeds by 6 pressures of each seal by
@@ -446,7 +447,7 @@ def _cells(readings: Readings) -> IntArray:
     return cells
 
 
-def run_drift(readings: Readings, offsets: Array) -> dict[int, float]:
+def run_drift(readings: Readings, offsets: FloatArray) -> dict[int, float]:
     """Relative change of the friction from the first to the last stroke of the run at each level [-].
 
     The slope of a line through the strokes of each direction in the order they were made; mean of the directions,
@@ -489,7 +490,7 @@ class Collinear(NamedTuple):
     correlation: float
 
 
-def collinear_regressors(readings: Readings, chamber_pressures: Array) -> list[Collinear]:
+def collinear_regressors(readings: Readings, chamber_pressures: FloatArray) -> list[Collinear]:
     """Every pair of regressors whose correlation is beyond `COLLINEAR`.
 
     Speed and seal pressure, which make viscous and pressure-dependent friction; velocity and pressure difference,
@@ -518,7 +519,7 @@ def collinear_regressors(readings: Readings, chamber_pressures: Array) -> list[C
     return found
 
 
-def _level_means(readings: Readings, columns: Array) -> Array:
+def _level_means(readings: Readings, columns: FloatArray) -> FloatArray:
     """Mean of each row of ``columns``, shape (rows, n), at each pressure level, shape (rows, levels)."""
     levels = np.unique(readings.level)
     return np.array([[column[readings.level == level].mean() for level in levels] for column in columns])
@@ -587,7 +588,7 @@ def _level_law(found: Fit, readings: Readings, inside: BoolArray) -> float:
     return float(found.friction(readings.at.taken(np.flatnonzero(inside))).mean())
 
 
-def _relative_slope(found: Fit, readings: Readings, inside: BoolArray) -> Array:
+def _relative_slope(found: Fit, readings: Readings, inside: BoolArray) -> FloatArray:
     """Relative change of that mean by a relative change of each parameter, shape (parameters,); finite differences."""
     middle = _level_law(found, readings, inside)
     result = np.empty(len(found.rung.parameters))
@@ -709,7 +710,7 @@ class Stiction(NamedTuple):
     """[N] all seals: law -> what it leaves, out of sample"""
 
 
-def identify_stiction(readings: Readings, friction: Array, offsets: Array) -> Stiction:
+def identify_stiction(readings: Readings, friction: FloatArray, offsets: FloatArray) -> Stiction:
     """Constant or load-dependent breakaway, whichever predicts readings left out; the constant one unless beaten.
 
     Args:
@@ -743,11 +744,11 @@ def identify_stiction(readings: Readings, friction: Array, offsets: Array) -> St
     return Stiction(chosen, slope / seals, 0.0, error / seals, rms)
 
 
-def _slope(regressor: Array, excess: Array) -> float:
+def _slope(regressor: FloatArray, excess: FloatArray) -> float:
     """Non-negative slope of least squares through the origin."""
     return max(float(np.sum(regressor * excess)) / float(np.sum(regressor**2)), 0.0)
 
 
-def _lowest_unbeaten(losses: dict[str, Array]) -> str:
+def _lowest_unbeaten(losses: dict[str, FloatArray]) -> str:
     best = min(losses.values(), key=lambda values: float(values.mean()))
     return next(name for name, values in losses.items() if not is_beaten(values, best))

@@ -18,10 +18,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from seal_friction_ros.core import feedforward
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.feedforward import UNUSABLE, FeedForwardSettings, Motion
 from seal_friction_ros.core.records import FrictionEstimate, FrictionState
 from seal_friction_ros.core.tuning import bounded, nearest_preferred, preferred
@@ -36,9 +36,6 @@ NEARLY = 0.05  # of the friction: an RMS difference as large is nearly none
 TOLD = 0.05  # a relative standard deviation above it is no knowledge
 SHARPEST_SMOOTHING = 1e-5  # [m/s]
 
-Samples = NDArray[np.float64]
-Choice = NDArray[np.bool_]
-
 
 class Recording(NamedTuple):
     """What an axis did, one entry per velocity sample."""
@@ -46,27 +43,27 @@ class Recording(NamedTuple):
     estimates: Sequence[FrictionEstimate]
     motions: Sequence[Motion]
     """reference and measured motion"""
-    force_sum: Samples
+    force_sum: FloatArray
     """[N], shape (n,)"""
 
     @property
-    def time(self) -> Samples:
+    def time(self) -> FloatArray:
         """Since the first sample [s], shape (n,)."""
         first = self.estimates[0].stamp
         return np.array([(estimate.stamp - first) * 1e-9 for estimate in self.estimates])
 
     @property
-    def velocity(self) -> Samples:
+    def velocity(self) -> FloatArray:
         """Of the rod [m/s], shape (n,)."""
         return np.array([motion.measured_velocity for motion in self.motions])
 
     @property
-    def reference_velocity(self) -> Samples:
+    def reference_velocity(self) -> FloatArray:
         """[m/s], shape (n,)."""
         return np.array([motion.reference_velocity for motion in self.motions])
 
     @property
-    def coulomb_friction(self) -> Samples:
+    def coulomb_friction(self) -> FloatArray:
         """[N], shape (n,)."""
         return np.array([estimate.coulomb_friction for estimate in self.estimates])
 
@@ -83,9 +80,9 @@ class Law(NamedTuple):
     mass_is_fitted: bool
     offset: float
     """[N] F_0; 0 where only one direction was driven"""
-    friction: Samples
+    friction: FloatArray
     """[N] force sum less mass times acceleration less offset; NaN where it is not known"""
-    sliding: Choice
+    sliding: BoolArray
     """samples that the law was fitted to"""
 
 
@@ -118,12 +115,12 @@ class Match(NamedTuple):
     told: dict[str, bool]
     """parameter -> whether it follows from the recording; else it is what it was"""
     law: Law
-    reversal: Choice
+    reversal: BoolArray
     """samples near a reversal of the reference"""
     without: Residual
     cases: tuple[MatchCase, ...]
     """nine, by friction error, then by delay error"""
-    force: Samples
+    force: FloatArray
     """[N] of the feed-forward when it acts, nothing wrong"""
 
     @property
@@ -137,7 +134,7 @@ class Match(NamedTuple):
         return all(case.residual.sliding < self.without.sliding for case in self.cases)
 
 
-def acceleration(time: Samples, velocity: Samples) -> Samples:
+def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
     """Slope of the parabola through `ACCELERATION_WINDOW` samples [m/s^2]; NaN where they are not evenly in time.
 
     Args:
@@ -200,7 +197,7 @@ def fit_law(recording: Recording, mass: float | None = None) -> Law:
     return Law(values[0], math.sqrt(variance), moved, mass is None, offset, friction, sliding)
 
 
-def near_reversals(time: Samples, reference_velocity: Samples) -> Choice:
+def near_reversals(time: FloatArray, reference_velocity: FloatArray) -> BoolArray:
     """Samples near a reversal of the reference, see `NEAR_REVERSAL`.
 
     Args:
@@ -221,7 +218,7 @@ def near_reversals(time: Samples, reference_velocity: Samples) -> Choice:
     return np.asarray(distance <= reach)
 
 
-def feedforward_force(settings: FeedForwardSettings, recording: Recording, friction_error: float = 0.0) -> Samples:
+def feedforward_force(settings: FeedForwardSettings, recording: Recording, friction_error: float = 0.0) -> FloatArray:
     """Force that the feed-forward would have commanded [N], shape (n,), with a model wrong by a share of it."""
     state, factor = feedforward.init(settings), 1.0 + friction_error
     forces = []
@@ -234,12 +231,12 @@ def feedforward_force(settings: FeedForwardSettings, recording: Recording, frict
     return np.array(forces)
 
 
-def delayed(time: Samples, force: Samples, delay: float) -> Samples:
+def delayed(time: FloatArray, force: FloatArray, delay: float) -> FloatArray:
     """What acts ``delay`` [s] after it was commanded; nothing before the first command. Shapes (n,)."""
     return np.interp(time - delay, time, force, left=0.0)
 
 
-def residual(law: Law, reversal: Choice, force: Samples) -> Residual:
+def residual(law: Law, reversal: BoolArray, force: FloatArray) -> Residual:
     """Friction that ``force`` [N], shape (n,), leaves."""
     left = law.friction - force
     return Residual(_rms(left[law.sliding]), _rms(left[law.sliding & reversal]))
@@ -317,5 +314,5 @@ def _slew(recording: Recording, settings: FeedForwardSettings) -> float | None:
         index -= 1
 
 
-def _rms(values: Samples) -> float:
+def _rms(values: FloatArray) -> float:
     return math.sqrt(float(np.mean(values**2))) if len(values) else 0.0

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
+
+from seal_friction_ros.core.arrays import FloatArray
 
 
 class MonotoneTable:
@@ -53,7 +54,7 @@ class MonotoneTable:
         t = x - knots[interval]
         return ((cubic * t + square) * t + slope) * t + value
 
-    def at_each(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def at_each(self, x: FloatArray) -> FloatArray:
         """Value at each of ``x``, finite, shape (n,): the same bits as one by one, being sums and products."""
         knots = np.array(self._knots)
         inside = np.where(x < knots[0], knots[0], x)

@@ -1,8 +1,6 @@
 """Pressure -> normal force of one seal on the wall it slides on."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from statistics import linear_regression
 from typing import Protocol
 
 from seal_friction_ros.core.monotone import MonotoneTable
@@ -69,17 +67,3 @@ class NormalForceTable:
         del projected_area
         beyond = max(pressure - self.pressures[-1], 0.0)
         return self.table(pressure) + self.table.end_slope * beyond
-
-
-def area_deformation_gain_from_points(
-    axial_forces: Sequence[float], normal_forces: Sequence[float]
-) -> AreaDeformationGain:
-    """Least-squares line F_n = G F_ax + F_rad through computed points, both in [N], shape (n,), n >= 2.
-
-    Source: thesis, section 6.2 and Figure 19.
-
-    Raises:
-        ValueError: The line makes no sense as a law (see `AreaDeformationGain`).
-    """
-    slope, intercept = linear_regression(axial_forces, normal_forces)
-    return AreaDeformationGain(slope, intercept)

@@ -82,7 +82,7 @@ def init(parameters: PipelineParameters) -> PipelineState:
 
 
 def receive(parameters: PipelineParameters, state: PipelineState, message: Input) -> tuple[PipelineState, Answer]:
-    """Take one message.
+    """Take one message: `observe`, and after a velocity `compensate`.
 
     Args:
         parameters: Settings and seals.
@@ -92,9 +92,20 @@ def receive(parameters: PipelineParameters, state: PipelineState, message: Input
     Returns:
         The next state and what goes out, every number of which is finite.
     """
-    if isinstance(message, Velocity):
-        return _on_velocity(parameters, state, message)
+    state, answer = observe(parameters, state, message)
+    return compensate(parameters, state, message, answer) if isinstance(message, Velocity) else (state, answer)
+
+
+def observe(parameters: PipelineParameters, state: PipelineState, message: Input) -> tuple[PipelineState, Answer]:
+    """First half of `receive`: everything but the feed-forward that follows an estimate.
+
+    The node publishes the estimate before it computes that feed-forward.
+    """
     seen, fed, pressure, force, reference, refused = state  # _replace would take three times as long
+    if isinstance(message, Velocity):
+        sample = RodSample(message.stamp, message.velocity, pressure, force, refused)
+        seen, estimate = estimator.step(parameters.estimator, seen, sample)
+        return PipelineState(seen, fed, pressure, force, reference, refused), Answer(estimate, None, message.frame_id)
     if isinstance(message, Pressure):
         return PipelineState(seen, fed, message, force, reference, refused), NOTHING
     if isinstance(message, Force):
@@ -109,20 +120,18 @@ def receive(parameters: PipelineParameters, state: PipelineState, message: Input
     return PipelineState(seen, fed, pressure, force, reference, refused), Answer(None, compensation, message.frame_id)
 
 
-def _on_velocity(
-    parameters: PipelineParameters, state: PipelineState, velocity: Velocity
+def compensate(
+    parameters: PipelineParameters, state: PipelineState, velocity: Velocity, answer: Answer
 ) -> tuple[PipelineState, Answer]:
-    stamp, measured, frame_id = velocity
-    _, force_state, pressure, force, reference, refused = state
-    sample = RodSample(stamp, measured, pressure, force, refused)
-    estimator_state, estimate = estimator.step(parameters.estimator, state.estimator, sample)
-    compensation = None
-    if reference.stamp != NEVER or parameters.feedforward.use_measured_velocity:
-        motion = motion_at(reference, stamp, measured)
-        motion = _with_velocity_friction(parameters, motion, estimator_state.pressure)
-        force_state, compensation = feedforward.step(parameters.feedforward, force_state, stamp, estimate, motion)
-    answer = Answer(estimate, compensation, frame_id)
-    return PipelineState(estimator_state, force_state, pressure, force, reference, refused), answer
+    """Second half of `receive`: what `observe` answered to a velocity, and the feed-forward that goes with it."""
+    seen, fed, pressure, force, reference, refused = state
+    estimate, _, frame_id = answer
+    if estimate is None or (reference.stamp == NEVER and not parameters.feedforward.use_measured_velocity):
+        return state, answer
+    motion = motion_at(reference, velocity.stamp, velocity.velocity)
+    motion = _with_velocity_friction(parameters, motion, seen.pressure)
+    fed, compensation = feedforward.step(parameters.feedforward, fed, velocity.stamp, estimate, motion)
+    return PipelineState(seen, fed, pressure, force, reference, refused), Answer(estimate, compensation, frame_id)
 
 
 @compilable

@@ -35,7 +35,7 @@ from seal_friction_ros.core.ehl.friction_law import FrictionMap
 from seal_friction_ros.core.friction_coefficient import CoefficientTable, FrictionCoefficientLaw, PowerLaw
 from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.seal import SealGeometry
-from seal_friction_ros.core.validated import from_mapping, plain
+from seal_friction_ros.core.validated import check_names, from_mapping, name_and_source
 
 NORMAL_FORCE_LAWS: dict[str, type] = {'area_deformation_gain': AreaDeformationGain, 'monotone_table': NormalForceTable}
 FRICTION_COEFFICIENT_LAWS: dict[str, type] = {'power_law': PowerLaw, 'monotone_table': CoefficientTable}
@@ -63,22 +63,10 @@ def parse_seal(document: Any) -> Seal:
     Raises:
         ValueError: The document makes no sense; the message names the seal, the field, its value and its bound.
     """
-    if not isinstance(document, Mapping):
-        raise ValueError(f'a seal file is a mapping of names to values, not {type(document).__name__}')
-    name = document.get('name')
-    if not isinstance(name, str) or not name:
-        raise ValueError(f'seal file: name = {name!r} is not a text')
-    if not name.isprintable():
-        raise ValueError(f'seal file: name = {name!r} is not one line of text')
+    name, _ = name_and_source(document, 'seal')
     where = f'seal {name}'
     law_name = _choice(document, 'coulomb_law', COULOMB_LAWS, where)
-    unknown = sorted(plain(key) for key in document if key not in _COMMON | _PARTS[law_name])
-    if unknown:
-        allowed = ', '.join(sorted(_COMMON | _PARTS[law_name]))
-        raise ValueError(f'{where}: {law_name} has no {", ".join(unknown)}: it has {allowed}')
-    source = document.get('source', '')
-    if not isinstance(source, str):
-        raise ValueError(f'{where}: source = {source!r} is not a text')
+    check_names(document, sorted(_COMMON | _PARTS[law_name]), f'{where}: {law_name}')
     law = _coulomb_law(document, law_name, where)
     terms = None
     if 'velocity_terms' in document:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.coulomb import MountedSeal
 from seal_friction_ros.core.friction_state import state_friction
@@ -265,15 +265,15 @@ def _outputs(
 class Trajectory(NamedTuple):
     """The servo after each of n steps; every array of shape (n,), units as in `ServoOutputs`."""
 
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    pressure_a: NDArray[np.float64]
-    pressure_b: NDArray[np.float64]
-    spool: NDArray[np.float64]
-    force_sum: NDArray[np.float64]
-    coulomb_friction: NDArray[np.float64]
-    breakaway_force: NDArray[np.float64]
-    limited: NDArray[np.float64]
+    position: FloatArray
+    velocity: FloatArray
+    pressure_a: FloatArray
+    pressure_b: FloatArray
+    spool: FloatArray
+    force_sum: FloatArray
+    coulomb_friction: FloatArray
+    breakaway_force: FloatArray
+    limited: FloatArray
 
 
 @compiled
@@ -303,8 +303,8 @@ def simulate(
     parameters: ServoParameters,
     state: ServoState,
     references: Iterable[Reference],
-    feedforward: float | NDArray[np.float64] = 0.0,
-    load_force: float | NDArray[np.float64] = 0.0,
+    feedforward: float | FloatArray = 0.0,
+    load_force: float | FloatArray = 0.0,
 ) -> tuple[ServoState, Trajectory]:
     """As many `step` as there are references, in one compiled go.
 

@@ -19,9 +19,9 @@ from enum import IntFlag
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.reference import Reference
 from seal_friction_ros.core.servo_plant import Constants
@@ -214,7 +214,7 @@ def control(
     return ControllerState(reference.position, integral), Command(spool, force, limited)
 
 
-def closed_loop(g: Gains, c: Constants, held: bool = False) -> NDArray[np.float64]:
+def closed_loop(g: Gains, c: Constants, held: bool = False) -> FloatArray:
     r"""Sample-to-sample matrix of the closed loop without friction, in mid-stroke and at null; or rod ``held``.
 
     State: x, v, p_L, s, s'/omega, integral. The plant between two samples is exact (matrix exponential).

@@ -11,14 +11,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.validated import check, parameter
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 LONGEST_GAP = 0.5  # [s] no stroke reaches across a longer pause in the log (our choice)
 FEWEST_SAMPLES = 10  # of a stroke, to take its median from (our choice)
@@ -71,15 +67,15 @@ class Sliding:
 class Signals(NamedTuple):
     """A log, row by row; arrays of shape (n,), NaN where there is no measurement."""
 
-    time: Array
+    time: FloatArray
     """[s] increasing"""
-    velocity: Array
+    velocity: FloatArray
     """[m/s] positive on extension"""
-    pressure_a: Array
+    pressure_a: FloatArray
     """[Pa, gauge]"""
-    pressure_b: Array
+    pressure_b: FloatArray
     """[Pa, gauge]"""
-    force_sum: Array
+    force_sum: FloatArray
     """[N] positive on extension"""
 
     def taken(self, index: IntArray | BoolArray) -> 'Signals':
@@ -144,7 +140,7 @@ class OffsetLine(NamedTuple):
 # -- velocity and acceleration ----------------------------------------------------------------------------------------
 
 
-def slope(time: Array, values: Array, law: SavitzkyGolay) -> Array:
+def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArray:
     """Slope over time by a Savitzky-Golay filter, at the times of the samples: velocity of a position, and so on.
 
     At each sample, the slope of the polynomial of least squares through the samples within the window around it; over
@@ -181,12 +177,12 @@ def slope(time: Array, values: Array, law: SavitzkyGolay) -> Array:
     return result
 
 
-def _unbroken(time: Array, index: IntArray, longest_gap: float) -> list[IntArray]:
+def _unbroken(time: FloatArray, index: IntArray, longest_gap: float) -> list[IntArray]:
     """Indices, cut wherever the time between two of them exceeds ``longest_gap`` [s]."""
     return np.split(index, np.flatnonzero(np.diff(time[index]) > longest_gap) + 1)
 
 
-def _segment_slope(time: Array, values: Array, law: SavitzkyGolay) -> Array:
+def _segment_slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArray:
     rows = len(time)
     interval = (time[-1] - time[0]) / (rows - 1)
     points = 2 * round(law.window / interval / 2.0) + 1
@@ -199,11 +195,11 @@ def _segment_slope(time: Array, values: Array, law: SavitzkyGolay) -> Array:
         return np.full(rows, np.nan)
     grid = np.linspace(time[0], time[-1], rows)
     slopes = savgol_filter(np.interp(grid, time, values), points, law.order, deriv=1, delta=interval, mode='interp')
-    result: Array = np.interp(time, grid, slopes)
+    result: FloatArray = np.interp(time, grid, slopes)
     return result
 
 
-def acceleration(time: Array, velocity: Array) -> Array:
+def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
     """Acceleration [m/s^2] by central differences of the velocity, shape (n,).
 
     It only has to tell even sliding from starting and stopping, so it is not smoothed beyond what the velocity is.
@@ -212,7 +208,7 @@ def acceleration(time: Array, velocity: Array) -> Array:
         time: Time of the samples [s], increasing, shape (n,), n >= 2.
         velocity: [m/s], shape (n,); NaN makes NaN around it.
     """
-    result: Array = np.gradient(velocity, time)
+    result: FloatArray = np.gradient(velocity, time)
     return result
 
 
@@ -310,7 +306,7 @@ def breakaways(signals: Signals, sliding: Sliding, shortest_rest: float = 0.1) -
 # -- friction and offset ----------------------------------------------------------------------------------------------
 
 
-def half_range(force: Array, direction: IntArray, *, of_medians: bool = True) -> HalfRange:
+def half_range(force: FloatArray, direction: IntArray, *, of_medians: bool = True) -> HalfRange:
     """Friction and offset of a force that was measured in both directions.
 
     friction = (F_extend - F_retract) / 2, offset = (F_extend + F_retract) / 2, with the median (or mean) of each
@@ -332,7 +328,7 @@ def half_range(force: Array, direction: IntArray, *, of_medians: bool = True) ->
     return HalfRange((extend - retract) / 2.0, (extend + retract) / 2.0)
 
 
-def offset_line(pressures: Array, offsets: Array) -> OffsetLine:
+def offset_line(pressures: FloatArray, offsets: FloatArray) -> OffsetLine:
     """Line of least squares through offsets of the force sum over pressure.
 
     An offset that does not depend on pressure is the load cell's; one that is proportional to it comes from an area
@@ -347,7 +343,7 @@ def offset_line(pressures: Array, offsets: Array) -> OffsetLine:
     return OffsetLine(float(constant), float(area_error), float(np.sqrt(np.mean(left**2))))
 
 
-def pressure_levels(pressures: Array) -> IntArray:
+def pressure_levels(pressures: FloatArray) -> IntArray:
     """Number of the pressure level that each pressure [Pa] belongs to, counted from the lowest; shape (n,).
 
     A new level begins at every step between sorted pressures above `LEVEL_GAP` of the pressure (`LEVEL_GAP_MIN` at
@@ -385,7 +381,7 @@ def longest_stretch(wrong: BoolArray) -> tuple[int, int]:
     return int(first[longest]), int(last[longest] - first[longest])
 
 
-def clipped_share(values: Array) -> float:
+def clipped_share(values: FloatArray) -> float:
     """Share of the samples at which a sensor stands at the end of its range; 0.0 if it does not.
 
     A sensor that moves with nearly every sample, and stands still for five samples and more at nothing but its highest

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import filtfilt, iirnotch
 
-from seal_friction_ros.core.signal_preparation import Array, IntArray
+from seal_friction_ros.core.arrays import FloatArray, IntArray
 from seal_friction_ros.core.validated import check, parameter
 
 
@@ -54,15 +54,15 @@ class SpoolEvaluation:
 class SpoolFriction(NamedTuple):
     """Friction of one cycle over displacement."""
 
-    displacement: Array
+    displacement: FloatArray
     """[m] from the middle of the stroke, shape (n,)"""
-    velocity: Array
+    velocity: FloatArray
     """[m/s] shape (n,)"""
-    force: Array
+    force: FloatArray
     """[N] as measured, shape (n,)"""
-    filtered: Array
+    filtered: FloatArray
     """[N] resonance notched, then averaged, shape (n,)"""
-    normalised: Array
+    normalised: FloatArray
     """[-] ``filtered`` over the reference force, shape (n,)"""
     reference_force: float
     """[N]"""
@@ -70,7 +70,7 @@ class SpoolFriction(NamedTuple):
     """[Hz] of the measuring chain; None if there is none"""
 
 
-def cycle_starts(displacement: Array) -> IntArray:
+def cycle_starts(displacement: FloatArray) -> IntArray:
     """Index at which each cycle begins: where the middle of the stroke is crossed on the way up, less a quarter cycle.
 
     Args:
@@ -92,16 +92,16 @@ def cycle_starts(displacement: Array) -> IntArray:
     return np.append(first, min(int(first[-1]) + period, len(displacement)))
 
 
-def moving_average(values: Array, width: int) -> Array:
+def moving_average(values: FloatArray, width: int) -> FloatArray:
     """Mean of ``width`` samples around each one, shape (n,); ends are held (our choice).
 
     Source: spool-valve paper, section 7.3: "a moving average filter with a step width of 50".
     """
-    result: Array = uniform_filter1d(values, width, mode='nearest')
+    result: FloatArray = uniform_filter1d(values, width, mode='nearest')
     return result
 
 
-def resonance_frequency(time: Array, force: Array, law: SpoolEvaluation) -> float | None:
+def resonance_frequency(time: FloatArray, force: FloatArray, law: SpoolEvaluation) -> float | None:
     """Frequency of the measuring chain [Hz], recognised in a force; None if none stands out.
 
     A motion to and fro has lines in its spectrum at all multiples of its frequency, which fall steadily; a resonance is
@@ -133,7 +133,7 @@ def resonance_frequency(time: Array, force: Array, law: SpoolEvaluation) -> floa
     return float(np.average(frequency[near], weights=amplitude[near] ** 2))
 
 
-def without_resonance(time: Array, force: Array, resonance: float, law: SpoolEvaluation) -> Array:
+def without_resonance(time: FloatArray, force: FloatArray, resonance: float, law: SpoolEvaluation) -> FloatArray:
     """Force [N] with the resonance notched out, without delay, shape (n,).
 
     Raises:
@@ -143,11 +143,11 @@ def without_resonance(time: Array, force: Array, resonance: float, law: SpoolEva
     if not 0.0 < resonance < rate / 2.0:
         raise ValueError(f'a resonance of {resonance:.6g} Hz is not below half the sampling rate of {rate:.6g} Hz')
     numerator, denominator = iirnotch(resonance, law.notch_quality, fs=rate)
-    result: Array = filtfilt(numerator, denominator, force)
+    result: FloatArray = filtfilt(numerator, denominator, force)
     return result
 
 
-def reference_force(displacement: Array, force: Array, half_width: float) -> float:
+def reference_force(displacement: FloatArray, force: FloatArray, half_width: float) -> float:
     """Mean magnitude of the force [N] within +/- ``half_width`` [m] of the middle of the stroke, to and fro.
 
     Source: spool-valve paper, chapter 6: the mean between -0.5 mm and 0.5 mm, where the speed is held.
@@ -168,7 +168,7 @@ def reference_force(displacement: Array, force: Array, half_width: float) -> flo
 
 
 def evaluate_cycles(
-    time: Array, displacement: Array, force: Array, law: SpoolEvaluation, reference: float | None = None
+    time: FloatArray, displacement: FloatArray, force: FloatArray, law: SpoolEvaluation, reference: float | None = None
 ) -> SpoolFriction:
     """Normalised friction over displacement of one cycle out of several.
 

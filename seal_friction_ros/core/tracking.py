@@ -3,22 +3,21 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Samples = NDArray[np.float64]
+from seal_friction_ros.core.arrays import FloatArray
 
 
-def tracking_rms(reference: Samples, position: Samples) -> float:
+def tracking_rms(reference: FloatArray, position: FloatArray) -> float:
     """Root mean square of the tracking error [m]; both of shape (n,) [m]."""
     return math.sqrt(float(np.mean((reference - position) ** 2)))
 
 
-def tracking_peak(reference: Samples, position: Samples) -> float:
+def tracking_peak(reference: FloatArray, position: FloatArray) -> float:
     """Largest tracking error [m]; both of shape (n,) [m]."""
     return float(np.abs(reference - position).max())
 
 
-def dwell_per_reversal(velocity: Samples, period: float, standstill: float = 0.0) -> float:
+def dwell_per_reversal(velocity: FloatArray, period: float, standstill: float = 0.0) -> float:
     """Mean time at rest per reversal of direction [s].
 
     A stretch at rest between motion one way and the other is a reversal; so is a change of sign without a sample at
@@ -41,7 +40,7 @@ def dwell_per_reversal(velocity: Samples, period: float, standstill: float = 0.0
     return float(resting.mean()) * period
 
 
-def reversals(velocity: Samples, standstill: float = 0.0) -> int:
+def reversals(velocity: FloatArray, standstill: float = 0.0) -> int:
     """How often the direction of motion changes; at a constant reference every one is part of a limit cycle."""
     direction = np.sign(velocity[np.abs(velocity) > standstill])
     return int(np.count_nonzero(direction[1:] != direction[:-1]))

@@ -19,11 +19,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.closed_loop import (
     Axis,
     Performance,
     Run,
-    Samples,
     TestMotions,
     judge,
     whole_delay,
@@ -116,7 +116,7 @@ class Problem:
 
     axis: Axis
     settings: TuningSettings
-    noise: Samples | None = None
+    noise: FloatArray | None = None
     """as of `closed_loop`"""
 
     def __post_init__(self) -> None:

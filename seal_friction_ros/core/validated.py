@@ -7,7 +7,7 @@ From this one place follow the check at construction, the check of a YAML file, 
 import dataclasses
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, TypeVar
 
 Record = TypeVar('Record')
@@ -92,9 +92,7 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
     if not isinstance(values, Mapping):
         raise ValueError(f'{where} is not a mapping of names to values but {values!r}')
     fields = {f.name: f for f in _fields(record_type) if f.init and f.name not in made}
-    unknown = sorted(plain(name) for name in values if name not in fields)
-    if unknown:
-        raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(fields)}')
+    check_names(values, fields, where)
     missing = [n for n, f in fields.items() if n not in values and f.default is dataclasses.MISSING]
     if missing:
         raise ValueError(f'{where} lacks {", ".join(missing)}')
@@ -103,6 +101,37 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
         return record_type(**made, **converted)
     except ValueError as error:
         raise ValueError(f'{where}: {error}') from None
+
+
+def check_names(values: Mapping[Any, Any], known: Collection[str], where: str) -> None:
+    """Check that a mapping has no names but ``known`` ones; ``where`` says what it is.
+
+    Raises:
+        ValueError: It has.
+    """
+    unknown = sorted(plain(name) for name in values if name not in known)
+    if unknown:
+        raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(known)}')
+
+
+def name_and_source(document: Any, kind: str) -> tuple[str, str]:
+    """Name of what a document is of, and where it is from, '' if it does not say.
+
+    Args:
+        document: What came from outside.
+        kind: What it should be of, for example ``case``.
+
+    Raises:
+        ValueError: It is no mapping, has no name of one line, or its source is no text.
+    """
+    if not isinstance(document, Mapping):
+        raise ValueError(f'a {kind} file is a mapping of names to values, not {type(document).__name__}')
+    name, source = document.get('name'), document.get('source', '')
+    if not isinstance(name, str) or not name or not name.isprintable():
+        raise ValueError(f'{kind} file: name = {name!r} is not one line of text')
+    if not isinstance(source, str):
+        raise ValueError(f'{kind} {name}: source = {source!r} is not a text')
+    return name, source
 
 
 def plain(name: Any) -> str:

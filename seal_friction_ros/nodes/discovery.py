@@ -1,10 +1,11 @@
-"""How nodes find each other where no ROS distribution has set that up."""
+"""How the middleware is set up where no ROS distribution has done that: config/fastdds.xml, and this machine only."""
 
 import os
 
 from seal_friction_ros.files import share_directory
 
-_PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+"""Variables of the environment that name a file of profiles for Fast DDS."""
 
 
 def set_up_discovery() -> None:
@@ -16,6 +17,6 @@ def set_up_discovery() -> None:
     if 'ROS_DISTRO' in os.environ:
         return
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    if not any(name in os.environ for name in _PROFILES):
+    if not any(name in os.environ for name in PROFILES):
         profiles = share_directory('seal_friction_ros', __file__) / 'config' / 'fastdds.xml'
-        os.environ[_PROFILES[0]] = str(profiles)
+        os.environ[PROFILES[0]] = str(profiles)

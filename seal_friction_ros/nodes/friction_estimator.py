@@ -15,7 +15,7 @@ from seal_friction_ros.core import wire
 from seal_friction_ros.core.configuration import Configuration, SealSelection, Snapshot, snapshot_text
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.feedforward import FeedForwardSettings
-from seal_friction_ros.core.pipeline import encoded, init, receive
+from seal_friction_ros.core.pipeline import Answer, compensate, encoded, init, observe
 from seal_friction_ros.files import FEEDFORWARD_PREFIX, load_configuration
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
@@ -166,11 +166,11 @@ class FrictionEstimator(ManagedNode):
             self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
             return
         received = self._now()
-        self._state, answer = receive(self._known, self._state, message)
-        published = []
-        for answer_type, answer_data in encoded(answer):  # each is on its way before the next is made
-            self._outputs[answer_type].publish(answer_data)
-            published.append((answer_type, answer_data))
+        self._state, answer = observe(self._known, self._state, message)
+        published = self._send(answer)
+        if answer.estimate is not None:  # it is on its way before the feed-forward is computed
+            self._state, answer = compensate(self._known, self._state, message, answer)
+            published += self._send(answer._replace(estimate=None))
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
@@ -183,6 +183,13 @@ class FrictionEstimator(ManagedNode):
         if answer.estimate is not None:
             self._statistics.on_estimate(answer.estimate, done - taken)
             self._recording.now_is_a_good_time()
+
+    def _send(self, answer: Answer) -> list[tuple[str, bytes]]:
+        """Publish what there is of an answer; what that was."""
+        sent = list(encoded(answer))
+        for type_name, data in sent:
+            self._outputs[type_name].publish(data)
+        return sent
 
     def _publish(self, type_name: str, data: bytes) -> None:
         self._outputs[type_name].publish(data)

@@ -34,7 +34,7 @@ class InputOptions:
     refuse_second_publisher: bool = parameter(
         False,
         unit='',
-        description='While an input has more than one publisher its samples do not count: '
+        description='While an input, or what this node publishes, has more than one publisher, no input counts: '
         'the estimate is invalid and the feed-forward fades out.',
     )
 

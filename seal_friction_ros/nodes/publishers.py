@@ -7,6 +7,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 def publishers(node: Node, topic: str) -> list[TopicEndpointInfo]:
     """Publishers of a topic that the node has discovered, in order of their names."""
+    if not node.count_publishers(topic):  # which takes a tenth of the time
+        return []
     return sorted(node.get_publishers_info_by_topic(topic), key=full_name)
 
 

@@ -17,8 +17,8 @@ from statistics import fmean
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.configuration import parse_snapshot
 from seal_friction_ros.core.records import FrictionEstimate, FrictionState, Status
 from seal_friction_ros.core.wire import DECODERS, Velocity
@@ -44,10 +44,6 @@ _INPUTS = ('velocity', 'pressure_a', 'pressure_b', 'force_sum', 'position', 'ref
 _COLUMNS = (*_INPUTS, *FrictionEstimate._fields[1:], 'feedforward_force')
 _INTEGERS = {'state', 'direction', 'status'}
 _HARMLESS = int(Status.OUTSIDE_IDENTIFIED_RANGE)  # the inputs are good, only the law is stretched
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

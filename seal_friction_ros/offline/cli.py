@@ -132,41 +132,46 @@ def _charts(arguments: argparse.Namespace) -> int:
 
 def _oring(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.files import config_path
-    from seal_friction_ros.offline.oring import check_new, compute_case, write_seal_file
+    from seal_friction_ros.offline.oring import compute_case, seal_comment, seal_document
     from seal_friction_ros.offline.oring_report import numbers_text, write_oring_report
+    from seal_friction_ros.offline.seal_output import check_new, write_seal
 
     if arguments.out:
         check_new(arguments.out)
     path = config_path('oring', arguments.case)
     computed = compute_case(path, arguments.pressures, for_seal_file=arguments.out is not None)
-    if arguments.out:
-        write_seal_file(computed, arguments.out)
     if arguments.report:
         write_oring_report(computed, arguments.report)
+    if arguments.out:
+        write_seal(seal_document(computed), arguments.out, seal_comment(computed))
     return _tell(arguments, computed.summary, numbers_text(computed))
 
 
 def _ehl_run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.ehl_commands import run_command
 
-    return _tell(
-        arguments,
-        *run_command(arguments.case, arguments.jobs, arguments.out, arguments.bag, arguments.window, arguments.average),
-    )
+    chosen = arguments.bag, arguments.window, arguments.average
+    return _tell(arguments, *run_command(arguments.case, _jobs(arguments), arguments.out, *chosen))
 
 
 def _ehl_study(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.ehl_commands import study_command
 
-    return _tell(arguments, *study_command(arguments.case, arguments.jobs, arguments.out, arguments.work))
+    return _tell(arguments, *study_command(arguments.case, _jobs(arguments), arguments.out, arguments.work))
 
 
 def _ehl_map(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.ehl_commands import map_command
 
     return _tell(
-        arguments, *map_command(arguments.case, arguments.jobs, arguments.out, arguments.work, arguments.seal_file)
+        arguments, *map_command(arguments.case, _jobs(arguments), arguments.out, arguments.work, arguments.seal_file)
     )
+
+
+def _jobs(arguments: argparse.Namespace) -> int:
+    from seal_friction_ros.offline.replay_many import available_cores
+
+    return arguments.jobs or available_cores()
 
 
 def _tune(arguments: argparse.Namespace) -> int:
@@ -203,7 +208,8 @@ def _servo(arguments: argparse.Namespace) -> int:
 
 def _identify(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.friction_sources import Choices
-    from seal_friction_ros.offline.identify import Wishes, as_figures, identify, in_words, write_seal
+    from seal_friction_ros.offline.identify import Wishes, as_figures, identify, in_words
+    from seal_friction_ros.offline.seal_output import write_seal
 
     choices = Choices(
         rig=arguments.rig,
@@ -474,13 +480,15 @@ def _add_ehl(commands: Any) -> None:
     run = _add(steps, 'run', _ehl_run, 'friction, film and contact over a motion')
     run.add_argument('--bag', type=Path, help='run through the position of this bag, and compare with its force')
     run.add_argument('--window', type=float, nargs=2, metavar=('FROM', 'TO'), help='part of the bag to take [s]')
-    run.add_argument('--average', type=int, default=50, metavar='SAMPLES', help='moving average, default 50')
+    run.add_argument('--average', type=_at_least_one, metavar='SAMPLES', help='with --bag: moving average, default 50')
     study = _add(steps, 'study', _ehl_study, 'friction with other solid shear stresses')
     chart = _add(steps, 'map', _ehl_map, 'friction map: steady friction over speed and pressure')
     chart.add_argument('--seal-file', type=Path, metavar='FILE.yaml', help='write it as a seal file; must not exist')
     for step in (run, study, chart):
         step.add_argument('case', help='case file: a path, or the name of one in config/ehl')
-        step.add_argument('--jobs', type=int, default=os.cpu_count() or 1, help='processes; default: one for each core')
+        step.add_argument(
+            '--jobs', type=_at_least_one, metavar='N', help='processes, one core each; default: all cores'
+        )
         step.add_argument('--out', type=Path, metavar='FILE.html', help='write a page with figures')
     for step in (study, chart):
         step.add_argument('--work', type=Path, metavar='FOLDER', help='keep finished parts here, and go on from them')
@@ -502,7 +510,12 @@ def _at_least_one(text: str) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; return its exit code."""
-    parsed = make_parser().parse_args(arguments)
+    parser = make_parser()
+    if '_ARGCOMPLETE' in os.environ:  # a shell asks what may come next
+        from argcomplete import autocomplete
+
+        autocomplete(parser)
+    parsed = parser.parse_args(arguments)
     try:
         return int(parsed.run(parsed))
     except ValueError as error:

@@ -9,14 +9,16 @@ import multiprocessing
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import cache, partial
+from importlib.metadata import version
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core import ehl
+from seal_friction_ros import core
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.ehl.case import Case, Spool, parse_case
 from seal_friction_ros.core.ehl.findings import Findings, discretisation_errors, findings
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
@@ -40,8 +42,10 @@ from seal_friction_ros.core.spool_evaluation import (
     without_resonance,
 )
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.bag_evaluation import FloatArray, read_run
+from seal_friction_ros.offline.bag_evaluation import read_run
 from seal_friction_ros.offline.progress import progress
+from seal_friction_ros.offline.seal_output import rounded
+from seal_friction_ros.offline.whole_file import write_whole
 
 _PROFILES = ('gap', 'film_pressure', 'contact_pressure', 'saturation')
 _CURVES = tuple(name for name in RunResult._fields if name not in (*_PROFILES, 'case'))
@@ -77,7 +81,17 @@ def single_case(name: str, what: str) -> Case:
 _UNITS = {
     **dict.fromkeys(('assisted_length', 'elastic_length', 'second_lobe'), 'm'),
     **dict.fromkeys(
-        ('friction', 'solid_slow', 'solid_fast', 'fluid_slow', 'fluid_fast', 'edge_assist', 'after_edge'), 'N'
+        (
+            'friction',
+            'solid_slow',
+            'solid_fast',
+            'fluid_slow',
+            'fluid_fast',
+            'edge_assist',
+            'friction_on_leaving',
+            'after_edge',
+        ),
+        'N',
     ),
 }
 
@@ -212,8 +226,9 @@ def _restored(case: Case, kept: dict[str, Any]) -> RunResult:
 
 
 class MapRuns(NamedTuple):
-    """The friction map with the rows it was made from."""
+    """The friction map of a case, with the rows it was made from."""
 
+    case: Case
     law: FrictionMap
     rows: list[SteadyFriction]
     retried_steps: int
@@ -253,47 +268,35 @@ def run_map(case: Case, jobs: int, work: Path | None = None) -> MapRuns:
     _in_parallel(f'{case.name}: map', jobs_left, jobs, keep)
     ordered = [rows[repr(pressure)] for pressure in pressures]
     retried = memory[0].retried_steps + sum(row.retried_steps for row in ordered)
-    return MapRuns(friction_map(case, ordered, memory[0].length), ordered, retried)
+    return MapRuns(case, friction_map(case, ordered, memory[0].length), ordered, retried)
 
 
-def write_seal_file(case: Case, computed: MapRuns, out: Path) -> None:
-    """Write the friction map as a seal file.
+def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
+    """Seal file called ``name`` of a friction map.
 
     The uncertainty is ours: one tenth of the friction, as nothing here was measured. Breakaway is the friction at the
     lowest speed of the map, as a share of that at its reference speed: the mean over the pressures.
-
-    Raises:
-        ValueError: The file exists, or cannot be written.
     """
-    law = computed.law
-    columns = len(law.speeds)
-    frictions = [law.frictions[i : i + columns] for i in range(0, len(law.frictions), columns)]
-    table = ',\n    '.join(', '.join(f'{value:.6e}' for value in row) for row in frictions)
-    creeping = fmean(
-        row[0] / law.coulomb_friction(pressure) for row, pressure in zip(frictions, law.pressures, strict=True)
-    )
-    text = f"""name: {out.stem}
-source: computed by seal_friction ehl map from the case {case.name}; steady sliding, mean of both directions
-coulomb_law: friction_map
-friction_map:
-  speeds: [{', '.join(f'{value:.12e}' for value in law.speeds)}]
-  pressures: [{', '.join(f'{value:.6e}' for value in law.pressures)}]
-  frictions: [
-    {table}]
-  reference_speed: {law.reference_speed:.6e}
-  memory_length: {law.memory_length:.6e}
-  presliding_length: {law.presliding_length:.6e}
-stiction_ratio: {max(0.0, creeping - 1.0):.3f}  # friction of creeping over that at the reference speed, less 1
-uncertainty: {{relative_std: 0.1}}
-identified_pressure: [{law.pressures[0]:.6e}, {law.pressures[-1]:.6e}]
-"""
-    try:
-        with out.open('x', encoding='utf-8') as file:
-            file.write(text)
-    except FileExistsError:
-        raise ValueError(f'{out}: exists already, not overwriting') from None
-    except OSError as error:
-        raise ValueError(f'{out}: {error.strerror}') from None
+    law, case = computed.law, computed.case
+    creeping = fmean(law.sliding_friction(p, law.speeds[0]) / law.coulomb_friction(p) for p in law.pressures)
+    pressures = [rounded(value, 7) for value in law.pressures]
+    return {
+        'name': name,
+        'source': f'computed by seal_friction ehl map from the case {case.name}; '
+        'steady sliding, mean of both directions',
+        'coulomb_law': 'friction_map',
+        'friction_map': {
+            'speeds': [rounded(value, 13) for value in law.speeds],  # their ratios have to be equal
+            'pressures': pressures,
+            'frictions': [rounded(value, 7) for value in law.frictions],
+            'reference_speed': rounded(law.reference_speed, 7),
+            'memory_length': rounded(law.memory_length, 7),
+            'presliding_length': rounded(law.presliding_length, 7),
+        },
+        'stiction_ratio': rounded(max(0.0, creeping - 1.0), 3),
+        'uncertainty': {'relative_std': 0.1},
+        'identified_pressure': [pressures[0], pressures[-1]],
+    }
 
 
 # -- simulation against measurement -----------------------------------------------------------------------------------
@@ -314,6 +317,8 @@ class Comparison:
     """force sum less the offset of the transducer [N]"""
     filtered: FloatArray
     """the same, resonance notched out, moving average [N]"""
+    computed: FloatArray
+    """friction of ``result`` at the times of the measurement, treated alike [N]"""
     averaged_samples: int
     resonance: float | None
     """[Hz] of the measuring chain, recognised in the force; None if none stands out"""
@@ -322,15 +327,14 @@ class Comparison:
 
     def figures(self) -> dict[str, Any]:
         """Numbers for JSON."""
-        computed = np.interp(self.time, self.result.time, self.result.friction)
         return {
             'case': self.result.case.name,
             'bag': self.bag,
             'resonance_Hz': self.resonance,
             'measured_mean_N': float(np.abs(self.filtered).mean()),
-            'computed_mean_N': float(np.abs(computed).mean()),
-            'rms_difference_N': float(np.sqrt(np.mean((computed - self.filtered) ** 2))),
-            'correlation': float(np.corrcoef(computed, self.filtered)[0, 1]),
+            'computed_mean_N': float(np.abs(self.computed).mean()),
+            'rms_difference_N': float(np.sqrt(np.mean((self.computed - self.filtered) ** 2))),
+            'correlation': float(np.corrcoef(self.computed, self.filtered)[0, 1]),
             'retried_steps': self.result.retried_steps,
             'mass_defect': self.result.mass_defect,
         }
@@ -341,8 +345,9 @@ def compare_with_bag(
 ) -> Comparison:
     """Run a case through the position that a bag recorded and set its force against the computed friction.
 
-    A resonance of the measuring chain is recognised in the force and taken out of it; the computed friction is shown
-    as a chain of that frequency would show it. Without one, or if the samples are uneven in time, that of the paper.
+    A resonance of the measuring chain is recognised in the force and taken out of it, and the rest averaged; the
+    computed friction goes the same way, so that the figures compare like with like. It is also shown as a chain of
+    that frequency would show it; without a resonance, or if the samples are uneven in time, that of the paper.
 
     Args:
         case: The case; its own motion is not used. The middle of the measured way is put at its centre.
@@ -382,10 +387,26 @@ def compare_with_bag(
     measured = force - _offset(position, force)
     resonance = resonance_frequency(time, measured, law) if _even(time) else None
     chain = MeasuringChain() if resonance is None else MeasuringChain(natural_frequency=resonance)
-    quiet = measured if resonance is None else without_resonance(time, measured, resonance, law)
-    filtered = moving_average(quiet, law.moving_average)
+
+    def treated(force: FloatArray) -> FloatArray:
+        quiet = force if resonance is None else without_resonance(time, force, resonance, law)
+        return moving_average(quiet, law.moving_average)
+
+    computed = treated(np.interp(time, result.time, result.friction))
     shown = transducer_force(chain, result.time, result.friction)
-    return Comparison(bag.name, chain, result, time, position, measured, filtered, law.moving_average, resonance, shown)
+    return Comparison(
+        bag=bag.name,
+        chain=chain,
+        result=result,
+        time=time,
+        position=position,
+        measured=measured,
+        filtered=treated(measured),
+        computed=computed,
+        averaged_samples=law.moving_average,
+        resonance=resonance,
+        shown=shown,
+    )
 
 
 def _offset(position: FloatArray, force: FloatArray) -> float:
@@ -426,7 +447,7 @@ def _results(work: list[tuple[str, Callable[[], Any]]], jobs: int) -> Iterable[t
     if jobs <= 1:
         yield from ((name, function()) for name, function in work)
         return
-    # A fresh process each: numba and the progress thread do not survive a fork.
+    # Fresh processes that compile for themselves: a fork could inherit a lock that the thread of the progress holds.
     context = multiprocessing.get_context('spawn')
     with ProcessPoolExecutor(jobs, mp_context=context) as pool:
         names = {pool.submit(function): name for name, function in work}
@@ -463,15 +484,18 @@ class _Store:
         """Keep a result."""
         if self._folder is None:
             return
-        path = self._folder / f'{key}.json'
-        partial_file = path.with_suffix('.partial')
-        partial_file.write_text(json.dumps(result), encoding='utf-8')
-        partial_file.replace(path)
+        write_whole(self._folder / f'{key}.json', json.dumps(result).encode())
 
 
 def _key(what: str, case: Case) -> str:
     """Name of a result: it changes with the case and with the code that computes it."""
-    digest = hashlib.sha256(f'{what} {json.dumps(asdict(case), sort_keys=True)}'.encode())
-    for source in sorted(Path(str(ehl.__file__)).parent.glob('*.py')):
+    return hashlib.sha256(f'{what} {json.dumps(asdict(case), sort_keys=True)} {_code()}'.encode()).hexdigest()[:32]
+
+
+@cache
+def _code() -> str:
+    """Digest of the whole core, and of the versions of what it computes with."""
+    digest = hashlib.sha256(' '.join(map(version, ('numpy', 'scipy', 'numba'))).encode())
+    for source in sorted(Path(str(core.__file__)).parent.rglob('*.py')):
         digest.update(source.read_bytes())
-    return digest.hexdigest()[:32]
+    return digest.hexdigest()

@@ -14,8 +14,8 @@ from seal_friction_ros.offline.ehl import (
     run_map,
     run_spool,
     run_study,
+    seal_document,
     single_case,
-    write_seal_file,
 )
 from seal_friction_ros.offline.ehl_report import (
     write_comparison_page,
@@ -24,16 +24,18 @@ from seal_friction_ros.offline.ehl_report import (
     write_spool_page,
     write_study_page,
 )
+from seal_friction_ros.offline.seal_output import check_new, write_seal
 
 Answer = tuple[dict[str, Any], str]
 
 
 def run_command(
-    name: str, jobs: int, out: Path | None, bag: Path | None, window: list[float] | None, average: int
+    name: str, jobs: int, out: Path | None, bag: Path | None, window: list[float] | None, average: int | None
 ) -> Answer:
     """Run a case or a spool, or a case on the motion of a bag."""
-    if bag is None and window is not None:
-        raise ValueError('--window is only for a --bag')
+    for option, value in (('--window', window), ('--average', average)):
+        if bag is None and value is not None:
+            raise ValueError(f'{option} is only for a --bag')
     case = load_case(name)
     if isinstance(case, Spool):
         if bag is not None:
@@ -46,7 +48,8 @@ def run_command(
         return _paged(figures, words, out, lambda page: write_spool_page(case.name, spool, labels, page))
     if bag is not None:
         part = None if window is None else (window[0], window[1])
-        comparison = compare_with_bag(case, bag, part, SpoolEvaluation(moving_average=average))
+        law = SpoolEvaluation() if average is None else SpoolEvaluation(moving_average=average)
+        comparison = compare_with_bag(case, bag, part, law)
         figures = comparison.figures()
         words = (
             f'{case.name} on {bag}: measured {figures["measured_mean_N"]:.3g} N, '
@@ -87,13 +90,9 @@ def study_command(name: str, jobs: int, out: Path | None, work: Path | None) -> 
 def map_command(name: str, jobs: int, out: Path | None, work: Path | None, seal_file: Path | None) -> Answer:
     """Compute the friction map of a case."""
     case = single_case(name, 'friction map')
-    if seal_file is not None and seal_file.exists():
-        raise ValueError(f'{seal_file}: exists already, not overwriting')
-    if seal_file is not None and not seal_file.parent.is_dir():
-        raise ValueError(f'{seal_file.parent}: no such folder')
-    computed = run_map(case, jobs, work)
     if seal_file is not None:
-        write_seal_file(case, computed, seal_file)
+        check_new(seal_file)
+    computed = run_map(case, jobs, work)
     law = computed.law
     figures = {
         'case': case.name,
@@ -107,7 +106,10 @@ def map_command(name: str, jobs: int, out: Path | None, work: Path | None, seal_
     }
     low, high = min(law.frictions), max(law.frictions)
     words = f'{case.name}: {len(law.speeds)} speeds x {len(law.pressures)} pressures, {low:.3g} to {high:.3g} N'
-    return _paged(figures, words, out, lambda page: write_map_page(case, computed, page))
+    answer = _paged(figures, words, out, lambda page: write_map_page(computed, page))
+    if seal_file is not None:
+        write_seal(seal_document(computed, seal_file.stem), seal_file)
+    return answer
 
 
 def _paged(figures: dict[str, Any], words: str, out: Path | None, write: Any) -> Answer:

@@ -12,13 +12,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.ticker import FuncFormatter
 from PIL import Image
 
+from seal_friction_ros.core.arrays import FloatArray, IntArray
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.findings import REFERENCE_HALF_WIDTH
 from seal_friction_ros.core.ehl.spool import SpoolResult
 from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
-from seal_friction_ros.core.units import BAR
+from seal_friction_ros.core.units import BAR, MM, MPA, UM
 from seal_friction_ros.core.validated import meanings
-from seal_friction_ros.offline.bag_evaluation import FloatArray, IntArray
 from seal_friction_ros.offline.ehl import CaseRun, Comparison, MapRuns, StudyRuns
 from seal_friction_ros.offline.figures import (
     BLACK,
@@ -36,7 +36,6 @@ from seal_friction_ros.offline.figures import (
 )
 from seal_friction_ros.offline.report import number, table, tiles, write_page
 
-MM, MICRON, MPA = 1e-3, 1e-6, 1e6  # [m], [m], [Pa]
 _FRAMES = 80  # of the animation
 _FRAME_RATE = 12  # [1/s]
 _ANIMATION_DPI = 80
@@ -70,11 +69,11 @@ def write_study_page(case: Case, study: StudyRuns, out: Path) -> tuple[Path, ...
         return write_page(out, f'Solid shear stress: {case.name}', lambda f: _study_sections(case, study, f), plots)
 
 
-def write_map_page(case: Case, computed: MapRuns, out: Path) -> tuple[Path, ...]:
+def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
     """Write the page of a friction map; see `write_run_page`."""
     with house_style():
         plots = [map_figure(computed)]
-        return write_page(out, f'Friction map: {case.name}', lambda f: _map_sections(case, computed, f), plots)
+        return write_page(out, f'Friction map: {computed.case.name}', lambda f: _map_sections(computed, f), plots)
 
 
 def write_comparison_page(comparison: Comparison, out: Path) -> tuple[Path, ...]:
@@ -178,7 +177,7 @@ def film_figure(result: RunResult) -> Plot:
     for column, (name, step) in enumerate(moments(result).items()):
         upper, lower = axes[0, column], axes[1, column]
         _draw_pressure(upper, x, result, step)
-        upper.set_title(f'{name}\n{result.sliding_velocity[step] / MM:.1f} mm/s')
+        upper.set_title(f'{name}\n{number(float(result.sliding_velocity[step]) / MM, 1)} mm/s')
         _draw_film(lower, x, result, step)
         lower.set_xlabel('along the seal [mm]')
     axes[0, 0].set_ylabel('pressure [MPa]')
@@ -207,7 +206,7 @@ def _draw_pressure(ax: Axes, x: FloatArray, result: RunResult, step: int) -> Non
 
 
 def _draw_film(ax: Axes, x: FloatArray, result: RunResult, step: int) -> None:
-    gap = result.gap[step] / MICRON
+    gap = result.gap[step] / UM
     ax.fill_between(x, 0.0, gap * result.saturation[step], color=SKY, alpha=0.5, lw=0)
     ax.plot(x, gap, color=BLUE)
 
@@ -274,7 +273,7 @@ def comparison_figure(comparison: Comparison) -> Plot:
     ax.plot(x, comparison.measured, color='#d9d9d9', lw=0.7, label='measured')
     ax.plot(x, comparison.filtered, color=GREY, label=f'measured, mean of {comparison.averaged_samples}')
     ax.plot(result.position / MM, comparison.shown, color=SKY, lw=0.8, label='computed, by the chain')
-    ax.plot(result.position / MM, result.friction, color=VERMILLION, lw=1.8, label='computed')
+    ax.plot(x, comparison.computed, color=VERMILLION, lw=1.8, label=f'computed, mean of {comparison.averaged_samples}')
     ax.set_xlabel('position of the spool [mm]')
     ax.set_ylabel('friction [N]')
     legend_above(ax)
@@ -324,8 +323,8 @@ def _write_animation(result: RunResult, path: Path) -> None:
     upper.set_ylim(0.0, 1.1 * float((result.contact_pressure[last] + result.film_pressure[last]).max()) / MPA)
     upper.set_ylabel('pressure [MPa]')
     legend_above(upper)
-    gap = lower.plot(x, result.gap[steps[0]] / MICRON, color=BLUE, label='gap')[0]
-    film = lower.plot(x, result.gap[steps[0]] / MICRON, color=SKY, lw=4.0, alpha=0.5, label='filled')[0]
+    gap = lower.plot(x, result.gap[steps[0]] / UM, color=BLUE, label='gap')[0]
+    film = lower.plot(x, result.gap[steps[0]] / UM, color=SKY, lw=4.0, alpha=0.5, label='filled')[0]
     lower.set_ylim(0.0, 1e6 * _gap_limit(result))
     lower.set_ylabel('gap [µm]')
     lower.set_xlabel('along the seal [mm]')
@@ -348,8 +347,8 @@ def _write_animation(result: RunResult, path: Path) -> None:
         pressures = (result.contact_pressure[step] + result.film_pressure[step], result.contact_pressure[step])
         for line, values in zip(upper.lines, (*pressures, result.film_pressure[step]), strict=True):
             line.set_ydata(values / MPA)
-        gap.set_ydata(result.gap[step] / MICRON)
-        film.set_ydata(result.gap[step] * result.saturation[step] / MICRON)
+        gap.set_ydata(result.gap[step] / UM)
+        film.set_ydata(result.gap[step] * result.saturation[step] / UM)
         dot.set_data([result.position[step] / MM], [result.friction[step]])
         canvas.restore_region(still)
         for axes, line in moving:
@@ -371,11 +370,12 @@ _TITLES = {
     'fluid_slow': ('fluid friction, slowing down, at 0.2 of the speed', 'N', 1.0),
     'fluid_fast': ('fluid friction at full speed', 'N', 1.0),
     'rise_on_deceleration': ('rise of friction on slowing down', '%', 0.01),
-    'assisted_length': ('way after a reversal on which friction pushes along', 'µm', MICRON),
-    'elastic_length': ('the same by elasticity: friction over stiffness', 'µm', MICRON),
+    'assisted_length': ('way after a reversal on which friction pushes along', 'µm', UM),
+    'elastic_length': ('the same by elasticity: friction over stiffness', 'µm', UM),
     'second_lobe': ('position at which friction falls again while the seal sticks', 'mm', MM),
     'edge_peak': ('peak on meeting the control edge over the friction after it', '1', 1.0),
     'edge_assist': ('push of the chamfer on leaving the seat', 'N', 1.0),
+    'friction_on_leaving': ('least of all friction meanwhile', 'N', 1.0),
     'after_edge': ('friction in the seat after the control edge', 'N', 1.0),
 }
 
@@ -436,9 +436,9 @@ def _study_sections(case: Case, study: StudyRuns, figure: Callable[[str], str]) 
     yield from _parameters(case)
 
 
-def _map_sections(case: Case, computed: MapRuns, figure: Callable[[str], str]) -> Iterable[str]:
+def _map_sections(computed: MapRuns, figure: Callable[[str], str]) -> Iterable[str]:
     law = computed.law
-    yield from _head(case)
+    yield from _head(computed.case)
     yield figure('friction_map')
     yield tiles(
         (
@@ -453,7 +453,7 @@ def _map_sections(case: Case, computed: MapRuns, figure: Callable[[str], str]) -
     ]
     yield '<h2>Friction of one seal [N]</h2>'
     yield table(heads, rows, ())
-    yield from _parameters(case)
+    yield from _parameters(computed.case)
 
 
 def _comparison_sections(comparison: Comparison, figure: Callable[[str], str]) -> Iterable[str]:

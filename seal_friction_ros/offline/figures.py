@@ -18,19 +18,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.records import FrictionState, Status
 from seal_friction_ros.core.units import BAR
-from seal_friction_ros.offline.bag_evaluation import (
-    BAND_95,
-    BagEvaluation,
-    BoolArray,
-    Event,
-    FloatArray,
-    IntArray,
-    PressureLevel,
-    RecordedRun,
-    worst,
-)
+from seal_friction_ros.offline.bag_evaluation import BAND_95, BagEvaluation, Event, PressureLevel, RecordedRun, worst
 
 BLACK, GREY, LIGHT_GREY = '#1a1a1a', '#7f7f7f', '#d9d9d9'
 BLUE, SKY, ORANGE, VERMILLION, GREEN, PURPLE = '#0072b2', '#56b4e9', '#e69f00', '#d55e00', '#009e73', '#cc79a7'

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core import wire
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.configuration import parse_snapshot
 from seal_friction_ros.core.friction_readings import (
     Measurement,
@@ -23,7 +24,7 @@ from seal_friction_ros.core.friction_readings import (
     prepare_noted,
     prepare_signals,
 )
-from seal_friction_ros.core.signal_preparation import Array, Signals, Sliding
+from seal_friction_ros.core.signal_preparation import Signals, Sliding
 from seal_friction_ros.core.units import UNITS
 from seal_friction_ros.core.validated import from_mapping
 from seal_friction_ros.files import config_path, share_directory
@@ -377,7 +378,7 @@ def table_rows(path: Path) -> list[dict[str, str]]:
 
 def column_in_si(
     path: Path, rows: Sequence[Mapping[str, str]], names: Iterable[str], quantity: str, units: Mapping[str, str]
-) -> Array:
+) -> FloatArray:
     """A column in SI, found by the beginning of its name; the rest of the name is the unit.
 
     Args:

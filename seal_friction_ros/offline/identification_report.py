@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from seal_friction_ros.core.arrays import FloatArray, IntArray
 from seal_friction_ros.core.coulomb import MountedSeal, PriorArtChart
 from seal_friction_ros.core.friction_laws import normal_forces
 from seal_friction_ros.core.friction_readings import Readings
@@ -15,7 +16,6 @@ from seal_friction_ros.core.identification import BAND_95, Score, offsets_of
 from seal_friction_ros.core.normal_force import AreaDeformationGain
 from seal_friction_ros.core.seal import projected_area
 from seal_friction_ros.core.seal_file import parse_seal
-from seal_friction_ros.core.signal_preparation import Array, IntArray
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.figures import (
@@ -37,10 +37,10 @@ from seal_friction_ros.offline.identify import (
     Ring,
     fitted_readings,
     normal_force_law,
-    seal_text,
     worst_left_out,
 )
 from seal_friction_ros.offline.report import number, table, tiles, write_page
+from seal_friction_ros.offline.seal_output import seal_text
 
 PRIOR_ART_SEAL = 'ms28775_114_prior_art'  # the one ring whose charts are known
 DOTS = 1500  # in a scatter; more hide each other
@@ -85,7 +85,7 @@ class _Shown:
         return np.arange(0, self.readings.count, step)
 
 
-def magnitudes(readings: Readings, friction: Array) -> Array:
+def magnitudes(readings: Readings, friction: FloatArray) -> FloatArray:
     """Measured friction, offset of each source removed [N], shape (n,); ``friction`` [N] is a law's at the readings."""
     offsets = offsets_of(readings, friction)
     return np.asarray(readings.at.direction * (readings.force - offsets[readings.source]))
@@ -105,7 +105,7 @@ def identification_figures(found: Identification) -> list[Plot]:
     return plots
 
 
-def _side_dots(ax: Axes, shown: _Shown, x: Array, y: Array) -> None:
+def _side_dots(ax: Axes, shown: _Shown, x: FloatArray, y: FloatArray) -> None:
     """Readings as dots: extension, retraction, and what the law was not fitted to."""
     chosen = shown.dots
     direction, used = shown.readings.at.direction[chosen], shown.is_used[chosen]

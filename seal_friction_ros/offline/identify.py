@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.coulomb import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction_laws import Rung, ladder, normal_forces, squeeze_force
 from seal_friction_ros.core.friction_readings import Prepared, Readings, level_friction
@@ -50,12 +50,13 @@ from seal_friction_ros.core.identification import (
 from seal_friction_ros.core.normal_force import NormalForceLaw
 from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.seal_file import NORMAL_FORCE_LAWS, parse_seal
-from seal_friction_ros.core.signal_preparation import Array, OffsetLine, offset_line
+from seal_friction_ros.core.signal_preparation import OffsetLine, offset_line
 from seal_friction_ros.core.units import BAR
 from seal_friction_ros.core.validated import from_mapping
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.friction_sources import Choices, Sources, read_sources
 from seal_friction_ros.offline.progress import progress
+from seal_friction_ros.offline.seal_output import rounded
 
 DIGITS = 6  # that a number in a seal file has
 PRESSURES_FOR_AN_EXPONENT = 6  # fewer do not tell one, once each is left out in turn (our choice)
@@ -440,7 +441,7 @@ def _offset_line(readings: Readings) -> OffsetLine | None:
 
 
 def _rounded(value: float) -> float:
-    return float(f'{value:.{DIGITS}g}')
+    return rounded(value, DIGITS)
 
 
 def _rounded_or_none(value: float) -> float | None:
@@ -526,27 +527,6 @@ def _identification_part(
     }
 
 
-def seal_text(document: Mapping[str, Any]) -> str:
-    """YAML of a seal file."""
-    text: str = yaml.safe_dump(dict(document), sort_keys=False, allow_unicode=True, width=110)
-    return text
-
-
-def write_seal(document: Mapping[str, Any], out: Path) -> None:
-    """Write a seal file, whole or not at all; one that is there is replaced.
-
-    Raises:
-        ValueError: It cannot be written.
-    """
-    partial = out.with_name(f'.{out.name}.partial')
-    try:
-        partial.write_text(seal_text(document), encoding='utf-8')
-        partial.replace(out)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise ValueError(f'{out}: cannot write the seal file: {error.strerror}') from None
-
-
 # -- pressure by pressure ---------------------------------------------------------------------------------------------
 
 
@@ -586,7 +566,9 @@ def _levels(data: Data, choice: Choice, worth: Worth, document: Mapping[str, Any
     return tuple(found)
 
 
-def fitted_readings(mounted: tuple[MountedSeal, ...], chambers: Array, velocity: Array) -> tuple[Array, Array]:
+def fitted_readings(
+    mounted: tuple[MountedSeal, ...], chambers: FloatArray, velocity: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Friction and its standard deviation [N] by mounted seals, as the node has them, shape (n,) each.
 
     Args:

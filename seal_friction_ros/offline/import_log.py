@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seal_friction_ros.core import wire
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.records import Force, Pressure
 from seal_friction_ros.core.signal_preparation import SavitzkyGolay, Sliding, slope
 from seal_friction_ros.core.units import unit_size
@@ -37,8 +38,6 @@ from seal_friction_ros.core.validated import check, from_mapping, parameter
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagWriter
 from seal_friction_ros.offline.progress import progress
-
-Array = NDArray[np.float64]
 
 _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one that the int32 seconds of a ROS stamp do not hold
 _LONGEST_LINE = 1 << 18  # characters
@@ -174,13 +173,13 @@ class Samples(NamedTuple):
 
     stamp: NDArray[np.int64]
     """[ns]"""
-    chamber_a: Array
+    chamber_a: FloatArray
     """[Pa, gauge]"""
-    chamber_b: Array
+    chamber_b: FloatArray
     """[Pa, gauge]"""
-    force_sum: Array
+    force_sum: FloatArray
     """[N]"""
-    velocity: Array
+    velocity: FloatArray
     """[m/s]"""
 
 
@@ -208,7 +207,7 @@ class ReadLog(NamedTuple):
     """A log in SI, and the columns it came from."""
 
     samples: 'Samples'
-    columns: dict[Term, Array]
+    columns: dict[Term, FloatArray]
     """as they stand in the log, in the units of the terms"""
 
 
@@ -271,7 +270,7 @@ class _Cells(NamedTuple):
     """The cells of a log that the rig file asks for."""
 
     line_numbers: Sequence[int]
-    columns: dict[Term, Array]
+    columns: dict[Term, FloatArray]
 
 
 def _read_cells(log: Path, rig: Rig) -> _Cells:
@@ -386,7 +385,7 @@ def _samples(log: Path, rig: Rig, cells: _Cells) -> Samples:
     return Samples(stamps, signals['chamber_a'], signals['chamber_b'], signals['force_sum'], signals['velocity'])
 
 
-def _combined(combination: Combination, columns: Mapping[Term, Array], rows: int) -> Array:
+def _combined(combination: Combination, columns: Mapping[Term, FloatArray], rows: int) -> FloatArray:
     total = np.full(rows, combination.constant)
     for term in combination.terms:
         total += term.size * columns[term]

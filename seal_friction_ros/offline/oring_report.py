@@ -14,12 +14,12 @@ from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Rectangle
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.oring_contact.case import gland_fill
 from seal_friction_ros.core.oring_contact.case_file import Measured
 from seal_friction_ros.core.oring_contact.results import Contact, ContactResult
 from seal_friction_ros.core.seal import projected_area, squeeze, stretch
-from seal_friction_ros.core.units import BAR, INCH, LBF, PSI
-from seal_friction_ros.offline.bag_evaluation import FloatArray
+from seal_friction_ros.core.units import BAR, INCH, LBF, MM, MPA, PSI
 from seal_friction_ros.offline.figures import (
     BLACK,
     BLUE,
@@ -35,7 +35,6 @@ from seal_friction_ros.offline.oring import Computed, sliding_contact
 from seal_friction_ros.offline.report import number, table, tiles, write_page
 from seal_friction_ros.offline.seal_charts import THESIS_SEAL, thesis_table
 
-_MPA, _MM = 1e6, 1e-3
 _COLUMNS = 3  # of panels
 
 
@@ -100,7 +99,7 @@ def numbers_text(computed: Computed) -> str:
     lines = [f'{summary.case}: on the {summary.sliding_wall}']
     lines += [
         f'  {pressure / BAR:8.2f} bar: normal force {normal:8.2f} N, axial force {axial:8.2f} N, '
-        f'peak contact stress {peak / _MPA:6.3f} MPa, contact width {width / _MM:5.3f} mm'
+        f'peak contact stress {peak / MPA:6.3f} MPa, contact width {width / MM:5.3f} mm'
         for pressure, normal, axial, peak, width in zip(*columns, strict=True)
     ]
     if summary.area_deformation_gain is not None and summary.radial_force_N is not None:
@@ -152,16 +151,16 @@ def shape_figure(computed: Computed) -> Plot:
     """Deformed section at each pressure, coloured by stress."""
     results = computed.results
     geometry = computed.file.case.geometry
-    highest = max(float(result.shape.von_mises.max()) for result in results) / _MPA
+    highest = max(float(result.shape.von_mises.max()) for result in results) / MPA
     figure, axes = _panels('The ring in its gland: von Mises stress', len(results), 2.5, sharex=True, sharey=True)
-    rod, gland = geometry.rod_diameter / 2.0 / _MM, geometry.gland_diameter / 2.0 / _MM
+    rod, gland = geometry.rod_diameter / 2.0 / MM, geometry.gland_diameter / 2.0 / MM
     thick = 0.12 * (gland - rod)
-    lowest_z = min(float(result.shape.nodes[:, 1].min()) for result in results) / _MM - 2.0 * thick
-    highest_z = max(float(result.shape.nodes[:, 1].max()) for result in results) / _MM + 2.0 * thick
+    lowest_z = min(float(result.shape.nodes[:, 1].min()) for result in results) / MM - 2.0 * thick
+    highest_z = max(float(result.shape.nodes[:, 1].max()) for result in results) / MM + 2.0 * thick
     for ax, result in zip(axes, results, strict=True):
-        corners = result.shape.nodes[result.shape.elements][:, :, ::-1] / _MM  # z to the right, r up
+        corners = result.shape.nodes[result.shape.elements][:, :, ::-1] / MM  # z to the right, r up
         cells = PolyCollection(
-            list(corners), array=result.shape.von_mises / _MPA, cmap='viridis', edgecolors='face', linewidths=0.2
+            list(corners), array=result.shape.von_mises / MPA, cmap='viridis', edgecolors='face', linewidths=0.2
         )
         cells.set_clim(0.0, highest)
         ax.add_collection(cells)
@@ -169,7 +168,7 @@ def shape_figure(computed: Computed) -> Plot:
         ax.add_patch(Rectangle((lowest_z, rod - thick), highest_z - lowest_z, thick, **steel))
         ax.add_patch(Rectangle((lowest_z, gland), highest_z - lowest_z, thick, **steel))
         if result.wall.force > 0.0:
-            wall = float(result.shape.nodes[:, 1].max()) / _MM
+            wall = float(result.shape.nodes[:, 1].max()) / MM
             ax.add_patch(Rectangle((wall, rod), highest_z - wall, gland - rod, **steel))
         ax.set_aspect('equal')
         ax.set_xlim(lowest_z, highest_z)
@@ -204,24 +203,23 @@ def profile_figure(computed: Computed) -> Plot:
     """Contact stress along the wall the ring slides on (Figures B-7 to B-11)."""
     results = computed.results
     wall = computed.file.case.geometry.sliding_wall
-    low, high = (sliding_contact(computed.file, result).peak_stress / _MPA for result in (results[0], results[-1]))
+    low, high = (sliding_contact(computed.file, result).peak_stress / MPA for result in (results[0], results[-1]))
     rise = f'rises from {low:.2f} to {high:.2f} MPa' if len(results) > 1 else f'is {low:.2f} MPa'
     title = f'The highest contact stress on the {wall} {rise}'
-    figure, axes = _panels(title, len(results), 2.2, sharex=True)
+    figure, axes = _panels(title, len(results), 2.2, sharex=True, sharey=True)
     compared = False
     for ax, result in zip(axes, results, strict=True):
         position, stress = _line(sliding_contact(computed.file, result))
-        ax.fill_between(position / _MM, stress / _MPA, color=BLUE, alpha=0.15, lw=0)
-        ax.plot(position / _MM, stress / _MPA, color=BLUE, lw=1.8, label='this computation')
+        ax.fill_between(position / MM, stress / MPA, color=BLUE, alpha=0.15, lw=0)
+        ax.plot(position / MM, stress / MPA, color=BLUE, lw=1.8, label='this computation')
         if result.pressure > 0.0:
-            ax.axhline(result.pressure / _MPA, color=GREY, lw=0.9, ls=':', label='fluid pressure')
+            ax.axhline(result.pressure / MPA, color=GREY, lw=0.9, ls=':', label='fluid pressure')
         thesis = thesis_case(computed, result)
         if thesis:
             compared = True
-            ax.plot(thesis.position / _MM, thesis.stress / _MPA, 'o', ms=4.5, color=BLACK, label='thesis, cells')
-        ax.set_ylim(bottom=0.0)
+            ax.plot(thesis.position / MM, thesis.stress / MPA, 'o', ms=4.5, color=BLACK, label='thesis, cells')
         ax.set_title(_pressure_text(result.pressure))
-    axes[0].set_xlim(left=0.0)  # of all: they share it
+    axes[0].set(xlim=(0.0, None), ylim=(0.0, None))  # of all: they share them
     for ax in axes[-_COLUMNS:]:
         ax.set_xlabel('from the upstream end [mm]')
         ax.tick_params(labelbottom=True)
@@ -250,8 +248,8 @@ def walls_figure(computed: Computed) -> Plot:
             if len(contact.position):
                 position, stress = _line(contact)
                 ax.plot(
-                    (contact.edges[0] + position) / _MM,
-                    stress / _MPA,
+                    (contact.edges[0] + position) / MM,
+                    stress / MPA,
                     color=colour,
                     label=f'{result.pressure / BAR:.3g} bar',
                 )
@@ -288,7 +286,7 @@ def force_figure(computed: Computed) -> Plot:
     thesis = [(result.pressure * area, case.normal_force) for result, case in points if case]
     if thesis:
         x, y = np.array(thesis).T
-        ax.plot(x / size, y / size, 's', ms=6.0, mfc='none', color=BLACK, label='thesis (Table 4)')
+        ax.plot(x / size, y / size, 's', ms=6.0, mfc='none', color=BLACK, label='thesis (Appendix B)')
     ax.set_ylim(bottom=0.0)
     ax.set_xlabel(f'axial force [{unit}]')
     ax.set_ylabel(f'normal force [{unit}]')
@@ -378,7 +376,7 @@ def _tiles(computed: Computed) -> str:
         ('squeeze of the free section', f'{100.0 * squeeze(case.geometry):.1f} %'),
         ('stretch', f'{100.0 * stretch(case.geometry):.1f} %'),
         ('fill of the gland', f'{100.0 * gland_fill(case.geometry, case.groove):.0f} %'),
-        ('Young modulus', f'{case.rubber.elastic_modulus / _MPA:.3g} MPa'),
+        ('Young modulus', f'{case.rubber.elastic_modulus / MPA:.3g} MPa'),
     ]
     if summary.area_deformation_gain is not None and summary.radial_force_N is not None:
         values += [
@@ -408,8 +406,8 @@ def _numbers_table(computed: Computed) -> str:
                 number(other.force),
                 number(result.axial_force),
                 number(off, 3, signed=True),
-                number(contact.peak_stress / _MPA, 3),
-                number(contact.width / _MM, 3),
+                number(contact.peak_stress / MPA, 3),
+                number(contact.width / MM, 3),
                 number(100.0 * (1.0 - result.volume_ratio), 3),
                 result.newton_steps,
             )

@@ -80,7 +80,7 @@ def replay_many(
 
 
 def _begun(work: Callable[[Path, Connection], None], bag: Path) -> tuple[Connection, BaseProcess]:
-    """A process that is at work; it shares what was loaded and compiled so far."""
+    """A process at work, forked: it shares what was loaded and compiled, and leaves the progress to its parent."""
     context = multiprocessing.get_context('fork')
     ours, its = context.Pipe(duplex=False)
     process = context.Process(target=work, args=(bag, its))

@@ -43,6 +43,7 @@ from seal_friction_ros.offline.tracking_evaluation import (
     tracking_numbers,
 )
 from seal_friction_ros.offline.tracking_figures import length, stretch_name, tracking_plots, tracking_verdict
+from seal_friction_ros.offline.whole_file import write_whole
 
 _MINUS = '\N{MINUS SIGN}'
 _MAX_CONFIGURATIONS = 5  # shown in full; a bag with more says how many
@@ -200,16 +201,6 @@ def write_page(
     except OSError as error:
         raise ValueError(f'{out}: cannot write the page or its figures: {error.strerror or error}') from None
     return tuple(files)
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    partial = path.with_name(f'.{path.name}.partial')
-    try:
-        partial.write_bytes(content)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[Any]], text_columns: Iterable[int] = (0,)) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.coulomb import (
     ActuatorFriction,
     MountedSeal,
@@ -25,7 +26,7 @@ from seal_friction_ros.core.seal import contact_length, projected_area, squeeze,
 from seal_friction_ros.core.seal_file import parse_seal
 from seal_friction_ros.core.units import BAR, INCH, LBF, PSI
 from seal_friction_ros.files import read_yaml, share_directory
-from seal_friction_ros.offline.bag_evaluation import BAND_95, FloatArray
+from seal_friction_ros.offline.bag_evaluation import BAND_95
 from seal_friction_ros.offline.figures import (
     BLACK,
     BLUE,
@@ -209,8 +210,8 @@ def coefficient_figure(shown: Charted, law: PhysicsBased) -> Plot:
         means = np.interp(pressures, levels, [friction[tested == p].mean() for p in levels]) / 2.0
         ax.plot(normal / size, means / normal, 'o', ms=6.5, color=BLACK, label='tests over finite elements (Figure 18)')
         caption += (
-            ' The points are half the mean dynamic friction of Tables A-1 to A-3 (one of two seals) over the normal '
-            'force of Table 4.'
+            ' The points are half the mean dynamic friction of Tables A-1 to A-3 of the thesis (one of two seals) over '
+            'the normal force of its Table 4.'
         )
         if abs(forces[0] / normal[0] - 1.0) > 0.1:
             caption += (
@@ -241,7 +242,7 @@ def normal_force_figure(shown: Charted, law: PhysicsBased) -> Plot:
     if shown.is_thesis_seal:
         table_4 = thesis_table('normal_force')
         points = _column(table_4, 'axial_force_lbf', LBF), _column(table_4, 'normal_force_lbf', LBF)
-        ax.plot(points[0] / size, points[1] / size, 'o', ms=6.5, color=BLACK, label='finite elements (Table 4)')
+        ax.plot(points[0] / size, points[1] / size, 'o', ms=6.5, color=BLACK, label='finite elements (thesis, Table 4)')
     ax.set_ylim(bottom=0.0)
     ax.set_xlabel(f'axial force of one seal, pressure times projected area [{unit}]')
     ax.set_ylabel(f'normal force of one seal [{unit}]')

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.configuration import SealSelection
 from seal_friction_ros.core.reference import Sine
 from seal_friction_ros.core.servo import ServoParameters, Trajectory, init, simulate
 from seal_friction_ros.core.tracking import dwell_per_reversal, tracking_peak, tracking_rms
-from seal_friction_ros.core.units import BAR
+from seal_friction_ros.core.units import BAR, MM
 from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.files import load_seals
-from seal_friction_ros.offline.bag_evaluation import FloatArray
 from seal_friction_ros.offline.figures import (
     BLACK,
     BLUE,
@@ -30,7 +30,7 @@ from seal_friction_ros.offline.figures import (
     new_figure,
 )
 from seal_friction_ros.offline.report import number, table, tiles, write_page
-from seal_friction_ros.offline.tracking_figures import MM, length, shade
+from seal_friction_ros.offline.tracking_figures import length, shade
 
 SETTLING_PERIODS = 2  # of the reference, until the start is forgotten; 0.4 s at 5 Hz
 PERIODS = 6  # of the reference that count

@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.arrays import FloatArray, IntArray
 from seal_friction_ros.core.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.estimator import EstimatorSettings
 from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.records import FrictionState
 from seal_friction_ros.core.tracking import dwell_per_reversal, reversals, tracking_peak, tracking_rms
-from seal_friction_ros.offline.bag_evaluation import MAX_GAP, FloatArray, IntArray, RecordedRun
+from seal_friction_ros.offline.bag_evaluation import MAX_GAP, RecordedRun
 
 SETTLING_TIME = 0.5  # [s] left out after a change, on top of fade_time: the feed-forward fades in, then the servo
 #                      forgets; the simulated one takes 0.1 s

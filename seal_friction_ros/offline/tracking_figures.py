@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.records import FrictionState
-from seal_friction_ros.offline.bag_evaluation import BoolArray, FloatArray, RecordedRun
+from seal_friction_ros.core.units import MM, UM
+from seal_friction_ros.offline.bag_evaluation import RecordedRun
 from seal_friction_ros.offline.figures import (
     BLUE,
     GREY,
@@ -23,7 +25,6 @@ from seal_friction_ros.offline.tracking_evaluation import TrackingEvaluation, Tr
 
 PERIODS = 3  # that are shown
 SHOWN_TIME = 1.0  # [s] of a reference that does not repeat itself
-MM, UM = 1e-3, 1e-6  # [m]
 
 
 def tracking_plots(run: RecordedRun, evaluation: TrackingEvaluation) -> list[Plot]:

@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 
 from seal_friction_ros.core import wire
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.closed_loop import Axis
 from seal_friction_ros.core.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.feedforward import FeedForwardSettings, Motion
@@ -26,11 +27,10 @@ from seal_friction_ros.core.validated import meanings
 from seal_friction_ros.core.wire import Position, ServoReference, Velocity
 from seal_friction_ros.files import FEEDFORWARD_PREFIX, default_configuration
 from seal_friction_ros.offline.bag import BagError, bag_topics, read_messages
-from seal_friction_ros.offline.bag_evaluation import FloatArray
 from seal_friction_ros.offline.figures import house_style
 from seal_friction_ros.offline.progress import progress
 from seal_friction_ros.offline.replay import Step, steps
-from seal_friction_ros.offline.report import write_page, write_whole
+from seal_friction_ros.offline.report import write_page
 from seal_friction_ros.offline.topics import Topics, find_topics
 from seal_friction_ros.offline.tune_report import (
     Task,
@@ -40,6 +40,7 @@ from seal_friction_ros.offline.tune_report import (
     tuning_figures,
     tuning_sections,
 )
+from seal_friction_ros.offline.whole_file import write_whole
 
 CONTROL_PERIOD, INNER_STEP = 1e-3, 1e-4  # [s] of the simulated servo, as servo_simulator runs it
 NOISE_LENGTH = 8192  # samples of noise, which then repeats

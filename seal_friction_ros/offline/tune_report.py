@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.closed_loop import (
     JUDGED_PERIODS,
     SETTLED_PERIODS,
@@ -20,8 +21,8 @@ from seal_friction_ros.core.feedforward import FeedForwardSettings
 from seal_friction_ros.core.matching import NEAR_REVERSAL, Match, Recording
 from seal_friction_ros.core.tracking import tracking_peak, tracking_rms
 from seal_friction_ros.core.tuning import Problem, Tuning
+from seal_friction_ros.core.units import MM, MS, UM
 from seal_friction_ros.core.validated import meanings
-from seal_friction_ros.offline.bag_evaluation import BoolArray, FloatArray
 from seal_friction_ros.offline.figures import (
     BLACK,
     BLUE,
@@ -38,7 +39,6 @@ from seal_friction_ros.offline.figures import (
 )
 from seal_friction_ros.offline.report import number, table, tiles
 
-MM, MS, MICROMETRE = 1e-3, 1e-3, 1e-6  # [m], [s], [m]
 ZOOM = 0.22  # of the period, on each side of a reversal
 SHOWN_REVERSALS = 6  # of a bag
 DOTS = 8000  # of a scatter
@@ -113,7 +113,7 @@ def tracking_figure(problem: Problem, found: Tuning, without: Run, with_it: Run)
         _part(ax, with_it.time, with_it.position / MM, color=BLUE, label='with feed-forward')
         ax.set_ylabel('rod position [mm]')
     for run, colour in ((without, VERMILLION), (with_it, BLUE)):
-        _part(axes[2], run.time, (run.position - run.reference) / MICROMETRE, color=colour)
+        _part(axes[2], run.time, (run.position - run.reference) / UM, color=colour)
     axes[2].axhline(0.0, color=GREY, lw=0.6)
     axes[2].set_ylabel('error [µm]')
     axes[2].set_xlabel('time [s]')
@@ -152,7 +152,7 @@ def move_figure(problem: Problem, found: Tuning, without: Run, with_it: Run) -> 
     """Error of the move, with the model right and too large."""
     worst = problem.runs(found.feedforward, friction_error=problem.settings.friction_error)[1]
     over = max(case.performance.overshoot for case in found.cases)
-    title = f'Largest overshoot of the move: {over / MICROMETRE:.3g} µm, with a model that is wrong'
+    title = f'Largest overshoot of the move: {over / UM:.3g} µm, with a model that is wrong'
     figure, axes = new_figure(title, 4.8, nrows=2, sharex=True)
     percent = f'{100.0 * problem.settings.friction_error:.3g} %'
     axes[0].plot(without.time, without.reference / MM, color=GREY, lw=2.2, alpha=0.6, label='reference')
@@ -162,7 +162,7 @@ def move_figure(problem: Problem, found: Tuning, without: Run, with_it: Run) -> 
         (worst, ORANGE, f'with a model {percent} too large'),
     ):
         axes[0].plot(run.time, run.position / MM, color=colour, lw=1.0)
-        axes[1].plot(run.time, (run.position - run.reference) / MICROMETRE, color=colour, label=name)
+        axes[1].plot(run.time, (run.position - run.reference) / UM, color=colour, label=name)
     axes[0].set_ylabel('rod position [mm]')
     axes[1].set_ylabel('error [µm]')
     axes[1].set_xlabel('time [s]')
@@ -189,7 +189,7 @@ def robustness_figure(problem: Problem, found: Tuning) -> Plot:
     )
     figure, axes = new_figure(title, 3.8, ncols=2)
     rows = [(c.friction_error, c.delay_error, c.performance) for c in found.cases]
-    _bars(axes[0], [(f, d, p.tracking_rms / MICROMETRE) for f, d, p in rows], was.tracking_rms / MICROMETRE)
+    _bars(axes[0], [(f, d, p.tracking_rms / UM) for f, d, p in rows], was.tracking_rms / UM)
     axes[0].set_ylabel('tracking RMS [µm]')
     _bars(axes[1], [(f, d, p.dwell / MS) for f, d, p in rows], was.dwell / MS)
     axes[1].set_ylabel('dwell per reversal [ms]')
@@ -338,7 +338,7 @@ def recorded_figure(recording: Recording, track: Track, found: Match) -> Plot:
     time, part = recording.time, _shown(found.reversal)
     _thin(axes[0], time[part], track.reference[part] / MM, color=GREY, lw=2.2, alpha=0.6, label='reference')
     _thin(axes[0], time[part], track.position[part] / MM, color=VERMILLION, label='rod')
-    error = (track.position - track.reference) / MICROMETRE
+    error = (track.position - track.reference) / UM
     _thin(axes[1], time[part], error[part], color=VERMILLION)
     axes[1].axhline(0.0, color=GREY, lw=0.6)
     for ax in axes:
@@ -389,10 +389,10 @@ def tuning_sections(
     yield f'<p class="lead">{escape(verdict)}</p>'
     yield tiles(
         [
-            (f'{was.tracking_rms / MICROMETRE:.3g} to {now.tracking_rms / MICROMETRE:.3g} µm', 'tracking RMS'),
+            (f'{was.tracking_rms / UM:.3g} to {now.tracking_rms / UM:.3g} µm', 'tracking RMS'),
             (f'{was.dwell / MS:.3g} to {now.dwell / MS:.3g} ms', 'dwell per reversal'),
-            (f'{_worst(found, "tracking_rms") / MICROMETRE:.3g} µm', 'worst tracking RMS of all cases'),
-            (f'{_worst(found, "overshoot") / MICROMETRE:.3g} µm', 'worst overshoot of all cases'),
+            (f'{_worst(found, "tracking_rms") / UM:.3g} µm', 'worst tracking RMS of all cases'),
+            (f'{_worst(found, "overshoot") / UM:.3g} µm', 'worst overshoot of all cases'),
             (f'{sum(case.performance.limit_cycle_reversals for case in found.cases)}', 'reversals at rest, all cases'),
         ]
     )
@@ -431,8 +431,8 @@ def _case_table(found: Tuning) -> str:
     )
 
     def row(friction: str, delay: str, p: Performance) -> tuple[Any, ...]:
-        lengths = [number(value / MICROMETRE, 1) for value in (p.tracking_rms, p.tracking_peak)]
-        rest = number(p.dwell / MS, 2), number(p.overshoot / MICROMETRE, 1), p.limit_cycle_reversals
+        lengths = [number(value / UM, 1) for value in (p.tracking_rms, p.tracking_peak)]
+        rest = number(p.dwell / MS, 2), number(p.overshoot / UM, 1), p.limit_cycle_reversals
         return friction, delay, *lengths, *rest, number(p.largest_force, 1), number(p.largest_force_rate * MS, 1)
 
     rows = [row('without', number(None), found.without)]
@@ -524,7 +524,7 @@ def match_sections(
     if recorded['recorded_tracking_rms'] is None:
         yield '<p>No rod position in the bag, so nothing to show.</p>'
     else:
-        rms, peak = (number((value or 0.0) / MICROMETRE, 1) for value in recorded.values())
+        rms, peak = (number((value or 0.0) / UM, 1) for value in recorded.values())
         yield f'<p>Recorded error: RMS {rms} µm, peak {peak} µm.</p>'
         yield figure('recorded')
     yield '<h2>Parameters</h2>'

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from seal_friction_ros.core.ehl.contact import (
 from seal_friction_ros.core.ehl.elasticity import HalfPlane
 from seal_friction_ros.core.ehl.grease import Grease
 from seal_friction_ros.core.ehl.reynolds import FilmEnds
-from seal_friction_ros.core.ehl.shear import fluid_shear, real_area_share, shear, solid_shear
+from seal_friction_ros.core.ehl.shear import fluid_shear, real_area_share, solid_shear
 from seal_friction_ros.core.ehl.topography import Topography
 
 LENGTH, RADIUS, MODULUS, DEPTH = 0.6e-3, 1e-3, 14.28e6, 1e-3  # [m], [m], [Pa], [m]
@@ -55,6 +56,18 @@ def slid(
         )
         state = step.state
     return step
+
+
+class Shear(NamedTuple):
+    """Shear forces [N/m]."""
+
+    solid: float
+    fluid: float
+
+
+def shear(contact: Contact, state: ContactState, wall_velocity: float, solid_shear_stress: float, ends: FilmEnds):
+    fluid = fluid_shear(*state, wall_velocity, contact.grease.numbers, contact.half_plane.cell_width, ends)
+    return Shear(solid_shear(contact, state.gap, solid_shear_stress), float(fluid))
 
 
 def dry(contact: Contact) -> ContactState:

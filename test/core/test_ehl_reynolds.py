@@ -1,16 +1,16 @@
 """The film of a given gap: against closed forms, conserved, complementary."""
 
+import given_gap
 import numpy as np
 import pytest
+from given_gap import OPEN, film_of_gap
 from scipy.optimize import brentq
 
 from seal_friction_ros.core.convergence import NotConvergedError
-from seal_friction_ros.core.ehl import reynolds
-from seal_friction_ros.core.ehl.reynolds import FilmEnds, film_of_gap
+from seal_friction_ros.core.ehl.reynolds import FilmEnds
 
 VISCOSITY = 0.01  # [Pa s]
 MEAN_VELOCITY = 0.5  # [m/s]
-OPEN = FilmEnds()
 
 
 def plane_slider(cells: int) -> tuple[float, float]:
@@ -130,6 +130,6 @@ def test_pulled_apart_a_film_cavitates_and_keeps_its_mass():
 
 
 def test_no_solution_is_an_error(monkeypatch):
-    monkeypatch.setattr(reynolds, '_ITERATIONS', 2)
+    monkeypatch.setattr(given_gap, 'ITERATIONS', 2)
     with pytest.raises(NotConvergedError, match='film_of_gap: no solution after 2 iterations'):
         Parabola().film(100)

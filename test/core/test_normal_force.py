@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from seal_friction_ros.core.normal_force import (
     AreaDeformationGain,
     NormalForceTable,
-    area_deformation_gain_from_points,
 )
 
 AREA = 1e-4  # [m^2]
@@ -19,26 +18,6 @@ pressures = st.floats(0.0, 1e9)
 def test_the_line_adds_a_share_of_the_axial_force_to_the_radial_force():
     assert LINE.normal_force(0.0, AREA) == 10.0
     assert LINE.normal_force(1e6, AREA) == pytest.approx(0.4 * 1e6 * AREA + 10.0)
-
-
-@given(st.floats(0.0, 10.0), st.floats(1e-3, 1e3))
-def test_a_line_is_found_again_from_points_on_it(gain, radial_force):
-    law = AreaDeformationGain(gain, radial_force)
-    axial = [0.0, 100.0, 250.0, 900.0]
-    found = area_deformation_gain_from_points(axial, [law.normal_force(force, 1.0) for force in axial])
-    assert found.area_deformation_gain == pytest.approx(gain, rel=1e-9, abs=1e-9)
-    assert found.radial_force == pytest.approx(radial_force, rel=1e-6, abs=1e-9)
-
-
-def test_the_line_is_the_least_squares_one():
-    found = area_deformation_gain_from_points([0.0, 1.0, 2.0], [1.0, 3.0, 2.0])
-    assert found.area_deformation_gain == pytest.approx(0.5)
-    assert found.radial_force == pytest.approx(1.5)
-
-
-def test_points_whose_line_falls_make_no_law():
-    with pytest.raises(ValueError, match=r'area_deformation_gain = -1.0 1 is below its lower bound 0.0'):
-        area_deformation_gain_from_points([0.0, 1.0], [2.0, 1.0])
 
 
 def test_the_table_goes_through_its_points_whatever_the_area():

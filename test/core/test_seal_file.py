@@ -245,7 +245,7 @@ def test_what_is_no_mapping_is_refused(document):
 
 @pytest.mark.parametrize('name', [None, 5, '', [], {}])
 def test_a_seal_needs_a_name(name):
-    assert complaint(changed(POWER, 'name', name)) == f'seal file: name = {name!r} is not a text'
+    assert complaint(changed(POWER, 'name', name)) == f'seal file: name = {name!r} is not one line of text'
 
 
 @pytest.mark.parametrize('value', [[0.0], [0.0, 1e6, 2e6], 'ab', {'a': 1, 'b': 2}, 5.0])

@@ -4,13 +4,13 @@ import csv
 import math
 from decimal import Decimal
 from pathlib import Path
-from statistics import fmean
+from statistics import fmean, linear_regression
 
 import pytest
 
 from seal_friction_ros.core.coulomb import MountedSeal, actuator_friction, coulomb_friction
 from seal_friction_ros.core.friction_coefficient import power_law_from_points
-from seal_friction_ros.core.normal_force import area_deformation_gain_from_points
+from seal_friction_ros.core.normal_force import AreaDeformationGain
 from seal_friction_ros.core.seal import contact_length, projected_area, squeeze
 from seal_friction_ros.core.seal_file import parse_seal
 from seal_friction_ros.core.units import INCH, LBF, PSI
@@ -143,9 +143,8 @@ def test_contact_length_is_1_963_inches():
 
 
 def line():
-    return area_deformation_gain_from_points(
-        [row['axial_force_lbf'] * LBF for row in NORMAL_FORCE], [row['normal_force_lbf'] * LBF for row in NORMAL_FORCE]
-    )
+    forces = ([row[name] * LBF for row in NORMAL_FORCE] for name in ('axial_force_lbf', 'normal_force_lbf'))
+    return AreaDeformationGain(*linear_regression(*forces))
 
 
 def test_area_deformation_gain_and_intercept_of_table_4():

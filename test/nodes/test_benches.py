@@ -10,6 +10,8 @@ def test_every_round_trip_is_answered_by_every_node_asked():
         assert figures['200']['missed'] == 0
         assert 0.0 < figures['200']['p50 [us]'] <= figures['200']['p99 [us]']
     assert len(found['ratios']) == 3
+    woken = found['figures']['estimator']['200']['event thread woken per sample']
+    assert woken < 3.0  # what config/fastdds.xml is for; without it four to eight times
 
 
 def test_the_start_is_timed():

@@ -1,6 +1,7 @@
 """The command line: exit codes, figures alone on stdout, one line for what went wrong, nothing left behind."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -156,3 +157,14 @@ def test_help_loads_no_numerics_no_compiler_and_no_ros():
         loaded = set(json.loads(found.stdout.splitlines()[-1]))
         assert 'usage: seal_friction' in found.stdout
         assert not loaded & {'numpy', 'scipy', 'matplotlib', 'numba', 'rclpy', 'rosbags', 'mcap', 'rich', 'yaml'}
+
+
+@pytest.mark.parametrize(
+    ('typed', 'offered'), [('rep', ['replay', 'report']), ('replay bag --v', ['--verify']), ('report --x', [])]
+)
+def test_a_shell_is_told_what_may_come_next(typed: str, offered: list[str], tmp_path: Path):
+    line, told = f'seal_friction {typed}', tmp_path / 'told'
+    asked = {'_ARGCOMPLETE': '1', '_ARGCOMPLETE_STDOUT_FILENAME': str(told), '_ARGCOMPLETE_IFS': '\n'}
+    environment = {**os.environ, **asked, 'COMP_LINE': line, 'COMP_POINT': str(len(line)), 'PYTHONPATH': str(ROOT)}
+    subprocess.run([sys.executable, '-m', 'seal_friction_ros.offline.cli'], env=environment, cwd=tmp_path, check=True)
+    assert told.read_text().split() == offered

@@ -139,7 +139,7 @@ def test_map_does_not_overwrite_a_seal_file(small, tmp_path, capsys):
     there = tmp_path / 'there.yaml'
     there.write_text('mine')
     assert main(['ehl', 'map', small, '--seal-file', str(there)]) == 2
-    assert 'exists already, not overwriting' in capsys.readouterr().err
+    assert 'exists already: not overwriting it' in capsys.readouterr().err
     assert there.read_text() == 'mine'
 
 
@@ -174,6 +174,7 @@ def test_every_bench_of_the_page_is_one(small, capsys, monkeypatch):
     specification.loader.exec_module(bench)
     monkeypatch.setattr(bench, 'single_case', lambda _name, what: ehl.single_case(small, what))
     monkeypatch.setattr(bench, 'SINGLE', ('small',))
+    monkeypatch.setattr(bench, 'OURS', {'small': ('topography.rms_height', 'seal.crown_radius')})
     monkeypatch.setattr(bench, 'CELLS', (32, 48))
     monkeypatch.setattr(bench, 'STEPS', (8e-3, 4e-3))
     monkeypatch.setattr(bench, 'CALLS', 50)
@@ -244,7 +245,8 @@ def test_measured_motion_of_a_bag_is_run_and_its_force_compared(small, tmp_path,
         (['map', 'spool'], 'a spool has no friction map'),
         (['run', 'spool', '--bag', 'x'], 'a spool cannot be compared with a bag'),
         (['run', 'inner_seal', '--window', '0', '1'], '--window is only for a --bag'),
-        (['map', 'inner_seal', '--seal-file', 'nowhere/x.yaml'], 'nowhere: no such folder'),
+        (['run', 'inner_seal', '--average', '9'], '--average is only for a --bag'),
+        (['map', 'inner_seal', '--seal-file', 'setup.py/x.yaml'], 'setup.py/x.yaml: cannot write into'),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(arguments, words, capsys):

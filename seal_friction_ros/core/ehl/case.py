@@ -19,7 +19,7 @@ from seal_friction_ros.core.ehl.groove import Groove
 from seal_friction_ros.core.ehl.kinematics import ConstantAcceleration
 from seal_friction_ros.core.ehl.topography import Topography
 from seal_friction_ros.core.ehl.wall import ControlEdge, FilmSupply
-from seal_friction_ros.core.validated import check, from_mapping, parameter, plain
+from seal_friction_ros.core.validated import check, check_names, from_mapping, name_and_source, parameter
 
 
 @dataclass(frozen=True)
@@ -277,18 +277,9 @@ def parse_case(document: Any) -> Case | Spool:
     Raises:
         ValueError: The document makes no sense; the message names the case, the field, its value and its bound.
     """
-    if not isinstance(document, Mapping):
-        raise ValueError(f'a case file is a mapping of names to values, not {type(document).__name__}')
-    name = document.get('name')
-    if not isinstance(name, str) or not name.isprintable() or not name:
-        raise ValueError(f'case file: name = {name!r} is not one line of text')
-    source = document.get('source', '')
-    if not isinstance(source, str):
-        raise ValueError(f'case {name}: source = {source!r} is not a text')
-    known = {'name', 'source', *(('seals', 'motion') if 'seals' in document else _PARTS)}
-    unknown = sorted(plain(key) for key in document if key not in known)
-    if unknown:
-        raise ValueError(f'case {name} has no {", ".join(unknown)}: it has {", ".join(sorted(known))}')
+    name, source = name_and_source(document, 'case')
+    known = ('name', 'source', *(('seals', 'motion') if 'seals' in document else _PARTS))
+    check_names(document, sorted(known), f'case {name}')
     if 'seals' in document:
         return _parse_spool(document, name, source)
     parts: dict[str, Any] = {

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.compiled import compiled
 from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl.elasticity import HalfPlane
@@ -29,8 +29,6 @@ from seal_friction_ros.core.ehl.grease import Grease, apparent_viscosity
 from seal_friction_ros.core.ehl.krylov import StalledError, gmres
 from seal_friction_ros.core.ehl.reynolds import FilmEnds, complementarity, reynolds_rows
 from seal_friction_ros.core.ehl.topography import Topography, contact_pressure
-
-FloatArray = npt.NDArray[np.float64]
 
 _ITERATIONS = 40
 _GMRES_ITERATIONS = 60

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import next_fast_len
 
-FloatArray = npt.NDArray[np.float64]
+from seal_friction_ros.core.arrays import FloatArray, IntArray
 
 _HALF_BAND = 6  # of the approximate inverse; 4 to 10 run alike
 
@@ -66,7 +66,7 @@ class HalfPlane:
         return np.asarray(self.influence[np.abs(i[:, None] - i)])
 
 
-def _influence(distance: FloatArray | npt.NDArray[np.int64], width: float, modulus: float, depth: float) -> FloatArray:
+def _influence(distance: FloatArray | IntArray, width: float, modulus: float, depth: float) -> FloatArray:
     """Integral of the kernel over a cell whose centre is ``distance`` cells away [m/Pa]."""
     far, near = (distance + 0.5) * width, (distance - 0.5) * width
     logarithms = far * np.log(far) - near * np.log(np.abs(near))

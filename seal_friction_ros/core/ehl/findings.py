@@ -6,13 +6,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 REFERENCE_HALF_WIDTH = 0.5e-3
 """[m] about the middle: where the paper takes its mean friction (chapter 6)"""
@@ -47,6 +44,8 @@ class Findings(NamedTuple):
     """largest friction on meeting the control edge over the mean in the seat after it"""
     edge_assist: float | None
     """[N] largest push of the chamfer along the motion, on leaving the seat"""
+    friction_on_leaving: float | None
+    """[N] least of all friction while that push is above half of it; negative pushes along"""
     after_edge: float | None
     """[N] mean friction well inside the seat, after the control edge"""
 
@@ -69,6 +68,8 @@ def findings(result: RunResult) -> Findings:
     slowing = [i for i, _ in slow]
     assisted, elastic = _assisted(result, last)
     edge = case.control_edge
+    pushed = np.where(last & (result.velocity > 0.0), result.edge, 0.0)
+    leaving = pushed <= 0.5 * pushed.min()
     return Findings(
         friction=float(np.abs(result.friction[middle]).mean()),
         solid_share=float(solid[sliding].sum() / (solid[sliding] + fluid[sliding]).sum()),
@@ -83,7 +84,8 @@ def findings(result: RunResult) -> Findings:
         elastic_length=elastic,
         second_lobe=_second_lobe(result, last),
         edge_peak=_edge_peak(result, last) if edge else None,
-        edge_assist=float(max(0.0, -result.edge[last & (result.velocity > 0.0)].min())) if edge else None,
+        edge_assist=max(0.0, -float(pushed.min())) if edge else None,
+        friction_on_leaving=float(result.friction[leaving].min()) if edge else None,
         after_edge=_after_edge(result, last) if edge else None,
     )
 

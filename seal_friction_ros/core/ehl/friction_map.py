@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl.case import Case, MapGrid
 from seal_friction_ros.core.ehl.contact import ContactState, contact_step
 from seal_friction_ros.core.ehl.friction_law import FrictionMap
-from seal_friction_ros.core.ehl.shear import fluid_shear, solid_shear
-from seal_friction_ros.core.ehl.transient import Model, rest
-
-FloatArray = npt.NDArray[np.float64]
+from seal_friction_ros.core.ehl.transient import Model, fluid_force, rest, solid_limit
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
 _MOST_RETRIES = 20
@@ -63,11 +60,8 @@ def _plain(case: Case, pressure: float) -> Case:
 
 def _friction(model: Model, state: ContactState, velocity: float) -> tuple[float, float]:
     """Friction and solid friction [N], magnitudes, at a sliding ``velocity`` [m/s]."""
-    width = model.contact.half_plane.cell_width
-    solid = model.circumference * solid_shear(model.contact, state.gap, model.case.seal.solid_shear_stress)
-    wall = -velocity
-    fluid = float(fluid_shear(*state, wall, model.case.grease.numbers, width, model.ends()))
-    return solid + model.circumference * fluid * math.copysign(1.0, wall), solid
+    solid = solid_limit(model, state)
+    return solid + math.copysign(1.0, velocity) * fluid_force(model, state, velocity), solid
 
 
 def _slid(

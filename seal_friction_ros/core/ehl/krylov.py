@@ -4,9 +4,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from seal_friction_ros.core.arrays import FloatArray
 
 
 class StalledError(ArithmeticError):

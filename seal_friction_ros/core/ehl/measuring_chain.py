@@ -4,11 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.validated import check, parameter
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -2,27 +2,15 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import erf
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.compiled import compiled
-from seal_friction_ros.core.ehl.contact import Contact, ContactState, asperity_pressure
+from seal_friction_ros.core.ehl.contact import Contact, asperity_pressure
 from seal_friction_ros.core.ehl.grease import apparent_viscosity
 from seal_friction_ros.core.ehl.reynolds import FilmEnds
-
-FloatArray = npt.NDArray[np.float64]
-
-
-class Shear(NamedTuple):
-    """Shear forces per length of circumference."""
-
-    solid: float
-    """tau_c A_real, without a sign [N/m]"""
-    fluid: float
-    """of the film on the seal, in the direction of the wall [N/m]"""
 
 
 def real_area_share(contact: Contact, gap: FloatArray) -> FloatArray:
@@ -66,18 +54,6 @@ def fluid_shear(
         rate = couette - poiseuille
         total += saturation[i] * apparent_viscosity(grease, rate) * rate
     return total * width
-
-
-def shear(
-    contact: Contact,
-    state: ContactState,
-    wall_velocity: float,
-    solid_shear_stress: float,
-    ends: FilmEnds,
-) -> Shear:
-    """Both shear forces [N/m] at a ``wall_velocity`` [m/s] in the frame of the seal and tau_c [Pa]."""
-    fluid = fluid_shear(*state, wall_velocity, contact.grease.numbers, contact.half_plane.cell_width, ends)
-    return Shear(solid_shear(contact, state.gap, solid_shear_stress), float(fluid))
 
 
 def sliding_velocity(

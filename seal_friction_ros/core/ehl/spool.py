@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.ehl.case import Member
 from seal_friction_ros.core.ehl.kinematics import Motion
 from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class MemberMotion:
@@ -41,7 +39,7 @@ class SpoolResult(NamedTuple):
     """of all seals [N], with the sign of the velocity it resists"""
     members: FloatArray
     """of each seal [N], shape (seals, steps)"""
-    last_cycle: npt.NDArray[np.bool_]
+    last_cycle: BoolArray
     """whether each step is in the last cycle"""
 
 

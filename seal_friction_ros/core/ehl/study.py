@@ -3,12 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.ehl.findings import REFERENCE_HALF_WIDTH, findings
 from seal_friction_ros.core.ehl.transient import RunResult, last_cycle
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class StudyTable(NamedTuple):

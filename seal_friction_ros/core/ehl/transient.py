@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.convergence import NotConvergedError
 from seal_friction_ros.core.ehl.case import Case
 from seal_friction_ros.core.ehl.contact import (
@@ -30,8 +30,6 @@ from seal_friction_ros.core.ehl.kinematics import Motion
 from seal_friction_ros.core.ehl.reynolds import FilmEnds
 from seal_friction_ros.core.ehl.shear import fluid_shear, sliding_velocity, solid_shear
 from seal_friction_ros.core.ehl.wall import WallFilm
-
-FloatArray = npt.NDArray[np.float64]
 
 _MOST_HALVINGS = 10
 _LONGEST_WALL = 1_000_000  # cells of its film
@@ -158,7 +156,7 @@ class RunResult(NamedTuple):
     """largest difference between lubricant in and out and that in the film, over that in the film, of any step"""
 
 
-def last_cycle(result: RunResult) -> npt.NDArray[np.bool_]:
+def last_cycle(result: RunResult) -> BoolArray:
     """Whether each step is in the last cycle of the motion of the case, shape (steps,)."""
     begin = result.time[-1] * (1.0 - 1.0 / result.case.motion.cycles)
     return np.asarray(result.time > begin + 1e-12)
@@ -251,13 +249,13 @@ def _edge_force(model: Model, moment: Moment) -> float:
     return -model.circumference * axial
 
 
-def _fluid_force(model: Model, state: ContactState, velocity: float) -> float:
+def fluid_force(model: Model, state: ContactState, velocity: float) -> float:
     """Fluid friction [N] at a sliding ``velocity`` [m/s]."""
     numbers, width = model.case.grease.numbers, model.contact.half_plane.cell_width
     return -model.circumference * float(fluid_shear(*state, -velocity, numbers, width, model.ends()))
 
 
-def _solid_limit(model: Model, state: ContactState) -> float:
+def solid_limit(model: Model, state: ContactState) -> float:
     """Magnitude of the solid friction [N] of a sliding contact."""
     return model.circumference * solid_shear(model.contact, state.gap, model.case.seal.solid_shear_stress)
 
@@ -267,15 +265,15 @@ def _slide(model: Model, moment: Moment, step: float, position: float) -> tuple[
     groove = model.case.seated_groove
     stuck_lag = moment.lag + position - moment.position
     edge = _edge_force(model, moment)
-    fluid_at_rest = _fluid_force(model, moment.state, 0.0)
-    solid = _solid_limit(model, moment.state)
+    fluid_at_rest = fluid_force(model, moment.state, 0.0)
+    solid = solid_limit(model, moment.state)
     drive = groove.force(stuck_lag) - edge - fluid_at_rest
     if abs(drive) <= solid:
         return 0.0, stuck_lag
     velocity = sliding_velocity(
         drive,
         solid,
-        lambda v: _fluid_force(model, moment.state, v) - fluid_at_rest,
+        lambda v: fluid_force(model, moment.state, v) - fluid_at_rest,
         lambda v: groove.force(stuck_lag - v * step) - edge - fluid_at_rest,
         max(abs(position - moment.position), (abs(drive) - solid) / groove.stiffness) / step,
     )
@@ -283,9 +281,9 @@ def _slide(model: Model, moment: Moment, step: float, position: float) -> tuple[
 
 
 def _forces(model: Model, moment: Moment, velocity: float) -> Forces:
-    fluid = _fluid_force(model, moment.state, velocity)
+    fluid = fluid_force(model, moment.state, velocity)
     edge = _edge_force(model, moment)
-    limit = _solid_limit(model, moment.state)
+    limit = solid_limit(model, moment.state)
     if velocity:
         solid = math.copysign(limit, velocity)
     else:  # stuck: the asperities hold what the spring asks, up to their limit

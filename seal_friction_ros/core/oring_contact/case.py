@@ -31,7 +31,7 @@ class Groove:
 class Numerics:
     """How finely it is computed. Defaults of ``lines`` and ``penalty`` converge the normal force to 1 %.
 
-    ``transition`` is a choice: a sharp one gives some 3 % more normal force under pressure, see docs/oring.md.
+    ``transition`` is a choice: a sharp one (0.01) makes 3.0 to 3.6 % more normal force under pressure: docs/oring.md.
 
     Raises:
         ValueError: A number is out of bounds.

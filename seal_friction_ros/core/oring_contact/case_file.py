@@ -25,7 +25,7 @@ from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCas
 from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
 from seal_friction_ros.core.seal import SealGeometry
 from seal_friction_ros.core.seal_file import parse_friction_coefficient
-from seal_friction_ros.core.validated import check, from_mapping, parameter, plain
+from seal_friction_ros.core.validated import check, check_names, from_mapping, name_and_source, parameter
 
 _KEYS = (
     'name', 'source', 'geometry', 'groove', 'rubber', 'wall_friction', 'numerics', 'pressures', 'friction', 'measured',
@@ -88,18 +88,9 @@ def parse_case(document: Any) -> CaseFile:
     Raises:
         ValueError: The document makes no sense; the message names the case, the field, its value and its bound.
     """
-    if not isinstance(document, Mapping):
-        raise ValueError(f'a case file is a mapping of names to values, not {type(document).__name__}')
-    name = document.get('name')
-    if not isinstance(name, str) or not name or not name.isprintable():
-        raise ValueError(f'case file: name = {name!r} is not one line of text')
+    name, source = name_and_source(document, 'case')
     where = f'case {name}'
-    unknown = sorted(plain(key) for key in document if key not in _KEYS)
-    if unknown:
-        raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(_KEYS)}')
-    source = document.get('source', '')
-    if not isinstance(source, str):
-        raise ValueError(f'{where}: source = {source!r} is not a text')
+    check_names(document, _KEYS, where)
     rubber = _rubber(document.get('rubber'), f'{where}: rubber')
     geometry = from_mapping(
         SealGeometry, document.get('geometry'), f'{where}: geometry', elastic_modulus=rubber.elastic_modulus

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.oring_contact.arrays import FloatArray, IntArray
+from seal_friction_ros.core.arrays import FloatArray, IntArray
 from seal_friction_ros.core.oring_contact.material import Rubber, shear_response, volume_response
 from seal_friction_ros.core.oring_contact.mesh import Mesh
 
@@ -103,13 +103,6 @@ def element_forces(
     tension_rows = (rubber.bulk_modulus / total)[:, None] * growth
     matrix += growth[:, :, None] * tension_rows[:, None, :]
     return ElementForces(force, matrix, true_tension, tension_rows)
-
-
-def strain_energy(elements: Elements, rubber: Rubber, gradient: FloatArray) -> float:
-    """Energy of the whole ring [J]."""
-    shear = shear_response(rubber, gradient)
-    bulk = 0.5 * rubber.bulk_modulus * (volume_ratios(elements, gradient) - 1.0) ** 2 @ elements.weights.sum(axis=1)
-    return float((elements.weights * shear.energy).sum() + bulk)
 
 
 def volume_ratios(elements: Elements, gradient: FloatArray) -> FloatArray:

@@ -41,11 +41,3 @@ def cylinder_between_plates(squeeze: float, diameter: float, plane_modulus: floa
     scale = plane_modulus * diameter  # of a force per length
     force = float(brentq(too_far, 1e-9 * scale, 0.2 * scale, xtol=1e-12 * scale))
     return LineContact(force, 2.0 * force / (math.pi * half_width(force)), 2.0 * half_width(force))
-
-
-def force_of_profile(peak_stress: float, width: float, diameter: float) -> float:
-    """Force [N] all around a wall of ``diameter`` [m] of an elliptic profile of contact stress [Pa] and width [m].
-
-    Source: [Johnson1985]_ equation (4.44), the profile of Hertz.
-    """
-    return math.pi / 4.0 * peak_stress * width * math.pi * diameter

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.convergence import NotConvergedError
-from seal_friction_ros.core.oring_contact.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.oring_contact.case import OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.continuation import follow
 from seal_friction_ros.core.oring_contact.equilibrium import (

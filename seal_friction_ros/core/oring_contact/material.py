@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.oring_contact.arrays import FloatArray
+from seal_friction_ros.core.arrays import FloatArray
 from seal_friction_ros.core.validated import check, parameter
 
 
@@ -30,7 +30,7 @@ class Rubber:
     """
 
     elastic_modulus: float = parameter(
-        5.5e6, unit='Pa', lower=1e4, upper=1e10, description='Young modulus at small strain, E.'
+        unit='Pa', lower=1e4, upper=1e10, description='Young modulus at small strain, E.'
     )
     mooney_ratio: float = parameter(
         0.25, unit='1', lower=0.0, upper=10.0, description='C01 / C10; 0 is a neo-Hookean rubber.'

@@ -1,4 +1,4 @@
-"""Types of the arrays that pass between the parts of the finite-element O-ring."""
+"""Types of the arrays that pass between the parts of the core."""
 
 import numpy as np
 from numpy.typing import NDArray
