@@ -59,11 +59,11 @@ def latencies(bag: Path, seconds: float, disk: StallingDisk) -> tuple[list[float
     state = init(parameters)
     recorder = Recorder(bag)
     found = []
-    start = time.perf_counter_ns() + PERIOD
+    start, first = time.perf_counter_ns() + PERIOD, time.time_ns()
     for number in range(round(seconds * 1e9 / PERIOD)):
         due = start + number * PERIOD
         time.sleep(max(due - time.perf_counter_ns(), 0) * 1e-9)
-        for topic, type_name, message, data in inputs(time.time_ns(), number):
+        for topic, type_name, message, data in inputs(first + number * PERIOD, number):
             recorder.record(topic, type_name, time.time_ns(), data)
             state, answer = receive(parameters, state, message)
             for answer_type, answer_data in encoded(answer):
