@@ -18,9 +18,9 @@ FLUSH_PERIOD = 0.3  # [s]
 _PERIOD = (
     0.05  # [s] between two looks at the queue if nobody says when: waking for each message would slow the estimator
 )
-_HASTE = 0.002  # [s] the same while more messages wait than are written at a time
+_HASTE = 0.002  # [s] the same while a backlog is written, if the estimator does not answer
 _ENOUGH = 20  # messages to be woken up for
-_AT_A_TIME = 100  # messages written before the estimator has the processor again, so a backlog does not delay it
+_AT_A_TIME = 50  # messages written before the estimator has the processor again, so a backlog does not delay it
 
 
 class Recorder:
@@ -111,9 +111,7 @@ class Recorder:
             if time.monotonic() - flushed >= FLUSH_PERIOD:
                 self._writer.flush()
                 flushed = time.monotonic()
-            if self._queue:
-                time.sleep(_HASTE)
-            elif self._wake.wait(_PERIOD):
+            if self._wake.wait(_HASTE if self._queue else _PERIOD):
                 self._wake.clear()
 
     def _rescue(self, failure: Exception) -> None:
