@@ -40,7 +40,7 @@ from spun import Spun
 from stalled_disk import StallingDisk
 from std_msgs.msg import Float64
 
-from seal_friction_ros.core import records
+from seal_friction_ros.core import records, wire
 from seal_friction_ros.core.feedforward import FeedForward
 from seal_friction_ros.core.records import Status
 from seal_friction_ros.nodes import qos
@@ -176,6 +176,16 @@ def second_publisher_refused(chance: random.Random, folder: Path) -> list[str]:
     return second_publisher(chance, folder, refuse=True)
 
 
+def is_answered(place: Stage) -> bool:
+    """Send one good moment; whether an estimate comes soon."""
+    place.now += MS
+    before = place.driver.estimates
+    for topic, messages in good(place.now).items():
+        if topic in place.driver.inputs:
+            place.driver.inputs[topic].publish(wire.encode_input(messages[0]))
+    return place.spin_until(lambda: place.driver.estimates > before, 0.2)
+
+
 def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
     """A publisher that offers best effort only, a subscriber that wants what was never kept, another type."""
     del chance, folder
@@ -196,7 +206,7 @@ def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
                 '/logger wants incompatible quality of service (volatile where transient local is wanted)',
                 '/odd_driver publishes std_msgs/msg/Float64, not seal_friction_msgs/msg/RodPosition',
             ):
-                said = place.spin_until(lambda words=words: words in message(place))
+                said = place.spin_until(lambda words=words: words in message(place), 30.0)  # names may come late
                 wrong += unless(said, f'not said: {words}, but: {message(place)}')
             wrong += unless(best_effort(place) == '/driver', f'best effort taken from {best_effort(place)}')
         place.connect()
@@ -207,6 +217,8 @@ def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
             said = place.spin_until(lambda taken=taken: best_effort(place) == taken)
             wrong += unless(said, f'best effort from {best_effort(place)}, not {taken}')
             place.connect()
+            # Without reliability, what is sent before both ends know of each other is lost.
+            wrong += unless(place.spin_until(lambda: is_answered(place)), 'no sample is answered')
             wrong += recovered(place)
         return wrong
 

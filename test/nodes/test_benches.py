@@ -4,13 +4,13 @@ from benches import bench
 
 
 def test_every_round_trip_is_answered_by_every_node_asked():
-    found = bench('live', '--seconds', '0.6', '--rates', '200')
+    found = bench('live', '--seconds', '0.6', '--rates', '500')
     assert len(found['figures']) == 4
     for figures in found['figures'].values():
-        assert figures['200']['missed'] == 0
-        assert 0.0 < figures['200']['p50 [us]'] <= figures['200']['p99 [us]']
+        assert figures['500']['missed'] == 0
+        assert 0.0 < figures['500']['p50 [us]'] <= figures['500']['p99 [us]']
     assert len(found['ratios']) == 3
-    woken = found['figures']['estimator']['200']['event thread woken per sample']
+    woken = found['figures']['estimator']['500']['event thread woken per sample']
     assert woken < 3.0  # what config/fastdds.xml is for; without it four to eight times
 
 
