@@ -38,7 +38,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'seal_friction = seal_friction_ros.offline.cli:run_and_exit',
+            'seal_friction = seal_friction_ros.offline.commands.main:run_and_exit',
             'friction_estimator = seal_friction_ros.nodes.friction_estimator:main',
             'servo_simulator = seal_friction_ros.nodes.servo_simulator:main',
             'bag_player = seal_friction_ros.nodes.bag_player:main',

@@ -17,16 +17,16 @@ from functools import partial
 
 from one_core import processor_time
 
-from seal_friction_ros.core.coulomb import MountedSeal, Seal, Uncertainty
-from seal_friction_ros.core.ehl.case import Case
-from seal_friction_ros.core.ehl.findings import Findings, findings
-from seal_friction_ros.core.ehl.friction_law import FrictionMap
-from seal_friction_ros.core.ehl.friction_map import friction_map, map_pressures, memory_length, steady_friction
-from seal_friction_ros.core.ehl.transient import run
-from seal_friction_ros.core.estimator import EstimatorParameters, init, step
-from seal_friction_ros.core.records import Force, Pressure, RodSample
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, init, step
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
+from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.lubrication.case import Case
+from seal_friction_ros.core.lubrication.findings import Findings, findings
+from seal_friction_ros.core.lubrication.friction_map import friction_map, map_pressures, memory_length, steady_friction
+from seal_friction_ros.core.lubrication.transient import run
 from seal_friction_ros.files import default_configuration
-from seal_friction_ros.offline.ehl import run_case, run_study, single_case
+from seal_friction_ros.offline.contact.lubrication_runs import run_case, run_study, single_case
 
 CELLS = (226, 452, 1000)
 STEPS = (1e-3, 5e-4, 2.5e-4)  # [s]

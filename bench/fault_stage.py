@@ -16,10 +16,17 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from spun import Spun
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.feedforward import LONGEST_STEP, FeedForward, FeedForwardSettings, Limited
-from seal_friction_ros.core.records import FrictionEstimate, Status
-from seal_friction_ros.core.wire import Velocity
+from seal_friction_ros.core.estimation.feedforward import LONGEST_STEP, FeedForward, FeedForwardSettings, Limited
+from seal_friction_ros.core.estimation.messages import (
+    DECODERS,
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    INPUTS,
+    OUTPUTS,
+    Velocity,
+    encode_input,
+)
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
@@ -48,14 +55,14 @@ class Driver(Node):
         super().__init__(name, **kwargs)
         self.inputs = {
             topic: self.create_publisher(message_class(type_name), topic, qos.STREAM)
-            for topic, type_name in wire.INPUTS.items()
+            for topic, type_name in INPUTS.items()
         }
         self.estimates = self.feedforwards = 0
         self.outputs: Outputs = []
         self.levels: list[str] = []
         self.diagnosed = 0
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
-        for topic, type_name in wire.OUTPUTS.items():
+        for topic, type_name in OUTPUTS.items():
             self.create_subscription(message_class(type_name), topic, self._listen(type_name), DEEP, raw=True)
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
@@ -64,9 +71,9 @@ class Driver(Node):
 
     def _listen(self, type_name: str) -> Callable[[bytes], None]:
         def hear(data: bytes) -> None:
-            self.estimates += type_name == wire.ESTIMATE_TYPE
-            self.feedforwards += type_name == wire.FEEDFORWARD_TYPE
-            self.outputs.append(wire.DECODERS[type_name](data))
+            self.estimates += type_name == ESTIMATE_TYPE
+            self.feedforwards += type_name == FEEDFORWARD_TYPE
+            self.outputs.append(DECODERS[type_name](data))
 
         return hear
 
@@ -74,7 +81,7 @@ class Driver(Node):
         """Publish a moment."""
         for topic, messages in tick.items():
             for message in messages:
-                self.inputs[topic].publish(message if isinstance(message, bytes) else wire.encode_input(message))
+                self.inputs[topic].publish(message if isinstance(message, bytes) else encode_input(message))
 
 
 class Stage(Spun):

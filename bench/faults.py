@@ -40,17 +40,18 @@ from spun import Spun
 from stalled_disk import StallingDisk
 from std_msgs.msg import Float64
 
-from seal_friction_ros.core import records, wire
-from seal_friction_ros.core.feedforward import FeedForward
-from seal_friction_ros.core.records import Status
+from seal_friction_ros.core.estimation import records
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.messages import encode_input
+from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.processes import free_domain, running
-from seal_friction_ros.offline import mcap_output
-from seal_friction_ros.offline.bag import read_messages
-from seal_friction_ros.offline.recover import recover
-from seal_friction_ros.offline.replay import replay
+from seal_friction_ros.offline.bags import mcap_writer
+from seal_friction_ros.offline.bags.bag import read_messages
+from seal_friction_ros.offline.bags.recover import recover
+from seal_friction_ros.offline.replay.replay import replay
 
 PATIENCE = 20.0  # [s]
 REQUIRED = ('estimate', 'feed-forward', 'status and diagnostics', 'recording')
@@ -182,7 +183,7 @@ def is_answered(place: Stage) -> bool:
     before = place.driver.estimates
     for topic, messages in good(place.now).items():
         if topic in place.driver.inputs:
-            place.driver.inputs[topic].publish(wire.encode_input(messages[0]))
+            place.driver.inputs[topic].publish(encode_input(messages[0]))
     return place.spin_until(lambda: place.driver.estimates > before, 0.2)
 
 
@@ -368,7 +369,7 @@ def fifty_more_topics(chance: random.Random, folder: Path) -> list[str]:
 def slow_disk(chance: random.Random, folder: Path) -> list[str]:
     """One write of the recorder blocks for a second; what is recorded meanwhile waits for it."""
     recording = {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
-    mcap_output.os = disk = StallingDisk(1.0, chance.uniform(0.0, 0.5))
+    mcap_writer.os = disk = StallingDisk(1.0, chance.uniform(0.0, 0.5))
     try:
         with stage(recording) as place:
             outputs, slowest = [], 0.0
@@ -382,7 +383,7 @@ def slow_disk(chance: random.Random, folder: Path) -> list[str]:
             wrong += complaints_at_any_time(place.driver.outputs)
             place.estimator.finish()
     finally:
-        mcap_output.os = os
+        mcap_writer.os = os
     return wrong + verified(folder / 'bag')
 
 

@@ -29,14 +29,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import parse_snapshot, snapshot_text
-from seal_friction_ros.core.seal_file import parse_seal
+from seal_friction_ros.core.estimation.configuration import parse_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.messages import DECODERS
+from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import load_parameter_file, read_yaml
-from seal_friction_ros.offline import mcap_file
-from seal_friction_ros.offline.bag import bag_topics, read_messages
-from seal_friction_ros.offline.import_log import read_rig, read_samples
-from seal_friction_ros.offline.recover import recover
+from seal_friction_ros.offline.bags import mcap_reader
+from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
+from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
+from seal_friction_ros.offline.bags.recover import recover
 
 CORPUS = Path(__file__).parents[1] / 'test' / 'corpus'
 SLOWEST = 1.0  # [s]
@@ -54,7 +54,7 @@ def read_bag(path: Path) -> None:
     """A bag as every command reads it: topics, then messages, then what they say."""
     bag_topics(path)
     for message in read_messages(path):
-        decode = wire.DECODERS.get(message.type_name)
+        decode = DECODERS.get(message.type_name)
         if decode is not None:
             with suppress(ValueError):
                 decode(message.data)
@@ -85,7 +85,7 @@ def read_snapshot(path: Path) -> None:
 def read_wire(path: Path) -> None:
     """The bytes as each of the messages; taken if one of them takes them."""
     data, taken = path.read_bytes(), 0
-    for decode in wire.DECODERS.values():
+    for decode in DECODERS.values():
         with suppress(ValueError):
             decode(data)
             taken += 1
@@ -110,8 +110,8 @@ def log_reader() -> Callable[[Path], None]:
 
 def bulk_reader() -> Callable[[Path], None]:
     """Reader of bags in bulk: what it takes, it has to read as the general reader does."""
-    from seal_friction_ros.core.bulk import Kind, UnsuitedError  # noqa: PLC0415  loads the compiler
-    from seal_friction_ros.offline.bulk_reading import compile_now, read_in_bulk  # noqa: PLC0415
+    from seal_friction_ros.core.estimation.compiled_pipeline import Kind, UnsuitedError  # noqa: PLC0415  loads the compiler
+    from seal_friction_ros.offline.bags.block_reader import compile_now, read_in_bulk  # noqa: PLC0415
 
     compile_now()
 
@@ -123,7 +123,7 @@ def bulk_reader() -> Callable[[Path], None]:
                 for block in read_in_bulk(path, lambda *_: Kind.OTHER)
                 for number in range(len(block.kinds))
             ]
-        except (UnsuitedError, OSError, *mcap_file.ERRORS) as error:  # as `replay_in_bulk` does
+        except (UnsuitedError, OSError, *mcap_reader.ERRORS) as error:  # as `replay_in_bulk` does
             raise ValueError(type(error).__name__) from None
         try:
             theirs = [message.data for message in read_messages(path)]

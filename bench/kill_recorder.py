@@ -25,17 +25,25 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import first_snapshot, snapshot_text
-from seal_friction_ros.core.pipeline import encoded, init, receive
-from seal_friction_ros.core.records import Force, Pressure
-from seal_friction_ros.core.wire import Input, Position, ServoReference, Velocity
+from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    INPUTS,
+    Input,
+    Position,
+    ServoReference,
+    Velocity,
+    encode_input,
+    encode_text,
+)
+from seal_friction_ros.core.estimation.pipeline import encoded, init, receive
+from seal_friction_ros.core.estimation.records import Force, Pressure
 from seal_friction_ros.files import default_configuration
-from seal_friction_ros.offline import bag as b
-from seal_friction_ros.offline.recorder import Recorder
-from seal_friction_ros.offline.recover import recover
-from seal_friction_ros.offline.replay import replay
-from seal_friction_ros.offline.topics import ANSWER_TOPICS
+from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.bags.recorder import Recorder
+from seal_friction_ros.offline.bags.recover import recover
+from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS
+from seal_friction_ros.offline.replay.replay import replay
 
 PERIOD = 1_000_000  # [ns]
 LARGEST_LOSS = 1.0  # [s]
@@ -54,7 +62,7 @@ def inputs(stamp: int, number: int) -> Iterator[tuple[str, str, Input, bytes]]:
         'rod_velocity': Velocity(stamp, velocity, b'rod'),
     }
     for topic, record in records.items():
-        yield f'/{topic}', wire.INPUTS[topic], record, wire.encode_input(record, b'rod')
+        yield f'/{topic}', INPUTS[topic], record, encode_input(record, b'rod')
 
 
 def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
@@ -73,7 +81,7 @@ def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
         recorder.record(topic, type_name, log_time, data)
 
     text = snapshot_text(first_snapshot(configuration))
-    record(b.CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, wire.encode_text(text))
+    record(b.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, encode_text(text))
     print('recording', flush=True)
     start = time.perf_counter_ns()
     for number in count():

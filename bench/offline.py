@@ -63,34 +63,34 @@ def write_log(path: Path, samples: int) -> None:
 
 
 def _import() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.import_log import import_log
+    from seal_friction_ros.offline.bags.import_log import import_log
 
     return lambda folder: import_log(folder / 'log.csv', folder / 'rig.yaml', folder / 'bag')
 
 
 def _replay() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.bulk_replay import compile_now
-    from seal_friction_ros.offline.replay import replay
+    from seal_friction_ros.offline.replay.compiled_replay import compile_now
+    from seal_friction_ros.offline.replay.replay import replay
 
     compile_now()
     return lambda folder: replay(folder / 'bag', bulk_from=0)
 
 
 def _replay_one_by_one() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.replay import replay
+    from seal_friction_ros.offline.replay.replay import replay
 
     return lambda folder: replay(folder / 'bag', bulk_from=sys.maxsize)
 
 
 def _replay_to_a_bag() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.replay import replay
+    from seal_friction_ros.offline.replay.replay import replay
 
     return lambda folder: replay(folder / 'bag', out=folder / 'replayed')
 
 
 def _verify() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.bulk_replay import compile_now
-    from seal_friction_ros.offline.replay import replay
+    from seal_friction_ros.offline.replay.compiled_replay import compile_now
+    from seal_friction_ros.offline.replay.replay import replay
 
     def verify(folder: Path) -> None:
         if not replay(folder / 'replayed', bulk_from=0).identical:
@@ -101,14 +101,14 @@ def _verify() -> Callable[[Path], object]:
 
 
 def _identify() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.friction_sources import Choices
-    from seal_friction_ros.offline.identify import Wishes, identify
+    from seal_friction_ros.offline.identification.identify import Wishes, identify
+    from seal_friction_ros.offline.identification.sources import Choices
 
     return lambda folder: identify([folder / 'bag'], Wishes(sources=Choices(chambers=('a', 'b'))), 'bench')
 
 
 def _report() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.report import write_report
+    from seal_friction_ros.offline.reports.bag_report import write_report
 
     return lambda folder: write_report(folder / 'replayed', folder / 'report.html', '')
 
@@ -175,7 +175,7 @@ def measure_workers(bag: Path) -> dict[str, float]:
     for workers in (1, 2):
         words = ['replay', *[str(bag)] * COPIES, '--workers', str(workers), '--json']
         start = time.monotonic()
-        command = [sys.executable, '-m', 'seal_friction_ros.offline.cli', *words]
+        command = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main', *words]
         subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
         figures[f'{workers}'] = time.monotonic() - start
     return figures | {'ratio': figures['1'] / figures['2']}

@@ -24,17 +24,17 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, PSI
+from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
 from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
 from seal_friction_ros.core.oring_contact.case_file import parse_case
 from seal_friction_ros.core.oring_contact.hertz import cylinder_between_plates
 from seal_friction_ros.core.oring_contact.loading import model_of, squeeze
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.results import contact_results, evaluate
-from seal_friction_ros.core.seal import SealGeometry, projected_area
-from seal_friction_ros.core.units import BAR, INCH, LBF, PSI
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.oring import compute_case
-from seal_friction_ros.offline.oring_report import appendix_b, friction_deviation, thesis_case
+from seal_friction_ros.offline.contact.oring_runs import compute_case
+from seal_friction_ros.offline.reports.oring_report import appendix_b, friction_deviation, thesis_case
 
 Rows = list[dict[str, float | str]]
 SQUEEZES = (0.02, 0.04, 0.06, 0.08)

@@ -9,8 +9,8 @@ import argparse
 import json
 import time
 
-from seal_friction_ros.core.reference import Sine
-from seal_friction_ros.core.servo import ServoParameters, init, simulate, step
+from seal_friction_ros.core.servo.motions import Sine
+from seal_friction_ros.core.servo.position_servo import ServoParameters, init, simulate, step
 from seal_friction_ros.files import default_configuration
 
 INNER_STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)  # [s]

@@ -23,12 +23,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from seal_friction_ros.core.pipeline import encoded, init, receive
+from seal_friction_ros.core.estimation.pipeline import encoded, init, receive
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.friction_estimator import SWITCH_INTERVAL
-from seal_friction_ros.offline import mcap_output
-from seal_friction_ros.offline.recorder import Recorder
-from seal_friction_ros.offline.topics import ANSWER_TOPICS
+from seal_friction_ros.offline.bags import mcap_writer
+from seal_friction_ros.offline.bags.recorder import Recorder
+from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS
 
 P99 = 'p99 [ms]'
 LARGEST_RATIO = 1.10
@@ -54,7 +54,7 @@ class StallingDisk:
 
 def latencies(bag: Path, seconds: float, disk: StallingDisk) -> tuple[list[float], Recorder]:
     """Latency of each estimate [s], and the recorder, closed."""
-    mcap_output.os = disk
+    mcap_writer.os = disk
     parameters = default_configuration().parameters()
     state = init(parameters)
     recorder = Recorder(bag)

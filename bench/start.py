@@ -25,7 +25,7 @@ from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.processes import free_domain, running
 
 PATIENCE = 30.0  # [s]
-COMMAND = [sys.executable, '-m', 'seal_friction_ros.offline.cli']
+COMMAND = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main']
 TYPED = 'seal_friction rep'
 ASKED = {
     '_ARGCOMPLETE': '1',

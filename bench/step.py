@@ -26,15 +26,21 @@ from rich.table import Table
 from rich.text import Text
 from seal_friction_msgs.msg import RodVelocity
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.estimator import step
-from seal_friction_ros.core.pipeline import Reference, encoded, init, receive
-from seal_friction_ros.core.records import Force, Pressure, RodSample
-from seal_friction_ros.core.wire import Velocity
+from seal_friction_ros.core.estimation.estimator import step
+from seal_friction_ros.core.estimation.messages import (
+    VELOCITY_TYPE,
+    Velocity,
+    decode_pressure,
+    decode_velocity,
+    encode_pressure,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.pipeline import Reference, encoded, init, receive
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.processes import free_domain
-from seal_friction_ros.offline.recorder import Recorder
+from seal_friction_ros.offline.bags.recorder import Recorder
 
 CALLS = 2000
 
@@ -48,11 +54,11 @@ def stages() -> dict[str, Callable[[], object]]:
     guided = alone._replace(reference=Reference(1, 0.1, 0.0))
     _, answer = receive(parameters, alone, velocity)
     _, both = receive(parameters, guided, velocity)
-    velocity_bytes, pressure_bytes = wire.encode_velocity(velocity), wire.encode_pressure(pressure, b'rod')
+    velocity_bytes, pressure_bytes = encode_velocity(velocity), encode_pressure(pressure, b'rod')
     return {
         'bare call': lambda: None,
-        'decode pressure': lambda: wire.decode_pressure(pressure_bytes),
-        'decode velocity': lambda: wire.decode_velocity(velocity_bytes),
+        'decode pressure': lambda: decode_pressure(pressure_bytes),
+        'decode velocity': lambda: decode_velocity(velocity_bytes),
         'receive pressure': lambda: receive(parameters, alone, pressure),
         'estimator step': lambda: step(parameters.estimator, alone.estimator, sample),
         'receive velocity': lambda: receive(parameters, alone, velocity),
@@ -72,7 +78,7 @@ def middleware() -> Iterator[dict[str, Callable[[], object]]]:
     deep = QoSProfile(depth=4 * CALLS)
     publisher = node.create_publisher(RodVelocity, 'rod_velocity', deep)
     subscription = node.create_subscription(RodVelocity, 'rod_velocity', lambda _: None, deep, raw=True)
-    velocity_bytes = wire.encode_velocity(Velocity(1, 0.1, b'rod'))
+    velocity_bytes = encode_velocity(Velocity(1, 0.1, b'rod'))
     message = deserialize_message(velocity_bytes, RodVelocity)
     stamps = count()
     with tempfile.TemporaryDirectory() as folder:
@@ -83,7 +89,7 @@ def middleware() -> Iterator[dict[str, Callable[[], object]]]:
             yield {
                 'publish': lambda: publisher.publish(velocity_bytes),
                 'take': lambda: subscription.handle.take_message(RodVelocity, True),
-                'record': lambda: recorder.record('/rod_velocity', wire.VELOCITY_TYPE, next(stamps), velocity_bytes),
+                'record': lambda: recorder.record('/rod_velocity', VELOCITY_TYPE, next(stamps), velocity_bytes),
                 'rclpy: deserialise': lambda: deserialize_message(velocity_bytes, RodVelocity),
                 'rclpy: serialise': lambda: serialize_message(message),
             }

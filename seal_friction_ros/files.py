@@ -6,11 +6,11 @@ from typing import Any
 
 import yaml
 
-from seal_friction_ros.core.configuration import Configuration, SealSelection
-from seal_friction_ros.core.coulomb import MountedSeal
-from seal_friction_ros.core.estimator import EstimatorSettings
-from seal_friction_ros.core.feedforward import FeedForwardSettings
-from seal_friction_ros.core.validated import from_mapping, meanings, plain
+from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.foundation.parameters import from_mapping, meanings, plain
+from seal_friction_ros.core.friction.actuator import MountedSeal
 
 _CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # what PyYAML lets out for '!!int foo'
 _OF_THE_NODE = (

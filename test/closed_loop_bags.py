@@ -3,15 +3,23 @@
 import dataclasses
 from pathlib import Path
 
-from seal_friction_ros.core import pipeline, wire
-from seal_friction_ros.core.configuration import Configuration, Snapshot, snapshot_text
-from seal_friction_ros.core.records import Force, Pressure
-from seal_friction_ros.core.reference import Sine, Wave
-from seal_friction_ros.core.servo import ServoParameters, init, outputs, step
-from seal_friction_ros.core.wire import Position, ServoReference, Velocity
+from seal_friction_ros.core.estimation import pipeline
+from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, snapshot_text
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    INPUTS,
+    Position,
+    ServoReference,
+    Velocity,
+    encode_input,
+    encode_text,
+)
+from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.servo.motions import Sine, Wave
+from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.files import default_configuration
-from seal_friction_ros.offline import bag as b
-from seal_friction_ros.offline.topics import ANSWER_TOPICS
+from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS
 
 RATE = 1000  # [Hz]
 START = 1_700_000_000_000_000_000  # [ns]
@@ -39,9 +47,9 @@ def write_closed_loop(
         for stretch, scale in enumerate(scales):
             configuration = with_coulomb_scale(scale)
             parameters, wave = configuration.parameters(), waves[stretch % len(waves)]
-            text = wire.encode_text(snapshot_text(Snapshot(configuration, known)))
+            text = encode_text(snapshot_text(Snapshot(configuration, known)))
             stamp = START + stretch * samples * (1_000_000_000 // RATE)
-            writer.write(b.CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, stamp, text)
+            writer.write(b.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, stamp, text)
             for i in range(stretch * samples, (stretch + 1) * samples):
                 stamp, wanted, force = START + i * (1_000_000_000 // RATE), wave.at(i / RATE), 0.0
                 inputs = (
@@ -52,7 +60,7 @@ def write_closed_loop(
                     (b.VELOCITY_TOPIC, Velocity(stamp, now.velocity, b'rod')),
                 )
                 for topic, record in inputs:
-                    writer.write(topic, wire.INPUTS[topic.strip('/')], stamp, wire.encode_input(record))
+                    writer.write(topic, INPUTS[topic.strip('/')], stamp, encode_input(record))
                     known, answer = pipeline.receive(parameters, known, record)
                     for kind, data in pipeline.encoded(answer):
                         writer.write(ANSWER_TOPICS[kind], kind, stamp, data)

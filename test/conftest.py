@@ -2,7 +2,7 @@
 
 from hypothesis import settings
 
-import seal_friction_ros.offline.cli  # noqa: F401  sets the number of threads, before any test loads numpy
+import seal_friction_ros.offline.commands.main  # noqa: F401  sets the number of threads, before any test loads numpy
 from seal_friction_ros.nodes.discovery import set_up_discovery
 
 settings.register_profile('reproducible', derandomize=True, deadline=None, database=None)

@@ -4,14 +4,29 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import Configuration, SealSelection, first_snapshot, snapshot_text
-from seal_friction_ros.core.estimator import EstimatorSettings
-from seal_friction_ros.core.records import Force, Pressure
-from seal_friction_ros.core.wire import Position, ServoReference, Velocity
+from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    FORCE_TYPE,
+    POSITION_TYPE,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    VELOCITY_TYPE,
+    Position,
+    ServoReference,
+    Velocity,
+    encode_force,
+    encode_position,
+    encode_pressure,
+    encode_reference,
+    encode_text,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.records import Force, Pressure
 from seal_friction_ros.files import load_configuration
-from seal_friction_ros.offline import bag as b
-from seal_friction_ros.offline.replay import replay
+from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.replay.replay import replay
 
 STEP = 10_000_000  # [ns]
 
@@ -20,23 +35,23 @@ def write_inputs(path: Path, samples: int = 300, configuration: Configuration | 
     """A rod that goes to and fro at changing pressure, with rests, and a few inputs that are missing or not finite."""
     with b.BagWriter(path) as writer:
         if configuration is not None:
-            data = wire.encode_text(snapshot_text(first_snapshot(configuration)))
-            writer.write(b.CONFIGURATION_TOPIC, wire.CONFIGURATION_TYPE, 0, data)
+            data = encode_text(snapshot_text(first_snapshot(configuration)))
+            writer.write(b.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, data)
         for i in range(samples):
             stamp = 1_000_000_000 + i * STEP
             velocity = max(abs(math.sin(i / 20)) - 0.3, 0.0) * math.copysign(0.05, math.sin(i / 20))
             if i % 50 != 7:
                 pressure = Pressure(stamp, 2e6 + 1e6 * math.sin(i / 70), math.nan if i % 61 == 5 else 5e5)
-                writer.write(b.PRESSURE_TOPIC, wire.PRESSURE_TYPE, stamp, wire.encode_pressure(pressure, b'rod'))
+                writer.write(b.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode_pressure(pressure, b'rod'))
             force = Force(stamp, 60.0 * math.sin(i / 20 + 0.3))
-            writer.write(b.FORCE_TOPIC, wire.FORCE_TYPE, stamp, wire.encode_force(force, b'rod'))
+            writer.write(b.FORCE_TOPIC, FORCE_TYPE, stamp, encode_force(force, b'rod'))
             if 100 <= i < 200:
                 reference = ServoReference(stamp, 0.001 * i, velocity, 0.0, b'rod')
-                writer.write(b.REFERENCE_TOPIC, wire.REFERENCE_TYPE, stamp, wire.encode_reference(reference))
-            position = wire.encode_position(Position(stamp, 0.001 * i), b'rod')
-            writer.write(b.POSITION_TOPIC, wire.POSITION_TYPE, stamp, position)
-            data = wire.encode_velocity(Velocity(stamp, velocity, b'rod'))
-            writer.write(b.VELOCITY_TOPIC, wire.VELOCITY_TYPE, stamp, data)
+                writer.write(b.REFERENCE_TOPIC, REFERENCE_TYPE, stamp, encode_reference(reference))
+            position = encode_position(Position(stamp, 0.001 * i), b'rod')
+            writer.write(b.POSITION_TOPIC, POSITION_TYPE, stamp, position)
+            data = encode_velocity(Velocity(stamp, velocity, b'rod'))
+            writer.write(b.VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
     return path
 
 

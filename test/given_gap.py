@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_banded
 
-from seal_friction_ros.core.arrays import FloatArray
-from seal_friction_ros.core.convergence import NotConvergedError
-from seal_friction_ros.core.ehl.reynolds import FilmEnds, complementarity, reynolds_rows
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.lubrication.reynolds import FilmEnds, complementarity, reynolds_rows
 
 ITERATIONS = 100
 _TOLERANCE = 1e-14  # of the largest flow, and of the complementarity

@@ -9,11 +9,10 @@ from pathlib import Path
 import demo
 import make_docs
 import pytest
+from paths import ROOT
 
 from seal_friction_ros.nodes.processes import free_domain, graph_environment
-from seal_friction_ros.offline.replay import replay
-
-ROOT = Path(__file__).parents[1]
+from seal_friction_ros.offline.replay.replay import replay
 
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
 README = (ROOT / 'README.md').read_text()

@@ -2,12 +2,12 @@
 
 import ast
 import sys
-from pathlib import Path
 
 import pytest
+from paths import ROOT
 
 PACKAGE = 'seal_friction_ros'
-SOURCES = Path(__file__).parents[1] / PACKAGE
+SOURCES = ROOT / PACKAGE
 ROS = {'rclpy', 'rcl_interfaces', 'std_msgs', 'std_srvs', 'diagnostic_msgs', 'lifecycle_msgs', 'seal_friction_msgs'}
 NOT_PHYSICS = {
     *ROS,

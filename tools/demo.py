@@ -19,16 +19,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from seal_friction_ros.core.units import BAR
+from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.files import config_path
 from seal_friction_ros.nodes.closed_loop import close_loop_live
 from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.nodes.realtime import realtime_granted
-from seal_friction_ros.offline.import_log import import_log
-from seal_friction_ros.offline.import_thesis import import_thesis
-from seal_friction_ros.offline.replay import replay
-from seal_friction_ros.offline.report import ReportSummary, write_report
-from seal_friction_ros.offline.servo_charts import write_servo_charts
+from seal_friction_ros.offline.bags.import_log import import_log
+from seal_friction_ros.offline.bags.import_thesis import import_thesis
+from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.reports.bag_report import ReportSummary, write_report
+from seal_friction_ros.offline.reports.servo_charts import write_servo_charts
 
 ROOT = Path(__file__).parents[1]
 OUT = ROOT / 'build' / 'demo'

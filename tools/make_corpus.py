@@ -15,29 +15,51 @@ from pathlib import Path
 import zstandard
 from mcap.writer import CompressionType, Writer
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import first_snapshot, snapshot_text
-from seal_friction_ros.core.feedforward import FeedForward
-from seal_friction_ros.core.pipeline import init, receive
-from seal_friction_ros.core.records import Force, FrictionEstimate, FrictionState, Pressure
+from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    DECODERS,
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    FORCE_TYPE,
+    POSITION_TYPE,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    VELOCITY_TYPE,
+    Position,
+    ServoReference,
+    Velocity,
+    encode_estimate,
+    encode_feedforward,
+    encode_force,
+    encode_position,
+    encode_pressure,
+    encode_reference,
+    encode_text,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.pipeline import init, receive
+from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure
+from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import default_configuration
-from seal_friction_ros.offline.mcap_file import MAGIC
+from seal_friction_ros.offline.bags.mcap_reader import MAGIC
 
 CORPUS = Path(__file__).parents[1] / 'test' / 'corpus'
 STAMP = 1_500_000_000
 MESSAGES = {
-    wire.PRESSURE_TYPE: wire.encode_pressure(Pressure(STAMP, 2e6, 5e5), b'rod'),
-    wire.FORCE_TYPE: wire.encode_force(Force(STAMP, 20.0), b'rod'),
-    wire.VELOCITY_TYPE: wire.encode_velocity(wire.Velocity(STAMP, 0.1, b'')),
-    wire.POSITION_TYPE: wire.encode_position(wire.Position(STAMP, 0.01), b'frame'),
-    wire.REFERENCE_TYPE: wire.encode_reference(wire.ServoReference(STAMP, 0.01, 0.1, 0.0, b'rod')),
-    wire.ESTIMATE_TYPE: wire.encode_estimate(
+    PRESSURE_TYPE: encode_pressure(Pressure(STAMP, 2e6, 5e5), b'rod'),
+    FORCE_TYPE: encode_force(Force(STAMP, 20.0), b'rod'),
+    VELOCITY_TYPE: encode_velocity(Velocity(STAMP, 0.1, b'')),
+    POSITION_TYPE: encode_position(Position(STAMP, 0.01), b'frame'),
+    REFERENCE_TYPE: encode_reference(ServoReference(STAMP, 0.01, 0.1, 0.0, b'rod')),
+    ESTIMATE_TYPE: encode_estimate(
         FrictionEstimate(STAMP, 40.0, 2.0, 45.0, 40.0, FrictionState.SLIDING, 1, 0, 0.001), b'rod'
     ),
-    wire.FEEDFORWARD_TYPE: wire.encode_feedforward(FeedForward(STAMP, 36.0, 1.0, 0), b'rod'),
-    wire.CONFIGURATION_TYPE: wire.encode_text('{}'),
+    FEEDFORWARD_TYPE: encode_feedforward(FeedForward(STAMP, 36.0, 1.0, 0), b'rod'),
+    CONFIGURATION_TYPE: encode_text('{}'),
 }
-_OF_A_BAG = (wire.PRESSURE_TYPE, wire.VELOCITY_TYPE, wire.ESTIMATE_TYPE)
+_OF_A_BAG = (PRESSURE_TYPE, VELOCITY_TYPE, ESTIMATE_TYPE)
 HUGE = 1 << 40  # [bytes]
 
 
@@ -159,8 +181,8 @@ def snapshots() -> dict[str, str]:
     parameters = configuration.parameters()
     state = init(parameters)
     start = snapshot_text(first_snapshot(configuration))
-    for type_name in (wire.PRESSURE_TYPE, wire.FORCE_TYPE, wire.REFERENCE_TYPE, wire.VELOCITY_TYPE):
-        state, _ = receive(parameters, state, wire.DECODERS[type_name](MESSAGES[type_name]))
+    for type_name in (PRESSURE_TYPE, FORCE_TYPE, REFERENCE_TYPE, VELOCITY_TYPE):
+        state, _ = receive(parameters, state, DECODERS[type_name](MESSAGES[type_name]))
     running = snapshot_text(first_snapshot(configuration)._replace(state=state))
     return {
         'start': start,
@@ -191,9 +213,9 @@ def sqlite() -> dict[str, bytes]:
                 database.execute('PRAGMA page_size = 512')
                 database.execute('CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT)')
                 database.execute(script)
-                database.execute('INSERT INTO topics VALUES (1, ?, ?)', ('/v', wire.VELOCITY_TYPE))
+                database.execute('INSERT INTO topics VALUES (1, ?, ?)', ('/v', VELOCITY_TYPE))
                 if name == 'good':
-                    rows = [(i, 1, i * 10, MESSAGES[wire.VELOCITY_TYPE]) for i in range(5)]
+                    rows = [(i, 1, i * 10, MESSAGES[VELOCITY_TYPE]) for i in range(5)]
                     database.executemany('INSERT INTO messages VALUES (?, ?, ?, ?)', rows)
             database.close()
             found[name] = path.read_bytes()

@@ -8,32 +8,38 @@ import re
 import sys
 from pathlib import Path
 
-from seal_friction_ros.core.configuration import SealSelection
-from seal_friction_ros.core.coulomb import ConstantCoulomb, PressurePowerLaw, PriorArtChart, Uncertainty, VelocityTerms
-from seal_friction_ros.core.ehl import case as ehl
-from seal_friction_ros.core.ehl import groove as ehl_groove
-from seal_friction_ros.core.ehl.case import Air, MapGrid, Member, SealBody, Study, Viscoelasticity
-from seal_friction_ros.core.ehl.friction_law import FrictionMap
-from seal_friction_ros.core.ehl.grease import Grease
-from seal_friction_ros.core.ehl.kinematics import ConstantAcceleration
-from seal_friction_ros.core.ehl.topography import Topography
-from seal_friction_ros.core.ehl.wall import ControlEdge, FilmSupply
-from seal_friction_ros.core.estimator import EstimatorSettings
-from seal_friction_ros.core.feedforward import FeedForwardSettings
-from seal_friction_ros.core.friction_coefficient import CoefficientTable, PowerLaw
-from seal_friction_ros.core.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.friction.actuator import (
+    ConstantCoulomb,
+    PressurePowerLaw,
+    PriorArtChart,
+    Uncertainty,
+    VelocityTerms,
+)
+from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
+from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
+from seal_friction_ros.core.lubrication import case as ehl
+from seal_friction_ros.core.lubrication import groove as ehl_groove
+from seal_friction_ros.core.lubrication.case import Air, MapGrid, Member, SealBody, Study, Viscoelasticity
+from seal_friction_ros.core.lubrication.grease import Grease
+from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
+from seal_friction_ros.core.lubrication.topography import Topography
+from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
 from seal_friction_ros.core.oring_contact.case_file import Measured
 from seal_friction_ros.core.oring_contact.material import Rubber
-from seal_friction_ros.core.reference import Chirp, PullTest, Sine, Step, Trapezoid
-from seal_friction_ros.core.seal import SealGeometry
-from seal_friction_ros.core.sensors import SensorSettings
-from seal_friction_ros.core.servo_controller import ServoController
-from seal_friction_ros.core.servo_plant import Cylinder, Load, ServoValve
-from seal_friction_ros.core.signal_preparation import SavitzkyGolay, Sliding
-from seal_friction_ros.core.spool_evaluation import SpoolEvaluation
-from seal_friction_ros.core.tuning_settings import MatchSettings, TuningSettings
-from seal_friction_ros.core.validated import meanings
+from seal_friction_ros.core.servo.controller import ServoController
+from seal_friction_ros.core.servo.motions import Chirp, PullTest, Sine, Step, Trapezoid
+from seal_friction_ros.core.servo.plant import Cylinder, Load, ServoValve
+from seal_friction_ros.core.servo.sensors import SensorSettings
+from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
 from seal_friction_ros.nodes.parameters import InputOptions, RecordingOptions, StartOptions
 from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
 

@@ -6,14 +6,14 @@ import tempfile
 from pathlib import Path
 
 from seal_friction_ros.files import config_path
-from seal_friction_ros.offline.ehl_commands import map_command, run_command, study_command
-from seal_friction_ros.offline.import_thesis import import_thesis
-from seal_friction_ros.offline.oring import compute_case
-from seal_friction_ros.offline.oring_report import write_oring_report
-from seal_friction_ros.offline.replay import replay
-from seal_friction_ros.offline.report import write_report
-from seal_friction_ros.offline.seal_charts import write_seal_charts
-from seal_friction_ros.offline.servo_charts import write_servo_charts
+from seal_friction_ros.offline.bags.import_thesis import import_thesis
+from seal_friction_ros.offline.contact.lubrication_commands import map_command, run_command, study_command
+from seal_friction_ros.offline.contact.oring_runs import compute_case
+from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.reports.bag_report import write_report
+from seal_friction_ros.offline.reports.oring_report import write_oring_report
+from seal_friction_ros.offline.reports.seal_charts import write_seal_charts
+from seal_friction_ros.offline.reports.servo_charts import write_servo_charts
 
 FIGURES = Path(__file__).parents[1] / 'docs' / 'figures'
 

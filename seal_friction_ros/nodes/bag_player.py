@@ -16,12 +16,12 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from seal_friction_msgs.msg import FrictionEstimate
 
-from seal_friction_ros.core import wire
+from seal_friction_ros.core.estimation.messages import INPUTS, VELOCITY_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.live_statistics import latency_values
 from seal_friction_ros.nodes.managed_node import message_class
-from seal_friction_ros.offline.bag import BagError, BagMessage, read_messages
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage, read_messages
 
 _UNANSWERED = 20  # [samples] so many velocities may be under way: well below the depth of the queues
 _PATIENCE = 5.0  # [s] to wait for the answer to a sample before giving up
@@ -34,7 +34,7 @@ class BagPlayer(Node):
         super().__init__('bag_player')
         self._publishers_of = {
             type_name: self.create_publisher(message_class(type_name), topic, qos.STREAM)
-            for topic, type_name in wire.INPUTS.items()
+            for topic, type_name in INPUTS.items()
         }
         self._connected = False
         self.sent: list[int] = []
@@ -60,7 +60,7 @@ class BagPlayer(Node):
 
     def publish(self, message: BagMessage) -> None:
         """Publish one message, byte for byte."""
-        if message.type_name == wire.VELOCITY_TYPE:
+        if message.type_name == VELOCITY_TYPE:
             self.sent.append(time.perf_counter_ns())
         self._publishers_of[message.type_name].publish(message.data)
 
@@ -103,7 +103,7 @@ def play(player: BagPlayer, bag: Path, rate: float) -> dict[str, str]:
     """
     start = time.monotonic()
     first: int | None = None
-    played = set(wire.INPUTS.values())
+    played = set(INPUTS.values())
     for message in read_messages(bag):
         if message.type_name not in played:
             continue

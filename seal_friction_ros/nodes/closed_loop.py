@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from seal_friction_msgs.msg import FrictionEstimate
 
-from seal_friction_ros.core.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.processes import running
 

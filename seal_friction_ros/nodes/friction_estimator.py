@@ -11,11 +11,11 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import Configuration, SealSelection, Snapshot, snapshot_text
-from seal_friction_ros.core.estimator import EstimatorSettings
-from seal_friction_ros.core.feedforward import FeedForwardSettings
-from seal_friction_ros.core.pipeline import Answer, compensate, encoded, init, observe
+from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, Snapshot, snapshot_text
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, INPUTS, OUTPUTS, encode_text
+from seal_friction_ros.core.estimation.pipeline import Answer, compensate, encoded, init, observe
 from seal_friction_ros.files import FEEDFORWARD_PREFIX, load_configuration
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
@@ -71,7 +71,7 @@ class FrictionEstimator(ManagedNode):
         settings = self.settings(EstimatorSettings), self.settings(FeedForwardSettings)
         configuration = load_configuration(self.settings(SealSelection), *settings)
         self._statistics = LiveStatistics()
-        for topic, type_name in wire.OUTPUTS.items():
+        for topic, type_name in OUTPUTS.items():
             self._outputs[type_name] = self.create_lifecycle_publisher(
                 message_class(type_name),
                 topic,
@@ -79,11 +79,11 @@ class FrictionEstimator(ManagedNode):
                 qos_overriding_options=qos.overridable(),
                 event_callbacks=PublisherEventCallbacks(incompatible_qos=partial(self._on_deaf, type_name)),
             )
-        self._outputs[wire.CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
-            message_class(wire.CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
+        self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
+            message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
         )
         self._topics = {type_name: publisher.topic_name for type_name, publisher in self._outputs.items()}
-        for name in wire.INPUTS:
+        for name in INPUTS:
             self._subscribe(name, qos.STREAM)
         self._configuration = configuration
 
@@ -123,7 +123,7 @@ class FrictionEstimator(ManagedNode):
         if name in self._inputs:
             self.destroy_subscription(self._inputs[name])
         overriding = qos.overridable() if profile is qos.STREAM else None
-        kind, callback = message_class(wire.INPUTS[name]), partial(self._on_input, name)
+        kind, callback = message_class(INPUTS[name]), partial(self._on_input, name)
         self._inputs[name] = self.create_subscription(
             kind,
             name,
@@ -158,9 +158,9 @@ class FrictionEstimator(ManagedNode):
         taken = time.perf_counter_ns()
         if not self.active:
             return
-        type_name = wire.INPUTS[name]
+        type_name = INPUTS[name]
         try:
-            message = wire.DECODERS[type_name](data)
+            message = DECODERS[type_name](data)
         except ValueError as error:
             self._statistics.on_malformed(name)
             self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
@@ -211,7 +211,7 @@ class FrictionEstimator(ManagedNode):
 
     def _publish_configuration(self) -> None:
         text = snapshot_text(Snapshot(self._configuration, self._state))
-        self._publish(wire.CONFIGURATION_TYPE, wire.encode_text(text))
+        self._publish(CONFIGURATION_TYPE, encode_text(text))
 
     # --- recording ---
 
@@ -247,7 +247,7 @@ class FrictionEstimator(ManagedNode):
     def diagnostics(self) -> dict[str, DiagnosticStatus]:
         """What comes in and goes out, and the recorder."""
         crowd = self._look_at_publishers()
-        counts = {name: self._publisher_count(name) for name in wire.INPUTS}
+        counts = {name: self._publisher_count(name) for name in INPUTS}
         recorder = self._recording.report()
         unheard = (self._listen_to_the_silent() if self.active else []) + self._who_is_deaf()
         estimate = self._statistics.report(self.active, counts)
@@ -281,8 +281,8 @@ class FrictionEstimator(ManagedNode):
 
     def _crowd(self) -> list[str]:
         """Topics with several publishers, in words."""
-        crowded = [self._topics[name] for name in wire.INPUTS if self._publisher_count(name) > 1]
-        answers = [self._topics[type_name] for type_name in wire.OUTPUTS.values()]  # of a second estimator
+        crowded = [self._topics[name] for name in INPUTS if self._publisher_count(name) > 1]
+        answers = [self._topics[type_name] for type_name in OUTPUTS.values()]  # of a second estimator
         crowded += [topic for topic in answers if self.count_publishers(topic) > 1]
         crowd = []
         for topic in crowded:
@@ -320,7 +320,7 @@ class FrictionEstimator(ManagedNode):
                     self.get_logger().warning(f'{topic}: {who} offers best effort only: taken as such')
                     self._subscribe(name, qos.best_effort(qos.STREAM))
                     break
-                reason = why_unheard(publisher, wire.INPUTS[name], wanted)
+                reason = why_unheard(publisher, INPUTS[name], wanted)
                 if reason:
                     unheard.append(f'{topic}: {reason}')
         return unheard

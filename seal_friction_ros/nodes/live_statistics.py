@@ -6,9 +6,9 @@ from statistics import median
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.feedforward import FeedForward, Limited
-from seal_friction_ros.core.records import FrictionEstimate, Status
+from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
+from seal_friction_ros.core.estimation.messages import INPUTS
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 
 _SETTLED = 0.9  # [s] a shorter interval without an estimate says nothing, if there was one before it
 _LATEST = 1_000_000_000  # [ns] a sample that comes later than this is not late: its clock was set
@@ -52,7 +52,7 @@ class LiveStatistics:
     def __init__(self) -> None:
         self._received: Counter[str] = Counter()
         self._malformed: Counter[str] = Counter()
-        self._gaps = {name: Gaps() for name in wire.INPUTS}
+        self._gaps = {name: Gaps() for name in INPUTS}
         self._by_status: Counter[int] = Counter()
         self._feedforwards_by_limit: Counter[int] = Counter()
         self._feedforward_force = 0.0
@@ -94,7 +94,7 @@ class LiveStatistics:
     @property
     def silent_inputs(self) -> list[str]:
         """Inputs of which nothing has come in this interval."""
-        return [name for name in wire.INPUTS if self._received[name] == self._received_before[name]]
+        return [name for name in INPUTS if self._received[name] == self._received_before[name]]
 
     def report(self, active: bool, publishers: dict[str, int]) -> DiagnosticStatus:
         """State of the estimate in this interval, which began a second ago at most.
@@ -105,7 +105,7 @@ class LiveStatistics:
         """
         seconds = max(time.monotonic() - self._started, 1e-3)
         values: dict[str, str] = {}
-        for name in wire.INPUTS:
+        for name in INPUTS:
             recent = self._received[name] - self._received_before[name]
             values[f'{name} publishers'] = str(publishers[name])
             values[f'{name} rate [Hz]'] = f'{recent / seconds:.1f}'

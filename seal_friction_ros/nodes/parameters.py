@@ -7,7 +7,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
 
-from seal_friction_ros.core.validated import Meaning, check, meanings, parameter
+from seal_friction_ros.core.foundation.parameters import Meaning, check, meanings, parameter
 
 Record = TypeVar('Record')
 

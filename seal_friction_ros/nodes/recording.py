@@ -6,8 +6,8 @@ from pathlib import Path
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from seal_friction_ros.nodes.parameters import RecordingOptions
-from seal_friction_ros.offline.bag import BagError
-from seal_friction_ros.offline.recorder import Recorder
+from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.recorder import Recorder
 
 
 class Recording:

@@ -12,18 +12,31 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from seal_friction_ros.core import wire
-from seal_friction_ros.core.configuration import SealSelection
-from seal_friction_ros.core.feedforward import FeedForward
-from seal_friction_ros.core.pull_rig import PullRig, init_pull_rig, pull_rig, step_pull_rig
-from seal_friction_ros.core.records import Force, Pressure
-from seal_friction_ros.core.reference import Chirp, PullTest, Reference, Sine, Step, Trapezoid, Wave
-from seal_friction_ros.core.sensors import Readings, SensorSettings, read
-from seal_friction_ros.core.servo import ServoParameters, init, outputs, step
-from seal_friction_ros.core.servo_controller import Limited, ServoController
-from seal_friction_ros.core.servo_plant import Cylinder, Load, ServoValve
-from seal_friction_ros.core.validated import check, parameter
-from seal_friction_ros.core.wire import Position, ServoReference, Velocity
+from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.messages import (
+    FEEDFORWARD_TYPE,
+    INPUTS,
+    REFERENCE_TYPE,
+    Position,
+    ServoReference,
+    Velocity,
+    decode_feedforward,
+    decode_reference,
+    encode_force,
+    encode_position,
+    encode_pressure,
+    encode_reference,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.servo.controller import Limited, ServoController
+from seal_friction_ros.core.servo.motions import Chirp, PullTest, Reference, Sine, Step, Trapezoid, Wave
+from seal_friction_ros.core.servo.plant import Cylinder, Load, ServoValve
+from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
+from seal_friction_ros.core.servo.pull_rig import PullRig, init_pull_rig, pull_rig, step_pull_rig
+from seal_friction_ros.core.servo.sensors import Readings, SensorSettings, read
 from seal_friction_ros.files import load_seals
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
@@ -130,13 +143,13 @@ class ServoSimulator(ManagedNode):
         for topic in _OUTPUTS:
             if topic != 'servo_reference' or self._settings.wave in WAVES:
                 self._sensor_publishers[topic] = self.create_lifecycle_publisher(
-                    message_class(wire.INPUTS[topic]), topic, qos.STREAM, qos_overriding_options=qos.overridable()
+                    message_class(INPUTS[topic]), topic, qos.STREAM, qos_overriding_options=qos.overridable()
                 )
         if self._settings.publish_clock:
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', qos.CLOCK)
-        self._listen('friction_feedforward', wire.FEEDFORWARD_TYPE, self._on_feedforward)
+        self._listen('friction_feedforward', FEEDFORWARD_TYPE, self._on_feedforward)
         if self._settings.wave == 'topic':
-            self._listen('servo_reference', wire.REFERENCE_TYPE, self._on_reference)
+            self._listen('servo_reference', REFERENCE_TYPE, self._on_reference)
 
     def _listen(self, topic: str, type_name: str, callback: Any) -> None:
         options = qos.overridable()
@@ -247,13 +260,13 @@ class ServoSimulator(ManagedNode):
 
     def _on_feedforward(self, data: bytes) -> None:
         try:
-            self._feedforward = wire.decode_feedforward(data)
+            self._feedforward = decode_feedforward(data)
         except ValueError as error:
             self._malformed('friction_feedforward', error)
 
     def _on_reference(self, data: bytes) -> None:
         try:
-            self._reference = wire.decode_reference(data)
+            self._reference = decode_reference(data)
         except ValueError as error:
             self._malformed('servo_reference', error)
 
@@ -302,7 +315,7 @@ class ServoSimulator(ManagedNode):
             seconds, nanoseconds = divmod(stamp, _SECOND)
             self._clock_publisher.publish(ClockMessage(clock=Time(sec=seconds, nanosec=nanoseconds)))
         if reference is not None and 'servo_reference' in self._sensor_publishers:
-            data = wire.encode_reference(ServoReference(stamp, *reference, FRAME))
+            data = encode_reference(ServoReference(stamp, *reference, FRAME))
             self._sensor_publishers['servo_reference'].publish(data)
         while len(self._under_way) > self._delay:
             self._publish(*self._under_way.popleft())
@@ -342,13 +355,13 @@ class ServoSimulator(ManagedNode):
     def _publish(self, stamp: int, readings: Readings) -> None:
         send = self._sensor_publishers
         if readings.pressure is not None:
-            send['cylinder_pressure'].publish(wire.encode_pressure(Pressure(stamp, *readings.pressure), FRAME))
+            send['cylinder_pressure'].publish(encode_pressure(Pressure(stamp, *readings.pressure), FRAME))
         if readings.force_sum is not None:
-            send['force_sum'].publish(wire.encode_force(Force(stamp, readings.force_sum), FRAME))
+            send['force_sum'].publish(encode_force(Force(stamp, readings.force_sum), FRAME))
         if readings.position is not None:
-            send['rod_position'].publish(wire.encode_position(Position(stamp, readings.position), FRAME))
+            send['rod_position'].publish(encode_position(Position(stamp, readings.position), FRAME))
         if readings.velocity is not None:
-            send['rod_velocity'].publish(wire.encode_velocity(Velocity(stamp, readings.velocity, FRAME)))
+            send['rod_velocity'].publish(encode_velocity(Velocity(stamp, readings.velocity, FRAME)))
 
     # --- diagnostics ---
 

@@ -18,13 +18,13 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
-from seal_friction_ros.core.configuration import parse_snapshot
-from seal_friction_ros.core.seal_file import parse_seal
+from seal_friction_ros.core.estimation.configuration import parse_snapshot
+from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import load_parameter_file, read_yaml
-from seal_friction_ros.offline.bag import BagWriter, bag_topics, read_messages
-from seal_friction_ros.offline.import_log import read_rig, read_samples
-from seal_friction_ros.offline.mcap_file import MAGIC
-from seal_friction_ros.offline.recover import recover
+from seal_friction_ros.offline.bags.bag import BagWriter, bag_topics, read_messages
+from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
+from seal_friction_ros.offline.bags.mcap_reader import MAGIC
+from seal_friction_ros.offline.bags.recover import recover
 
 CORPUS = ROOT / 'test' / 'corpus'
 

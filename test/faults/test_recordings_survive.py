@@ -12,8 +12,8 @@ from benches import ENVIRONMENT, ROOT, bench
 from faults import OWN_MOUNTS
 
 from seal_friction_ros.nodes.processes import free_domain, graph_environment, running
-from seal_friction_ros.offline.recover import recover
-from seal_friction_ros.offline.replay import replay
+from seal_friction_ros.offline.bags.recover import recover
+from seal_friction_ros.offline.replay.replay import replay
 
 
 def test_three_recordings_killed_at_one_kilohertz_are_recovered_and_verify():
@@ -50,18 +50,18 @@ def test_a_node_that_is_killed_leaves_a_recording_that_is_recovered_and_verifies
 RECORD_UNTIL_FULL = """
 import json, sys, time
 from pathlib import Path
-from seal_friction_ros.core import wire
-from seal_friction_ros.offline.recorder import Recorder
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
+from seal_friction_ros.offline.bags.recorder import Recorder
 
 recorder = Recorder(Path(sys.argv[1]) / 'bag', split_size=200_000)
 number = 0
 while not recorder.error:
-    recorder.record('/t', wire.CONFIGURATION_TYPE, number, wire.encode_text(str(number)))
+    recorder.record('/t', CONFIGURATION_TYPE, number, encode_text(str(number)))
     number += 1
     time.sleep(0.00005)
 recorder.close()
-from seal_friction_ros.offline.bag import bag_topics, read_messages
-texts = [wire.decode_text(message.data) for message in read_messages(recorder.path)]
+from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
+texts = [decode_text(message.data) for message in read_messages(recorder.path)]
 print(json.dumps({
     'error': recorder.error, 'in order': texts == [str(i) for i in range(len(texts))], 'read': len(texts),
     'written': recorder.written, 'dropped': recorder.dropped, 'offered': number,

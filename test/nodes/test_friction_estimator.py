@@ -10,6 +10,7 @@ import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from live_graph import graph
+from paths import ROOT
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParametersAtomically
 from rclpy.context import Context
@@ -19,15 +20,15 @@ from seal_friction_msgs.msg import FrictionEstimate, RodVelocity
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.coulomb import actuator_friction
-from seal_friction_ros.core.estimator import EstimatorSettings
-from seal_friction_ros.core.feedforward import FeedForwardSettings
-from seal_friction_ros.core.validated import meanings
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.parameters import InputOptions, RecordingOptions, StartOptions
-from seal_friction_ros.offline.bag import bag_topics
-from seal_friction_ros.offline.replay import replay
+from seal_friction_ros.offline.bags.bag import bag_topics
+from seal_friction_ros.offline.replay.replay import replay
 
 SECOND = 10**9  # [ns]
 BOOL, DOUBLE, STRING_ARRAY = 1, 3, 9  # rcl_interfaces/ParameterType
@@ -311,7 +312,7 @@ def test_simulated_time_is_honoured_and_stops_nothing():
 
 def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_path: Path, capfd):
     seal = tmp_path / 'seal.yaml'
-    text = Path(__file__).parents[2].joinpath('config/seals/ms28775_114.yaml').read_text()
+    text = ROOT.joinpath('config/seals/ms28775_114.yaml').read_text()
     seal.write_text(text.replace('exponent: 0.562321', 'exponent: 1.7'))
     with graph({'seals': [str(seal)], 'seal_chambers': ['a']}, autostart=False) as g:
         assert not g.estimator.autostart()

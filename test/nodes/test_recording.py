@@ -13,8 +13,8 @@ from std_srvs.srv import Trigger
 
 from seal_friction_ros.nodes.parameters import RecordingOptions
 from seal_friction_ros.nodes.recording import Recording
-from seal_friction_ros.offline import mcap_output
-from seal_friction_ros.offline.bag import BagError, BagWriter, read_messages
+from seal_friction_ros.offline.bags import mcap_writer
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
 
 START = 'friction_estimator/start_recording'
 STOP = 'friction_estimator/stop_recording'
@@ -73,7 +73,7 @@ def test_a_request_to_stop_is_answered_though_the_disk_stalls_and_the_bag_is_fin
         g.connect()
         assert g.call(Trigger, START, Trigger.Request()).success
         with monkeypatch.context() as stalled:
-            stalled.setattr(mcap_output, 'os', StalledDisk())
+            stalled.setattr(mcap_writer, 'os', StalledDisk())
             started = time.monotonic()
             assert g.call(Trigger, STOP, Trigger.Request()).success
             assert g.estimate(10**9, 0.1).state == FrictionEstimate.SLIDING

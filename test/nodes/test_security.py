@@ -1,11 +1,11 @@
 """The SROS2 policy allows what the running nodes have, and nothing else: neither can drift from the other."""
 
 from contextlib import contextmanager
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 import rclpy
+from paths import ROOT
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
@@ -13,7 +13,7 @@ from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.processes import free_domain
 from seal_friction_ros.nodes.servo_simulator import ServoSimulator
 
-POLICY = Path(__file__).parents[2] / 'config' / 'security' / 'policy.xml'
+POLICY = ROOT / 'config' / 'security' / 'policy.xml'
 # Every way a node can be wired: the policy has to allow each, and nothing beyond all of them.
 WIRINGS = {
     'friction_estimator': (FrictionEstimator, [{}, {'use_sim_time': True}]),

@@ -23,12 +23,12 @@ from seal_friction_msgs.msg import (
 )
 from spun import Spun
 
-from seal_friction_ros.core.reference import Sine
+from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.processes import free_domain
 from seal_friction_ros.nodes.servo_simulator import ServoSimulator
-from seal_friction_ros.offline.bag_evaluation import evaluate, read_run
-from seal_friction_ros.offline.replay import replay
+from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.reports.bag_evaluation import evaluate, read_run
 
 TOPICS = {
     'cylinder_pressure': CylinderPressure,

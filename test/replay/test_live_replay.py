@@ -14,13 +14,14 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from paths import ROOT
 
-from seal_friction_ros.core import wire
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE
 from seal_friction_ros.nodes.processes import free_domain, play_live
-from seal_friction_ros.offline.bag import read_messages
-from seal_friction_ros.offline.replay import chosen_configuration, replay
+from seal_friction_ros.offline.bags.bag import read_messages
+from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
-BAGS = sorted(path.parent for path in (Path(__file__).parents[2] / 'bags').glob('*/metadata.yaml'))
+BAGS = sorted(path.parent for path in (ROOT / 'bags').glob('*/metadata.yaml'))
 
 
 def live_and_offline(bag: Path, rate: float, folder: Path) -> tuple[list[bytes], list[bytes], bool]:
@@ -37,7 +38,7 @@ def live_and_offline(bag: Path, rate: float, folder: Path) -> tuple[list[bytes],
 
 
 def estimates(bag: Path) -> list[bytes]:
-    return [message.data for message in read_messages(bag) if message.type_name == wire.ESTIMATE_TYPE]
+    return [message.data for message in read_messages(bag) if message.type_name == ESTIMATE_TYPE]
 
 
 @pytest.mark.parametrize('rate', [1.0, 10.0, 0.0])

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.friction.geometry import SealGeometry, stretch
 from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.material import Rubber
-from seal_friction_ros.core.seal import SealGeometry, stretch
-from seal_friction_ros.core.validated import check, parameter
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from seal_friction_ros.core.convergence import NotConvergedError
+from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.oring_contact.equilibrium import Assembly, Model, State, solve
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings
 

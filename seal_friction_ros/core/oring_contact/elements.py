@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.oring_contact.material import Rubber, shear_response, volume_response
 from seal_friction_ros.core.oring_contact.mesh import Mesh
 

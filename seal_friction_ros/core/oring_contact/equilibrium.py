@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from seal_friction_ros.core.arrays import FloatArray, IntArray
-from seal_friction_ros.core.convergence import NotConvergedError
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.oring_contact.elements import (
     Elements,
     deformation_gradient,

@@ -2,8 +2,8 @@
 
 import math
 
+from seal_friction_ros.core.foundation.units import INCH, PSI
 from seal_friction_ros.core.oring_contact.material import elastic_modulus_of_hardness, hardness_of_elastic_modulus
-from seal_friction_ros.core.units import INCH, PSI
 
 _PRESSURES = (500.0 * PSI, 1000.0 * PSI, 1500.0 * PSI, 2000.0 * PSI, 3000.0 * PSI)  # [Pa]
 _CLEARANCES = {

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.arrays import BoolArray, FloatArray
-from seal_friction_ros.core.convergence import NotConvergedError
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
+from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.oring_contact.case import OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.continuation import follow
 from seal_friction_ros.core.oring_contact.equilibrium import (
@@ -29,7 +30,6 @@ from seal_friction_ros.core.oring_contact.surroundings import (
     surface_pressure,
     wall_stresses,
 )
-from seal_friction_ros.core.seal import projected_area
 
 _SOFTER = 100.0  # walls while the ring is squeezed: their penalty is this much smaller
 _SQUEEZE_STRIDE, _STIFFEN_STRIDE, _FRICTION_STRIDE = 1.0, 0.5, 0.1  # parts of their ways to try first

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.arrays import FloatArray
-from seal_friction_ros.core.validated import check, parameter
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.parameters import check, parameter
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 
 CORE = 0.5
 """Half width of the core as a share of the section radius (own choice: keeps the elements well shaped)."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.oring_contact.case import OringCase
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, volume_ratios
 from seal_friction_ros.core.oring_contact.equilibrium import Model, outline

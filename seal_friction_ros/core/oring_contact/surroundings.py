@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 
 ROD, GLAND, WALL = 0, 1, 2
 _WALL_NORMALS = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])  # into the wall, over (r, z)

@@ -1,0 +1,1 @@
+"""The live estimate and feed-forward: records, messages, and one function for each message."""

@@ -1,0 +1,157 @@
+"""All that the estimator was told, as one text: published with the estimates and kept in every bag.
+
+So a bag carries what is needed to replay it, also when parameters changed on the way.
+"""
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, get_type_hints
+
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, Reference, init
+from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.foundation.parameters import check, from_mapping, parameter
+from seal_friction_ros.core.friction.seal_file import mount_seals
+
+
+@dataclass(frozen=True)
+class SealSelection:
+    """Which seals the actuator has, one ROS parameter per field.
+
+    Raises:
+        ValueError: There are not as many chambers as seals, or none.
+    """
+
+    seals: tuple[str, ...] = parameter(
+        ('ms28775_114', 'ms28775_114'),
+        unit='',
+        live=False,
+        description='Seal file of each seal: a path, or the name of one in config/seals.',
+    )
+    seal_chambers: tuple[str, ...] = parameter(
+        ('a', 'b'), unit='', live=False, description='Chamber whose pressure each seal sees: a or b.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if not self.seals:
+            raise ValueError('SealSelection.seals is empty: name at least one seal')
+        if len(self.seals) != len(self.seal_chambers):
+            raise ValueError(
+                f'SealSelection.seal_chambers = {list(self.seal_chambers)} has {len(self.seal_chambers)} entries '
+                f'but there are {len(self.seals)} seals: give one chamber a seal'
+            )
+        wrong = [chamber for chamber in self.seal_chambers if chamber not in ('a', 'b')]
+        if wrong:
+            raise ValueError(
+                f'SealSelection.seal_chambers = {list(self.seal_chambers)}: {wrong[0]!r} is neither a nor b'
+            )
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """What the estimator runs with, in the form it came in."""
+
+    selection: SealSelection
+    seal_documents: tuple[Mapping[str, Any], ...]
+    settings: EstimatorSettings
+    feedforward: FeedForwardSettings
+
+    def parameters(self) -> PipelineParameters:
+        """Parameters of estimate and feed-forward.
+
+        Raises:
+            ValueError: A seal document makes no sense.
+        """
+        seals = mount_seals(self.seal_documents, self.selection.seal_chambers)
+        return PipelineParameters(EstimatorParameters(self.settings, seals), self.feedforward)
+
+
+class Snapshot(NamedTuple):
+    """All that the next answer depends on besides the messages to come."""
+
+    configuration: Configuration
+    state: PipelineState
+
+
+def first_snapshot(configuration: Configuration) -> Snapshot:
+    """Snapshot before the first message."""
+    return Snapshot(configuration, init(configuration.parameters()))
+
+
+def snapshot_text(snapshot: Snapshot) -> str:
+    """Snapshot as JSON; equal ones give equal text. Measured values are hexadecimal, so also NaN and infinity pass."""
+    configuration, state = snapshot
+    document = {
+        'selection': dataclasses.asdict(configuration.selection),
+        'seal_documents': configuration.seal_documents,
+        'settings': dataclasses.asdict(configuration.settings),
+        'feedforward': dataclasses.asdict(configuration.feedforward),
+        'state': _plain(state),
+    }
+    return json.dumps(document, sort_keys=True, allow_nan=False)
+
+
+def parse_snapshot(text: str) -> Snapshot:
+    """Snapshot from its JSON text.
+
+    Raises:
+        ValueError: The text is not the JSON of a snapshot, or a value in it makes no sense.
+    """
+    try:
+        document = json.loads(text)
+        configuration = Configuration(
+            from_mapping(SealSelection, document['selection'], 'configuration: selection'),
+            tuple(document['seal_documents']),
+            from_mapping(EstimatorSettings, document['settings'], 'configuration: settings'),
+            from_mapping(FeedForwardSettings, document['feedforward'], 'configuration: feedforward'),
+        )
+        state = _state(document['state'])
+        return Snapshot(configuration, state)
+    except (TypeError, LookupError, OverflowError, RecursionError) as error:
+        raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
+
+
+def _state(document: Any) -> PipelineState:
+    """State of the pipeline from what `_plain` made of it.
+
+    Raises:
+        ValueError: A number that was computed here, or a sample that was found usable, is not finite.
+    """
+    seen: EstimatorState = _parsed(EstimatorState, document['estimator'])
+    fed: FeedForwardState = _parsed(FeedForwardState, document['feedforward'])
+    usable = (seen.pressure, seen.force, seen.velocity, seen.leapt_pressure, seen.leapt_force, seen.leapt_velocity)
+    computed = (fed.force, fed.fade, fed.velocity, *fed.estimate)
+    if not all(math.isfinite(value) for value in (*computed, *(number for sample in usable for number in sample))):
+        raise ValueError('configuration: a number in the state is not finite')
+    return PipelineState(
+        seen,
+        fed,
+        _parsed(Pressure, document['pressure']),
+        _parsed(Force, document['force']),
+        _parsed(Reference, document['reference']),
+        bool(document['refused']),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Named tuples as mappings, whole numbers as they are, others as hexadecimal text."""
+    if isinstance(value, tuple) and hasattr(value, '_asdict'):
+        return {name: _plain(field) for name, field in value._asdict().items()}
+    return float(value).hex() if isinstance(value, float) else int(value)
+
+
+def _parsed(record_type: Any, document: Any) -> Any:
+    """Named tuple from what `_plain` made of it; each field of the type that it has to be of."""
+    hints = get_type_hints(record_type)
+    return record_type(**{name: _field(hints[name], document[name]) for name in record_type._fields})
+
+
+def _field(kind: Any, value: Any) -> Any:
+    if hasattr(kind, '_fields'):
+        return _parsed(kind, value)
+    return float.fromhex(value) if kind is float else kind(int(value))

@@ -1,0 +1,335 @@
+"""The one estimator, online and offline.
+
+``state = init(parameters)``, then ``state, estimate = step(parameters, state, sample)`` at every velocity sample.
+
+Nothing here knows of ROS, files or a clock: time is the stamp of the samples, so the same samples give the same
+estimates, live or replayed.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from seal_friction_ros.core.estimation.records import (
+    NEVER,
+    NO_FORCE,
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    Pressure,
+    RodSample,
+    Status,
+)
+from seal_friction_ros.core.foundation.compilable import compilable
+from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.states import FrictionState, StateFriction, is_at_rest, state_friction
+
+
+@dataclass(frozen=True)
+class EstimatorSettings:
+    """Settings of the estimator, one field per ROS parameter.
+
+    Raises:
+        ValueError: A setting is out of bounds, or two contradict each other.
+    """
+
+    stick_velocity: float = parameter(
+        1e-3, unit='m/s', lower=0.0, upper=1.0, description='A sliding rod is at rest at this speed and below.'
+    )
+    slip_velocity: float = parameter(
+        2e-3, unit='m/s', lower=0.0, upper=1.0, description='A rod at rest slides above this speed.'
+    )
+    use_stiction: bool = parameter(
+        True, unit='', description='Breakaway force above Coulomb friction by the stiction of the seals.'
+    )
+    pressure_timeout: float = parameter(
+        0.1, unit='s', lower=1e-4, upper=60.0, description='Largest distance in time between velocity and pressure.'
+    )
+    force_timeout: float = parameter(
+        0.1, unit='s', lower=1e-4, upper=60.0, description='Largest distance in time between velocity and force sum.'
+    )
+    pressure_min: float = parameter(
+        -1.2e5, unit='Pa', lower=-1.2e5, upper=0.0, description='A pressure below this is a sensor fault.'
+    )
+    pressure_max: float = parameter(
+        4.5e7, unit='Pa', lower=1e4, upper=1e9, description='A pressure above this is a sensor fault.'
+    )
+    velocity_max: float = parameter(
+        10.0, unit='m/s', lower=1e-3, upper=100.0, description='A speed above this is a sensor fault.'
+    )
+    force_max: float = parameter(
+        1e6, unit='N', lower=1.0, upper=1e9, description='A force sum of a magnitude above this is a sensor fault.'
+    )
+
+    pressure_rate_max: float = parameter(
+        1e10, unit='Pa/s', lower=1.0, upper=1e15, description='A pressure that leaps faster than this is not believed.'
+    )
+    force_rate_max: float = parameter(
+        1e8, unit='N/s', lower=1e-3, upper=1e15, description='A force sum that leaps faster than this is not believed.'
+    )
+    acceleration_max: float = parameter(
+        1e3, unit='m/s^2', lower=1e-3, upper=1e9, description='A velocity that leaps faster than this is not believed.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.slip_velocity < self.stick_velocity:
+            raise ValueError(
+                f'EstimatorSettings.slip_velocity = {self.slip_velocity} m/s is below '
+                f'stick_velocity = {self.stick_velocity} m/s'
+            )
+
+
+@dataclass(frozen=True)
+class EstimatorParameters:
+    """All that the estimator knows beforehand: its settings and the seals of the actuator.
+
+    Raises:
+        ValueError: There is no seal.
+    """
+
+    settings: EstimatorSettings
+    seals: tuple[MountedSeal, ...]
+
+    def __post_init__(self) -> None:
+        if not self.seals:
+            raise ValueError('EstimatorParameters.seals is empty: name at least one seal')
+
+
+class Speed(NamedTuple):
+    """One rod velocity."""
+
+    stamp: int
+    """[ns]"""
+    velocity: float
+    """[m/s]"""
+
+
+NO_SPEED = Speed(NEVER, 0.0)
+
+
+class EstimatorState(NamedTuple):
+    """What one step leaves for the next."""
+
+    stamp: int
+    """[ns] of the last velocity sample; `NEVER` before the first"""
+    at_rest: bool
+    pressure: Pressure
+    """last usable pressure"""
+    force: Force
+    """last usable force sum"""
+    velocity: Speed
+    """last usable velocity"""
+    leapt_pressure: Pressure
+    """pressure that leapt away from the last usable one, if that was the newest"""
+    leapt_force: Force
+    leapt_velocity: Speed
+
+
+class Observation(NamedTuple):
+    """What one sample says, before any friction is computed."""
+
+    stamp: int
+    """[ns]"""
+    velocity: float
+    """[m/s] at which the seals slide; 0 at rest and where it is not known"""
+    status: int
+    """bits of `Status`"""
+    input_age: float
+    """[s] as in `FrictionEstimate`"""
+
+
+def init(parameters: EstimatorParameters) -> EstimatorState:
+    """State before the first sample: nothing is known, the rod counts as moving."""
+    del parameters
+    return EstimatorState(NEVER, False, NO_PRESSURE, NO_FORCE, NO_SPEED, NO_PRESSURE, NO_FORCE, NO_SPEED)
+
+
+# Status bits as plain integers: IntFlag arithmetic costs a microsecond each time.
+_PRESSURE_MISSING = int(Status.PRESSURE_MISSING)
+_FORCE_MISSING = int(Status.FORCE_MISSING)
+_PRESSURE_STALE = int(Status.PRESSURE_STALE)
+_FORCE_STALE = int(Status.FORCE_STALE)
+_PRESSURE_NOT_FINITE = int(Status.PRESSURE_NOT_FINITE)
+_FORCE_NOT_FINITE = int(Status.FORCE_NOT_FINITE)
+_VELOCITY_NOT_FINITE = int(Status.VELOCITY_NOT_FINITE)
+_PRESSURE_OUT_OF_RANGE = int(Status.PRESSURE_OUT_OF_RANGE)
+_FORCE_OUT_OF_RANGE = int(Status.FORCE_OUT_OF_RANGE)
+_VELOCITY_OUT_OF_RANGE = int(Status.VELOCITY_OUT_OF_RANGE)
+_OUTSIDE_IDENTIFIED_RANGE = int(Status.OUTSIDE_IDENTIFIED_RANGE)
+_STAMP_NOT_INCREASING = int(Status.STAMP_NOT_INCREASING)
+_PRESSURE_LEAP = int(Status.PRESSURE_LEAP)
+_FORCE_LEAP = int(Status.FORCE_LEAP)
+_VELOCITY_LEAP = int(Status.VELOCITY_LEAP)
+_INPUT_REFUSED = int(Status.INPUT_REFUSED)
+
+_NO_MOTION = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
+_NO_STATE = _NO_MOTION | _INPUT_REFUSED | _PRESSURE_MISSING
+_NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE
+_NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
+_UNKNOWN = StateFriction(FrictionState.UNKNOWN, 0, 0.0)
+
+SHORTEST_INTERVAL = 1e-3  # [s] our choice: below it noise leaps, and stamps of some drivers are no finer
+
+
+def step(
+    parameters: EstimatorParameters, state: EstimatorState, sample: RodSample
+) -> tuple[EstimatorState, FrictionEstimate]:
+    """Estimate the friction of the seals at one rod-velocity sample.
+
+    A pressure or force sum that is not finite, out of range, or that leaps is never used: the last usable one is, for
+    as long as it is not stale, and the status says so. A velocity like that, inputs that are refused, or no usable
+    pressure ever, make the state UNKNOWN with a friction force of 0 N; so does, at rest, a force sum that is missing or
+    stale. A stale pressure leaves the state and the last known friction, flagged.
+
+    A sample leaps if it is further from the last usable one than the largest rate allows for the time between them, at
+    least `SHORTEST_INTERVAL`. The next sample is believed if it agrees with either: so a spike costs one sample, and so
+    does a step that is real.
+
+    Args:
+        parameters: Settings and seals.
+        state: From `init` or the step before.
+        sample: Velocity sample with the newest pressure and force sum.
+
+    Returns:
+        The next state and the estimate, every number of which is finite.
+
+    Source: thesis, chapter 7 (Figures 20 and 21); what is done with unusable inputs is our choice.
+    """
+    state, seen = observe(parameters.settings, state, sample)
+    friction = _NO_FRICTION
+    if not seen.status & _PRESSURE_MISSING:
+        pressure = state.pressure
+        friction = actuator_friction(parameters.seals, pressure.chamber_a, pressure.chamber_b, seen.velocity)
+    return state, answer(parameters.settings, state, seen, friction)
+
+
+@compilable
+def observe(
+    settings: EstimatorSettings, state: EstimatorState, sample: RodSample
+) -> tuple[EstimatorState, Observation]:
+    """First half of a step: which inputs are in use, what is wrong with them, and whether the rod moves."""
+    status = _INPUT_REFUSED if sample.refused else 0
+    if state.stamp != NEVER and sample.stamp <= state.stamp:
+        status |= _STAMP_NOT_INCREASING
+
+    pressure, leapt_pressure, fault = _usable_pressure(settings, sample.pressure, state.pressure, state.leapt_pressure)
+    status |= fault
+    force, leapt_force, fault = _usable_force(settings, sample.force, state.force, state.leapt_force)
+    status |= fault
+    pressure_age = 0.0 if pressure.stamp == NEVER else (sample.stamp - pressure.stamp) * 1e-9
+    force_age = 0.0 if force.stamp == NEVER else (sample.stamp - force.stamp) * 1e-9
+    if abs(pressure_age) > settings.pressure_timeout:
+        status |= _PRESSURE_STALE
+    if abs(force_age) > settings.force_timeout:
+        status |= _FORCE_STALE
+    input_age = pressure_age if pressure_age >= force_age else force_age
+    if status & (_PRESSURE_MISSING | _FORCE_MISSING):
+        input_age = -1.0
+
+    newest = Speed(sample.stamp, sample.velocity)
+    velocity, leapt_velocity, fault = _usable_velocity(settings, newest, state.velocity, state.leapt_velocity)
+    status |= fault
+    at_rest, sliding_velocity = state.at_rest, 0.0
+    if not fault:
+        at_rest = is_at_rest(sample.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
+        if not at_rest:
+            sliding_velocity = sample.velocity
+    state = EstimatorState(
+        sample.stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity
+    )
+    return state, Observation(sample.stamp, sliding_velocity, status, input_age)
+
+
+@compilable
+def answer(
+    settings: EstimatorSettings, state: EstimatorState, seen: Observation, friction: ActuatorFriction
+) -> FrictionEstimate:
+    """Second half of a step: what acts on the rod, given the friction of all seals at the pressure in use."""
+    status = seen.status
+    coulomb = friction.coulomb_friction
+    breakaway = coulomb + friction.stiction if settings.use_stiction else coulomb
+    if not friction.in_identified_range:
+        status |= _OUTSIDE_IDENTIFIED_RANGE
+    acting = _UNKNOWN
+    if not (status & _NO_STATE or (state.at_rest and status & _NO_FORCE_SUM)):
+        sliding = coulomb + friction.velocity_friction
+        acting = state_friction(state.velocity.velocity, state.force.force, state.at_rest, sliding, breakaway)
+    return FrictionEstimate(
+        seen.stamp,
+        coulomb,
+        friction.coulomb_friction_std,
+        breakaway,
+        acting.friction_force,
+        acting.state,
+        acting.direction,
+        status,
+        seen.input_age,
+    )
+
+
+@compilable
+def _leaps(change: float, elapsed: int, largest_rate: float) -> bool:
+    """Whether a change is faster than ``largest_rate`` [unit of change / s] over ``elapsed`` [ns]."""
+    return abs(change) > largest_rate * max(abs(elapsed) * 1e-9, SHORTEST_INTERVAL)
+
+
+@compilable
+def _pressure_leaps(settings: EstimatorSettings, newer: Pressure, older: Pressure) -> bool:
+    elapsed, fastest = newer.stamp - older.stamp, settings.pressure_rate_max
+    return _leaps(newer.chamber_a - older.chamber_a, elapsed, fastest) or _leaps(
+        newer.chamber_b - older.chamber_b, elapsed, fastest
+    )
+
+
+@compilable
+def _usable_pressure(
+    settings: EstimatorSettings, newest: Pressure, used: Pressure, leapt: Pressure
+) -> tuple[Pressure, Pressure, int]:
+    """Pressure to use, the one that leapt, and what is wrong."""
+    missing = _PRESSURE_MISSING if used.stamp == NEVER else 0
+    if newest.stamp == NEVER:
+        return used, leapt, missing
+    a, b = newest.chamber_a, newest.chamber_b
+    lowest, highest = settings.pressure_min, settings.pressure_max
+    if not (lowest <= a <= highest and lowest <= b <= highest):
+        finite = math.isfinite(a) and math.isfinite(b)
+        return used, leapt, missing | (_PRESSURE_OUT_OF_RANGE if finite else _PRESSURE_NOT_FINITE)
+    if missing or not _pressure_leaps(settings, newest, used):
+        return newest, NO_PRESSURE, 0
+    confirms = leapt.stamp not in (NEVER, newest.stamp)
+    if confirms and not _pressure_leaps(settings, newest, leapt):
+        return newest, NO_PRESSURE, 0
+    return used, newest, _PRESSURE_LEAP
+
+
+@compilable
+def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt: Force) -> tuple[Force, Force, int]:
+    """Force sum to use, the one that leapt, and what is wrong."""
+    missing = _FORCE_MISSING if used.stamp == NEVER else 0
+    if newest.stamp == NEVER:
+        return used, leapt, missing
+    if not abs(newest.force) <= settings.force_max:
+        return used, leapt, missing | (_FORCE_OUT_OF_RANGE if math.isfinite(newest.force) else _FORCE_NOT_FINITE)
+    fastest = settings.force_rate_max
+    if missing or not _leaps(newest.force - used.force, newest.stamp - used.stamp, fastest):
+        return newest, NO_FORCE, 0
+    confirms = leapt.stamp not in (NEVER, newest.stamp)
+    if confirms and not _leaps(newest.force - leapt.force, newest.stamp - leapt.stamp, fastest):
+        return newest, NO_FORCE, 0
+    return used, newest, _FORCE_LEAP
+
+
+@compilable
+def _usable_velocity(settings: EstimatorSettings, newest: Speed, used: Speed, leapt: Speed) -> tuple[Speed, Speed, int]:
+    """Velocity to use, the one that leapt, and what is wrong."""
+    if not abs(newest.velocity) <= settings.velocity_max:
+        return used, leapt, _VELOCITY_OUT_OF_RANGE if math.isfinite(newest.velocity) else _VELOCITY_NOT_FINITE
+    fastest = settings.acceleration_max
+    if used.stamp == NEVER or not _leaps(newest.velocity - used.velocity, newest.stamp - used.stamp, fastest):
+        return newest, NO_SPEED, 0
+    confirms = leapt.stamp not in (NEVER, newest.stamp)
+    if confirms and not _leaps(newest.velocity - leapt.velocity, newest.stamp - leapt.stamp, fastest):
+        return newest, NO_SPEED, 0
+    return used, newest, _VELOCITY_LEAP

@@ -1,0 +1,96 @@
+"""What goes into the estimator and what comes out of it.
+
+These are made for every sample, so they are named tuples: immutable, and three times cheaper than frozen dataclasses.
+What has not come yet is a record with the stamp `NEVER` and not None, so that each field has one type and the estimator
+can be compiled as it stands.
+"""
+
+from enum import IntFlag
+from typing import NamedTuple
+
+from seal_friction_ros.core.friction.states import FrictionState
+
+NEVER = -(2**63)  # [ns] stamp of a record that stands for none
+
+
+class Status(IntFlag):
+    """What is wrong with an estimate; 0 means nothing. The meanings are written in FrictionEstimate.msg."""
+
+    PRESSURE_MISSING = 1
+    FORCE_MISSING = 2
+    PRESSURE_STALE = 4
+    FORCE_STALE = 8
+    PRESSURE_NOT_FINITE = 16
+    FORCE_NOT_FINITE = 32
+    VELOCITY_NOT_FINITE = 64
+    PRESSURE_OUT_OF_RANGE = 128
+    FORCE_OUT_OF_RANGE = 256
+    VELOCITY_OUT_OF_RANGE = 512
+    OUTSIDE_IDENTIFIED_RANGE = 1024
+    STAMP_NOT_INCREASING = 2048
+    PRESSURE_LEAP = 4096
+    FORCE_LEAP = 8192
+    VELOCITY_LEAP = 16384
+    INPUT_REFUSED = 32768
+
+
+class Pressure(NamedTuple):
+    """One cylinder-pressure sample."""
+
+    stamp: int
+    """[ns]"""
+    chamber_a: float
+    """[Pa, gauge]"""
+    chamber_b: float
+    """[Pa, gauge]"""
+
+
+class Force(NamedTuple):
+    """One force-sum sample: every axial force on the moving mass except seal friction."""
+
+    stamp: int
+    """[ns]"""
+    force: float
+    """[N] positive on extension"""
+
+
+NO_PRESSURE = Pressure(NEVER, 0.0, 0.0)
+NO_FORCE = Force(NEVER, 0.0)
+
+
+class RodSample(NamedTuple):
+    """One rod-velocity sample with the newest pressure and force sum that came before it."""
+
+    stamp: int
+    """[ns]"""
+    velocity: float
+    """[m/s] positive on extension"""
+    pressure: Pressure
+    force: Force
+    refused: bool = False
+    """whether nobody knows who sent them, so that they must not act"""
+
+
+class FrictionEstimate(NamedTuple):
+    """What the seals do at one rod-velocity sample. Every number is finite, whatever came in."""
+
+    stamp: int
+    """[ns] of the velocity sample"""
+    coulomb_friction: float
+    """[N] magnitude of the friction of all seals while sliding"""
+    coulomb_friction_std: float
+    """[N] one standard deviation, for a new reading"""
+    breakaway_force: float
+    """[N] at least ``coulomb_friction``"""
+    friction_force: float
+    """[N] ``m a = force_sum - friction_force``"""
+    state: FrictionState
+    direction: int
+    """-1, 0 or 1"""
+    status: int
+    """bits of `Status`"""
+    input_age: float
+    """[s] age of the older of pressure and force in use; -1.0 while one is missing"""
+
+
+NO_ESTIMATE = FrictionEstimate(NEVER, 0.0, 0.0, 0.0, 0.0, FrictionState.UNKNOWN, 0, 0, -1.0)

@@ -1,0 +1,1 @@
+"""Parameters, units, arrays, compilation: what every other room stands on."""

@@ -1,0 +1,1 @@
+"""Friction of the seals of an actuator: geometry, laws, states."""

@@ -1,0 +1,103 @@
+"""Geometry of an O-ring in its gland: squeeze, stretch, projected area, contact length."""
+
+import math
+from dataclasses import dataclass
+
+from seal_friction_ros.core.foundation.parameters import check, parameter
+
+
+@dataclass(frozen=True)
+class SealGeometry:
+    """An O-ring and the ring-shaped space it is squeezed into.
+
+    The space lies between an inner wall (rod, or groove of a piston) and an outer wall (gland, or bore).
+
+    Raises:
+        ValueError: A dimension is out of bounds, the walls do not fit, or the ring is not squeezed.
+    """
+
+    section_diameter: float = parameter(unit='m', lower=1e-4, upper=0.1, description='Diameter of the ring section, d.')
+    ring_inner_diameter: float = parameter(unit='m', lower=1e-4, upper=10.0, description='Free inner diameter, d_i.')
+    rod_diameter: float = parameter(unit='m', lower=1e-4, upper=10.0, description='Inner wall: rod, or piston groove.')
+    gland_diameter: float = parameter(unit='m', lower=1e-4, upper=10.0, description='Outer wall: gland, or bore.')
+    sliding_wall: str = parameter('rod', unit='', description='Wall the ring slides on: rod, or bore.')
+    elastic_modulus: float = parameter(
+        5.5e6, unit='Pa', lower=1e4, upper=1e10, description='Young modulus at small strain, E.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.sliding_wall not in ('rod', 'bore'):
+            raise ValueError(f'SealGeometry.sliding_wall = {self.sliding_wall!r} is neither rod nor bore')
+        if self.gland_diameter <= self.rod_diameter:
+            raise ValueError(
+                f'SealGeometry.gland_diameter = {self.gland_diameter} m is not above '
+                f'rod_diameter = {self.rod_diameter} m'
+            )
+        if not 0.0 < squeeze(self) < 0.5:
+            raise ValueError(
+                f'SealGeometry.section_diameter = {self.section_diameter} m gives a squeeze of {squeeze(self):.3f}; '
+                'bounds 0 to 0.5 (both excluded)'
+            )
+
+
+def squeeze(seal: SealGeometry) -> float:
+    """Compression of the ring section as a share of its diameter [-].
+
+    squeeze = (d - (D_gland - D_rod) / 2) / d.
+
+    Source: thesis, section 4.1.
+    """
+    gap = (seal.gland_diameter - seal.rod_diameter) / 2.0
+    return (seal.section_diameter - gap) / seal.section_diameter
+
+
+def projected_area(seal: SealGeometry) -> float:
+    """Area the pressure acts on in axial direction [m^2].
+
+    A_r = pi/4 (D_gland^2 - D_rod^2).
+
+    Source: thesis, Table 1 and chapter 7.
+    """
+    return math.pi / 4.0 * (seal.gland_diameter**2 - seal.rod_diameter**2)
+
+
+def contact_length(seal: SealGeometry) -> float:
+    """Circumference of the wall the ring slides on [m].
+
+    L_r = pi D_rod for a rod seal; pi D_gland where the ring slides in a bore.
+
+    Source: thesis, Table 1; the bore is our addition.
+    """
+    return math.pi * (seal.rod_diameter if seal.sliding_wall == 'rod' else seal.gland_diameter)
+
+
+def stretch(seal: SealGeometry) -> float:
+    """Hoop strain of the ring on the inner wall [-]; negative if the ring is loose on it.
+
+    eps = (D_rod - d_i) / d_i.
+
+    Source: thesis, section 4.1.
+    """
+    return (seal.rod_diameter - seal.ring_inner_diameter) / seal.ring_inner_diameter
+
+
+def hoop_force(seal: SealGeometry) -> float:
+    """Tension along the stretched ring [N]; a loose ring has none.
+
+    T = E eps A_section, A_section = pi d^2 / 4.
+
+    Source: thesis, section 4.1 and Figure 13; no tension in a loose ring is our addition.
+    """
+    section = math.pi / 4.0 * seal.section_diameter**2
+    return seal.elastic_modulus * max(stretch(seal), 0.0) * section
+
+
+def stretch_radial_force(seal: SealGeometry) -> float:
+    """Radial force the stretched ring adds on the inner wall, summed over the circumference [N].
+
+    2 pi T, as for a hoop under internal pressure.
+
+    Source: thesis, section 4.1 and Figure 13.
+    """
+    return 2.0 * math.pi * hoop_force(seal)

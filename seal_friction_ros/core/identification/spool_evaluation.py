@@ -1,0 +1,201 @@
+"""Friction of a seal on a test rig that drives it to and fro, evaluated as the spool-valve paper does.
+
+Ten cycles are driven and the ninth is evaluated, so the lubricant film has settled. The measuring chain (force
+transducer, joints, rod) rings at a frequency of its own, 157 Hz in the paper, which no speed moves: it is recognised as
+such, and filtered. The force is normalised by its mean in the middle of the stroke, where the speed is held.
+
+Source: spool-valve paper, chapters 4 (cycles), 6 (resonance, normalisation) and 7.3 (moving average). How the resonance
+is recognised and notched is our choice; the paper does both by eye.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.signal import filtfilt, iirnotch
+
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.parameters import check, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpoolEvaluation:
+    """How a measurement of several cycles is evaluated; the defaults are the paper's.
+
+    Raises:
+        ValueError: A value is out of bounds, or there are fewer cycles than the one to evaluate.
+    """
+
+    cycles: int = parameter(10, unit='', lower=1, upper=10**6, description='Cycles that one measurement has.')
+    evaluated_cycle: int = parameter(9, unit='', lower=1, upper=10**6, description='Cycle that is evaluated, from 1.')
+    moving_average: int = parameter(50, unit='samples', lower=1, upper=10**6, description='Width of the average.')
+    reference_half_width: float = parameter(
+        0.5e-3, unit='m', lower=1e-6, upper=1.0, description='The reference force is the mean within +/- this.'
+    )
+    lowest_resonance: float = parameter(
+        50.0, unit='Hz', lower=0.1, upper=1e5, description='Below it an oscillation belongs to the motion.'
+    )
+    resonance_prominence: float = parameter(
+        2.2, unit='1', lower=1.0, upper=1e6, description='Hump over its two sides that makes a resonance.'
+    )
+    notch_quality: float = parameter(
+        5.0, unit='1', lower=0.5, upper=1e3, description='Resonance over width of the notch.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.evaluated_cycle > self.cycles:
+            raise ValueError(
+                f'SpoolEvaluation.evaluated_cycle = {self.evaluated_cycle} is above cycles = {self.cycles}'
+            )
+
+
+class SpoolFriction(NamedTuple):
+    """Friction of one cycle over displacement."""
+
+    displacement: FloatArray
+    """[m] from the middle of the stroke, shape (n,)"""
+    velocity: FloatArray
+    """[m/s] shape (n,)"""
+    force: FloatArray
+    """[N] as measured, shape (n,)"""
+    filtered: FloatArray
+    """[N] resonance notched, then averaged, shape (n,)"""
+    normalised: FloatArray
+    """[-] ``filtered`` over the reference force, shape (n,)"""
+    reference_force: float
+    """[N]"""
+    resonance: float | None
+    """[Hz] of the measuring chain; None if there is none"""
+
+
+def cycle_starts(displacement: FloatArray) -> IntArray:
+    """Index at which each cycle begins: where the middle of the stroke is crossed on the way up, less a quarter cycle.
+
+    Args:
+        displacement: [m], shape (n,), of a motion to and fro with a rest or a turn at each end.
+
+    Returns:
+        Indices, the end of the last cycle included, shape (cycles + 1,).
+
+    Raises:
+        ValueError: There are not two crossings, so no cycle.
+    """
+    middle = (float(displacement.max()) + float(displacement.min())) / 2.0
+    above = displacement > middle
+    rising = np.flatnonzero(~above[:-1] & above[1:]) + 1
+    if len(rising) < 2:
+        raise ValueError(f'{len(rising)} crossings of the middle of the stroke: no cycle: drive to and fro')
+    period = round(float(np.median(np.diff(rising))))
+    first = np.maximum(rising - period // 4, 0)
+    return np.append(first, min(int(first[-1]) + period, len(displacement)))
+
+
+def moving_average(values: FloatArray, width: int) -> FloatArray:
+    """Mean of ``width`` samples around each one, shape (n,); ends are held (our choice).
+
+    Source: spool-valve paper, section 7.3: "a moving average filter with a step width of 50".
+    """
+    result: FloatArray = uniform_filter1d(values, width, mode='nearest')
+    return result
+
+
+def resonance_frequency(time: FloatArray, force: FloatArray, law: SpoolEvaluation) -> float | None:
+    """Frequency of the measuring chain [Hz], recognised in a force; None if none stands out.
+
+    A motion to and fro has lines in its spectrum at all multiples of its frequency, which fall steadily; a resonance is
+    a hump among them. So the envelope of the spectrum (the highest line within 10 Hz) is compared with itself at two
+    thirds and at three halves of each frequency: where it is highest above both, by ``resonance_prominence``, is the
+    resonance. Its place is the mean of the lines under the hump, weighted by their power.
+
+    Args:
+        time: [s], even steps, shape (n,).
+        force: [N], shape (n,).
+        law: Lowest frequency and prominence.
+
+    Source: spool-valve paper, section 6.2, for what it is; how it is recognised is our choice.
+    """
+    step = float(np.median(np.diff(time)))
+    amplitude = np.abs(np.fft.rfft((force - force.mean()) * np.hanning(len(force))))
+    frequency = np.fft.rfftfreq(len(force), step)
+    width = max(round(20.0 / frequency[1]), 3)
+    envelope = np.maximum(maximum_filter1d(amplitude, width), 1e-12 * amplitude.max())
+    looked_at = np.flatnonzero((frequency > law.lowest_resonance) & (frequency < frequency[-1] / 1.5))
+    if len(looked_at) < 10:
+        return None
+    sides = [np.interp(frequency[looked_at] * ratio, frequency, envelope) for ratio in (1.0 / 1.5, 1.5)]
+    prominence = envelope[looked_at] / np.maximum(*sides)
+    best = int(np.argmax(prominence))
+    if not prominence[best] > law.resonance_prominence:
+        return None
+    near = np.abs(frequency - frequency[looked_at[best]]) <= 0.15 * frequency[looked_at[best]]
+    return float(np.average(frequency[near], weights=amplitude[near] ** 2))
+
+
+def without_resonance(time: FloatArray, force: FloatArray, resonance: float, law: SpoolEvaluation) -> FloatArray:
+    """Force [N] with the resonance notched out, without delay, shape (n,).
+
+    Raises:
+        ValueError: The resonance is not below half the sampling rate.
+    """
+    rate = 1.0 / float(np.median(np.diff(time)))
+    if not 0.0 < resonance < rate / 2.0:
+        raise ValueError(f'a resonance of {resonance:.6g} Hz is not below half the sampling rate of {rate:.6g} Hz')
+    numerator, denominator = iirnotch(resonance, law.notch_quality, fs=rate)
+    result: FloatArray = filtfilt(numerator, denominator, force)
+    return result
+
+
+def reference_force(displacement: FloatArray, force: FloatArray, half_width: float) -> float:
+    """Mean magnitude of the force [N] within +/- ``half_width`` [m] of the middle of the stroke, to and fro.
+
+    Source: spool-valve paper, chapter 6: the mean between -0.5 mm and 0.5 mm, where the speed is held.
+
+    Raises:
+        ValueError: The stroke does not reach as far, or the force there is zero.
+    """
+    inside = np.abs(displacement) <= half_width
+    if not inside.any() or np.abs(displacement).max() < half_width:
+        raise ValueError(
+            f'the stroke of +/- {1e3 * float(np.abs(displacement).max()):.3g} mm does not reach '
+            f'+/- {1e3 * half_width:.3g} mm: choose a narrower reference_half_width'
+        )
+    mean = float(np.abs(force[inside]).mean())
+    if not mean > 0.0:
+        raise ValueError('the force in the middle of the stroke is zero: nothing to normalise by')
+    return mean
+
+
+def evaluate_cycles(
+    time: FloatArray, displacement: FloatArray, force: FloatArray, law: SpoolEvaluation, reference: float | None = None
+) -> SpoolFriction:
+    """Normalised friction over displacement of one cycle out of several.
+
+    Args:
+        time: [s], even steps, shape (n,).
+        displacement: [m], shape (n,).
+        force: [N], shape (n,), positive with the velocity.
+        law: How it is evaluated.
+        reference: Reference force [N] of another measurement, as the paper normalises all seals by the outer one
+            without pressure; None: this cycle's own.
+
+    Raises:
+        ValueError: A sample is not finite, there are too few cycles or samples, or there is nothing to normalise by.
+    """
+    if not all(np.isfinite(column).all() for column in (time, displacement, force)):
+        raise ValueError('time, displacement or force has samples that are not finite: cut them out')
+    starts = cycle_starts(displacement)
+    if len(starts) - 1 < law.evaluated_cycle:
+        raise ValueError(
+            f'{len(starts) - 1} cycles, but cycle {law.evaluated_cycle} is to be evaluated: drive {law.cycles} cycles'
+        )
+    resonance = resonance_frequency(time, force, law)
+    quiet = force if resonance is None else without_resonance(time, force, resonance, law)
+    smooth = moving_average(quiet, law.moving_average)
+    cycle = slice(int(starts[law.evaluated_cycle - 1]), int(starts[law.evaluated_cycle]))
+    middle = (float(displacement.max()) + float(displacement.min())) / 2.0
+    centred = displacement[cycle] - middle
+    own = reference_force(centred, smooth[cycle], law.reference_half_width) if reference is None else reference
+    velocity = np.gradient(displacement, time)[cycle]
+    return SpoolFriction(centred, velocity, force[cycle], smooth[cycle], smooth[cycle] / own, own, resonance)

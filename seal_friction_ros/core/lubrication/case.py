@@ -1,0 +1,299 @@
+"""Everything a run needs, and the document (a mapping, as YAML gives it) it is made from.
+
+A case file looks like this; every part and field is in docs/ehl.md::
+
+    name: inner_seal
+    source: where the numbers are from
+    seal: {interference: 36.0e-6}
+    motion: {distance: 1.8e-3}
+    control_edge: {position: 0.3e-3}     # optional, like film_supply and viscoelasticity
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from seal_friction_ros.core.foundation.parameters import check, check_names, from_mapping, name_and_source, parameter
+from seal_friction_ros.core.lubrication.grease import Grease
+from seal_friction_ros.core.lubrication.groove import Groove
+from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
+from seal_friction_ros.core.lubrication.topography import Topography
+from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
+
+
+@dataclass(frozen=True)
+class SealBody:
+    """Shape and material of the seal. Shape: our choice (the paper's is confidential); material: Table 1.
+
+    Raises:
+        ValueError: A value is out of bounds, or the material has no stiffness.
+    """
+
+    sealing_diameter: float = parameter(
+        6e-3, unit='m', lower=1e-4, upper=10.0, description='Of the seat (paper: 6 mm).'
+    )
+    crown_radius_left: float = parameter(
+        1e-3, unit='m', lower=1e-5, upper=1.0, description='Radius of the profile left of its crown.'
+    )
+    crown_radius_right: float = parameter(
+        1e-3, unit='m', lower=1e-5, upper=1.0, description='Radius of the profile right of its crown.'
+    )
+    interference: float = parameter(
+        36e-6, unit='m', lower=0.0, upper=1e-2, description='How far the undeformed crown overlaps the wall.'
+    )
+    section_height: float = parameter(
+        1e-3, unit='m', lower=1e-5, upper=0.1, description='Depth at which the seal is held.'
+    )
+    mooney_c10: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='C_10.')
+    mooney_c01: float = parameter(1.785e6, unit='Pa', lower=0.0, upper=1e9, description='C_01.')
+    solid_shear_stress: float = parameter(
+        1.5e6, unit='Pa', lower=0.0, upper=1e9, description='tau_c on the real area of contact.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.modulus <= 0.0:
+            raise ValueError('SealBody.mooney_c10 and mooney_c01 are both 0 Pa: give the seal a stiffness')
+
+    @property
+    def modulus(self) -> float:
+        """Plane-strain modulus at small strain E* = E / (1 - 1/4) with E = 6 (C_10 + C_01) [Pa]."""
+        return 8.0 * (self.mooney_c10 + self.mooney_c01)
+
+
+@dataclass(frozen=True)
+class Air:
+    """Pressure on both sides of the seal, above that at which the film cavitates (ambient).
+
+    Raises:
+        ValueError: A value is out of bounds.
+    """
+
+    pressure_left: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e8, description='Gauge.')
+    pressure_right: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e8, description='Gauge.')
+    pressure_interference: float = parameter(
+        6e-11,
+        unit='m/Pa',
+        lower=0.0,
+        upper=1e-6,
+        description='Interference that a pressure difference adds through the groove (our choice: 36 um at 6 bar).',
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @property
+    def difference(self) -> float:
+        """Magnitude of the pressure difference [Pa]."""
+        return abs(self.pressure_left - self.pressure_right)
+
+
+@dataclass(frozen=True)
+class Viscoelasticity:
+    """Seal that is stiffer when loaded fast: standard linear solid; the Mooney-Rivlin stiffness is the relaxed one.
+
+    Raises:
+        ValueError: A value is out of bounds.
+
+    Source: spool-valve paper, section 7.4, for the effect; model and numbers are our choice.
+    """
+
+    stiffening: float = parameter(
+        1.0, unit='1', lower=0.0, upper=100.0, description='Instantaneous over relaxed modulus, less 1.'
+    )
+    relaxation_time: float = parameter(
+        0.3, unit='s', lower=1e-6, upper=1e6, description='Time constant of creep under constant pressure.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """Grid and time step.
+
+    Raises:
+        ValueError: A value is out of bounds.
+    """
+
+    cells: int = parameter(226, unit='1', lower=32, upper=4000, description='Cells of the film (paper: 226 nodes).')
+    film_width: float = parameter(0.6e-3, unit='m', lower=1e-5, upper=0.1, description='Length of the film region.')
+    time_step: float = parameter(5e-4, unit='s', lower=1e-7, upper=0.1, description='Before any halving.')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class Study:
+    """Study of section 7.2: the case with other solid shear stresses.
+
+    Raises:
+        ValueError: A value is out of bounds, or there is none.
+    """
+
+    solid_shear_stresses: tuple[float, ...] = parameter(
+        (0.5e6, 0.75e6, 1.0e6, 1.25e6, 1.5e6, 1.75e6, 2.0e6, 2.25e6, 2.5e6),
+        unit='Pa',
+        lower=1e3,
+        upper=1e9,
+        description='tau_c of each run.',
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if not self.solid_shear_stresses:
+            raise ValueError('Study.solid_shear_stresses is empty')
+
+
+@dataclass(frozen=True)
+class MapGrid:
+    """Velocities and pressures of the friction map.
+
+    Raises:
+        ValueError: A value is out of bounds, or a range has no extent.
+    """
+
+    velocity_min: float = parameter(1e-4, unit='m/s', lower=1e-7, upper=10.0, description='Lowest speed.')
+    velocity_max: float = parameter(0.1, unit='m/s', lower=1e-6, upper=100.0, description='Highest speed.')
+    velocities: int = parameter(20, unit='1', lower=2, upper=200, description='Speeds, in equal ratios.')
+    pressure_max: float = parameter(6e5, unit='Pa', lower=1.0, upper=1e8, description='Highest pressure; lowest is 0.')
+    pressures: int = parameter(6, unit='1', lower=2, upper=100, description='Pressures, in equal steps.')
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.velocity_max <= self.velocity_min:
+            raise ValueError(
+                f'MapGrid.velocity_max = {self.velocity_max} m/s is not above velocity_min = {self.velocity_min} m/s'
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One seal, its wall, lubricant and motion.
+
+    Raises:
+        ValueError: Two parts contradict each other.
+    """
+
+    name: str
+    source: str = ''
+    seal: SealBody = field(default_factory=SealBody)
+    topography: Topography = field(default_factory=Topography)
+    grease: Grease = field(default_factory=Grease)
+    groove: Groove = field(default_factory=Groove)
+    air: Air = field(default_factory=Air)
+    motion: ConstantAcceleration = field(default_factory=ConstantAcceleration)
+    numerics: Numerics = field(default_factory=Numerics)
+    study: Study = field(default_factory=Study)
+    map: MapGrid = field(default_factory=MapGrid)
+    control_edge: ControlEdge | None = None
+    film_supply: FilmSupply | None = None
+    viscoelasticity: Viscoelasticity | None = None
+
+    def __post_init__(self) -> None:
+        if self.seal.section_height < self.numerics.film_width:
+            raise ValueError(
+                f'case {self.name}: seal.section_height = {self.seal.section_height} m is less than '
+                f'numerics.film_width = {self.numerics.film_width} m: the half-plane needs more depth than width'
+            )
+        if self.air.pressure_left or self.air.pressure_right:
+            for part in ('film_supply', 'control_edge'):
+                if getattr(self, part):
+                    raise ValueError(
+                        f'case {self.name}: {part} needs both sides at ambient pressure: leave out air, or {part}'
+                    )
+
+    @property
+    def interference(self) -> float:
+        """Interference with what the pressure difference adds [m]."""
+        return self.seal.interference + self.air.pressure_interference * self.air.difference
+
+    @property
+    def seated_groove(self) -> Groove:
+        """The groove as it acts: a pressure difference holds the seal on one flank (paper, section 7.4)."""
+        return dataclasses.replace(self.groove, half_clearance=0.0) if self.air.difference > 0.0 else self.groove
+
+
+_PARTS: dict[str, type] = {
+    'seal': SealBody,
+    'topography': Topography,
+    'grease': Grease,
+    'groove': Groove,
+    'air': Air,
+    'motion': ConstantAcceleration,
+    'numerics': Numerics,
+    'study': Study,
+    'map': MapGrid,
+    'control_edge': ControlEdge,
+    'film_supply': FilmSupply,
+    'viscoelasticity': Viscoelasticity,
+}
+
+
+@dataclass(frozen=True)
+class Member:
+    """One seal of a spool with several.
+
+    Raises:
+        ValueError: A value is out of bounds.
+    """
+
+    case: str
+    """name of its case"""
+    mirrored: bool = False
+    """sits the other way round: its case is driven the other way"""
+    shift: float = parameter(
+        0.0, unit='m', lower=-1.0, upper=1.0, description='Where the spool stands when the case is at 0.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class Spool:
+    """Several seals on one spool, moved together; their frictions add up.
+
+    Raises:
+        ValueError: There is no seal.
+    """
+
+    name: str
+    source: str
+    motion: ConstantAcceleration
+    members: tuple[Member, ...]
+
+    def __post_init__(self) -> None:
+        if not self.members:
+            raise ValueError(f'spool {self.name}: seals is empty')
+
+
+def parse_case(document: Any) -> Case | Spool:
+    """Make a case, or a spool if the document has ``seals``, from the document of a case file.
+
+    Raises:
+        ValueError: The document makes no sense; the message names the case, the field, its value and its bound.
+    """
+    name, source = name_and_source(document, 'case')
+    known = ('name', 'source', *(('seals', 'motion') if 'seals' in document else _PARTS))
+    check_names(document, sorted(known), f'case {name}')
+    if 'seals' in document:
+        return _parse_spool(document, name, source)
+    parts: dict[str, Any] = {
+        key: from_mapping(record, document[key] if document[key] is not None else {}, f'case {name}: {key}')
+        for key, record in _PARTS.items()
+        if key in document
+    }
+    return Case(name=name, source=source, **parts)
+
+
+def _parse_spool(document: Mapping[str, Any], name: str, source: str) -> Spool:
+    seals = document['seals']
+    if not isinstance(seals, list):
+        raise ValueError(f'spool {name}: seals = {seals!r} is not a list')
+    members = tuple(from_mapping(Member, seal, f'spool {name}: seals[{i}]') for i, seal in enumerate(seals))
+    motion = from_mapping(ConstantAcceleration, document.get('motion', {}), f'spool {name}: motion')
+    return Spool(name, source, motion, members)

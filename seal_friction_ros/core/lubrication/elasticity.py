@@ -1,0 +1,84 @@
+"""Deflection of the seal surface under pressure: a half-plane whose far side is held."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import next_fast_len
+
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+
+_HALF_BAND = 6  # of the approximate inverse; 4 to 10 run alike
+
+
+@dataclass(frozen=True, eq=False)
+class HalfPlane:
+    r"""Influence matrix of a half-plane on a uniform grid of cells, each with one pressure, rigid at a depth.
+
+    .. math:: u(x) = \frac{2}{\pi E^*} \int p(s) \ln\frac{d}{|x - s|}\,ds
+
+    exact for pressure that is constant in each cell. A half-plane deflects without bound, so a ``depth`` d has to say
+    where it does not: about the height of the seal section (our choice).
+
+    Source: K. L. Johnson, Contact Mechanics, 1985, section 2.3 and appendix.
+    """
+
+    cells: int
+    cell_width: float
+    """[m]"""
+    modulus: float
+    """plane-strain modulus E* = E / (1 - nu^2) [Pa]"""
+    depth: float
+    """[m]"""
+    influence: FloatArray = field(init=False, repr=False)
+    """deflection of a cell by a unit pressure r cells away [m/Pa], shape (cells,)"""
+    stiffness_band: FloatArray = field(init=False, repr=False)
+    """banded approximate inverse of the influence matrix: stiffness against a cell r away [Pa/m], shape (7,)"""
+    _length: int = field(init=False, repr=False)
+    _spectrum: npt.NDArray[np.complex128] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.cells < 16:
+            raise ValueError(f'HalfPlane.cells = {self.cells} is too few: take 16 at least')
+        if self.depth < self.cells * self.cell_width:
+            raise ValueError(
+                f'HalfPlane.depth = {self.depth} m is less than the {self.cells * self.cell_width} m of the film'
+            )
+        influence = _influence(np.arange(self.cells), self.cell_width, self.modulus, self.depth)
+        length = next_fast_len(2 * self.cells, real=True)
+        ring = np.zeros(length)  # first column of a circulant that holds the Toeplitz matrix
+        ring[: self.cells] = influence
+        ring[-self.cells + 1 :] = influence[:0:-1]
+        object.__setattr__(self, '_length', length)
+        object.__setattr__(self, 'influence', influence)
+        object.__setattr__(self, '_spectrum', np.fft.rfft(ring))
+        object.__setattr__(self, 'stiffness_band', _stiffness_band(self.cells, self.cell_width, self.modulus))
+
+    def deflection(self, pressure: FloatArray) -> FloatArray:
+        """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,); n log n by fast Fourier transform."""
+        spectrum = np.fft.rfft(pressure, self._length) * self._spectrum
+        return np.asarray(np.fft.irfft(spectrum, self._length)[: self.cells])
+
+    def matrix(self) -> FloatArray:
+        """Full influence matrix [m/Pa], shape (cells, cells)."""
+        i = np.arange(self.cells)
+        return np.asarray(self.influence[np.abs(i[:, None] - i)])
+
+
+def _influence(distance: FloatArray | IntArray, width: float, modulus: float, depth: float) -> FloatArray:
+    """Integral of the kernel over a cell whose centre is ``distance`` cells away [m/Pa]."""
+    far, near = (distance + 0.5) * width, (distance - 0.5) * width
+    logarithms = far * np.log(far) - near * np.log(np.abs(near))
+    return np.asarray(2.0 / (math.pi * modulus) * (width * (1.0 + math.log(depth)) - logarithms))
+
+
+def _stiffness_band(cells: int, width: float, modulus: float) -> FloatArray:
+    """Inverse of the influence matrix of a long periodic grid, cut to a band; what is cut off goes to the diagonal."""
+    length = 8 * cells
+    distance = np.minimum(np.arange(length), length - np.arange(length))
+    spectrum = np.fft.rfft(_influence(distance, width, modulus, length * width)).real
+    spectrum[0] = math.inf
+    band = np.fft.irfft(1.0 / spectrum, length)[: _HALF_BAND + 1]
+    band[0] = -2.0 * band[1:].sum() + modulus / (cells * width)
+    return np.asarray(band)

@@ -1,0 +1,176 @@
+"""The friction map of a case: steady sliding over speed and pressure, and how far friction lags behind a change."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.lubrication.case import Case, MapGrid
+from seal_friction_ros.core.lubrication.contact import ContactState, contact_step
+from seal_friction_ros.core.lubrication.transient import Model, fluid_force, rest, solid_limit
+
+_PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
+_MOST_RETRIES = 20
+_MEMORY_STEPS = 200
+_LONG_PASSAGES = 250.0  # a step of so many is nearly one to the steady film
+
+
+class SteadyFriction(NamedTuple):
+    """Steady sliding friction at one pressure, over the speeds of the grid."""
+
+    pressure: float
+    """[Pa, gauge] on one side"""
+    friction: FloatArray
+    """[N] mean of both directions"""
+    solid: FloatArray
+    """[N] mean of both directions"""
+    direction_difference: FloatArray
+    """[N] friction towards the pressure less that away from it"""
+    retried_steps: int
+
+
+class Memory(NamedTuple):
+    """How long friction remembers."""
+
+    length: float
+    """[m] of sliding"""
+    retried_steps: int
+
+
+def map_speeds(grid: MapGrid) -> FloatArray:
+    """Speeds of a map [m/s], in equal ratios."""
+    return np.geomspace(grid.velocity_min, grid.velocity_max, grid.velocities)
+
+
+def map_pressures(grid: MapGrid) -> FloatArray:
+    """Pressures of a map [Pa], in equal steps from 0."""
+    return np.linspace(0.0, grid.pressure_max, grid.pressures)
+
+
+def _plain(case: Case, pressure: float) -> Case:
+    """The case on a plain flooded wall, elastic, with ``pressure`` [Pa] on its left."""
+    air = dataclasses.replace(case.air, pressure_left=pressure, pressure_right=0.0)
+    return dataclasses.replace(case, air=air, control_edge=None, film_supply=None, viscoelasticity=None)
+
+
+def _friction(model: Model, state: ContactState, velocity: float) -> tuple[float, float]:
+    """Friction and solid friction [N], magnitudes, at a sliding ``velocity`` [m/s]."""
+    solid = solid_limit(model, state)
+    return solid + math.copysign(1.0, velocity) * fluid_force(model, state, velocity), solid
+
+
+def _slid(
+    model: Model, start: ContactState, velocity: float, durations: Sequence[float]
+) -> tuple[ContactState, list[ContactState], int]:
+    """Sliding at a ``velocity`` [m/s] by implicit Euler steps of ``durations`` [s]; one that fails is taken in halves.
+
+    An infinite step, to the steady film, is taken again after a finite one.
+
+    Returns:
+        The last state, that after each of ``durations``, and how many steps failed.
+
+    Raises:
+        NotConvergedError: More than 20 steps failed.
+    """
+    state, states, retried = start, [], 0
+    for duration in durations:
+        left = [duration]
+        while left:
+            old = state.saturation * state.gap
+            try:
+                done = contact_step(model.contact, state, model.profile, -velocity, model.ends(), old, left[-1])
+            except NotConvergedError:
+                retried += 1
+                if retried > _MOST_RETRIES:
+                    raise
+                failed = left.pop()
+                if math.isinf(failed):
+                    left += [failed, _LONG_PASSAGES * model.case.numerics.film_width / abs(velocity)]
+                else:
+                    left += [0.5 * failed, 0.5 * failed]
+                continue
+            left.pop()
+            state = done.state
+        states.append(state)
+    return state, states, retried
+
+
+def steady_state(model: Model, start: ContactState, velocity: float) -> tuple[ContactState, int]:
+    """Film of steady sliding at a ``velocity`` [m/s] by ever longer steps from ``start``; how many steps failed.
+
+    Raises:
+        NotConvergedError: More than 20 steps failed.
+    """
+    passage = model.case.numerics.film_width / abs(velocity)
+    state, _, retried = _slid(model, start, velocity, [share * passage for share in _PASSAGES])
+    return state, retried
+
+
+def steady_friction(case: Case, pressure: float) -> SteadyFriction:
+    """Steady sliding friction of a case at one pressure [Pa], both directions, over the speeds of its grid.
+
+    Raises:
+        NotConvergedError: A film did not converge; the message says at which speed and pressure.
+    """
+    model = Model(_plain(case, pressure))
+    speeds = map_speeds(case.map)
+    values = np.empty((2, 2, len(speeds)))
+    begin = rest(model, 0.0).state
+    retried = 0
+    for k, direction in enumerate((1.0, -1.0)):
+        state = begin
+        for i, speed in enumerate(speeds):
+            try:
+                state, more = steady_state(model, state, direction * float(speed))
+            except NotConvergedError as error:
+                raise NotConvergedError(f'case {case.name} at {speed:.4g} m/s, {pressure:.4g} Pa: {error}') from None
+            retried += more
+            values[k, :, i] = _friction(model, state, direction * float(speed))
+    friction, solid = values.mean(axis=0)
+    return SteadyFriction(pressure, friction, solid, values[1, 0] - values[0, 0], retried)
+
+
+def memory_length(case: Case) -> Memory:
+    """Sliding over which friction follows a change of speed [m], without pressure.
+
+    From steady sliding at a fifth of the highest speed of the motion the speed is set to the highest; the length is
+    that of an exponential of the same area, the integral of (F - F_end) / (F_start - F_end) over the way.
+
+    Raises:
+        NotConvergedError: A step did not converge.
+    """
+    model = Model(_plain(case, 0.0))
+    fast = case.motion.speed
+    slow, first = steady_state(model, rest(model, 0.0).state, 0.2 * fast)
+    steady, second = steady_state(model, slow, fast)
+    step = 4.0 * case.numerics.film_width / fast / _MEMORY_STEPS
+    _, states, third = _slid(model, slow, fast, [step] * _MEMORY_STEPS)
+    course = np.array([_friction(model, state, fast)[0] for state in (slow, *states)])
+    end = _friction(model, steady, fast)[0]
+    over = (course - end) / (course[0] - end)
+    return Memory(float(np.trapezoid(over) * step * fast), first + second + third)
+
+
+def friction_map(case: Case, rows: list[SteadyFriction], memory: float) -> FrictionMap:
+    """The law from its computed rows, one for each pressure of the grid, in any order.
+
+    Raises:
+        ValueError: The rows are not those of the grid.
+    """
+    ordered = sorted(rows, key=lambda row: row.pressure)
+    pressures = map_pressures(case.map)
+    if len(ordered) != len(pressures) or not np.allclose([row.pressure for row in ordered], pressures):
+        raise ValueError('friction_map: the rows are not those of the pressures of the grid')
+    return FrictionMap(
+        speeds=tuple(map_speeds(case.map).tolist()),
+        pressures=tuple(pressures.tolist()),
+        frictions=tuple(float(value) for row in ordered for value in row.friction),
+        reference_speed=case.motion.speed,
+        memory_length=memory,
+        presliding_length=float(ordered[0].friction[0]) / case.groove.stiffness,
+    )

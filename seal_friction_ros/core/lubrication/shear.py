@@ -1,0 +1,116 @@
+"""Friction of a contact: shear of the film, and of the asperities that touch."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.special import erf
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.lubrication.contact import Contact, asperity_pressure
+from seal_friction_ros.core.lubrication.grease import apparent_viscosity
+from seal_friction_ros.core.lubrication.reynolds import FilmEnds
+
+
+def real_area_share(contact: Contact, gap: FloatArray) -> FloatArray:
+    """Local share A_real of the surface that touches, shape (n,), at a ``gap`` [m]; see `Topography`."""
+    pressure, _ = asperity_pressure(gap, contact.asperities)
+    return np.asarray(erf(pressure / contact.topography.real_area_pressure(contact.half_plane.modulus)))
+
+
+def solid_shear(contact: Contact, gap: FloatArray, solid_shear_stress: float) -> float:
+    """Solid shear force [N/m]: integral of tau_c A_real over the seal.
+
+    Source: spool-valve paper, equation (2).
+    """
+    return solid_shear_stress * float(real_area_share(contact, gap).sum()) * contact.half_plane.cell_width
+
+
+@compiled
+def fluid_shear(
+    gap: FloatArray,
+    pressure: FloatArray,
+    saturation: FloatArray,
+    wall_velocity: float,
+    grease: tuple[float, float, float, float, float],
+    width: float,
+    ends: FilmEnds,
+) -> float:
+    """Shear force of the film on the seal [N/m], in the direction of the moving wall if positive with its velocity.
+
+    tau = eta(gamma) gamma with the rate at the seal surface, gamma = U / h - h p' / (2 eta(U / h)); streamers of a
+    cavitated film shear with their share (our choice). Arguments as in `ContactState` and `reynolds.reynolds_rows`.
+
+    Source: spool-valve paper, equation (1).
+    """
+    n = gap.shape[0]
+    total = 0.0
+    for i in range(n):
+        left = pressure[i - 1] if i > 0 else 2.0 * ends[0] - pressure[0]
+        right = pressure[i + 1] if i < n - 1 else 2.0 * ends[1] - pressure[n - 1]
+        couette = wall_velocity / gap[i]
+        poiseuille = gap[i] * (right - left) / (4.0 * width * apparent_viscosity(grease, couette))
+        rate = couette - poiseuille
+        total += saturation[i] * apparent_viscosity(grease, rate) * rate
+    return total * width
+
+
+def sliding_velocity(
+    drive: float,
+    solid: float,
+    fluid_at: Callable[[float], float],
+    spring_at: Callable[[float], float],
+    fastest: float,
+) -> float:
+    """Velocity at which spring and friction balance, if the seal does not stick.
+
+    solid sign(v) + fluid(v) = spring(v), the film held. The left side rises with v and the right side falls, so there
+    is one solution between 0 and whatever the spring could drive.
+
+    Args:
+        drive: Force of the spring if the seal stuck [N], of a magnitude above ``solid``.
+        solid: Magnitude of the solid friction [N].
+        fluid_at: Fluid friction [N] against a sliding velocity [m/s].
+        spring_at: Force of the spring [N] after a step at a sliding velocity [m/s].
+        fastest: A speed to begin the search with [m/s].
+
+    Raises:
+        ValueError: There is no balance below a million times ``fastest``.
+
+    The method is that of Illinois, M. Dowell, P. Jarratt 1971.
+    """
+    direction = math.copysign(1.0, drive)
+
+    def surplus(speed: float) -> float:
+        return direction * (spring_at(direction * speed) - fluid_at(direction * speed)) - solid
+
+    low, high, at_low = 0.0, fastest, direction * drive - solid
+    at_high = surplus(high)
+    while at_high > 0.0:
+        low, at_low = high, at_high
+        high *= 2.0
+        if high > 1e6 * fastest:
+            raise ValueError(
+                f'no sliding velocity below {high:.3g} m/s balances {drive:.4g} N: is the seal held at all?'
+            )
+        at_high = surplus(high)
+    kept = 0
+    for _ in range(100):
+        if high - low <= 1e-9 * fastest:
+            break
+        middle = (low * at_high - high * at_low) / (at_high - at_low)
+        value = surplus(middle)
+        if value == 0.0:
+            return direction * middle
+        if value > 0.0:
+            low, at_low = middle, value
+            at_high = 0.5 * at_high if kept > 0 else at_high
+            kept = 1
+        else:
+            high, at_high = middle, value
+            at_low = 0.5 * at_low if kept < 0 else at_low
+            kept = -1
+        if abs(value) <= 1e-9 * (abs(drive) + solid):
+            return direction * middle
+    return direction * 0.5 * (low + high)

@@ -1,0 +1,389 @@
+r"""A whole motion of one seal, step by step: ``moment = rest(model)``, then ``moment, forces = advance(...)``.
+
+The spool drives the contact through the groove (`groove`): lag e, velocity of the contact v = spool velocity - de/dt.
+One step first finds v from the balance of spring and friction with the film as it is, sticking included, then moves the
+film by one implicit Euler step with that v (our choice: of first order in the step, like the film itself). Forces count
+positive where they resist a motion to the right, so friction has the sign of the velocity.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
+from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.lubrication.case import Case
+from seal_friction_ros.core.lubrication.contact import (
+    Contact,
+    ContactState,
+    asperity_pressure,
+    contact_step,
+    dry_contact,
+    film_properties,
+)
+from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.kinematics import Motion
+from seal_friction_ros.core.lubrication.reynolds import FilmEnds
+from seal_friction_ros.core.lubrication.shear import fluid_shear, sliding_velocity, solid_shear
+from seal_friction_ros.core.lubrication.wall import WallFilm
+
+_MOST_HALVINGS = 10
+_LONGEST_WALL = 1_000_000  # cells of its film
+_LARGEST_RECORD = 100_000_000  # numbers along the seal that a run may keep, 0.8 GB
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A case made ready to run.
+
+    Air presses on the seal from all sides, and rubber passes that on like a fluid; so only what film and asperities
+    press above the air deflects it (our choice: between the sides the air falls over the middle half of the film).
+
+    Raises:
+        ValueError: The grid does not fit the seal.
+    """
+
+    case: Case
+    contact: Contact = field(init=False)
+    place: FloatArray = field(init=False)
+    """cells along the seal from its crown [m], shape (n,)"""
+    ambient: FloatArray = field(init=False)
+    """pressure of the air, from that on the left to that on the right [Pa], shape (n,)"""
+    profile: FloatArray = field(init=False)
+    """gap of the undeformed seal to a plain wall, less what the air deflects [m], shape (n,)"""
+    circumference: float = field(init=False)
+    """[m]"""
+
+    def __post_init__(self) -> None:
+        case, numerics = self.case, self.case.numerics
+        width = numerics.film_width / numerics.cells
+        plane = HalfPlane(numerics.cells, width, case.seal.modulus, case.seal.section_height)
+        place = (np.arange(numerics.cells) + 0.5) * width - 0.5 * numerics.film_width
+        radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
+        object.__setattr__(self, 'contact', Contact(plane, case.topography, case.grease))
+        object.__setattr__(self, 'place', place)
+        passed = np.clip(0.5 + 2.0 * place / numerics.film_width, 0.0, 1.0)
+        ambient = case.air.pressure_left + passed * (case.air.pressure_right - case.air.pressure_left)
+        profile = place**2 / (2.0 * radius) - case.interference - plane.deflection(ambient)
+        object.__setattr__(self, 'ambient', ambient)
+        object.__setattr__(self, 'profile', profile)
+        object.__setattr__(self, 'circumference', math.pi * case.seal.sealing_diameter)
+
+    def rigid_gap(self, contact_place: float) -> FloatArray:
+        """Gap of the undeformed seal [m] with its crown at ``contact_place`` along the wall [m]."""
+        edge = self.case.control_edge
+        return self.profile if edge is None else self.profile + edge.fall(contact_place + self.place)[0]
+
+    def ends(self, left: float = 1.0, right: float = 1.0) -> FilmEnds:
+        """What is beyond both ends of the film, with the saturation of what flows in."""
+        return FilmEnds(self.case.air.pressure_left, self.case.air.pressure_right, left, right)
+
+
+class Moment(NamedTuple):
+    """What one step leaves for the next."""
+
+    time: float
+    """[s]"""
+    position: float
+    """of the spool [m]"""
+    lag: float
+    """of the contact behind the spool [m]"""
+    state: ContactState
+    wall_film: WallFilm | None
+    """film on the wall outside the seal; None where it is flooded"""
+    creep: FloatArray
+    """deflection that creeps after the pressure [m], shape (n,); zeros for an elastic seal"""
+
+    @property
+    def contact_place(self) -> float:
+        """Crown of the seal along the wall [m]."""
+        return self.position - self.lag
+
+
+class Forces(NamedTuple):
+    """Forces of the wall on the seal at the end of a step [N]; together what the spool feels."""
+
+    friction: float
+    """all of it: solid + fluid + edge"""
+    solid: float
+    fluid: float
+    edge: float
+    """axial part of the pressure on the chamfer; it pushes the seal out of the seat"""
+    sliding_velocity: float
+    """of the contact over the wall [m/s]"""
+
+
+class RunResult(NamedTuple):
+    """A run; arrays with one entry per step, the first after the first step."""
+
+    case: Case
+    time: FloatArray
+    """[s]"""
+    position: FloatArray
+    """of the spool [m]"""
+    velocity: FloatArray
+    """of the spool [m/s]"""
+    sliding_velocity: FloatArray
+    """of the contact [m/s]"""
+    friction: FloatArray
+    """[N], with the sign of the velocity it resists"""
+    solid: FloatArray
+    """[N]"""
+    fluid: FloatArray
+    """[N]"""
+    edge: FloatArray
+    """[N]"""
+    lag: FloatArray
+    """[m]"""
+    place: FloatArray
+    """cells along the seal [m], shape (n,)"""
+    gap: FloatArray
+    """[m], shape (steps, n)"""
+    film_pressure: FloatArray
+    """[Pa], shape (steps, n)"""
+    contact_pressure: FloatArray
+    """[Pa], shape (steps, n)"""
+    saturation: FloatArray
+    """shape (steps, n)"""
+    retried_steps: int
+    """steps that failed and were taken again in halves"""
+    newton_iterations: int
+    mass_defect: float
+    """largest difference between lubricant in and out and that in the film, over that in the film, of any step"""
+
+
+def last_cycle(result: RunResult) -> BoolArray:
+    """Whether each step is in the last cycle of the motion of the case, shape (steps,)."""
+    begin = result.time[-1] * (1.0 - 1.0 / result.case.motion.cycles)
+    return np.asarray(result.time > begin + 1e-12)
+
+
+def rest(model: Model, position: float) -> Moment:
+    """The seal at rest and relaxed on its left seat: dry contact, gap as full of lubricant as the wall makes it.
+
+    Raises:
+        NotConvergedError: The dry contact was not found.
+        ValueError: The wall is too long to carry a film.
+    """
+    case = model.case
+    n = case.numerics.cells
+    lag = -case.seated_groove.half_clearance
+    air_deflects = model.contact.half_plane.deflection(model.ambient)
+    gap = dry_contact(model.contact, model.rigid_gap(position - lag) + air_deflects)
+    pressure, _ = asperity_pressure(gap, model.contact.asperities)
+    creep = np.zeros(n)
+    if case.viscoelasticity:
+        stiffening = case.viscoelasticity.stiffening
+        creep = stiffening / (1.0 + stiffening) * model.contact.half_plane.deflection(pressure + model.ambient)
+    saturation, wall_film = np.ones(n), None
+    if case.film_supply:
+        film = case.film_supply.initial_film
+        saturation = np.minimum(1.0, 2.0 * film / gap)
+        width = model.contact.half_plane.cell_width
+        reach = case.motion.distance + 2.0 * case.numerics.film_width
+        count = math.ceil(2.0 * reach / width)
+        if count > _LONGEST_WALL:
+            raise ValueError(
+                f'case {case.name}: the film on the wall has {count} cells: make motion.distance shorter, '
+                'or leave out film_supply'
+            )
+        start = position - reach
+        wall_film = WallFilm(start, width, np.full(count, film * width))
+    return Moment(0.0, position, lag, ContactState(gap, np.array(model.ambient), saturation), wall_film, creep)
+
+
+def advance(model: Model, moment: Moment, time: float, position: float) -> tuple[Moment, Forces, int, float]:
+    """One step to ``time`` [s], when the spool is at ``position`` [m].
+
+    Returns:
+        The next moment, forces, iterations of Newton's method, and the share of the lubricant that was not conserved.
+
+    Raises:
+        NotConvergedError: The step has no solution within the iterations allowed; a smaller one may.
+    """
+    case, contact = model.case, model.contact
+    width = contact.half_plane.cell_width
+    step = time - moment.time
+    velocity, lag = _slide(model, moment, step, position)
+    contact_place = position - lag
+    way = contact_place - moment.contact_place
+    ends, taken = _supply(model, moment, way, step)
+    compliance, creep_kept = 1.0, np.zeros(1)
+    if case.viscoelasticity:
+        relaxing = step / case.viscoelasticity.relaxation_time
+        slow = case.viscoelasticity.stiffening / (1.0 + case.viscoelasticity.stiffening)
+        compliance = 1.0 - slow + slow * relaxing / (1.0 + relaxing)
+        creep_kept = moment.creep / (1.0 + relaxing)
+    rigid = model.rigid_gap(contact_place) + creep_kept
+    old = moment.state.saturation * moment.state.gap
+    done = contact_step(contact, moment.state, rigid, -velocity, ends, old, step, compliance)
+    state = done.state
+
+    film_volume = float((state.saturation * state.gap).sum()) * width
+    gained = (float(done.flow[0]) - float(done.flow[-1])) * step
+    defect = abs(film_volume - float(old.sum()) * width - gained) / film_volume
+    wall_film = moment.wall_film
+    if wall_film is not None:
+        wall_film = _wall_film_after(model, moment, wall_film, taken, done.flow * step, contact_place)
+    solid_pressure, _ = asperity_pressure(state.gap, contact.asperities)
+    creep = moment.creep
+    if case.viscoelasticity:
+        creep = creep_kept + slow * relaxing / (1.0 + relaxing) * contact.half_plane.deflection(
+            state.pressure + solid_pressure
+        )
+    after = Moment(time, position, lag, state, wall_film, creep)
+    return after, _forces(model, after, velocity), done.iterations, defect
+
+
+def _edge_force(model: Model, moment: Moment) -> float:
+    edge = model.case.control_edge
+    if edge is None:
+        return 0.0
+    solid, _ = asperity_pressure(moment.state.gap, model.contact.asperities)
+    _, slope = edge.fall(moment.contact_place + model.place)
+    axial = float(((moment.state.pressure + solid) * slope).sum()) * model.contact.half_plane.cell_width
+    return -model.circumference * axial
+
+
+def fluid_force(model: Model, state: ContactState, velocity: float) -> float:
+    """Fluid friction [N] at a sliding ``velocity`` [m/s]."""
+    numbers, width = model.case.grease.numbers, model.contact.half_plane.cell_width
+    return -model.circumference * float(fluid_shear(*state, -velocity, numbers, width, model.ends()))
+
+
+def solid_limit(model: Model, state: ContactState) -> float:
+    """Magnitude of the solid friction [N] of a sliding contact."""
+    return model.circumference * solid_shear(model.contact, state.gap, model.case.seal.solid_shear_stress)
+
+
+def _slide(model: Model, moment: Moment, step: float, position: float) -> tuple[float, float]:
+    """Sliding velocity [m/s] during the step and lag [m] after it."""
+    groove = model.case.seated_groove
+    stuck_lag = moment.lag + position - moment.position
+    edge = _edge_force(model, moment)
+    fluid_at_rest = fluid_force(model, moment.state, 0.0)
+    solid = solid_limit(model, moment.state)
+    drive = groove.force(stuck_lag) - edge - fluid_at_rest
+    if abs(drive) <= solid:
+        return 0.0, stuck_lag
+    velocity = sliding_velocity(
+        drive,
+        solid,
+        lambda v: fluid_force(model, moment.state, v) - fluid_at_rest,
+        lambda v: groove.force(stuck_lag - v * step) - edge - fluid_at_rest,
+        max(abs(position - moment.position), (abs(drive) - solid) / groove.stiffness) / step,
+    )
+    return velocity, stuck_lag - velocity * step
+
+
+def _forces(model: Model, moment: Moment, velocity: float) -> Forces:
+    fluid = fluid_force(model, moment.state, velocity)
+    edge = _edge_force(model, moment)
+    limit = solid_limit(model, moment.state)
+    if velocity:
+        solid = math.copysign(limit, velocity)
+    else:  # stuck: the asperities hold what the spring asks, up to their limit
+        asked = model.case.seated_groove.force(moment.lag) - edge - fluid
+        solid = min(max(asked, -limit), limit)
+    return Forces(solid + fluid + edge, solid, fluid, edge, velocity)
+
+
+def _supply(model: Model, moment: Moment, way: float, step: float) -> tuple[FilmEnds, FloatArray]:
+    """Ends of the film for a step by ``way`` [m], and the lubricant taken from each cell of the wall [m^2]."""
+    if moment.wall_film is None or way == 0.0:
+        return model.ends(), np.zeros(1)
+    left, right = _seal_ends(model, moment.contact_place)
+    swept = (right, right + way) if way > 0.0 else (left + way, left)
+    taken = moment.wall_film.ahead(*swept, left, right)
+    end = -1 if way > 0.0 else 0
+    numbers, rough = model.case.grease.numbers, model.contact.rough
+    height = film_properties(moment.state.gap, abs(way) / step, numbers, rough)[2, end]
+    filled = min(1.0, float(taken.sum()) / (0.5 * abs(way) * float(height)))
+    return (model.ends(right=filled) if way > 0.0 else model.ends(left=filled)), taken
+
+
+def _seal_ends(model: Model, contact_place: float) -> tuple[float, float]:
+    half = 0.5 * model.case.numerics.film_width
+    return contact_place - half, contact_place + half
+
+
+def _wall_film_after(
+    model: Model, moment: Moment, wall_film: WallFilm, taken: FloatArray, through: FloatArray, contact_place: float
+) -> WallFilm:
+    """Film on the wall once the volumes ``through`` the faces [m^2] have moved and the seal is at ``contact_place``."""
+    old_left, old_right = _seal_ends(model, moment.contact_place)
+    left, right = _seal_ends(model, contact_place)
+    if contact_place == moment.contact_place:
+        spilled = wall_film.moved(np.zeros_like(wall_film.volume), 0.0, left, left, left, -float(through[0]))
+        return spilled.moved(np.zeros_like(wall_film.volume), 0.0, right, right, right, float(through[-1]))
+    if contact_place > moment.contact_place:
+        pushed = float(taken.sum()) + float(through[-1])
+        return wall_film.moved(taken, pushed, right, old_left, left, -float(through[0]))
+    pushed = float(taken.sum()) - float(through[0])
+    return wall_film.moved(taken, pushed, left, right, old_right, float(through[-1]))
+
+
+def run(case: Case, motion: Motion | None = None, on_step: Callable[[int], None] | None = None) -> RunResult:
+    """Run a case through its motion, or through another.
+
+    A step that fails is taken again in two halves, up to 10 times over.
+
+    Args:
+        case: The case.
+        motion: Position of the spool; default: that of the case.
+        on_step: Called with 1 after every step, for a progress bar.
+
+    Raises:
+        NotConvergedError: A step failed however small; the message says when.
+        ValueError: The result would not fit in memory.
+    """
+    moved = case.motion if motion is None else motion
+    model = Model(case)
+    steps = max(1, math.ceil(moved.duration / case.numerics.time_step - 1e-9))
+    if 4 * steps * case.numerics.cells > _LARGEST_RECORD:
+        raise ValueError(
+            f'case {case.name}: {steps} steps of {case.numerics.cells} cells are too many to keep: make the motion '
+            'shorter, or numerics.time_step longer'
+        )
+    moment = rest(model, moved.position(0.0))
+    rows: list[tuple[float, ...]] = []
+    profiles: list[tuple[FloatArray, ...]] = []
+    retried = iterations = 0
+    worst = 0.0
+    for i in range(1, steps + 1):
+        goals = [moved.duration * i / steps]
+        while goals:
+            goal = goals[-1]
+            try:
+                after, forces, newton, defect = advance(model, moment, goal, moved.position(goal))
+            except NotConvergedError as error:
+                retried += 1
+                if len(goals) > _MOST_HALVINGS:
+                    raise NotConvergedError(f'case {case.name} at {goal:.6g} s: {error}') from None
+                goals.append(0.5 * (moment.time + goal))
+                continue
+            goals.pop()
+            velocity = (after.position - moment.position) / (after.time - moment.time)
+            moment = after
+            iterations += newton
+            worst = max(worst, defect)
+        rows.append((moment.time, moment.position, velocity, moment.lag, *forces))
+        solid_pressure, _ = asperity_pressure(moment.state.gap, model.contact.asperities)
+        profiles.append((moment.state.gap, moment.state.pressure, solid_pressure, moment.state.saturation))
+        if on_step:
+            on_step(1)
+    time, position, velocities, lag, friction, solid, fluid, edge, sliding = np.array(rows).T
+    gap, film, contact, saturation = (np.array(values) for values in zip(*profiles, strict=True))
+    return RunResult(
+        case, time, position, velocities, sliding, friction, solid, fluid, edge, lag, model.place,
+        gap, film, contact, saturation, retried, iterations, worst,
+    )  # fmt: skip
+
+
+def with_solid_shear_stress(case: Case, solid_shear_stress: float) -> Case:
+    """The case with another tau_c [Pa]."""
+    return dataclasses.replace(case, seal=dataclasses.replace(case.seal, solid_shear_stress=solid_shear_stress))

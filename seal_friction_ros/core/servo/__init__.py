@@ -1,0 +1,1 @@
+"""The simulated servo: plant, controller, sensors, motions."""

@@ -1,0 +1,594 @@
+r"""Servo valve, cylinder and load with the seals of the estimator: parameters, equations, one inner step.
+
+The equations are the field's [Merritt1967]_ (valve: chapter 5, cylinder: chapter 6), the seals those of `coulomb` and
+`friction_state`. Between events the state follows smooth equations, integrated by a Runge-Kutta step of fourth order.
+Events end a step early: the rod comes to rest, breaks away or meets an end stop, a cavity begins or collapses. They are
+located inside the step, so that a stuck rod has a velocity of exactly 0.0 and a position that does not change by one
+bit [Karnopp1985]_.
+
+Our choices, none of them in the sources:
+
+- Stuck is a state of its own, without Karnopp's velocity band, since here the velocity is known and not measured.
+- A rod that slows down ever more without end, as it can against a leaking chamber, is at rest below 1 nm/s.
+- End stops are rigid and take all of the kinetic energy.
+- A chamber that is emptied faster than it is filled holds a cavity at vapour pressure (see `chamber_pressure`).
+- Below ``transition_pressure`` an orifice is laminar (see `signed_root`).
+- The energy that flowed in and the energy that was dissipated are integrated along, to check the rest.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.units import INCH, PSI
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+
+AMBIENT = 101325.0  # [Pa, absolute] zero of gauge pressure
+TABLE_INTERVALS = 8192
+CREEP_SPEED = 1e-9  # [m/s] a rod that slides slower than this, and ever slower, is at rest
+MAX_EVENTS = 16  # in one inner step; then the rod is held to its end
+
+
+@dataclass(frozen=True)
+class ServoValve:
+    """Four-way servo valve with critical lap, and its supply.
+
+    Raises:
+        ValueError: A value is out of bounds, or supply is below return pressure.
+    """
+
+    supply_pressure: float = parameter(1000.0 * PSI, unit='Pa', lower=0.0, upper=1e8, description='Supply, gauge.')
+    return_pressure: float = parameter(1e5, unit='Pa', lower=0.0, upper=1e8, description='Return, gauge.')
+    rated_flow: float = parameter(
+        2.5e-5, unit='m3/s', lower=1e-8, upper=0.1, description='Flow at full opening and rated pressure drop.'
+    )
+    rated_pressure_drop: float = parameter(
+        1000.0 * PSI, unit='Pa', lower=1e4, upper=1e8, description='Pressure drop over both lands for the rated flow.'
+    )
+    natural_frequency: float = parameter(
+        1257.0, unit='rad/s', lower=1.0, upper=1e5, description='Undamped natural frequency of the spool.'
+    )
+    damping_ratio: float = parameter(0.8, unit='1', lower=0.05, upper=10.0, description='Damping ratio of the spool.')
+    null_leakage: float = parameter(
+        6e-14, unit='m3/(s Pa)', lower=0.0, upper=1e-9, description='Laminar leakage of each of the four lands.'
+    )
+    transition_pressure: float = parameter(
+        3e5, unit='Pa', lower=1e3, upper=1e7, description='Pressure drop below which an orifice is laminar.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.supply_pressure < self.return_pressure:
+            raise ValueError(
+                f'ServoValve.supply_pressure = {self.supply_pressure} Pa is below '
+                f'return_pressure = {self.return_pressure} Pa'
+            )
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Balanced cylinder: the rod goes through both ends, so both chambers push on the same area.
+
+    The stroke runs from -stroke/2 to +stroke/2; chamber a extends the rod (positive).
+
+    Raises:
+        ValueError: A value is out of bounds, the bore is not wider than the rod, or there is next to no dead volume.
+    """
+
+    rod_diameter: float = parameter(0.625 * INCH, unit='m', lower=1e-4, upper=1.0, description='Rod diameter.')
+    bore_diameter: float = parameter(0.75 * INCH, unit='m', lower=1e-4, upper=2.0, description='Bore diameter.')
+    stroke: float = parameter(0.05, unit='m', lower=1e-4, upper=10.0, description='Way from stop to stop.')
+    dead_volume: float = parameter(
+        2e-6, unit='m3', lower=1e-9, upper=1.0, description='Volume of each chamber, with its line, at its stop.'
+    )
+    internal_leakage: float = parameter(
+        1e-14, unit='m3/(s Pa)', lower=0.0, upper=1e-8, description='Laminar leakage past the piston.'
+    )
+    external_leakage: float = parameter(
+        0.0, unit='m3/(s Pa)', lower=0.0, upper=1e-8, description='Laminar leakage of each chamber to ambient.'
+    )
+    bulk_modulus: float = parameter(
+        7e8, unit='Pa', lower=1e7, upper=5e9, description='Effective bulk modulus of oil, lines and walls.'
+    )
+    vapour_pressure: float = parameter(
+        1e3, unit='Pa', lower=1.0, upper=1e5, description='Absolute pressure at which the oil cavitates.'
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.bore_diameter <= self.rod_diameter:
+            raise ValueError(
+                f'Cylinder.bore_diameter = {self.bore_diameter} m is not above rod_diameter = {self.rod_diameter} m'
+            )
+        if self.dead_volume < 0.01 * piston_area(self) * self.stroke:
+            raise ValueError(
+                f'Cylinder.dead_volume = {self.dead_volume} m3 is below 1 % of the swept volume '
+                f'{piston_area(self) * self.stroke:.3g} m3: a chamber without volume is infinitely stiff'
+            )
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the rod moves.
+
+    Raises:
+        ValueError: A value is out of bounds.
+    """
+
+    mass: float = parameter(5.0, unit='kg', lower=1e-3, upper=1e6, description='Piston, rod and load.')
+    spring_stiffness: float = parameter(0.0, unit='N/m', lower=0.0, upper=1e9, description='Spring to ground.')
+    spring_position: float = parameter(
+        0.0, unit='m', lower=-10.0, upper=10.0, description='Position at which the spring is relaxed.'
+    )
+    viscous_damping: float = parameter(20.0, unit='N s/m', lower=0.0, upper=1e7, description='Force per speed.')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def piston_area(cylinder: Cylinder) -> float:
+    """Area each chamber pushes on [m^2]: A = pi/4 (D_bore^2 - D_rod^2)."""
+    return math.pi / 4.0 * (cylinder.bore_diameter**2 - cylinder.rod_diameter**2)
+
+
+def total_volume(cylinder: Cylinder) -> float:
+    """Volume of both chambers [m^3], the same at every position: V_t = A stroke + 2 V_dead."""
+    return piston_area(cylinder) * cylinder.stroke + 2.0 * cylinder.dead_volume
+
+
+def natural_frequency(cylinder: Cylinder, mass: float) -> float:
+    r"""Hydraulic natural frequency in mid-stroke [rad/s].
+
+    .. math:: \omega_h = \sqrt{4 \beta A^2 / (V_t m)}
+
+    Source: [Merritt1967]_ chapter 6.
+    """
+    area = piston_area(cylinder)
+    return math.sqrt(4.0 * cylinder.bulk_modulus * area**2 / (total_volume(cylinder) * mass))
+
+
+def orifice_gain(valve: ServoValve) -> float:
+    """K of one fully open land, Q = K sqrt(dp) [m^3/(s Pa^0.5)]: the rated drop falls half over each of two lands."""
+    return valve.rated_flow / math.sqrt(valve.rated_pressure_drop / 2.0)
+
+
+class Constants(NamedTuple):
+    """Everything the equations need, as plain numbers."""
+
+    supply: float
+    ret: float
+    orifice_gain: float
+    null_leakage: float
+    transition: float
+    spool_frequency: float
+    spool_damping: float
+    area: float
+    limit: float
+    """Position of the stops [m]: stroke / 2."""
+    mid_volume: float
+    """Volume of one chamber at position 0 [m^3]."""
+    internal_leakage: float
+    external_leakage: float
+    bulk_modulus: float
+    vapour: float
+    """Vapour pressure [Pa, gauge]."""
+    supply_enthalpy: float
+    return_enthalpy: float
+    mass: float
+    stiffness: float
+    spring_position: float
+    damping: float
+    table_interval: float
+    coulomb_a: Any
+    """Coulomb friction [N] of the seals on chamber a at multiples of ``table_interval`` [Pa]."""
+    coulomb_b: Any
+    breakaway_a: Any
+    """Breakaway force [N], likewise."""
+    breakaway_b: Any
+
+
+class PlantState(NamedTuple):
+    """State of valve, chambers and rod."""
+
+    position: float
+    """[m]"""
+    velocity: float
+    """[m/s] exactly 0.0 while stuck"""
+    charge_a: float
+    """[Pa, gauge] pressure of chamber a; below vapour pressure it counts the cavity, see `chamber_pressure`"""
+    charge_b: float
+    spool: float
+    """[-] -1 to 1; positive opens supply to chamber a"""
+    spool_rate: float
+    """[1/s]"""
+    energy_in: float
+    """[J] taken from supply, return and load force since the start"""
+    energy_dissipated: float
+    """[J] in valve, leakage, viscous load, seals and end stops"""
+    direction: int
+    """-1 or 1: sliding that way; 0: stuck"""
+    transitions: int
+    """How often the rod came to rest or broke away since the start"""
+
+
+def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[MountedSeal, ...]) -> Constants:
+    """Numbers for the equations.
+
+    The seals' laws become tables up to twice the largest pressure that they or the supply know. A
+    table of 8192 intervals, read linearly and on with its last slope, is within 1e-5 of the laws in
+    seal_friction_ros/core and keeps them monotone: the price of compiling the equations.
+    """
+    beta = cylinder.bulk_modulus
+    highest = max([valve.supply_pressure, 1e6] + [m.seal.pressure_max for m in seals])
+    interval = 2.0 * highest / TABLE_INTERVALS
+    pressures = [i * interval for i in range(TABLE_INTERVALS + 1)]
+    on_a = tuple(m for m in seals if m.chamber == 'a')
+    on_b = tuple(m for m in seals if m.chamber == 'b')
+    frictions_a = [actuator_friction(on_a, p, 0.0) for p in pressures]
+    frictions_b = [actuator_friction(on_b, 0.0, p) for p in pressures]
+    return Constants(
+        supply=valve.supply_pressure,
+        ret=valve.return_pressure,
+        orifice_gain=orifice_gain(valve),
+        null_leakage=valve.null_leakage,
+        transition=valve.transition_pressure,
+        spool_frequency=valve.natural_frequency,
+        spool_damping=valve.damping_ratio,
+        area=piston_area(cylinder),
+        limit=cylinder.stroke / 2.0,
+        mid_volume=total_volume(cylinder) / 2.0,
+        internal_leakage=cylinder.internal_leakage,
+        external_leakage=cylinder.external_leakage,
+        bulk_modulus=beta,
+        vapour=cylinder.vapour_pressure - AMBIENT,
+        supply_enthalpy=-beta * math.expm1(-valve.supply_pressure / beta),
+        return_enthalpy=-beta * math.expm1(-valve.return_pressure / beta),
+        mass=load.mass,
+        stiffness=load.spring_stiffness,
+        spring_position=load.spring_position,
+        damping=load.viscous_damping,
+        table_interval=interval,
+        coulomb_a=np.array([f.coulomb_friction for f in frictions_a]),
+        coulomb_b=np.array([f.coulomb_friction for f in frictions_b]),
+        breakaway_a=np.array([f.coulomb_friction + f.stiction for f in frictions_a]),
+        breakaway_b=np.array([f.coulomb_friction + f.stiction for f in frictions_b]),
+    )
+
+
+def init_plant(c: Constants, position: float = 0.0) -> PlantState:
+    """At rest at ``position`` [m], valve closed, both chambers half-way between supply and return."""
+    half = (c.supply + c.ret) / 2.0
+    return PlantState(position, 0.0, half, half, 0.0, 0.0, 0.0, 0.0, 0, 0)
+
+
+@compiled
+def signed_root(drop: float, transition: float) -> float:
+    r"""Root of a pressure drop with its sign, laminar (finite slope) near zero.
+
+    .. math:: \sqrt{|\Delta p|}\,\mathrm{sgn}(\Delta p) \text{ for } |\Delta p| \ge p_t, \quad
+        \sqrt{p_t}\, r (5 - r^2) / 4,\; r = \Delta p / p_t \text{ below}
+
+    Source: two flow regimes as in [Ellman1999]_; the cubic, which meets value and slope of the root, is our choice.
+    """
+    if drop >= transition:
+        return math.sqrt(drop)
+    if drop <= -transition:
+        return -math.sqrt(-drop)
+    r = drop / transition
+    return math.sqrt(transition) * r * (5.0 - r * r) / 4.0
+
+
+@compiled
+def chamber_pressure(charge: float, vapour: float) -> float:
+    r"""Pressure of a chamber [Pa, gauge]: its charge, but never below vapour pressure.
+
+    The charge is the pressure that the oil would have if it alone had to fill the chamber, beta ln(m / (rho_0 V)).
+    Where that is below vapour pressure, oil at vapour pressure fills V exp((charge - vapour) / beta) and a cavity the
+    rest. So volume is conserved through growth and collapse of a cavity.
+    """
+    return max(charge, vapour)
+
+
+@compiled
+def coulomb(c: Constants, pressure_a: float, pressure_b: float) -> float:
+    """Coulomb friction of all seals [N]: `coulomb.actuator_friction`, from its tables."""
+    return from_table(c.coulomb_a, pressure_a / c.table_interval) + from_table(
+        c.coulomb_b, pressure_b / c.table_interval
+    )
+
+
+@compiled
+def breakaway(c: Constants, pressure_a: float, pressure_b: float) -> float:
+    """Breakaway force of all seals [N], likewise."""
+    return from_table(c.breakaway_a, pressure_a / c.table_interval) + from_table(
+        c.breakaway_b, pressure_b / c.table_interval
+    )
+
+
+@compiled
+def from_table(values: Any, place: float) -> float:
+    """Linear between ``values`` at 0, 1, 2, ...; the first below, on with the last slope above."""
+    if place <= 0.0:
+        return float(values[0])
+    i = min(int(place), TABLE_INTERVALS - 1)
+    low = float(values[i])
+    return low + (float(values[i + 1]) - low) * (place - i)
+
+
+@compiled
+def active_force(c: Constants, y: tuple[float, ...], load_force: float) -> float:
+    r"""Axial forces on the rod except seals and end stops [N].
+
+    .. math:: A (p_a - p_b) - k (x - x_k) - b v + F_{load}
+    """
+    pressure_a = chamber_pressure(y[2], c.vapour)
+    pressure_b = chamber_pressure(y[3], c.vapour)
+    spring = c.stiffness * (y[0] - c.spring_position)
+    return c.area * (pressure_a - pressure_b) - spring - c.damping * y[1] + load_force
+
+
+@compiled
+def force_sum(c: Constants, y: tuple[float, ...], load_force: float) -> float:
+    """Axial forces on the rod except its seals [N]. At a stop the rod presses on, the stop takes all that presses."""
+    force = active_force(c, y, load_force)
+    if y[1] == 0.0 and ((y[0] >= c.limit and force > 0.0) or (y[0] <= -c.limit and force < 0.0)):
+        return 0.0
+    return force
+
+
+@compiled
+def port_flow(c: Constants, opening: float, outside: float, pressure: float) -> float:
+    """Flow into a chamber through one land [m^3/s]: orifice and null leakage.
+
+    Source: [Merritt1967]_ chapter 5.
+    """
+    drop = outside - pressure
+    return c.orifice_gain * opening * signed_root(drop, c.transition) + c.null_leakage * drop
+
+
+@compiled
+def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, load_force: float) -> tuple[float, ...]:
+    r"""Time derivatives of the first eight numbers of `PlantState`.
+
+    .. math::
+        \dot x &= v, \qquad m \dot v = \Sigma F - d f_c(p_a, p_b) \quad (\text{stuck, } d = 0: \dot x = \dot v = 0) \\
+        \dot p_a &= \beta / V_a\, (Q_a - C_i (p_a - p_b) - C_e p_a - A v), \quad V_a = V_t/2 + A x \\
+        \ddot s &= \omega^2 (u - s) - 2 \zeta \omega \dot s
+
+    With constant bulk modulus a chamber's volume V holds V (H - p), H(p) = beta (exp(p / beta) - 1) the enthalpy of a
+    volume at p, and a flow Q carries H Q. What comes through a land came with the enthalpy of its other side; what is
+    missing was dissipated there.
+
+    Source: [Merritt1967]_ chapters 5 and 6; the energy is our derivation.
+    """
+    position, velocity, charge_a, charge_b, spool, spool_rate = y[0], y[1], y[2], y[3], y[4], y[5]
+    beta = c.bulk_modulus
+    a, b = chamber_pressure(charge_a, c.vapour), chamber_pressure(charge_b, c.vapour)
+    to_a, to_b = max(spool, 0.0), max(-spool, 0.0)
+    supply_a, return_a = port_flow(c, to_a, c.supply, a), port_flow(c, to_b, c.ret, a)
+    supply_b, return_b = port_flow(c, to_b, c.supply, b), port_flow(c, to_a, c.ret, b)
+    past_piston = c.internal_leakage * (a - b)
+    flow_a = supply_a + return_a - past_piston - c.external_leakage * a
+    flow_b = supply_b + return_b + past_piston - c.external_leakage * b
+
+    swept = c.area * velocity
+    oil_a = c.mid_volume + c.area * position
+    oil_b = c.mid_volume - c.area * position
+    charge_flow_a = flow_a if charge_a >= c.vapour else flow_a * math.exp((c.vapour - charge_a) / beta)
+    charge_flow_b = flow_b if charge_b >= c.vapour else flow_b * math.exp((c.vapour - charge_b) / beta)
+
+    friction = direction * coulomb(c, a, b)
+    acceleration = (active_force(c, y, load_force) - friction) / c.mass if direction != 0 else 0.0
+
+    density_a, density_b = math.exp(a / beta), math.exp(b / beta)
+    power_in = density_a * (supply_a * c.supply_enthalpy + return_a * c.return_enthalpy) + density_b * (
+        supply_b * c.supply_enthalpy + return_b * c.return_enthalpy
+    )
+    into_chambers = beta * ((density_a - 1.0) * flow_a + (density_b - 1.0) * flow_b)
+    rubbing = c.damping * velocity * velocity + friction * velocity
+    return (
+        velocity,
+        acceleration,
+        beta / oil_a * (charge_flow_a - swept),
+        beta / oil_b * (charge_flow_b + swept),
+        spool_rate,
+        c.spool_frequency * (c.spool_frequency * (command - spool) - 2.0 * c.spool_damping * spool_rate),
+        power_in + load_force * velocity,
+        power_in - into_chambers + rubbing,
+    )
+
+
+@compiled
+def along(y: tuple[float, ...], k: tuple[float, ...], h: float) -> tuple[float, ...]:
+    """State ``y`` a time ``h`` [s] along the rates ``k``."""
+    return (
+        y[0] + h * k[0],
+        y[1] + h * k[1],
+        y[2] + h * k[2],
+        y[3] + h * k[3],
+        y[4] + h * k[4],
+        y[5] + h * k[5],
+        y[6] + h * k[6],
+        y[7] + h * k[7],
+    )
+
+
+@compiled
+def smooth_step(
+    c: Constants, y: tuple[float, ...], direction: int, command: float, load_force: float, h: float
+) -> tuple[float, ...]:
+    """Runge-Kutta step of fourth order over ``h`` [s] in one friction state; the spool stops dead at its ends."""
+    k1 = rates(c, y, direction, command, load_force)
+    k2 = rates(c, along(y, k1, 0.5 * h), direction, command, load_force)
+    k3 = rates(c, along(y, k2, 0.5 * h), direction, command, load_force)
+    k4 = rates(c, along(y, k3, h), direction, command, load_force)
+    y = along(along(along(along(y, k1, h / 6.0), k2, h / 3.0), k3, h / 3.0), k4, h / 6.0)
+    if abs(y[4]) > 1.0:
+        return (y[0], y[1], y[2], y[3], math.copysign(1.0, y[4]), 0.0, y[6], y[7])
+    return y
+
+
+@compiled
+def margin(c: Constants, y: tuple[float, ...], direction: int, load_force: float) -> float:
+    """How far the friction state is from its end. A stuck one has ended below zero, a sliding one at zero already.
+
+    Stuck: breakaway force minus force sum [N]. Sliding: the smaller of speed [m/s] and way to the stop ahead [m].
+    """
+    if direction == 0:
+        holding = breakaway(c, chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour))
+        return holding - abs(force_sum(c, y, load_force))
+    return min(y[1] * direction, c.limit - y[0] * direction)
+
+
+@compiled
+def after_event(c: Constants, y: tuple[float, ...], direction: int, load_force: float) -> tuple[tuple[float, ...], int]:
+    """State and direction once the friction state has ended at ``y``.
+
+    A sliding rod comes to rest, at an end stop with the loss of its kinetic energy, and stays there unless the force
+    sum exceeds the breakaway force; a stuck rod slides where the force sum points.
+    """
+    if direction != 0:
+        position, velocity = y[0], y[1]
+        if c.limit - position * direction <= 0.0:
+            position = c.limit * direction
+        lost = 0.5 * c.mass * velocity * velocity
+        y = (position, 0.0, y[2], y[3], y[4], y[5], y[6], y[7] + lost)
+        if margin(c, y, 0, load_force) >= 0.0:
+            return y, 0
+    return y, 1 if force_sum(c, y, load_force) > 0.0 else -1
+
+
+@compiled
+def cavity_margin(c: Constants, before: tuple[float, ...], after: tuple[float, ...]) -> float:
+    """Way of the charges from vapour pressure [Pa], the smaller of both; negative if one crossed since ``before``."""
+    nearest = 1e12
+    for i in (2, 3):
+        side = before[i] - c.vapour
+        if side != 0.0:
+            nearest = min(nearest, math.copysign(1.0, side) * (after[i] - c.vapour))
+    return nearest
+
+
+@compiled
+def time_of_event(
+    c: Constants, y: tuple[float, ...], direction: int, command: float, load_force: float, h: float
+) -> float:
+    """Time within ``h`` [s], at or just after the moment the friction state ends or a cavity begins or collapses.
+
+    The smaller of `margin` and `cavity_margin` must be positive at 0 and must not be at ``h``. Illinois method.
+    """
+    early, late, side = 0.0, h, 0
+    margin_early = min(margin(c, y, direction, load_force), cavity_margin(c, y, y))
+    new = smooth_step(c, y, direction, command, load_force, h)
+    margin_late = min(margin(c, new, direction, load_force), cavity_margin(c, y, new))
+    for _ in range(60):
+        if late - early <= 1e-9 * h:
+            break
+        middle = early + (late - early) * margin_early / (margin_early - margin_late)
+        middle = min(max(middle, early + 4e-10 * h), late - 4e-10 * h)
+        new = smooth_step(c, y, direction, command, load_force, middle)
+        margin_middle = min(margin(c, new, direction, load_force), cavity_margin(c, y, new))
+        if margin_middle > 0.0:
+            early, margin_early = middle, margin_middle
+            margin_late *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            late, margin_late = middle, margin_middle
+            margin_early *= 0.5 if side == -1 else 1.0
+            side = -1
+    return late
+
+
+@compiled
+def with_motion(y: tuple[float, ...], direction: int, transitions: int) -> PlantState:
+    """Plant state of the eight integrated numbers and the friction state."""
+    return PlantState(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], direction, transitions)
+
+
+@compiled
+def creeps(before: tuple[float, ...], after: tuple[float, ...], direction: int) -> bool:
+    """Whether a sliding rod has become as slow as nothing, and slower: it would come to rest only in infinite time."""
+    return direction != 0 and after[1] * direction < min(CREEP_SPEED, before[1] * direction)
+
+
+@compiled
+def lasts(margin_now: float, direction: int) -> bool:
+    """Whether a friction state goes on: a stuck rod also at the breakaway force, a sliding one only at a speed."""
+    return margin_now > 0.0 or (direction == 0 and margin_now == 0.0)
+
+
+@compiled
+def inner_step(c: Constants, state: PlantState, command: float, load_force: float, h: float) -> PlantState:
+    """Advance valve, chambers and rod by ``h`` [s] with command [-1 to 1] and load force [N] held.
+
+    A rod that starts to slide but does not get anywhere within the step (no stiction, force at the limit) is held for
+    the rest of the step, and so is one after `MAX_EVENTS` events: no Zeno.
+    """
+    y: tuple[float, ...] = state[:8]
+    direction, transitions = state.direction, state.transitions
+    rest = h
+    for _ in range(MAX_EVENTS):
+        new = smooth_step(c, y, direction, command, load_force, rest)
+        goes_on = lasts(margin(c, new, direction, load_force), direction)
+        starts_inside = margin(c, y, direction, load_force) > 0.0
+        if goes_on and (cavity_margin(c, y, new) > 0.0 or not starts_inside):
+            if not creeps(y, new, direction):
+                return with_motion(new, direction, transitions)
+            y, rest = new, 0.0
+        elif starts_inside:
+            before = time_of_event(c, y, direction, command, load_force, rest)
+            y = smooth_step(c, y, direction, command, load_force, before)
+            rest = rest - before
+            if lasts(margin(c, y, direction, load_force), direction):
+                continue  # a cavity began or collapsed, no more
+        elif direction != 0:
+            break
+        was, (y, direction) = direction, after_event(c, y, direction, load_force)
+        transitions += 1 if (was == 0) != (direction == 0) else 0
+        if rest <= 0.0:
+            return with_motion(y, direction, transitions)
+    y = (y[0], 0.0, y[2], y[3], y[4], y[5], y[6], y[7])
+    transitions += 1 if direction != 0 else 0
+    return with_motion(smooth_step(c, y, 0, command, load_force, rest), 0, transitions)
+
+
+@compiled
+def stored_energy(c: Constants, state: PlantState) -> float:
+    r"""Energy in both chambers, mass and spring [J].
+
+    .. math:: E = \sum_{a,b} [V_{oil} (H(p) - p) - p V_{cavity}] + m v^2 / 2 + k (x - x_k)^2 / 2
+    """
+    beta = c.bulk_modulus
+    energy = 0.5 * c.mass * state.velocity**2 + 0.5 * c.stiffness * (state.position - c.spring_position) ** 2
+    for charge, side in ((state.charge_a, 1.0), (state.charge_b, -1.0)):
+        pressure = chamber_pressure(charge, c.vapour)
+        volume = c.mid_volume + side * c.area * state.position
+        oil = volume * math.exp((charge - pressure) / beta)
+        energy += oil * (beta * math.expm1(pressure / beta) - pressure) - pressure * (volume - oil)
+    return energy
+
+
+def fastest_rate(valve: ServoValve, cylinder: Cylinder, load: Load) -> tuple[float, str]:
+    """Largest rate of the equations [1/s] and what has it: what the inner step must resolve.
+
+    Spool: its natural frequency. Chamber: the slope of a laminar orifice, 5/4 K / sqrt(p_t), and the leakages on the
+    smallest volume, plus the oscillation of the mass on the oil at a stop.
+    """
+    beta, volume = cylinder.bulk_modulus, cylinder.dead_volume
+    slope = 1.25 * orifice_gain(valve) / math.sqrt(valve.transition_pressure)
+    leakage = 2.0 * valve.null_leakage + 2.0 * cylinder.internal_leakage + cylinder.external_leakage
+    largest = total_volume(cylinder) - volume
+    stiffness = beta * piston_area(cylinder) ** 2 * (1.0 / volume + 1.0 / largest) + load.spring_stiffness
+    oscillation = math.sqrt(stiffness / load.mass) + load.viscous_damping / load.mass
+    chamber = beta / volume * (slope + leakage)
+    spool = valve.natural_frequency * max(1.0, 2.0 * valve.damping_ratio)
+    hydraulics = chamber + oscillation
+    text = (
+        f'chamber and orifice {chamber:.4g} 1/s (lower rated_flow, or higher dead_volume or transition_pressure) '
+        f'plus hydraulic oscillation {oscillation:.4g} 1/s'
+    )
+    return (spool, 'spool of the valve') if spool > hydraulics else (hydraulics, text)

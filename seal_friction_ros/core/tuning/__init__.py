@@ -1,0 +1,1 @@
+"""The feed-forward tuned on a simulated or a recorded axis."""

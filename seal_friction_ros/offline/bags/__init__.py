@@ -1,0 +1,1 @@
+"""Bags: read, write, record, recover, import."""

@@ -1,0 +1,482 @@
+"""rosbag2 bags: a folder with ``metadata.yaml`` and MCAP files (profile ``ros2``), written and read.
+
+What is written opens in ``ros2 bag``, Foxglove, PlotJuggler, ``rosbags`` and the ``mcap`` reader, message definitions
+inside. What is read may be any rosbag2 bag (MCAP or SQLite), a bare MCAP or SQLite file, or what a stranger made to
+look like one: memory is bounded, and nothing outside of the bag is opened.
+"""
+
+import errno
+import shutil
+import sqlite3
+import struct
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path, PurePosixPath
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import yaml
+import zstandard
+from mcap.exceptions import McapError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, PACKAGE
+from seal_friction_ros.files import parse_yaml, read_yaml, share_directory
+from seal_friction_ros.offline.bags import mcap_reader, sqlite_reader
+from seal_friction_ros.offline.bags.mcap_writer import Description, McapOutput, Span
+
+PRESSURE_TOPIC = '/cylinder_pressure'
+VELOCITY_TOPIC = '/rod_velocity'
+POSITION_TOPIC = '/rod_position'
+FORCE_TOPIC = '/force_sum'
+REFERENCE_TOPIC = '/servo_reference'
+ESTIMATE_TOPIC = '/friction_estimate'
+FEEDFORWARD_TOPIC = '/friction_feedforward'
+CONFIGURATION_TOPIC = '/friction_estimator/configuration'
+_LARGEST_METADATA = 1 << 20  # [bytes] of metadata.yaml, with some 5000 files or 1000 topics
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_FOREVER = {'sec': 9223372036, 'nsec': 854775807}
+
+
+class BagError(ValueError):
+    """A bag that cannot be read or written; one line that says which and why."""
+
+
+class BagMessage(NamedTuple):
+    """One message of a bag, still serialised."""
+
+    topic: str
+    type_name: str
+    log_time: int
+    """[ns]"""
+    data: bytes
+
+
+@cache
+def message_definition(type_name: str) -> tuple[str, str]:
+    """Full text of a message definition (comments included) and its RIHS01 hash."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    package, _, name = type_name.split('/')
+    if package != PACKAGE:
+        return store.generate_msgdef(type_name, ros_version=2)[0], store.hash_rihs01(type_name)
+    text = (_message_share() / 'msg' / f'{name}.msg').read_text()
+    store.register(get_types_from_msg(text, type_name))
+    generated, _ = store.generate_msgdef(type_name, ros_version=2)
+    separator = '=' * 80 + '\n'
+    dependencies = generated.split(separator)[1:]
+    return separator.join([text, *dependencies]), store.hash_rihs01(type_name)
+
+
+def _message_share() -> Path:
+    spec = find_spec(PACKAGE)
+    if spec is None or spec.origin is None:
+        raise BagError(f'{PACKAGE} is not installed: run make setup, or source the colcon workspace')
+    return share_directory(PACKAGE, spec.origin)
+
+
+@cache
+def describe(type_name: str) -> Description:
+    """Description of topics of a type that is installed."""
+    definition, type_hash = message_definition(type_name)
+    metadata = {'offered_qos_profiles': _yaml_text([_qos(type_name)]), 'topic_type_hash': type_hash}
+    return Description(type_name, 'ros2msg', definition.encode(), metadata)
+
+
+class BagWriter:
+    """Writes one bag, message by message, in the order given.
+
+    Log times are made strictly increasing, so that every reader, which sorts by them, gives the messages back in the
+    order in which they were written. ``metadata.yaml`` is there from the start; it is true at the end and, in between,
+    as of the last finished file and the newest topic.
+
+    As a context manager it removes what it wrote if the block fails, so that a failed command leaves nothing behind.
+
+    Args:
+        path: Folder of the bag; must not exist.
+        split_size: A new file begins where one would grow beyond this [bytes]; 0: never.
+        split_duration: A new file begins where one would become longer than this [s]; 0: never.
+
+    Raises:
+        BagError: There is something at ``path`` already, or it cannot be made.
+    """
+
+    def __init__(self, path: Path, *, split_size: int = 0, split_duration: float = 0.0) -> None:
+        self.path = path
+        for type_name in DECODERS:
+            describe(type_name)  # now, where it can be said, and not when the first message comes
+        self._split_size, self._split_time = split_size, round(split_duration * 1e9)
+        self._descriptions: dict[tuple[str, str], Description] = {}
+        self._listed = 0
+        self._last_time = -1
+        self._custom_data: dict[str, str] = {}
+        self._finished: list[tuple[str, Span]] = []
+        self._finished_counts: dict[tuple[str, str], int] = {}
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            raise BagError(f'{path} exists already: not overwriting') from None
+        except OSError as error:
+            raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
+        try:
+            self._output = self._file(0)
+            try:
+                self._write_metadata()
+            except OSError:
+                self._output.close()
+                raise
+        except OSError as error:
+            shutil.rmtree(path, ignore_errors=True)  # made just now, by us
+            raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
+
+    def write(
+        self, topic: str, type_name: str, log_time: int, data: bytes, description: Description | None = None
+    ) -> int:
+        """Append one serialised message.
+
+        Args:
+            topic: Its topic.
+            type_name: Its type.
+            log_time: [ns]
+            data: CDR.
+            description: Of the topic; may be left out if the type is installed.
+
+        Returns:
+            The log time [ns] it got: the one given, or 1 ns after the last.
+
+        Raises:
+            OSError: The disk does not take it.
+        """
+        known = self._descriptions.get((topic, type_name))
+        if known is None:
+            known = self._descriptions[topic, type_name] = description or describe(type_name)
+        log_time = max(log_time, self._last_time + 1)
+        if self._is_full(log_time, len(data)):
+            self._split()
+        self._last_time = log_time
+        self._output.write(topic, known, log_time, data)
+        return log_time
+
+    def flush(self) -> None:
+        """Hand what was written to the operating system, so that it outlives this process.
+
+        Raises:
+            OSError: The disk does not take it.
+        """
+        self._output.flush()
+        if len(self._descriptions) > self._listed:
+            self._write_metadata()
+
+    @property
+    def message_count(self) -> int:
+        """Messages written so far."""
+        return sum(span.messages for _, span in self._finished) + self._output.span.messages
+
+    def close(self, custom_data: dict[str, str] | None = None) -> None:
+        """Write what is pending, the index and the final ``metadata.yaml``; ``custom_data`` goes into the latter.
+
+        Raises:
+            OSError: The disk does not take it.
+        """
+        self._custom_data = custom_data or {}
+        self._output.finish(_yaml_text(self._information()))
+        self._write_metadata()
+        self._output.close()
+
+    def rescue(self, failure: str, offered: int) -> None:
+        """After a failure: leave a valid bag of all whole chunks; on a full disk without the last, to make room.
+
+        Args:
+            failure: What went wrong; kept in ``metadata.yaml``.
+            offered: Messages that were to be recorded; those that are not in the bag are counted there, too.
+
+        Raises:
+            OSError: Not even that could be done; what is there is for ``seal_friction recover``.
+        """
+        try:
+            while True:
+                try:
+                    self._output.finish_early()
+                    self._custom_data = {'dropped_messages': str(offered - self.message_count), 'failure': failure}
+                    self._write_metadata()
+                    return
+                except OSError as error:
+                    if error.errno not in _FULL:
+                        raise
+                    if not self._output.give_back():
+                        break
+            if self._finished:
+                self._output.path.unlink(missing_ok=True)  # a new file without a chunk
+            (self.path / 'metadata.yaml').unlink(missing_ok=True)  # the last room there is
+            self._write_metadata()
+        finally:
+            self._output.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self.close()
+                return
+        except OSError:
+            self._remove()
+            raise
+        self._remove()
+
+    def _remove(self) -> None:
+        self._output.close()
+        shutil.rmtree(self.path, ignore_errors=True)
+
+    def _is_full(self, log_time: int, size: int) -> bool:
+        span = self._output.span
+        too_large = self._split_size and self._output.size + size > self._split_size
+        too_long = self._split_time and log_time - span.first_time > self._split_time
+        return bool(span.messages and (too_large or too_long))
+
+    def _file(self, number: int) -> McapOutput:
+        return McapOutput(self.path / f'{self.path.name}_{number}.mcap')
+
+    def _split(self) -> None:
+        finished = self._output
+        finished.finish(_yaml_text(self._information()))
+        following = self._file(len(self._finished) + 1)
+        finished.close()
+        self._finished.append((finished.path.name, finished.span))
+        self._finished_counts = self._counts(finished)
+        self._output = following
+        self._write_metadata()
+
+    def _counts(self, newest: McapOutput) -> dict[tuple[str, str], int]:
+        counts = dict(self._finished_counts)
+        for key, count in newest.counts.items():
+            counts[key] = counts.get(key, 0) + count
+        return counts
+
+    def _information(self) -> dict[str, Any]:
+        newest = (self._output.path.name, self._output.span)
+        files = [*self._finished, newest] if newest[1].messages or not self._finished else self._finished
+        spans = [span for _, span in files]
+        counts = self._counts(self._output)
+        return {
+            'version': 9,
+            'storage_identifier': 'mcap',
+            'relative_file_paths': [name for name, _ in files],
+            **_span_information(Span(spans[0].first_time, spans[-1].last_time, sum(span.messages for span in spans))),
+            'topics_with_message_count': [
+                {'topic_metadata': _topic_metadata(topic, description), 'message_count': counts[topic, type_name]}
+                for (topic, type_name), description in self._descriptions.items()
+                if (topic, type_name) in counts
+            ],
+            'compression_format': '',
+            'compression_mode': '',
+            'files': [{'path': name, **_span_information(span)} for name, span in files],
+            'custom_data': self._custom_data or None,
+            'ros_distro': 'rosbags',
+        }
+
+    def _write_metadata(self) -> None:
+        text = _yaml_text({'rosbag2_bagfile_information': self._information()})
+        partial = self.path / 'metadata.yaml.partial'
+        try:
+            partial.write_text(text)
+            partial.replace(self.path / 'metadata.yaml')
+        except OSError:
+            partial.unlink(missing_ok=True)
+            raise
+        self._listed = len(self._descriptions)
+
+
+def _span_information(span: Span) -> dict[str, Any]:
+    return {
+        'duration': {'nanoseconds': span.last_time - span.first_time},
+        'starting_time': {'nanoseconds_since_epoch': span.first_time},
+        'message_count': span.messages,
+    }
+
+
+def _topic_metadata(topic: str, description: Description) -> dict[str, Any]:
+    return {
+        'name': topic,
+        'type': description.type_name,
+        'serialization_format': 'cdr',
+        'offered_qos_profiles': _parsed(description.metadata['offered_qos_profiles']),
+        'type_description_hash': description.metadata['topic_type_hash'],
+    }
+
+
+@cache
+def _parsed(text: str) -> Any:
+    return parse_yaml(text.encode(), 'QoS')
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """Writes no aliases: not every reader of bags knows them."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        del data
+        return True
+
+
+def _yaml_text(document: Any) -> str:
+    return yaml.dump(document, Dumper=_PlainDumper, sort_keys=False)
+
+
+def _qos(type_name: str) -> dict[str, Any]:
+    latched = type_name == CONFIGURATION_TYPE
+    return {
+        'history': 'keep_last',
+        'depth': 1 if latched else 100,
+        'reliability': 'reliable',
+        'durability': 'transient_local' if latched else 'volatile',
+        'deadline': _FOREVER,
+        'lifespan': _FOREVER,
+        'liveliness': 'automatic',
+        'liveliness_lease_duration': _FOREVER,
+        'avoid_ros_namespace_conventions': False,
+    }
+
+
+def read_messages(path: Path) -> Iterator[BagMessage]:
+    """Messages of a bag, file by file, each in order of log time.
+
+    Args:
+        path: Bag folder, or a bare MCAP or SQLite file.
+
+    Raises:
+        BagError: There is no bag, or it is damaged (found out when the damage is reached).
+    """
+    with _as_bag_errors(path):
+        found = _storage(path)
+        for file in found.files:
+            for message in _read_file(file, found.is_sqlite):
+                if found.are_messages_packed:
+                    data = mcap_reader.unpack_zstd(message.data, mcap_reader.LARGEST_CHUNK)
+                    yield message._replace(data=data)
+                else:
+                    yield message
+
+
+class Storage(NamedTuple):
+    """The files of a bag, and how messages are kept in them."""
+
+    files: tuple[Path, ...]
+    is_sqlite: bool
+    are_messages_packed: bool = False
+
+
+def storage(path: Path) -> Storage:
+    """Find the files of a bag.
+
+    Raises:
+        BagError: There is no bag.
+    """
+    with _as_bag_errors(path):
+        return _storage(path)
+
+
+def _read_file(path: Path, is_sqlite: bool) -> Iterator[BagMessage]:
+    if is_sqlite:
+        yield from (BagMessage(*message) for message in sqlite_reader.messages(path))
+        return
+    with path.open('rb') as file:
+        for channel, log_time, data in mcap_reader.messages(file, mcap_reader.scan_finished(file)):
+            yield BagMessage(channel.topic, channel.type_name, log_time, data)
+
+
+class TopicInfo(NamedTuple):
+    """What a bag says of one of its topics."""
+
+    type_name: str
+    message_count: int
+
+
+def bag_topics(path: Path) -> dict[str, TopicInfo]:
+    """Topics of a bag with their type and number of messages, from its index where it has one.
+
+    Raises:
+        BagError: There is no bag, or it is damaged.
+    """
+    found: dict[str, TopicInfo] = {}
+    with _as_bag_errors(path):
+        stored = _storage(path)
+        for file in stored.files:
+            for topic, type_name, count in _count_file(file, stored.is_sqlite):
+                before = found.get(topic)
+                if before is not None and before.type_name != type_name:
+                    raise ValueError(f'{topic} has messages of {before.type_name} and of {type_name}')
+                found[topic] = TopicInfo(type_name, count + (before.message_count if before else 0))
+    return found
+
+
+def _count_file(path: Path, is_sqlite: bool) -> Iterator[tuple[str, str, int]]:
+    if is_sqlite:
+        yield from sqlite_reader.topics(path)
+        return
+    with path.open('rb') as file:
+        layout = mcap_reader.scan_finished(file)
+        if layout.channels and layout.counts:
+            for number, channel in layout.channels.items():
+                yield channel.topic, channel.type_name, layout.counts.get(number, 0)
+        else:
+            for channel, _, _ in mcap_reader.messages(file, layout):
+                yield channel.topic, channel.type_name, 1
+
+
+@contextmanager
+def _as_bag_errors(path: Path) -> Iterator[None]:
+    """Turn whatever a reader says of a damaged bag into one line."""
+    try:
+        yield
+    except BagError:
+        raise
+    except (McapError, OSError, ValueError, struct.error, sqlite3.Error, zstandard.ZstdError) as error:
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        raise BagError(f'{path}: not a readable bag: {reason}') from None
+
+
+def _storage(path: Path) -> Storage:
+    """Find the files of a bag.
+
+    Raises:
+        ValueError: There are none, or they are not in the folder.
+    """
+    if not path.is_dir():
+        if not path.is_file():
+            raise ValueError('there is no such file' if not path.exists() else 'neither a file nor a folder')
+        return Storage((path,), path.suffix == '.db3')
+    metadata = path / 'metadata.yaml'
+    if not metadata.is_file():
+        raise BagError(f'{path}: no metadata.yaml in it, so not a rosbag2 bag')
+    document = read_yaml(_inside(path, 'metadata.yaml'), _LARGEST_METADATA)
+    information = document.get('rosbag2_bagfile_information') if isinstance(document, Mapping) else None
+    if not isinstance(information, Mapping):
+        raise ValueError('metadata.yaml is not that of a rosbag2 bag')
+    names, kind = information.get('relative_file_paths'), information.get('storage_identifier')
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError('metadata.yaml: relative_file_paths is not a list of names')
+    if kind not in ('mcap', 'sqlite3'):
+        raise ValueError(f'metadata.yaml: storage_identifier = {kind!r} is neither mcap nor sqlite3')
+    mode = str(information.get('compression_mode') or 'none').lower()
+    if mode not in ('none', 'message'):
+        raise ValueError(f'its files are compressed as a whole (compression_mode = {mode!r}): unpack them first')
+    return Storage(tuple(_inside(path, name) for name in names), kind == 'sqlite3', mode == 'message')
+
+
+def _inside(folder: Path, name: str) -> Path:
+    """File of a bag; early versions of rosbag2 put the name of the folder before that of the file.
+
+    Raises:
+        ValueError: The name, or a link, leads out of the folder, or there is no such file.
+    """
+    parts = PurePosixPath(name).parts
+    file = folder / parts[-1] if parts else folder
+    if len(parts) > 2 or not {'/', '..'}.isdisjoint(parts) or file.resolve().parent != folder.resolve():
+        raise ValueError(f'{name!r} leads out of the folder of the bag')
+    if not file.is_file():
+        raise ValueError(f'{name!r}, which metadata.yaml names, is not there')
+    return file

@@ -1,0 +1,260 @@
+"""A bag read in bulk: blocks of messages as they lie in the file, and where each one is.
+
+The checks are those of `mcap_file`, and so is the order. Anything out of the ordinary (damage, a topic described twice,
+chunks that overlap by much) is refused with `UnsuitedError`: the general reader then says what it is, or reads it.
+"""
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mcap.opcode import Opcode
+
+from seal_friction_ros.core.estimation.compiled_pipeline import (
+    MOST_MESSAGES,
+    Bytes,
+    Integers,
+    Kind,
+    Messages,
+    UnsuitedError,
+)
+from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.offline.bags import mcap_reader
+from seal_friction_ros.offline.bags.bag import BagMessage, read_messages, storage
+from seal_friction_ros.offline.bags.mcap_reader import Block, Layout
+
+KindOf = Callable[[str, str], Kind]
+"""Topic and message type -> what its messages are."""
+
+_AT_ONCE = 1 << 21  # [bytes] read before they are handed on: some 20 000 messages
+_UNKNOWN = 255  # instead of a `Kind`: the channel has not been described
+_SMALLEST = 31  # [bytes] of the record of a message without content
+_MESSAGE, _SCHEMA, _CHANNEL = int(Opcode.MESSAGE), int(Opcode.SCHEMA), int(Opcode.CHANNEL)
+_LAST_TIME = mcap_reader.LAST_TIME
+
+
+def read_in_bulk(path: Path, kind_of: KindOf) -> Iterator[Messages]:
+    """Messages of a bag in the order of `bag.read_messages`, at most `MOST_MESSAGES` at a time.
+
+    Raises:
+        UnsuitedError: It is not for this way.
+        BagError: It cannot be read.
+    """
+    files = storage(path)
+    if files.is_sqlite or files.are_messages_packed:
+        yield from _gathered(read_messages(path), kind_of)
+        return
+    for file_path in files.files:
+        with file_path.open('rb') as file:
+            layout = mcap_reader.scan_finished(file)
+            for messages in _of_file(file, layout, kind_of):
+                for first in range(0, len(messages.kinds), MOST_MESSAGES):
+                    yield messages.taken(first, first + MOST_MESSAGES)
+
+
+def compile_now() -> None:
+    """Compile what is compiled here, for processes to come."""
+    messages, times = _pool_of(bytes(1), 0)
+    _walk(*messages, times, 0, 0, 0, 0, 0, np.zeros(1, np.uint8))
+
+
+def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
+    """Messages of the general reader in blocks."""
+    source = iter(messages)
+    while block := list(islice(source, MOST_MESSAGES // 4)):
+        kinds = np.array([kind_of(message.topic, message.type_name) for message in block], np.uint8)
+        sizes = np.array([len(message.data) for message in block], np.int64)
+        data = np.frombuffer(b''.join(message.data for message in block), np.uint8)
+        yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes)
+
+
+class _Pool(NamedTuple):
+    """Messages that were read, with their log times [ns]."""
+
+    messages: Messages
+    times: Integers
+
+
+def _pool_of(data: bytes, count: int) -> _Pool:
+    """Room for so many messages."""
+    columns: Integers = np.empty((3, count), np.int64)
+    return _Pool(Messages(np.frombuffer(data, np.uint8), np.empty(count, np.uint8), *columns[:2]), columns[2])
+
+
+_EMPTY = _pool_of(b'', 0)
+
+
+def _of_file(file: BinaryIO, layout: Layout, kind_of: KindOf) -> Iterator[Messages]:
+    """Messages in order of log time; equal times in the order of the file."""
+    channels = _Channels(layout, kind_of)
+    blocks = sorted(layout.blocks, key=lambda block: block.first) if layout.channels else layout.blocks
+    earliest = mcap_reader.earliest_times(blocks)
+    _check_overlap(blocks, earliest)
+    kept = _EMPTY
+    begin = size = 0
+    for end, block in enumerate(blocks, start=1):
+        size += block.unpacked_size
+        if size < _AT_ONCE and end < len(blocks):
+            continue
+        pool = _sorted(_read(file, blocks[begin:end], channels, kept))
+        begin, size = end, 0
+        sure = len(pool.times)
+        if end < len(blocks):
+            sure = int(np.searchsorted(pool.times, min(earliest[end], _LAST_TIME), side='right'))
+        yield pool.messages.taken(0, sure)
+        kept = _copied(pool, sure)
+
+
+def _check_overlap(blocks: Sequence[Block], earliest: Sequence[int]) -> None:
+    """Refuse chunks that overlap in time by so much that `mcap_file` might.
+
+    Raises:
+        UnsuitedError: They do.
+    """
+    open_blocks: list[tuple[int, int]] = []  # end in time [ns] and size
+    at_once = 0
+    for block, begin in zip(blocks, earliest, strict=True):
+        while open_blocks and open_blocks[0][0] < begin:
+            at_once -= heapq.heappop(open_blocks)[1]
+        heapq.heappush(open_blocks, (block.last, block.unpacked_size))
+        at_once += block.unpacked_size
+        if at_once > mcap_reader.MOST_AT_ONCE:
+            raise UnsuitedError('chunks overlap by much')
+
+
+def _sorted(pool: _Pool) -> _Pool:
+    (data, kinds, offsets, sizes), times = pool
+    if (times[:-1] <= times[1:]).all():
+        return pool
+    order = np.argsort(times, kind='stable')
+    return _Pool(Messages(data, kinds[order], offsets[order], sizes[order]), times[order])
+
+
+def _copied(pool: _Pool, first: int) -> _Pool:
+    """What has to wait, since a chunk that follows reaches back before it."""
+    if first == len(pool.times):
+        return _EMPTY
+    (_, kinds, _, sizes), times = pool
+    data = b''.join(pool.messages.message(number) for number in range(first, len(times)))
+    kept = sizes[first:]
+    return _Pool(Messages(np.frombuffer(data, np.uint8), kinds[first:], np.cumsum(kept) - kept, kept), times[first:])
+
+
+class _Channels:
+    """What is known of channels, as a table for compiled code."""
+
+    def __init__(self, layout: Layout, kind_of: KindOf) -> None:
+        self._names = mcap_reader.Names(layout.channels)
+        self._kind_of = kind_of
+        self._known = dict(layout.channels)
+        self.kinds: Bytes = np.full(1 << 16, _UNKNOWN, np.uint8)
+        for number, channel in layout.channels.items():
+            self.kinds[number] = kind_of(channel.topic, channel.type_name)
+
+    def learn(self, opcode: int, data: bytes) -> None:
+        """Take the record of a schema or a channel."""
+        self._names.learn(opcode, data)
+        for number, channel in self._names.channels.items():
+            if self._known.setdefault(number, channel) != channel:
+                raise UnsuitedError(f'{channel.topic} is described twice')
+            self.kinds[number] = self._kind_of(channel.topic, channel.type_name)
+
+
+def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: _Pool) -> _Pool:
+    """Messages that were kept and those of the blocks, in this order.
+
+    Raises:
+        UnsuitedError: A block cannot be read.
+    """
+    parts, ends = [kept.messages.data.tobytes()], []
+    size = len(parts[0])
+    try:
+        for block in blocks:
+            parts.append(mcap_reader.unpacked(file, block))
+            size += len(parts[-1])
+            ends.append((block, size))
+        data = b''.join(parts)
+        start = len(parts[0])
+        del parts
+        count = len(kept.times)
+        most = count + (size - start) // _SMALLEST
+        pool = _pool_of(data, most)
+        pool.messages.kinds[:count] = kept.messages.kinds
+        pool.messages.offsets[:count] = kept.messages.offsets
+        pool.messages.sizes[:count] = kept.messages.sizes
+        pool.times[:count] = kept.times
+        for block, end in ends:
+            count = _index(pool, count, start, end, block, channels)
+            start = end
+    except mcap_reader.ERRORS as error:
+        raise UnsuitedError(str(error)) from None
+    return _Pool(pool.messages.taken(0, count), pool.times[:count])
+
+
+def _index(pool: _Pool, count: int, start: int, end: int, block: Block, channels: _Channels) -> int:
+    """Find the messages of a block; the number of all messages with them."""
+    data = pool.messages.data
+    first, last = min(block.first, _LAST_TIME + 1), min(block.last, _LAST_TIME)
+    while start < end:
+        start, count, opcode = _walk(*pool.messages, pool.times, count, start, end, first, last, channels.kinds)
+        if opcode < 0:
+            raise UnsuitedError(f'a record at byte {start}')
+        if opcode in (_SCHEMA, _CHANNEL):
+            following = start + 9 + int.from_bytes(data[start + 1 : start + 9].tobytes(), 'little')
+            channels.learn(opcode, data[start + 9 : following].tobytes())
+            start = following
+    return count
+
+
+@compiled
+def _whole_number(data: Bytes, offset: int) -> int:
+    """Eight bytes, little endian; negative from 2^63 on."""
+    value = np.int64(0)
+    for i in range(8):
+        value |= np.int64(data[offset + i]) << np.int64(8 * i)
+    return int(value)
+
+
+@compiled
+def _walk(
+    data: Bytes,
+    kinds: Bytes,
+    offsets: Integers,
+    sizes: Integers,
+    times: Integers,
+    count: int,
+    start: int,
+    end: int,
+    first: int,
+    last: int,
+    kind_of_channel: npt.NDArray[np.uint8],
+) -> tuple[int, int, int]:
+    """Walk over records of a block up to its end, or up to the description of a schema or channel.
+
+    Returns:
+        Where the walk ended, the number of all messages, and the opcode of the record there; 0 at the end of the block,
+        -1 if the record makes no sense.
+    """
+    while start < end:
+        if end - start < 9:
+            return start, count, -1
+        opcode, length = data[start], _whole_number(data, start + 1)
+        if length < 0 or length > end - start - 9:
+            return start, count, -1
+        if _SCHEMA <= opcode <= _CHANNEL:
+            return start, count, opcode
+        if opcode == _MESSAGE:
+            if length < 22:
+                return start, count, -1
+            kind = kind_of_channel[data[start + 9] | np.int64(data[start + 10]) << 8]
+            time = _whole_number(data, start + 15)
+            if kind == _UNKNOWN or not first <= time <= last:
+                return start, count, -1
+            kinds[count], offsets[count], sizes[count], times[count] = kind, start + 31, length - 22, time
+            count += 1
+        start += 9 + length
+    return start, count, 0

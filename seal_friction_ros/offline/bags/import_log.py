@@ -1,0 +1,445 @@
+"""A measured log and a rig file -> a bag with the pressure, force sum and rod velocity of each row.
+
+The rig file says what the log is: which columns, in which units, with which signs and areas. It looks like this; the
+files in ``config/rigs`` are examples::
+
+    name: my_rig
+    source: what the log is, and why the signs are as they are
+    frame_id: rod               # frame of the messages
+    header: comment             # none; row: the first line; comment: the last '#' line before the first row
+    skip_rows: 15               # rows at the beginning that are passed over
+    start: 1.0                  # [s] added to the time of each row
+    time: {column: 0, unit: ms} # columns count from 0 ...
+    chamber_a: {terms: [{column_name: P(psig), unit: psi}]} # ... or go by their name in the header
+    chamber_b: {constant: 0.0}  # [Pa]
+    force_sum:                  # sum of gain * column, plus a constant [N]
+      terms: [{column: 6, unit: N}, {column: 5, unit: bar, gain: -518.7, gain_unit: mm2}]
+    velocity:
+      terms: [{column: 4, unit: mm, gain: -1.0}]
+      savitzky_golay: {window: 0.2, order: 2, largest_gap: 0.05} # absent: the terms are a velocity already
+    sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # what identification takes; absent: these values
+"""
+
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seal_friction_ros.core.estimation.messages import (
+    FORCE_TYPE,
+    PRESSURE_TYPE,
+    VELOCITY_TYPE,
+    Velocity,
+    encode_force,
+    encode_pressure,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.parameters import check, from_mapping, parameter
+from seal_friction_ros.core.foundation.units import unit_size
+from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding, slope
+from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.bags.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagWriter
+from seal_friction_ros.offline.work.progress import progress
+
+_LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one that the int32 seconds of a ROS stamp do not hold
+_LONGEST_LINE = 1 << 18  # characters
+_SHOWN = 40  # characters of a wrong cell that an error repeats
+_PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
+_HEADERS = ('none', 'row', 'comment')
+_QUANTITIES = {
+    'number': ('1',),
+    'time': ('s', 'ms', 'us', 'ns'),
+    'length': ('m', 'mm', 'um', 'in'),
+    'velocity': ('m/s', 'mm/s', 'in/s'),
+    'pressure': ('Pa', 'kPa', 'MPa', 'bar', 'psi'),
+    'force': ('N', 'kN', 'lbf'),
+    'area': ('m2', 'mm2', 'in2'),
+}
+_QUANTITY_OF = {unit: quantity for quantity, units in _QUANTITIES.items() for unit in units}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Term:
+    """One column of the log with its unit, times a gain that may have a unit of its own (an area, a sensor's scale).
+
+    Raises:
+        ValueError: The column is named twice or not at all, or there is no such unit.
+    """
+
+    column: int = parameter(-1, unit='', lower=-1, upper=9999, description='Number of the column, counted from 0.')
+    column_name: str = parameter('', unit='', description='Name of the column in the header, instead of its number.')
+    unit: str = parameter(unit='', description='Unit of the column.')
+    gain: float = parameter(1.0, unit='', description='Factor; -1 turns the sign.')
+    gain_unit: str = parameter('1', unit='', description='Unit of the gain.')
+
+    def __post_init__(self) -> None:
+        check(self)
+        if (self.column < 0) == (not self.column_name):
+            raise ValueError(
+                f'Term.column = {self.column}, Term.column_name = {self.column_name!r}: '
+                'give one of them, the number (0 or more) or the name'
+            )
+        for name in ('unit', 'gain_unit'):
+            if getattr(self, name) not in _QUANTITY_OF:
+                raise ValueError(f'Term.{name} = {getattr(self, name)!r} is not one of {", ".join(_QUANTITY_OF)}')
+
+    @property
+    def size(self) -> float:
+        """What a 1 in the column adds, in SI."""
+        return self.gain * unit_size(self.gain_unit) * unit_size(self.unit)
+
+    def is_a(self, quantity: str) -> bool:
+        """Whether column times gain is a ``quantity`` (a key of the table of quantities above)."""
+        factors = {_QUANTITY_OF[self.unit], _QUANTITY_OF[self.gain_unit]}
+        return factors == {quantity, 'number'} or (quantity == 'force' and factors == {'pressure', 'area'})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Combination:
+    """Linear combination of columns: constant + sum of gain times column, in SI.
+
+    Raises:
+        ValueError: The constant is not finite.
+    """
+
+    terms: tuple[Term, ...] = ()
+    constant: float = parameter(0.0, unit='SI', description='Part that no column gives.')
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rig:
+    """What a log of one rig is.
+
+    Raises:
+        ValueError: A value is out of bounds, or a column has a unit that does not fit what is made from it.
+    """
+
+    name: str
+    source: str = ''
+    frame_id: str = 'rod'
+    header: str = 'none'
+    skip_rows: int = parameter(0, unit='rows', lower=0, upper=10**9, description='Rows passed over at the beginning.')
+    start: float = parameter(0.0, unit='s', lower=0.0, upper=2.0e9, description='Added to the time of each row.')
+    time: Term
+    chamber_a: Combination
+    chamber_b: Combination
+    force_sum: Combination
+    velocity: Combination
+    savitzky_golay: SavitzkyGolay | None
+    sliding: Sliding
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.header not in _HEADERS:
+            raise ValueError(f'Rig.header = {self.header!r} is not one of {", ".join(_HEADERS)}')
+        if not self.frame_id.isprintable() or len(self.frame_id) > 255:
+            raise ValueError(f'Rig.frame_id = {self.frame_id[:_SHOWN]!r} is not up to 255 printable characters')
+        wanted = {'time': 'time', 'chamber_a': 'pressure', 'chamber_b': 'pressure', 'force_sum': 'force'}
+        wanted['velocity'] = 'velocity' if self.savitzky_golay is None else 'length'
+        for where, term in self.terms():
+            quantity = wanted[where.split('.')[0]]
+            if not term.is_a(quantity):
+                raise ValueError(
+                    f'{where}.unit = {term.unit!r} with gain_unit = {term.gain_unit!r} is no {quantity}: '
+                    f'use one of {", ".join(_QUANTITIES[quantity])}'
+                )
+            if self.header == 'none' and term.column_name:
+                raise ValueError(f'{where}.column_name = {term.column_name!r} but header = none: no names to go by')
+
+    def terms(self) -> Iterator[tuple[str, Term]]:
+        """Every term with its place in the rig file."""
+        yield 'time', self.time
+        for part in _PARTS[1:]:
+            for number, term in enumerate(getattr(self, part).terms):
+                yield f'{part}.terms[{number}]', term
+
+
+class ImportSummary(NamedTuple):
+    """What an import wrote."""
+
+    rows: int
+    """one pressure, one force sum and one velocity message each"""
+    not_finite: int
+    """rows of which a pressure, the force sum or the velocity is NaN or infinite; the estimator flags them"""
+    first_stamp: int
+    """[ns]"""
+    last_stamp: int
+    """[ns]"""
+
+
+class Samples(NamedTuple):
+    """What goes into a bag, row by row; arrays of shape (n,)."""
+
+    stamp: NDArray[np.int64]
+    """[ns]"""
+    chamber_a: FloatArray
+    """[Pa, gauge]"""
+    chamber_b: FloatArray
+    """[Pa, gauge]"""
+    force_sum: FloatArray
+    """[N]"""
+    velocity: FloatArray
+    """[m/s]"""
+
+
+def import_log(log: Path, rig_file: Path, out: Path) -> ImportSummary:
+    """Turn a measured log into a bag.
+
+    Args:
+        log: Text of one row per line, cells parted by commas, semicolons or white space; '#' starts a comment line.
+        rig_file: What the columns are.
+        out: Bag to write; must not exist.
+
+    Returns:
+        What was written.
+
+    Raises:
+        ValueError: Rig file or log cannot be read or make no sense; one line that names file and field or line. Nothing
+            is written then.
+        BagError: There is something at ``out`` already, or it cannot be made.
+    """
+    rig = read_rig(rig_file)
+    return write_samples(out, read_samples(log, rig).samples, rig.frame_id)
+
+
+class ReadLog(NamedTuple):
+    """A log in SI, and the columns it came from."""
+
+    samples: 'Samples'
+    columns: dict[Term, FloatArray]
+    """as they stand in the log, in the units of the terms"""
+
+
+def read_samples(log: Path, rig: Rig) -> ReadLog:
+    """Read a log.
+
+    Raises:
+        ValueError: The log cannot be read or makes no sense; one line that names file and field or line.
+    """
+    cells = _read_cells(log, rig)
+    return ReadLog(_samples(log, rig, cells), cells.columns)
+
+
+def read_rig(path: Path) -> Rig:
+    """Rig from its file.
+
+    Raises:
+        ValueError: The file cannot be read, or a value in it makes no sense; names file, field, value and bound.
+    """
+    document = read_yaml(path)
+    if not isinstance(document, Mapping):
+        raise ValueError(f'{path}: a rig file is a mapping of names to values, not {type(document).__name__}')
+    missing = [part for part in _PARTS if part not in document]
+    if missing:
+        raise ValueError(f'{path}: rig file lacks {", ".join(missing)}')
+    velocity, filter_values = _taken_out(document['velocity'], 'savitzky_golay')
+    parts = {part: _combination(document[part], f'{path}: {part}') for part in _PARTS[1:-1]}
+    parts['velocity'] = _combination(velocity, f'{path}: velocity')
+    return from_mapping(
+        Rig,
+        {key: value for key, value in document.items() if key not in (*_PARTS, 'sliding')},
+        str(path),
+        time=from_mapping(Term, document['time'], f'{path}: time'),
+        savitzky_golay=None
+        if filter_values is None
+        else from_mapping(SavitzkyGolay, filter_values, f'{path}: velocity.savitzky_golay'),
+        sliding=from_mapping(Sliding, document.get('sliding', {}), f'{path}: sliding'),
+        **parts,
+    )
+
+
+def _taken_out(values: Any, key: str) -> tuple[Any, Any]:
+    """A mapping without ``key``, and what stood there; anything else as it is, for `from_mapping` to refuse."""
+    if not isinstance(values, Mapping):
+        return values, None
+    return {k: v for k, v in values.items() if k != key}, values.get(key)
+
+
+def _combination(document: Any, where: str) -> Combination:
+    values, terms = _taken_out(document, 'terms')
+    if terms is not None and not isinstance(terms, list):
+        raise ValueError(f'{where}.terms = {terms!r} is not a list')
+    if isinstance(values, Mapping) and not terms and 'constant' not in values:
+        raise ValueError(f'{where} has neither terms nor a constant')
+    made = tuple(from_mapping(Term, term, f'{where}.terms[{i}]') for i, term in enumerate(terms or ()))
+    return from_mapping(Combination, values, where, terms=made)
+
+
+class _Cells(NamedTuple):
+    """The cells of a log that the rig file asks for."""
+
+    line_numbers: Sequence[int]
+    columns: dict[Term, FloatArray]
+
+
+def _read_cells(log: Path, rig: Rig) -> _Cells:
+    if log.exists() and not (log.is_file() or log.is_dir()):  # a pipe or a device never ends
+        raise ValueError(f'{log}: not a file')
+    terms = list(dict(rig.terms()).values())
+    line_numbers, numbers = array('q'), array('d')
+    try:
+        with log.open(encoding='utf-8-sig') as file:
+            header, lines = _parted(enumerate(_lines(file, log), start=1), rig.header)
+            width = len(header)
+            positions: list[int] = []
+            for count, (number, cells) in enumerate(lines):
+                width = width or len(cells)
+                if not positions:
+                    positions = [_position(term, where, header, width, log) for where, term in rig.terms()]
+                if count >= rig.skip_rows:
+                    numbers.extend(_numbers(cells, positions, width, f'{log}: line {number}'))
+                    line_numbers.append(number)
+    except OSError as error:
+        raise ValueError(f'{log}: {error.strerror}') from None
+    except UnicodeDecodeError:
+        raise ValueError(f'{log}: not a text file') from None
+    if not line_numbers:
+        raise ValueError(f'{log}: no row of numbers in it after the {rig.skip_rows} that the rig file passes over')
+    columns = np.frombuffer(numbers, dtype=np.float64).reshape(len(line_numbers), len(terms)).T
+    return _Cells(line_numbers, dict(zip(terms, columns, strict=True)))
+
+
+def _lines(file: TextIO, log: Path) -> Iterator[str]:
+    while line := file.readline(_LONGEST_LINE):
+        if len(line) == _LONGEST_LINE:
+            raise ValueError(f'{log}: a line of more than {_LONGEST_LINE} characters, so not a log')
+        yield line
+
+
+def _parted(
+    numbered_lines: Iterator[tuple[int, str]], header_kind: str
+) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+    """Names in the header (none if it has none), and the rows after it: line number and cells."""
+    header: list[str] = []
+    for number, line in numbered_lines:
+        text = line.strip()
+        if text.startswith('#'):
+            header = _split(text.lstrip('#')) if header_kind == 'comment' else header
+        elif text and header_kind == 'row':
+            return _split(text), _rows(numbered_lines)
+        elif text:
+            return header, _with_first((number, _split(text)), _rows(numbered_lines))
+    return header, iter(())
+
+
+def _with_first(first: tuple[int, list[str]], rest: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
+    yield first
+    yield from rest
+
+
+def _rows(numbered_lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, list[str]]]:
+    for number, line in numbered_lines:
+        text = line.strip()
+        if text and not text.startswith('#'):
+            yield number, _split(text)
+
+
+def _split(text: str) -> list[str]:
+    """Cells of a line: parted by commas, else by semicolons, else by white space; quotes around a cell are dropped."""
+    separator = next((mark for mark in ',;' if mark in text), None)
+    return [cell.strip().strip('"\'') for cell in text.split(separator)]
+
+
+def _position(term: Term, where: str, header: list[str], width: int, log: Path) -> int:
+    """Number of the column that a term names.
+
+    Raises:
+        ValueError: There is none, or several.
+    """
+    if not term.column_name:
+        if term.column >= width:
+            raise ValueError(f'{log}: rig file asks for {where}.column = {term.column}, but there are 0 to {width - 1}')
+        return term.column
+    found = [i for i, name in enumerate(header) if name == term.column_name]
+    if len(found) != 1:
+        raise ValueError(
+            f'{log}: rig file asks for {where}.column_name = {term.column_name!r}, '
+            f'there {len(found)} times in the header: {", ".join(header)[:1000]}'
+        )
+    return found[0]
+
+
+def _numbers(cells: list[str], positions: list[int], width: int, where: str) -> list[float]:
+    if len(cells) != width:
+        raise ValueError(f'{where}: {len(cells)} columns where there should be {width}')
+    numbers = []
+    for position in positions:
+        try:
+            numbers.append(float(cells[position]))
+        except ValueError:
+            raise ValueError(f'{where}: column {position} is {cells[position][:_SHOWN]!r}, not a number') from None
+    return numbers
+
+
+def _samples(log: Path, rig: Rig, cells: _Cells) -> Samples:
+    stamps = _stamps(log, rig, cells)
+    with np.errstate(invalid='ignore', over='ignore'):  # NaN and infinite cells are passed on as they are
+        signals = {part: _combined(getattr(rig, part), cells.columns, len(stamps)) for part in _PARTS[1:]}
+    if rig.savitzky_golay is not None:
+        seconds = (stamps - stamps[0]) * 1e-9
+        try:
+            signals['velocity'] = slope(seconds, signals['velocity'], rig.savitzky_golay)
+        except ValueError as error:
+            raise ValueError(f'{log}: {error}') from None
+    return Samples(stamps, signals['chamber_a'], signals['chamber_b'], signals['force_sum'], signals['velocity'])
+
+
+def _combined(combination: Combination, columns: Mapping[Term, FloatArray], rows: int) -> FloatArray:
+    total = np.full(rows, combination.constant)
+    for term in combination.terms:
+        total += term.size * columns[term]
+    return total
+
+
+def _stamps(log: Path, rig: Rig, cells: _Cells) -> NDArray[np.int64]:
+    """Stamps [ns]: start + time column.
+
+    Raises:
+        ValueError: A time is not finite, or beyond what a stamp holds, or not after the one before it.
+    """
+    with np.errstate(invalid='ignore', over='ignore'):
+        nanoseconds = np.rint((rig.start + rig.time.size * cells.columns[rig.time]) * 1e9)
+    for number, value in zip(cells.line_numbers, nanoseconds, strict=True):
+        if not 0.0 <= value < _LAST_STAMP:
+            raise ValueError(f'{log}: line {number}: a stamp of {value * 1e-9:.9g} s is not between 0 s and 2^31 s')
+    stamps: NDArray[np.int64] = nanoseconds.astype(np.int64)
+    backwards = np.flatnonzero(np.diff(stamps) <= 0)
+    if len(backwards):
+        row = int(backwards[0]) + 1
+        raise ValueError(
+            f'{log}: line {cells.line_numbers[row]}: time {stamps[row] * 1e-9:.9g} s is not after '
+            f'{stamps[row - 1] * 1e-9:.9g} s in the row before'
+        )
+    return stamps
+
+
+def write_samples(out: Path, samples: Samples, frame_id: str) -> ImportSummary:
+    """Write samples as a bag: pressure, force sum, then velocity, all three with the stamp of their row.
+
+    The velocity comes last, since it is what triggers an estimate from the other two.
+
+    Raises:
+        BagError: There is something at ``out`` already, or it cannot be made.
+    """
+    frame = frame_id.encode()
+    with BagWriter(out) as writer, progress(f'import {out.name}', len(samples.stamp)) as advance:
+        for count, row in enumerate(zip(*(array.tolist() for array in samples), strict=True), start=1):
+            stamp, chamber_a, chamber_b, force_sum, velocity = row
+            pressure = encode_pressure(Pressure(stamp, chamber_a, chamber_b), frame)
+            force = encode_force(Force(stamp, force_sum), frame)
+            writer.write(PRESSURE_TOPIC, PRESSURE_TYPE, stamp, pressure)
+            writer.write(FORCE_TOPIC, FORCE_TYPE, stamp, force)
+            writer.write(VELOCITY_TOPIC, VELOCITY_TYPE, stamp, encode_velocity(Velocity(stamp, velocity, frame)))
+            if count % 1000 == 0:
+                advance(1000)
+    finite = np.logical_and.reduce([np.isfinite(array) for array in samples[1:]])
+    return ImportSummary(len(finite), int((~finite).sum()), int(samples.stamp[0]), int(samples.stamp[-1]))

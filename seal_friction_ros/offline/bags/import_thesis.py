@@ -1,0 +1,99 @@
+"""The pull test of the thesis as a bag: what its tables hold, played as signals."""
+
+import csv
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.units import LBF, PSI
+from seal_friction_ros.files import share_directory
+from seal_friction_ros.offline.bags.import_log import ImportSummary, Samples, write_samples
+
+RATE = 100  # [Hz]
+RUNNING_VELOCITY = 0.01  # [m/s] a slow pull by hand; the thesis gives no speed
+START = 1.0  # [s] stamp of the first sample
+DWELL_SAMPLES = 30
+RAMP_SAMPLES = 40
+RUNNING_SAMPLES = 60
+REST_SAMPLES = 20
+CYCLE_SAMPLES = DWELL_SAMPLES + RAMP_SAMPLES + RUNNING_SAMPLES + REST_SAMPLES
+DIRECTIONS = {'extend': 1, 'retract': -1}
+
+
+class Pull(NamedTuple):
+    """One pull of the test: the two readings at one pressure in one direction, sums over both seals."""
+
+    test: int
+    pressure: float
+    """[Pa, gauge]"""
+    direction: int
+    """1 extend, -1 retract"""
+    static_friction: float
+    """[N] magnitude at which the rod breaks out"""
+    dynamic_friction: float
+    """[N] magnitude while it runs"""
+
+
+def read_pulls() -> list[Pull]:
+    """The 66 pulls (132 readings) of Tables A-1 to A-3, in the order of the tables."""
+    path = share_directory('seal_friction_ros', __file__) / 'data' / 'thesis' / 'friction_tests.csv'
+    readings: dict[tuple[int, int, str], dict[str, float]] = {}
+    with path.open(encoding='utf-8', newline='') as file:
+        for row in csv.DictReader(file):
+            key = int(row['test']), int(row['pressure_psig']), row['direction']
+            readings.setdefault(key, {})[row['kind']] = float(row['friction_lbf']) * LBF
+    return [
+        Pull(test, psi * PSI, DIRECTIONS[direction], of_kind['static'], of_kind['dynamic'])
+        for (test, psi, direction), of_kind in readings.items()
+    ]
+
+
+def import_thesis(out: Path) -> ImportSummary:
+    """Write the pull test of the thesis as a bag: 3 tests, 11 pressures, retract and extend, 132 readings.
+
+    Each pull is 1.5 s at 100 Hz: at rest without force (0.3 s), at rest under a force that rises evenly to the static
+    reading (0.4 s, its last sample is the reading), running at 10 mm/s under the dynamic reading (0.6 s), at rest
+    without force (0.2 s). Both chambers have the pressure of the test. A force sum that equals the friction while the
+    rod runs evenly is the rig's case: a spring scale pulls, and nothing accelerates.
+
+    Args:
+        out: Bag to write; must not exist.
+
+    Returns:
+        What was written: 9900 rows, 99 s.
+
+    Raises:
+        BagError: There is something at ``out`` already, or it cannot be made.
+
+    Source: thesis, section 5.2 and Tables A-1 to A-3 (readings only). How long each part lasts and the speed are our
+    choice: the real test dwells 30 s before each reading, which here would be 35 minutes of nothing.
+    """
+    pulls = read_pulls()
+    count = len(pulls) * CYCLE_SAMPLES
+    pressure = np.repeat([pull.pressure for pull in pulls], CYCLE_SAMPLES)
+    force = np.concatenate([_force(pull) for pull in pulls])
+    velocity = np.concatenate([_velocity(pull) for pull in pulls])
+    stamp = np.arange(count, dtype=np.int64) * (1_000_000_000 // RATE) + int(START * 1e9)
+    return write_samples(out, Samples(stamp, pressure, pressure, force, velocity), 'rod')
+
+
+def _force(pull: Pull) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Force on the rod over one pull [N], positive on extension, shape (CYCLE_SAMPLES,)."""
+    magnitude = np.concatenate(
+        [
+            np.zeros(DWELL_SAMPLES),
+            np.linspace(0.0, pull.static_friction, RAMP_SAMPLES),
+            np.full(RUNNING_SAMPLES, pull.dynamic_friction),
+            np.zeros(REST_SAMPLES),
+        ]
+    )
+    return pull.direction * magnitude
+
+
+def _velocity(pull: Pull) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Velocity of the rod over one pull [m/s], positive on extension, shape (CYCLE_SAMPLES,)."""
+    velocity = np.zeros(CYCLE_SAMPLES)
+    first = DWELL_SAMPLES + RAMP_SAMPLES
+    velocity[first : first + RUNNING_SAMPLES] = pull.direction * RUNNING_VELOCITY
+    return velocity

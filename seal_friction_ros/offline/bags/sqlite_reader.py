@@ -1,0 +1,68 @@
+"""One SQLite file of a rosbag2 bag, read as a stranger's: plain tables only, no views, nothing written beside it."""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from seal_friction_ros.offline.bags.mcap_reader import LARGEST_CHUNK
+
+_TOPICS = 'SELECT id, name, type FROM topics'
+_COUNTS = 'SELECT topic_id, count(*) FROM messages GROUP BY topic_id'
+_MESSAGES = 'SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id'
+_LONGEST_NAME = 1024  # characters of a topic or a type
+
+
+def topics(path: Path) -> list[tuple[str, str, int]]:
+    """Name, message type and number of messages of each topic.
+
+    Raises:
+        ValueError: The file is no such database.
+        sqlite3.Error: It is damaged.
+    """
+    with _opened(path) as database:
+        counts = {number: int(count) for number, count in database.execute(_COUNTS)}
+        return [(name, type_name, counts.get(number, 0)) for number, name, type_name in _names(database)]
+
+
+def messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
+    """Topic, message type, log time [ns] and bytes of each message, in order of log time.
+
+    Raises:
+        ValueError: The file is no such database.
+        sqlite3.Error: It is damaged.
+    """
+    with _opened(path) as database:
+        names = {number: (name, type_name) for number, name, type_name in _names(database)}
+        for number, log_time, data in database.execute(_MESSAGES):
+            if number not in names or not isinstance(log_time, int) or not isinstance(data, bytes):
+                raise ValueError(f'a message of topic {number!r} at {log_time!r} makes no sense')
+            yield *names[number], log_time, data
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[sqlite3.Connection]:
+    with closing(sqlite3.connect(f'{path.resolve().as_uri()}?mode=ro&immutable=1', uri=True)) as database:
+        try:
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_CHUNK)
+            database.execute('PRAGMA trusted_schema = OFF')
+            for table in ('topics', 'messages'):
+                _check_plain(database, table)
+            yield database
+        except MemoryError:  # so SQLite answers to some damaged sizes, which it has not tried to get
+            raise ValueError('a size in it makes no sense') from None
+
+
+def _check_plain(database: sqlite3.Connection, table: str) -> None:
+    """Refuse a view and a virtual table, and columns that are computed: reading them need not end."""
+    stored = "SELECT count(*) FROM sqlite_schema WHERE name = ? AND type = 'table' AND rootpage > 0"
+    computed = 'SELECT count(*) FROM pragma_table_xinfo(?) WHERE hidden'
+    if database.execute(stored, (table,)).fetchone() != (1,) or any(*database.execute(computed, (table,))):
+        raise ValueError(f'no plain table of {table} in it')
+
+
+def _names(database: sqlite3.Connection) -> Iterator[tuple[int, str, str]]:
+    for number, *names in database.execute(_TOPICS):
+        if not all(isinstance(name, str) and name.isprintable() and len(name) <= _LONGEST_NAME for name in names):
+            raise ValueError(f'topic {number!r} has no sensible name or type')
+        yield number, names[0], names[1]

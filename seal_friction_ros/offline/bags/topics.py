@@ -1,0 +1,71 @@
+"""Which topic of a bag is what to the estimator."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    FORCE_TYPE,
+    POSITION_TYPE,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    VELOCITY_TYPE,
+)
+from seal_friction_ros.offline.bags.bag import ESTIMATE_TOPIC, FEEDFORWARD_TOPIC, BagError, TopicInfo, bag_topics
+
+ANSWER_TOPICS = {ESTIMATE_TYPE: ESTIMATE_TOPIC, FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
+"""Message type of an answer -> topic, where the bag has no name for it."""
+
+
+class Topics(NamedTuple):
+    """Names of the estimator's topics in a bag; an empty name where there is no such topic."""
+
+    pressure: str
+    velocity: str
+    force: str
+    reference: str
+    position: str
+    estimate: str
+    feedforward: str
+    configuration: str
+
+
+_TYPES = Topics(
+    PRESSURE_TYPE,
+    VELOCITY_TYPE,
+    FORCE_TYPE,
+    REFERENCE_TYPE,
+    POSITION_TYPE,
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    CONFIGURATION_TYPE,
+)
+
+
+def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] | None = None) -> Topics:
+    """The estimator's topics in a bag, found by message type, so that names and remapping do not matter.
+
+    Args:
+        bag: The bag.
+        namespace: Only topics below it are looked at; for bags of several actuators.
+        known: From `bag_topics`, if it was asked already.
+
+    Raises:
+        BagError: There is no velocity, or a type has several topics.
+    """
+    names = []
+    below = f'/{namespace.strip("/")}/'.replace('//', '/')
+    known = bag_topics(bag) if known is None else known
+    topics = {topic: info for topic, info in known.items() if topic.startswith(below)}
+    for wanted in _TYPES:
+        found = sorted(topic for topic, info in topics.items() if info.type_name == wanted and info.message_count)
+        if len(found) > 1:
+            raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
+        names.append(found[0] if found else '')
+    result = Topics(*names)
+    if not result.velocity:
+        raise BagError(f'{bag}: no message of {VELOCITY_TYPE} in it, so nothing to estimate from')
+    return result

@@ -1,0 +1,1 @@
+"""Runs of the contact computations: lubricated contact and finite-element O-ring."""

@@ -1,0 +1,164 @@
+"""The finite-element O-ring from files to files: a case file in; numbers, a seal file and a report out."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import linear_regression
+from typing import Any, NamedTuple
+
+from seal_friction_ros.core.oring_contact.case import check_pressures
+from seal_friction_ros.core.oring_contact.case_file import CaseFile, Friction, parse_case
+from seal_friction_ros.core.oring_contact.results import Contact, ContactResult, contact_results
+from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.work.seal_writer import rounded
+
+DIGITS = 8  # that a computed number in a seal file has
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Contact stress along a wall, at the nodes in contact."""
+
+    position_m: tuple[float, ...]
+    """along rod and gland, positive downstream from the middle of the free ring; for the wall the radius"""
+    stress_Pa: tuple[float, ...]  # noqa: N815  (unit symbols keep their case)
+
+
+@dataclass(frozen=True)
+class OringSummary:
+    """Numbers of a case, one of each for every pressure."""
+
+    case: str
+    sliding_wall: str
+    pressure_Pa: tuple[float, ...]  # noqa: N815
+    normal_force_N: tuple[float, ...]  # noqa: N815
+    """contact stress on the wall the ring slides on, over its area"""
+    axial_force_N: tuple[float, ...]  # noqa: N815
+    """of the gland on the ring, along the axis"""
+    peak_contact_stress_Pa: tuple[float, ...]  # noqa: N815
+    contact_width_m: tuple[float, ...]
+    area_deformation_gain: float | None
+    """slope of normal over axial force, least squares; None with one pressure"""
+    radial_force_N: float | None  # noqa: N815
+    """what that line has at no axial force; None with one pressure"""
+    friction_N: tuple[float, ...] | None  # noqa: N815
+    """sliding friction of one seal, if the case has a friction coefficient"""
+    rod_profile: tuple[Profile, ...]
+    gland_profile: tuple[Profile, ...]
+    wall_profile: tuple[Profile, ...]
+    """downstream wall; empty without pressure"""
+
+
+class Computed(NamedTuple):
+    """A case and what came of it."""
+
+    file: CaseFile
+    results: tuple[ContactResult, ...]
+    summary: OringSummary
+
+
+def sliding_contact(file: CaseFile, result: ContactResult) -> Contact:
+    """Contact on the wall the ring slides on."""
+    return result.rod if file.case.geometry.sliding_wall == 'rod' else result.gland
+
+
+def compute_case(path: Path, pressures: Sequence[float] = (), *, for_seal_file: bool = False) -> Computed:
+    """Compute a case file, with a progress bar.
+
+    Args:
+        path: The case file.
+        pressures: Instead of those in the file [Pa, gauge], increasing.
+        for_seal_file: Refuse, before computing, what `seal_document` could not make a seal of.
+
+    Raises:
+        ValueError: The file makes no sense or is not enough for a seal file, or the ring does not fit, does not seal or
+            finds no equilibrium.
+    """
+    document = read_yaml(path)
+    try:
+        file = parse_case(document)
+        wanted = tuple(pressures) or file.pressures
+        check_pressures(file.case, wanted)
+        if for_seal_file:
+            _friction_of_seal(file, wanted)
+        results = []
+        with progress(f'{file.case.name}: pressures', len(wanted)) as advance:
+            for result in contact_results(file.case, wanted):
+                results.append(result)
+                advance(1)
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from None
+    return Computed(file, tuple(results), _summary(file, results))
+
+
+def _summary(file: CaseFile, results: Sequence[ContactResult]) -> OringSummary:
+    contacts = [sliding_contact(file, result) for result in results]
+    normal = tuple(contact.force for contact in contacts)
+    axial = tuple(result.axial_force for result in results)
+    gain, radial = linear_regression(axial, normal) if len(results) > 1 else (None, None)
+    law = file.friction.law if file.friction else None
+    return OringSummary(
+        case=file.case.name,
+        sliding_wall=file.case.geometry.sliding_wall,
+        pressure_Pa=tuple(result.pressure for result in results),
+        normal_force_N=normal,
+        axial_force_N=axial,
+        peak_contact_stress_Pa=tuple(contact.peak_stress for contact in contacts),
+        contact_width_m=tuple(contact.width for contact in contacts),
+        area_deformation_gain=gain,
+        radial_force_N=radial,
+        friction_N=tuple(law.coefficient_of_friction(force) * force for force in normal) if law else None,
+        rod_profile=tuple(_profile(result.rod) for result in results),
+        gland_profile=tuple(_profile(result.gland) for result in results),
+        wall_profile=tuple(_profile(result.wall) for result in results),
+    )
+
+
+def _profile(contact: Contact) -> Profile:
+    return Profile(tuple(contact.position.tolist()), tuple(contact.stress.tolist()))
+
+
+def _friction_of_seal(file: CaseFile, pressures: Sequence[float]) -> Friction:
+    if file.friction is None:
+        raise ValueError(f'case {file.case.name}: a seal file needs its section friction, with a friction_coefficient')
+    if len(pressures) < 2:
+        raise ValueError(f'case {file.case.name}: a seal file needs two pressures at least')
+    return file.friction
+
+
+def seal_document(computed: Computed) -> dict[str, Any]:
+    """Seal file whose normal force is a table of the computed pressures.
+
+    Raises:
+        ValueError: The case has no friction coefficient or one pressure only.
+    """
+    file, summary = computed.file, computed.summary
+    friction = _friction_of_seal(file, summary.pressure_Pa)
+    pressures = [rounded(value, DIGITS) for value in summary.pressure_Pa]
+    source = f'{file.source} Normal force: finite elements, {file.case.numerics.lines} lines.'
+    return {
+        'name': file.case.name,
+        'source': ' '.join(source.split()),
+        'geometry': asdict(file.case.geometry),
+        'coulomb_law': 'physics_based',
+        'normal_force': {
+            'law': 'monotone_table',
+            'pressures': pressures,
+            'normal_forces': [rounded(value, DIGITS) for value in summary.normal_force_N],
+        },
+        'friction_coefficient': dict(friction.friction_coefficient),
+        'stiction': friction.stiction,
+        'uncertainty': asdict(friction.uncertainty),
+        'identified_pressure': [pressures[0], pressures[-1]],
+    }
+
+
+def seal_comment(computed: Computed) -> str:
+    """What stands above that seal file."""
+    summary = computed.summary
+    return (
+        'Made by `seal_friction oring`, which computes the normal force from geometry and rubber; see docs/oring.md.\n'
+        f'As a line over axial force: area_deformation_gain: {summary.area_deformation_gain:.6g} [1], '
+        f'radial_force: {summary.radial_force_N:.6g} [N].'
+    )

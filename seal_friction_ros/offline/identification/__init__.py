@@ -1,0 +1,1 @@
+"""From bags, logs and data sheets to a seal file."""

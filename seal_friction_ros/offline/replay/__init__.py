@@ -1,0 +1,1 @@
+"""A bag through the estimator, and two bags compared."""

@@ -1,0 +1,295 @@
+"""How well a servo tracked: numbers from a bag that holds the reference and the position of the rod.
+
+The bag is cut where the configuration changed, so that a feed-forward that was switched on live can be compared with
+the same servo without it. What counts as settled, as periodic and as the same reference is our choice and stands with
+the constants below.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.servo.tracking import dwell_per_reversal, reversals, tracking_peak, tracking_rms
+from seal_friction_ros.offline.reports.bag_evaluation import MAX_GAP, RecordedRun
+
+SETTLING_TIME = 0.5  # [s] left out after a change, on top of fade_time: the feed-forward fades in, then the servo
+#                      forgets; the simulated one takes 0.1 s
+MIN_SAMPLES = 50  # a shorter stretch tells nothing
+MIN_PERIODS = 2  # of a reference that is called periodic
+HYSTERESIS = 0.1  # of the amplitude: a reference must pass the middle by as much to have crossed it
+SAME = 0.05  # periods, amplitudes and shapes that differ by less are the same
+
+
+class Periodicity(NamedTuple):
+    """A reference that repeats itself."""
+
+    period: float
+    """[s]"""
+    crossings: FloatArray
+    """[s] when it goes up through a little above its middle; since the first sample"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackingStretch:
+    """Tracking while the configuration stayed the same, without the time it took to settle."""
+
+    first: int
+    """index of the first estimate that counts"""
+    last: int
+    """index of the last one"""
+    start: float
+    """[s] of the first, since the first estimate of the bag"""
+    end: float
+    """[s] of the last"""
+    settling: float
+    """[s] left out before"""
+    settings: FeedForwardSettings | None
+    """None if the bag does not say"""
+    standstill: float
+    """[m/s] speed at and below which the rod counts as resting: the estimator's ``stick_velocity``"""
+    samples: int
+    """estimates that count: those with reference and position"""
+    amplitude: float
+    """[m] of the reference, half the way from its lowest to its highest"""
+    period: float | None
+    """[s] of the reference; None if it does not repeat itself"""
+    rms: float
+    """[m] root mean square of the tracking error"""
+    peak: float
+    """[m] largest tracking error"""
+    reversals: int
+    """how often the rod changed its direction"""
+    dwell: float | None
+    """[s] mean rest per reversal of the rod; None if it does not reverse"""
+    reference_dwell: float | None
+    """[s] likewise of the reference, which passes through standstill as well"""
+    not_sliding: float | None
+    """[-] share of the estimates of a known state that do not slide"""
+    feedforward_peak: float
+    """[N] largest feed-forward; 0.0 without"""
+    rms_change: float | None = None
+    """[%] of the RMS against the first stretch without feed-forward, if that had the same reference"""
+    dwell_change: float | None = None
+    """[%] likewise of the dwell"""
+
+    @property
+    def has_feedforward(self) -> bool:
+        """Whether there was any force of the feed-forward."""
+        return self.feedforward_peak > 0.0
+
+
+@dataclass(frozen=True)
+class TrackingEvaluation:
+    """Tracking in every stretch of a bag."""
+
+    stretches: tuple[TrackingStretch, ...]
+    notes: tuple[str, ...]
+    """what has to be said about it"""
+
+    @property
+    def without(self) -> TrackingStretch | None:
+        """First stretch without feed-forward, with which the others are compared."""
+        return next((stretch for stretch in self.stretches if not stretch.has_feedforward), None)
+
+    @property
+    def compensated(self) -> TrackingStretch | None:
+        """Last stretch with feed-forward; with the reference of the one without, if there is one like that."""
+        active = [stretch for stretch in self.stretches if stretch.has_feedforward]
+        comparable = [stretch for stretch in active if stretch.rms_change is not None]
+        return next(reversed(comparable or active), None)
+
+
+def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
+    """Tracking in each stretch between two changes of configuration; None without reference or position.
+
+    Of a stretch in which either is missing for more than `MAX_GAP`, the longest part without such a gap counts. The
+    first ``fade_time`` + `SETTLING_TIME` of it are left out, and of a periodic reference whole periods count.
+    """
+    if not np.isfinite(run.reference - run.position).any():
+        return None
+    found, short = [], 0
+    for first, end, configuration in configuration_stretches(run):
+        stretch = _evaluate(run, first, end, configuration)
+        if stretch is None:
+            short += 1
+        else:
+            found.append(stretch)
+    base = next((stretch for stretch in found if not stretch.has_feedforward), None)
+    compared = tuple(stretch if base is None else _compared(stretch, base) for stretch in found)
+    return TrackingEvaluation(compared, tuple(_notes(compared, base, short)))
+
+
+def configuration_stretches(run: RecordedRun) -> Iterator[tuple[int, int, Configuration | None]]:
+    """First index, index behind the last, and configuration of each stretch in which that did not change.
+
+    The configuration is None before the first one in the bag, and where it is not understood.
+    """
+    known = [(0, None), *zip(run.configuration_rows, map(_parsed, run.configurations), strict=True)]
+    changes = [known[0]]
+    for row, configuration in known[1:]:
+        if configuration is None or configuration != changes[-1][1]:
+            changes.append((row, configuration))
+    for (first, configuration), (end, _) in pairwise([*changes, (len(run.time), None)]):
+        if end > first:
+            yield first, end, configuration
+
+
+def _parsed(change: tuple[float, str]) -> Configuration | None:
+    try:
+        return parse_snapshot(change[1]).configuration
+    except (ValueError, LookupError, TypeError):
+        return None  # the report shows it as it is
+
+
+def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configuration | None) -> TrackingStretch | None:
+    """Numbers of one stretch; None if it is too short."""
+    settings = configuration.feedforward if configuration else None
+    estimator_settings = configuration.settings if configuration else EstimatorSettings()
+    settling = (settings or FeedForwardSettings()).fade_time + SETTLING_TIME
+    part = _longest_part(run, first, end)
+    part = part[run.time[part] >= run.time[part[0]] + settling] if len(part) else part
+    if len(part) < MIN_SAMPLES or run.time[part[-1]] <= run.time[part[0]]:
+        return None
+    repeats = periodicity(run.time[part], run.reference[part])
+    if repeats is not None:
+        part = part[run.time[part] < run.time[part[0]] + _whole_periods(run.time[part], repeats.period)]
+    time, reference, position = run.time[part], run.reference[part], run.position[part]
+    standstill = estimator_settings.stick_velocity
+    turns, dwell = _dwell(time, run.velocity[part], standstill)
+    _, reference_dwell = _dwell(time[1:], np.diff(reference) / np.diff(time), standstill)
+    known = run.state[part] != FrictionState.UNKNOWN
+    sliding = np.count_nonzero(run.state[part] == FrictionState.SLIDING)
+    force = run.feedforward_force[part]
+    return TrackingStretch(
+        first=int(part[0]),
+        last=int(part[-1]),
+        start=float(time[0]),
+        end=float(time[-1]),
+        settling=settling,
+        settings=settings,
+        standstill=standstill,
+        samples=len(part),
+        amplitude=float(np.ptp(reference)) / 2.0,
+        period=repeats.period if repeats else None,
+        rms=tracking_rms(reference, position),
+        peak=tracking_peak(reference, position),
+        reversals=turns,
+        dwell=dwell,
+        reference_dwell=reference_dwell,
+        not_sliding=1.0 - float(sliding / np.count_nonzero(known)) if known.any() else None,
+        feedforward_peak=float(np.abs(force[np.isfinite(force)]).max(initial=0.0)),
+    )
+
+
+def _longest_part(run: RecordedRun, first: int, end: int) -> IntArray:
+    """Indices of the longest part, in time, in which reference and position are never missing for long."""
+    known = first + np.flatnonzero(np.isfinite(run.reference[first:end] - run.position[first:end]))
+    if not len(known):
+        return known
+    steps = np.diff(run.time[known])
+    parts = np.split(known, np.flatnonzero((steps > MAX_GAP) | (steps <= 0.0)) + 1)
+    return max(parts, key=lambda part: float(run.time[part[-1]] - run.time[part[0]]))
+
+
+def _whole_periods(time: FloatArray, period: float) -> float:
+    """Time of the whole periods in some times [s], one sample more or less."""
+    step = float(np.median(np.diff(time)))
+    return math.floor(float(time[-1] - time[0] + step) / period + 1e-6) * period - step / 2.0
+
+
+def _even(time: FloatArray, values: FloatArray) -> tuple[float, FloatArray]:
+    """Time between samples [s], and the values at evenly spaced times: what is missing in between is interpolated."""
+    known = np.isfinite(values)
+    time, values = time[known], values[known]
+    if len(time) < 2:
+        return 0.0, values
+    step = float(np.median(np.diff(time)))
+    count = round((time[-1] - time[0]) / step) + 1
+    return step, np.interp(time[0] + step * np.arange(count), time, values)
+
+
+def _dwell(time: FloatArray, velocity: FloatArray, standstill: float) -> tuple[int, float | None]:
+    """How often the direction changes, and the mean rest [s] at each; None if it never does."""
+    step, even = _even(time, velocity)
+    turns = reversals(even, standstill)
+    return turns, dwell_per_reversal(even, step, standstill) if turns else None
+
+
+def periodicity(time: FloatArray, reference: FloatArray) -> Periodicity | None:
+    """Period of a reference [m] over increasing times [s]; None if it does not repeat itself `MIN_PERIODS` times.
+
+    A period is the time between two crossings of the middle, upwards. It must not vary by more than `SAME`, and 95 %
+    of the samples must come back a period later to within `SAME` of the amplitude.
+    """
+    step, even = _even(time, reference)
+    middle, amplitude = (even.max() + even.min()) / 2.0, float(np.ptp(even)) / 2.0
+    level = middle + HYSTERESIS * amplitude
+    side = np.where(even > level, 1, 0) - np.where(even < middle - HYSTERESIS * amplitude, 1, 0)
+    outside = np.flatnonzero(side)
+    up = outside[1:][(side[outside[1:]] == 1) & (side[outside[:-1]] == -1)]
+    if len(up) <= MIN_PERIODS:
+        return None
+    crossings = step * (up - (even[up] - level) / (even[up] - even[up - 1]))
+    intervals = np.diff(crossings)
+    period = float(intervals.mean())
+    if np.ptp(intervals) > SAME * period + 2.0 * step:
+        return None
+    samples = step * np.arange(len(even))
+    early = samples <= samples[-1] - period
+    later = np.interp(samples[early] + period, samples, even)
+    if np.quantile(np.abs(later - even[early]), 0.95) > SAME * amplitude:
+        return None
+    return Periodicity(period, crossings)
+
+
+# -- comparison -------------------------------------------------------------------------------------------------------
+
+
+def _same_reference(one: TrackingStretch, other: TrackingStretch) -> bool:
+    def close(a: float | None, b: float | None) -> bool:
+        if a is None or b is None:
+            return a is b
+        return abs(a - b) <= SAME * max(a, b)
+
+    return close(one.amplitude, other.amplitude) and close(one.period, other.period)
+
+
+def _compared(stretch: TrackingStretch, base: TrackingStretch) -> TrackingStretch:
+    if stretch is base or not _same_reference(stretch, base):
+        return stretch
+    return replace(stretch, rms_change=_change(stretch.rms, base.rms), dwell_change=_change(stretch.dwell, base.dwell))
+
+
+def _change(value: float | None, base: float | None) -> float | None:
+    """Change in percent; None where there is nothing to compare with."""
+    return None if value is None or not base else 100.0 * (value / base - 1.0)
+
+
+def _notes(stretches: Sequence[TrackingStretch], base: TrackingStretch | None, short: int) -> Iterator[str]:
+    if short:
+        yield (
+            f'{short} stretches of unchanged configuration are too short to say how the servo tracked: less than '
+            f'{MIN_SAMPLES} samples with reference and position are left once it has settled.'
+        )
+    if stretches and base is None:
+        yield 'There is no stretch without feed-forward, so nothing to compare the feed-forward with.'
+    for stretch in stretches:
+        if base is not None and not _same_reference(stretch, base):
+            yield (
+                f'The reference from {stretch.start:.1f} s on is another one than that from {base.start:.1f} s on, '
+                'without feed-forward: the two are not compared.'
+            )
+
+
+def tracking_numbers(evaluation: TrackingEvaluation | None) -> list[dict[str, Any]]:
+    """The numbers for JSON, one object per stretch: plain types, every number finite or null."""
+    return [asdict(stretch) for stretch in evaluation.stretches] if evaluation is not None else []

@@ -1,0 +1,56 @@
+"""The one way in which seal files are written: checked as the node will read them, whole or not at all."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.files import parse_yaml
+from seal_friction_ros.offline.work.atomic_file import write_whole
+
+
+def check_new(out: Path) -> None:
+    """Check that a file can be made, before the work for it begins.
+
+    Raises:
+        ValueError: It is there already, or nothing can be written where it should be.
+    """
+    if out.exists():
+        raise ValueError(f'{out} exists already: not overwriting it')
+    parent = next(parent for parent in out.absolute().parents if parent.exists())
+    if not parent.is_dir() or not os.access(parent, os.W_OK):
+        raise ValueError(f'{out}: cannot write into {parent}')
+
+
+def rounded(value: float, digits: int) -> float:
+    """A number with so many significant digits, for a file that people read."""
+    return float(f'{value:.{digits}g}')
+
+
+def seal_text(document: Mapping[str, Any]) -> str:
+    """YAML of a seal file."""
+    text: str = yaml.safe_dump(dict(document), sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+    return text
+
+
+def write_seal(document: Mapping[str, Any], out: Path, comment: str = '') -> None:
+    """Write a seal file, with its folder if there is none; one that is there is replaced.
+
+    Args:
+        document: The seal.
+        out: The file.
+        comment: Lines to stand above it.
+
+    Raises:
+        ValueError: The document makes no seal, or the file cannot be written.
+    """
+    content = (''.join(f'# {line}\n' for line in comment.splitlines()) + seal_text(document)).encode()
+    parse_seal(parse_yaml(content, str(out)))
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(out, content)
+    except OSError as error:
+        raise ValueError(f'{out}: cannot write the seal file: {error.strerror}') from None

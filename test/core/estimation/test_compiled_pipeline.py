@@ -1,0 +1,274 @@
+"""Many messages at once give the bytes and the state that they give one by one, whatever comes in."""
+
+import dataclasses
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.bulk_friction import actuator_frictions
+from seal_friction_ros.core.estimation.compiled_pipeline import Kind, Messages, UnsuitedError, receive_all
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters
+from seal_friction_ros.core.estimation.messages import (
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    ServoReference,
+    Velocity,
+    decode_force,
+    decode_pressure,
+    decode_reference,
+    decode_velocity,
+    encode_force,
+    encode_pressure,
+    encode_reference,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, encoded, init, receive
+from seal_friction_ros.core.estimation.records import NEVER, Force, Pressure
+from seal_friction_ros.core.friction.actuator import (
+    ConstantCoulomb,
+    MountedSeal,
+    PressurePowerLaw,
+    VelocityTerms,
+    actuator_friction,
+)
+from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.files import default_configuration, read_yaml
+
+SEALS = {path.stem: parse_seal(read_yaml(path)) for path in sorted((ROOT / 'config' / 'seals').glob('*.yaml'))}
+DEFAULT = default_configuration().parameters()
+MS = 1_000_000  # [ns]
+
+
+class FromElsewhere:
+    """A law that nobody has heard of."""
+
+    def coulomb_friction(self, pressure: float) -> float:
+        return 5.0 + math.atan(pressure / 1e6)
+
+
+ONE = SEALS['ms28775_114']
+SEALS |= {
+    'power': dataclasses.replace(ONE, coulomb_law=PressurePowerLaw(3.0, 0.4, 2.0 / 3.0), stiction_ratio=0.3),
+    'constant': dataclasses.replace(ONE, coulomb_law=ConstantCoulomb(7.0)),
+    'from_elsewhere': dataclasses.replace(ONE, coulomb_law=FromElsewhere()),
+    'viscous': dataclasses.replace(ONE, velocity_terms=VelocityTerms(120.0, asymmetry=-0.2)),
+    'mapped': dataclasses.replace(
+        ONE,
+        coulomb_law=FrictionMap(
+            speeds=(1e-3, 1e-2, 1e-1),
+            pressures=(0.0, 5e6),
+            frictions=(9.0, 7.0, 6.0, 22.0, 18.0, 15.0),
+            reference_speed=0.02,
+        ),
+    ),
+    'stribeck': dataclasses.replace(SEALS['ms28775_114_table'], velocity_terms=VelocityTerms(30.0, 4.0, 0.003, 0.1)),
+}
+
+
+def with_seals(names: Sequence[str], **changes: object) -> PipelineParameters:
+    """The default settings, changed, with these seals in chambers a, b, a, ..."""
+    seals = tuple(MountedSeal(SEALS[name], 'ab'[i % 2]) for i, name in enumerate(names))
+    known = {f.name for f in dataclasses.fields(DEFAULT.feedforward)}
+    guiding = {name: value for name, value in changes.items() if name in known}
+    rest = {name: value for name, value in changes.items() if name not in known}
+    settings = dataclasses.replace(DEFAULT.estimator.settings, **rest)
+    return PipelineParameters(EstimatorParameters(settings, seals), dataclasses.replace(DEFAULT.feedforward, **guiding))
+
+
+def serialised(record: object, frame: bytes) -> tuple[Kind, bytes]:
+    match record:
+        case Pressure():
+            return Kind.PRESSURE, encode_pressure(record, frame)
+        case Force():
+            return Kind.FORCE, encode_force(record, frame)
+        case Velocity():
+            return Kind.VELOCITY, encode_velocity(record._replace(frame_id=frame))
+        case ServoReference():
+            return Kind.REFERENCE, encode_reference(record._replace(frame_id=frame))
+    return Kind.OTHER, b'something'
+
+
+def in_memory(pieces: Sequence[tuple[Kind, bytes]]) -> Messages:
+    sizes = np.array([len(data) for _, data in pieces], np.int64)
+    data = np.frombuffer(b''.join(data for _, data in pieces), np.uint8)
+    return Messages(data, np.array([kind for kind, _ in pieces], np.uint8), np.cumsum(sizes) - sizes, sizes)
+
+
+DECODERS = {
+    Kind.PRESSURE: decode_pressure,
+    Kind.FORCE: decode_force,
+    Kind.VELOCITY: decode_velocity,
+    Kind.REFERENCE: decode_reference,
+}
+
+
+def one_by_one(parameters: PipelineParameters, state: PipelineState, pieces: Sequence[tuple[Kind, bytes]]):
+    answers = []
+    for kind, data in pieces:
+        given_back: dict[str, bytes] = {}
+        if kind in DECODERS:
+            state, answer = receive(parameters, state, DECODERS[kind](data))
+            given_back = dict(encoded(answer))
+        answers.append((given_back.get(ESTIMATE_TYPE, b''), given_back.get(FEEDFORWARD_TYPE, b'')))
+    return state, answers
+
+
+def all_at_once(parameters: PipelineParameters, state: PipelineState, pieces: Sequence[tuple[Kind, bytes]]):
+    state, found = receive_all(parameters, state, in_memory(pieces))
+    places = zip(*(column.tolist() for column in found[1:]), strict=True)
+    return state, [(found.data[a : a + b].tobytes(), found.data[c : c + d].tobytes()) for a, b, c, d in places]
+
+
+def assert_same(parameters: PipelineParameters, state: PipelineState, pieces: Sequence[tuple[Kind, bytes]], cuts=()):
+    expected_state, expected = one_by_one(parameters, state, pieces)
+    answers = []
+    for first, end in pairwise([0, *sorted(cuts), len(pieces)]):
+        state, some = all_at_once(parameters, state, pieces[first:end])
+        answers += some
+    assert answers == expected
+    assert repr(state) == repr(expected_state)  # NaN is not equal to itself
+
+
+odd = st.sampled_from([math.nan, math.inf, -math.inf, -0.0, 0.0, 1e300, 5e-324])
+frames = st.sampled_from([b'', b'rod', b'x' * 11, 'zylinder_ü'.encode(), b'y' * 300])
+pressures = st.floats(-1e4, 8e6) | st.floats(-2e5, 5e7) | odd
+small = st.floats(-0.004, 0.004) | st.floats(-0.3, 0.3) | odd
+forces = st.floats(-80.0, 80.0) | st.floats(-2e6, 2e6) | odd
+later = st.sampled_from([0, MS, MS, MS, MS, 40 * MS, 150 * MS, 3_000 * MS, -MS, -900 * MS, 2**31 * 10**9])
+
+
+@st.composite
+def runs(draw) -> list[tuple[Kind, bytes]]:
+    """Messages in any order, their stamps mostly a millisecond apart, with what sensors do when they fail."""
+    stamp, pieces = draw(st.sampled_from([0, 10**18, 1])), []
+    for _ in range(draw(st.integers(1, 30))):
+        stamp += draw(later)
+        stamp = max(min(stamp, (2**31 - 1) * 10**9), -(2**31) * 10**9)
+        what = draw(st.integers(0, 7))
+        at = stamp + draw(st.sampled_from([0, 0, 0, -200 * MS if stamp > 0 else 0]))
+        if what in (0, 1):
+            record: object = Pressure(at, draw(pressures), draw(pressures))
+        elif what == 2:
+            record = Force(at, draw(forces))
+        elif what in (3, 4):
+            record = ServoReference(at, 0.0, draw(small), draw(st.floats(-2.0, 2.0) | odd))
+        elif what == 5:
+            record = None
+        else:
+            record = Velocity(at, draw(small), b'')
+        kind, data = serialised(record, draw(frames))
+        pieces.append((kind, data + b'\x00' * draw(st.integers(0, 3))))
+    return pieces
+
+
+chosen_seals = st.lists(st.sampled_from(sorted(SEALS)), min_size=1, max_size=3)
+changes = st.fixed_dictionaries(
+    {},
+    optional={
+        'use_measured_velocity': st.booleans(),
+        'stribeck_scale': st.floats(0.0, 2.0),
+        'stribeck_exponent': st.sampled_from([0.5, 1.0, 2.0, 3.7]),
+        'viscous_friction': st.floats(0.0, 1e4),
+        'fade_time': st.floats(1e-4, 1.0),
+        'force_limit': st.floats(0.0, 200.0),
+        'slew_limit': st.floats(1e-3, 1e6),
+        'use_stiction': st.booleans(),
+        'stick_velocity': st.just(0.0),
+        'pressure_rate_max': st.floats(1e6, 1e10),
+        'force_rate_max': st.floats(1e2, 1e8),
+        'acceleration_max': st.floats(1.0, 1e3),
+    },
+)
+
+
+@hypothesis_settings(max_examples=400)
+@given(runs(), chosen_seals, changes, st.booleans(), st.integers(0, 30))
+def test_any_run_of_messages_gives_the_same_bytes_and_the_same_state(pieces, names, changed, refused, cut):
+    parameters = with_seals(names, **changed)
+    state = init(parameters)._replace(refused=refused)
+    assert_same(parameters, state, pieces, cuts=[min(cut, len(pieces))])
+
+
+def noisy(samples: int, seed: int) -> list[tuple[Kind, bytes]]:
+    """A rod that goes to and fro at changing pressure with noise on all, and now and then a sensor that fails."""
+    random = np.random.default_rng(seed)
+    pieces = []
+    for i in range(samples):
+        stamp = 10**18 + i * MS
+        a, b, f, v = random.normal(size=4)
+        speed = max(abs(math.sin(i / 300)) - 0.3, 0.0) * math.copysign(0.05, math.sin(i / 300)) + 1e-4 * v
+        records = [
+            Pressure(stamp, 2e6 + 2.2e6 * math.sin(i / 700) + 1e4 * a, 5e5 + 1e4 * b),
+            Force(stamp, 60.0 * math.sin(i / 300 + 0.3) + f),
+            ServoReference(stamp, 0.0, speed, 0.1 * a),
+            Velocity(stamp, math.nan if i % 997 == 5 else speed, b''),
+        ]
+        pieces += [serialised(record, b'rod') for record in records if random.random() > 0.02]
+    return pieces
+
+
+@pytest.mark.parametrize('name', sorted(SEALS))
+def test_twenty_seconds_with_every_seal_are_the_same_to_the_byte(name):
+    assert_same(with_seals([name, 'ms28775_114']), init(DEFAULT), noisy(1500, len(name)))
+
+
+@pytest.mark.parametrize('name', sorted(SEALS))
+def test_the_friction_of_many_moments_is_that_of_each(name):
+    random = np.random.default_rng(1)
+    seals = (MountedSeal(SEALS[name], 'a'), MountedSeal(SEALS[name], 'b'))
+    edges = [0.0, -0.0, -1e4, SEALS[name].pressure_max, 6894757.2931783, 4.5e7]
+    a = np.concatenate([edges, random.uniform(-1e4, 9e6, 3000), random.uniform(0.0, 4.5e7, 500)])
+    b, v = random.permutation(a), random.choice([0.0, -0.0, 0.001, -0.3, 9.0], len(a)) * random.random(len(a))
+    found = actuator_frictions(seals, a, b, v)
+    each = [actuator_friction(seals, *moment) for moment in zip(a.tolist(), b.tolist(), v.tolist(), strict=True)]
+    for column, expected in zip(found, zip(*each, strict=True), strict=True):
+        assert column.tobytes() == np.array(expected).tobytes()
+
+
+@pytest.mark.parametrize('kind', DECODERS)
+def test_what_the_decoder_refuses_is_refused_and_what_it_takes_is_taken(kind):
+    record = {Kind.PRESSURE: Pressure(1, 2.0, 3.0), Kind.FORCE: Force(1, 2.0), Kind.VELOCITY: Velocity(1, 2.0, b'')}
+    good = serialised(record.get(kind, ServoReference(1, 2.0, 3.0, 4.0)), b'rod')[1]
+    bad = [good[:n] for n in range(len(good))] + [good + bytes(n) for n in range(6)]
+    for place in range(16):
+        bad += [good[:place] + bytes([value]) + good[place + 1 :] for value in (0, 1, 4, 5, 127, 128, 255)]
+    bad += [good[:8] + nanoseconds.to_bytes(4, 'little') + good[12:] for nanoseconds in (999_999_999, 1_000_000_000)]
+    bad += [serialised(DECODERS[kind](good), b'x' * length)[1] for length in (1023, 1024)]
+    refused = 0
+    for data in bad:
+        try:
+            DECODERS[kind](data)
+        except ValueError:
+            refused += 1
+            with pytest.raises(UnsuitedError):
+                receive_all(DEFAULT, init(DEFAULT), in_memory([(kind, data)]))
+        else:
+            assert_same(DEFAULT, init(DEFAULT), [(kind, data)])
+    assert refused > 40
+
+
+def test_a_stamp_in_the_state_that_64_bits_do_not_hold_is_refused():
+    for stamp in (2**62, -(2**62), 2**70):
+        state = init(DEFAULT)._replace(force=Force(stamp, 1.0))
+        with pytest.raises(UnsuitedError):
+            receive_all(DEFAULT, state, in_memory([serialised(Velocity(1, 0.0, b''), b'rod')]))
+    assert_same(DEFAULT, init(DEFAULT)._replace(force=Force(NEVER, 1.0)), [serialised(Velocity(1, 0.0, b''), b'rod')])
+
+
+def test_the_live_node_does_not_load_the_compiler():
+    program = (
+        'import json, sys; import seal_friction_ros.core.estimation.pipeline; print(json.dumps(sorted(sys.modules)))'
+    )
+    found = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True)
+    assert 'numba' not in json.loads(found.stdout)

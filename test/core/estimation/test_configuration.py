@@ -1,0 +1,233 @@
+"""The snapshot in a bag: it comes back as it was, and equal ones are equal text."""
+
+import dataclasses
+import json
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.configuration import (
+    Configuration,
+    SealSelection,
+    Snapshot,
+    parse_snapshot,
+    snapshot_text,
+)
+from seal_friction_ros.core.estimation.estimator import NO_SPEED, EstimatorSettings, EstimatorState, Speed
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
+from seal_friction_ros.core.estimation.messages import ServoReference, Velocity, decode_text, encode_text
+from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, PipelineState, Reference, init, receive
+from seal_friction_ros.core.estimation.records import (
+    NEVER,
+    NO_ESTIMATE,
+    NO_FORCE,
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    Pressure,
+)
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.files import load_configuration, read_yaml
+
+SEALS = ROOT / 'config' / 'seals'
+CONFIGURATION = load_configuration(SealSelection(), EstimatorSettings())
+ESTIMATE = FrictionEstimate(5, 40.0, 1.5, 50.0, -40.0, FrictionState.SLIDING, -1, 0, 0.001)
+SNAPSHOT = Snapshot(
+    CONFIGURATION,
+    PipelineState(
+        EstimatorState(
+            5, True, Pressure(3, 1e6, 2e6), Force(4, -3.5), Speed(5, 0.1), NO_PRESSURE, Force(5, 9e5), NO_SPEED
+        ),
+        FeedForwardState(5, 12.5, 0.75, ESTIMATE, -0.02),
+        Pressure(3, math.nan, -0.0),
+        NO_FORCE,
+        Reference(4, -0.02, math.inf),
+        refused=True,
+    ),
+)
+
+stamps = st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1)
+usable = st.floats(allow_nan=False, allow_infinity=False)
+anything = st.floats()
+estimates = st.builds(
+    FrictionEstimate,
+    stamps,
+    *[usable] * 4,
+    st.sampled_from(FrictionState),
+    st.integers(-1, 1),
+    st.integers(0, 2**16 - 1),
+    usable,
+)
+stamps_or_never = st.just(NEVER) | stamps
+usable_pressures = st.just(NO_PRESSURE) | st.builds(Pressure, stamps, usable, usable)
+usable_forces = st.just(NO_FORCE) | st.builds(Force, stamps, usable)
+usable_speeds = st.just(NO_SPEED) | st.builds(Speed, stamps, usable)
+states = st.builds(
+    PipelineState,
+    st.builds(EstimatorState, stamps_or_never, st.booleans(), *[usable_pressures, usable_forces, usable_speeds] * 2),
+    st.builds(FeedForwardState, stamps_or_never, usable, usable, st.just(NO_ESTIMATE) | estimates, usable),
+    st.just(NO_PRESSURE) | st.builds(Pressure, stamps, anything, anything),
+    st.just(NO_FORCE) | st.builds(Force, stamps, anything),
+    st.just(NO_REFERENCE) | st.builds(Reference, stamps, anything, anything),
+    st.booleans(),
+)
+
+
+def with_part(path: str, value) -> str:
+    """Text of a snapshot with another value (or, for ..., none) at a dotted path."""
+    document = json.loads(snapshot_text(SNAPSHOT))
+    *parents, key = path.split('.')
+    part = document
+    for parent in parents:
+        part = part[parent]
+    if value is ...:
+        del part[key]
+    else:
+        part[key] = value
+    return json.dumps(document)
+
+
+def bits(value):
+    """A state bit by bit; every NaN counts alike, since nothing computes with its payload."""
+    if isinstance(value, tuple):
+        return [type(value), *(bits(item) for item in value)]
+    return struct.pack('<d', math.nan if math.isnan(value) else value) if isinstance(value, float) else value
+
+
+@given(states)
+def test_a_snapshot_comes_back_to_the_bit_nan_included(state):
+    back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state)))
+    assert back.configuration.parameters() == CONFIGURATION.parameters()
+    assert back.configuration.selection == CONFIGURATION.selection
+    assert bits(back.state) == bits(state)
+
+
+@given(states)
+def test_the_text_is_a_fixed_point(state):
+    text = snapshot_text(Snapshot(CONFIGURATION, state))
+    assert snapshot_text(parse_snapshot(text)) == text
+
+
+@given(
+    st.builds(EstimatorSettings, use_stiction=st.booleans(), pressure_timeout=st.floats(1e-4, 60.0)),
+    st.builds(FeedForwardSettings, use_measured_velocity=st.booleans(), coulomb_scale=st.floats(0.0, 2.0)),
+)
+def test_settings_come_back_exactly(settings, feedforward):
+    configuration = Configuration(SealSelection(), CONFIGURATION.seal_documents, settings, feedforward)
+    back = parse_snapshot(snapshot_text(SNAPSHOT._replace(configuration=configuration))).configuration
+    assert (back.settings, back.feedforward) == (settings, feedforward)
+
+
+def test_the_order_of_a_file_does_not_matter_to_the_text():
+    def backwards(part):
+        return {k: backwards(part[k]) for k in reversed(part)} if isinstance(part, dict) else part
+
+    turned = tuple(backwards(document) for document in CONFIGURATION.seal_documents)
+    again = SNAPSHOT._replace(configuration=dataclasses.replace(CONFIGURATION, seal_documents=turned))
+    assert [list(a) for a in turned] != [list(b) for b in CONFIGURATION.seal_documents]
+    assert snapshot_text(again) == snapshot_text(SNAPSHOT)
+
+
+@pytest.mark.parametrize('path', sorted(SEALS.glob('*.yaml')), ids=lambda path: path.stem)
+def test_every_shipped_seal_survives_the_text_and_the_wire(path):
+    configuration = load_configuration(SealSelection((str(path),), ('b',)), EstimatorSettings())
+    data = encode_text(snapshot_text(SNAPSHOT._replace(configuration=configuration)))
+    back = parse_snapshot(decode_text(data)).configuration
+    assert back.seal_documents == (read_yaml(path),)
+    assert back.parameters() == configuration.parameters()
+
+
+def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
+    parameters = CONFIGURATION.parameters()
+    before = [Pressure(0, 3e6, 3e6), Force(0, 12.0), ServoReference(0, 0.0, 0.02, 0.0), Velocity(1, 5e-4, b'')]
+    state = init(parameters)
+    for message in before:
+        state, _ = receive(parameters, state, message)
+    back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state)))
+    straight = receive(parameters, state, Velocity(2000, 1.5e-3, b'rod'))
+    taken_up = receive(back.configuration.parameters(), back.state, Velocity(2000, 1.5e-3, b'rod'))
+    assert straight[1].feedforward.force > 0.0
+    assert taken_up == straight
+
+
+@pytest.mark.parametrize('text', ['', '{', 'null', '5', '[]', '{}', '"text"', '{"selection": {}}'])
+def test_what_is_no_snapshot_is_refused_with_a_value_error(text):
+    with pytest.raises(ValueError):
+        parse_snapshot(text)
+
+
+@pytest.mark.parametrize(
+    ('path', 'value', 'complaint'),
+    [
+        ('selection', ..., "not the JSON of a snapshot: KeyError: 'selection'"),
+        ('settings', ..., "KeyError: 'settings'"),
+        ('state', ..., "KeyError: 'state'"),
+        ('feedforward', ..., "KeyError: 'feedforward'"),
+        ('state.reference', ..., "KeyError: 'reference'"),
+        ('seal_documents', 5, 'not the JSON of a snapshot: TypeError'),
+        ('state', [], 'not the JSON of a snapshot: TypeError'),
+        ('state.refused', ..., "KeyError: 'refused'"),
+        ('state.pressure', [1], 'not the JSON of a snapshot: TypeError'),
+        ('state.pressure.chamber_a', [], 'not the JSON of a snapshot: TypeError'),
+        ('state.pressure.chamber_b', ..., "KeyError: 'chamber_b'"),
+        ('state.force.force', 'x', 'hexadecimal'),
+        ('state.force.stamp', 'x', 'invalid literal'),
+        ('state.estimator.velocity.velocity', 'nan', 'a number in the state is not finite'),
+        ('state.feedforward.estimate.state', 9, '9 is not a valid FrictionState'),
+        ('selection.seals', 'ms28775_114', "configuration: selection.seals = 'ms28775_114' is not a list"),
+        ('selection.seal_chambers', ['a'], 'has 1 entries but there are 2 seals'),
+        ('settings.stick_velocity', -1.0, 'stick_velocity = -1.0 m/s is below its lower bound'),
+        ('settings.sticky', 1.0, 'configuration: settings has no sticky'),
+    ],
+)
+def test_a_damaged_snapshot_is_refused_with_what_is_wrong(path, value, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        parse_snapshot(with_part(path, value))
+
+
+@pytest.mark.parametrize(
+    ('change', 'complaint'),
+    [
+        ({'seals': ()}, 'SealSelection.seals is empty: name at least one seal'),
+        ({'seals': ('x',)}, 'has 2 entries but there are 1 seals: give one chamber a seal'),
+        ({'seal_chambers': ('a', 'c')}, "'c' is neither a nor b"),
+    ],
+)
+def test_a_selection_that_makes_no_sense_is_refused(change, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        SealSelection(**change)
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        pytest.param('[' * 100_000, id='deep nesting'),
+        pytest.param(with_part('state.force.force', '0x1p+5000'), id='force beyond every float'),
+        pytest.param(with_part('state.force.stamp', math.inf), id='stamp infinite'),
+        pytest.param(with_part('settings.stick_velocity', 10**400), id='setting beyond every float'),
+    ],
+)
+def test_a_hostile_snapshot_is_refused_with_a_value_error(text):
+    with pytest.raises(ValueError):
+        parse_snapshot(text)
+
+
+@pytest.mark.parametrize(
+    'path',
+    [
+        'state.estimator.pressure.chamber_b',
+        'state.estimator.force.force',
+        'state.estimator.velocity.velocity',
+        'state.estimator.leapt_force.force',
+        'state.feedforward.fade',
+        'state.feedforward.estimate.coulomb_friction',
+    ],
+)
+@pytest.mark.parametrize('value', ['nan', '-inf'])
+def test_a_value_in_use_that_is_not_finite_is_refused(path, value):
+    with pytest.raises(ValueError, match='a number in the state is not finite'):
+        parse_snapshot(with_part(path, value))

@@ -1,0 +1,468 @@
+"""The estimator: what holds for every input, and what each status bit says."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
+from seal_friction_ros.core.estimation.messages import decode_estimate, encode_estimate
+from seal_friction_ros.core.estimation.records import (
+    NO_FORCE,
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    Pressure,
+    RodSample,
+    Status,
+)
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.files import read_yaml
+
+SEALS = {
+    name: parse_seal(read_yaml(ROOT / 'config' / 'seals' / f'{name}.yaml'))
+    for name in ('ms28775_114', 'ms28775_114_table', 'ms28775_114_prior_art')
+}
+BOTH = (MountedSeal(SEALS['ms28775_114'], 'a'), MountedSeal(SEALS['ms28775_114'], 'b'))
+PARAMETERS = EstimatorParameters(EstimatorSettings(), BOTH)
+START = 1_700_000_000_000_000_000  # [ns]
+MS = 1_000_000  # [ns]
+
+
+def sample(stamp=START, velocity=0.01, pressure=3e6, force=30.0, *, pressure_age=0, force_age=0) -> RodSample:
+    """A good sample but for what is given; ages in [ms]; a pressure may be one for both chambers, a pair, or None."""
+    a, b = pressure if isinstance(pressure, tuple) else (pressure, pressure)
+    return RodSample(
+        stamp,
+        velocity,
+        NO_PRESSURE if pressure is None else Pressure(stamp - pressure_age * MS, a, b),
+        NO_FORCE if force is None else Force(stamp - force_age * MS, force),
+    )
+
+
+def run(samples, parameters=PARAMETERS) -> list[FrictionEstimate]:
+    state, estimates = init(parameters), []
+    for one in samples:
+        state, estimate = step(parameters, state, one)
+        estimates.append(estimate)
+    return estimates
+
+
+def only(one: RodSample, parameters=PARAMETERS) -> FrictionEstimate:
+    return run([one], parameters)[0]
+
+
+def last(*samples: RodSample, parameters=PARAMETERS) -> FrictionEstimate:
+    return run(samples, parameters)[-1]
+
+
+# --- any input ---
+
+anything = st.floats() | st.sampled_from([5e-324, -5e-324, 2.2e-308, 1e300, -1.7976931348623157e308, -0.0])
+plausible = st.floats(-2e5, 5e7)
+any_stamp = st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1)
+near_stamp = st.integers(-200 * MS, 200 * MS).map(lambda offset: START + offset)
+stamps = any_stamp | near_stamp
+pressures = st.just(NO_PRESSURE) | st.builds(Pressure, stamps, anything | plausible, anything | plausible)
+forces = st.just(NO_FORCE) | st.builds(Force, stamps, anything | st.floats(-1e3, 1e3))
+any_sample = st.builds(RodSample, stamps, anything | st.floats(-0.01, 0.01), pressures, forces, st.booleans())
+
+mounted = st.builds(MountedSeal, st.sampled_from(sorted(SEALS)).map(SEALS.__getitem__), st.sampled_from('ab'))
+all_settings = st.builds(
+    lambda speeds, **others: EstimatorSettings(stick_velocity=min(speeds), slip_velocity=max(speeds), **others),
+    st.tuples(*[st.sampled_from([0.0, 1e-3, 2e-3]) | st.floats(0.0, 1.0)] * 2),
+    use_stiction=st.booleans(),
+    pressure_timeout=st.floats(1e-4, 60.0),
+    force_timeout=st.floats(1e-4, 60.0),
+    pressure_min=st.floats(-1.2e5, 0.0),
+    pressure_max=st.floats(1e4, 1e9),
+    velocity_max=st.floats(1e-3, 100.0),
+    force_max=st.floats(1.0, 1e9),
+    pressure_rate_max=st.floats(1.0, 1e15),
+    force_rate_max=st.floats(1e-3, 1e15),
+    acceleration_max=st.floats(1e-3, 1e9),
+)
+all_parameters = st.builds(EstimatorParameters, all_settings, st.lists(mounted, min_size=1, max_size=3).map(tuple))
+
+
+@settings(max_examples=400)
+@given(all_parameters, st.lists(any_sample, min_size=1, max_size=6))
+@example(PARAMETERS, [RodSample(START, math.nan, Pressure(START, math.nan, math.inf), Force(START, -math.inf))])
+def test_whatever_comes_in_what_goes_out_is_finite_consistent_and_can_be_sent(parameters, samples):
+    for one, estimate in zip(samples, run(samples, parameters), strict=True):
+        assert all(math.isfinite(value) for value in estimate)
+        assert estimate.stamp == one.stamp
+        assert 0.0 <= estimate.coulomb_friction <= estimate.breakaway_force
+        assert estimate.coulomb_friction_std >= 0.0
+        assert abs(estimate.friction_force) <= estimate.breakaway_force
+        assert estimate.direction in (-1, 0, 1)
+        assert estimate.friction_force * estimate.direction >= 0.0
+        assert 0 <= estimate.status < 2 * max(Status)
+        if estimate.state is FrictionState.UNKNOWN:
+            assert (estimate.direction, estimate.friction_force) == (0, 0.0)
+            assert estimate.status
+        assert decode_estimate(encode_estimate(estimate)) == estimate
+
+
+@given(all_parameters, st.lists(any_sample, min_size=1, max_size=6))
+def test_the_same_samples_give_the_same_bytes(parameters, samples):
+    once, again = ([encode_estimate(e) for e in run(samples, parameters)] for _ in range(2))
+    assert once == again
+
+
+@given(all_parameters, st.lists(any_sample, min_size=2, max_size=6), st.integers(1, 5))
+def test_a_state_carries_all_that_matters_from_the_past(parameters, samples, cut):
+    state = init(parameters)
+    for one in samples[:cut]:
+        state, _ = step(parameters, state, one)
+    kept = type(state)(*state)
+    rest = []
+    for one in samples[cut:]:
+        kept, estimate = step(parameters, kept, one)
+        rest.append(estimate)
+    assert rest == run(samples, parameters)[cut:]
+
+
+@given(all_parameters, any_sample, any_sample)
+def test_a_step_leaves_the_state_it_was_given_as_it_was(parameters, first, second):
+    state, _ = step(parameters, init(parameters), first)
+    before = repr(state)
+    step(parameters, state, second)
+    assert repr(state) == before
+
+
+# --- physics, on usable inputs ---
+
+good = st.builds(
+    sample,
+    velocity=st.sampled_from([0.0, 1e-3, -1.5e-3]) | st.floats(-0.5, 0.5),
+    pressure=st.tuples(st.floats(-1e5, 9e6), st.floats(-1e5, 9e6)),
+    force=st.sampled_from([0.0, 30.0, -30.0]) | st.floats(-200.0, 200.0),
+)
+seals_and_settings = st.builds(
+    EstimatorParameters,
+    st.builds(EstimatorSettings, use_stiction=st.booleans()),
+    st.lists(mounted, min_size=1, max_size=3).map(tuple),
+)
+
+
+@given(seals_and_settings, st.lists(good, min_size=1, max_size=5))
+def test_sliding_friction_takes_power_from_the_rod(parameters, samples):
+    for one, estimate in zip(samples, run(samples, parameters), strict=True):
+        if estimate.state is FrictionState.SLIDING:
+            assert estimate.friction_force * one.velocity > 0.0
+            assert abs(estimate.friction_force) == estimate.coulomb_friction
+
+
+@given(seals_and_settings, st.lists(good, min_size=1, max_size=5))
+def test_friction_at_rest_never_pushes_the_rod_along(parameters, samples):
+    for one, estimate in zip(samples, run(samples, parameters), strict=True):
+        if estimate.state in (FrictionState.STUCK, FrictionState.BREAKAWAY):
+            net = one.force.force - estimate.friction_force
+            assert net * one.force.force >= 0.0
+
+
+@given(seals_and_settings, st.lists(good, min_size=1, max_size=5))
+def test_a_stuck_rod_feels_exactly_the_force_sum(parameters, samples):
+    for one, estimate in zip(samples, run(samples, parameters), strict=True):
+        if estimate.state is FrictionState.STUCK:
+            assert estimate.friction_force == one.force.force
+            assert abs(one.force.force) < estimate.breakaway_force
+
+
+@given(seals_and_settings, st.lists(any_sample | good, min_size=1, max_size=6))
+def test_left_and_right_are_alike(parameters, samples):
+    mirrored = [
+        one._replace(velocity=-one.velocity, force=one.force._replace(force=-one.force.force)) for one in samples
+    ]
+    for here, there in zip(run(samples, parameters), run(mirrored, parameters), strict=True):
+        assert there == here._replace(friction_force=-here.friction_force, direction=-here.direction)
+
+
+@given(seals_and_settings, good, st.floats(0.0, 2e7), st.floats(0.0, 2e7))
+def test_more_pressure_in_either_chamber_is_never_less_friction(parameters, one, more_a, more_b):
+    a, b = one.pressure.chamber_a, one.pressure.chamber_b
+    higher = one._replace(pressure=Pressure(START, a + more_a, b + more_b))
+    low, high = only(one, parameters), only(higher, parameters)
+    for name in ('coulomb_friction', 'coulomb_friction_std', 'breakaway_force'):
+        assert getattr(low, name) <= getattr(high, name) * (1.0 + 1e-12)
+    assert abs(low.friction_force) <= abs(high.friction_force) * (1.0 + 1e-12)
+
+
+@given(good)
+def test_coulomb_friction_and_its_std_are_those_of_the_actuator(one):
+    expected = actuator_friction(BOTH, one.pressure.chamber_a, one.pressure.chamber_b)
+    estimate = only(one)
+    assert estimate.coulomb_friction == expected.coulomb_friction
+    assert estimate.coulomb_friction_std == expected.coulomb_friction_std
+    assert estimate.breakaway_force == expected.coulomb_friction + expected.stiction
+
+
+@given(good)
+def test_without_stiction_the_rod_breaks_away_at_the_coulomb_friction(one):
+    estimate = only(one, replace(PARAMETERS, settings=EstimatorSettings(use_stiction=False)))
+    assert estimate.breakaway_force == estimate.coulomb_friction
+
+
+def test_a_rod_that_rests_is_pushed_and_slides_goes_through_the_three_states():
+    pushes = [(0.0, 0.0), (0.0, 20.0), (0.0, 60.0), (1.5e-3, 60.0), (0.05, 60.0), (1.5e-3, 60.0), (5e-4, 10.0)]
+    states = [e.state.name for e in run([sample(START + i * MS, v, 3e6, f) for i, (v, f) in enumerate(pushes)])]
+    assert states == ['STUCK', 'STUCK', 'BREAKAWAY', 'BREAKAWAY', 'SLIDING', 'SLIDING', 'STUCK']
+
+
+# --- status bits: provoked, and gone with the next good sample ---
+
+GOOD = sample(START)
+PROVOKED = {
+    # name: (samples before, sample that provokes it, all bits then set)
+    'PRESSURE_MISSING': ([], sample(START + MS, pressure=None), Status.PRESSURE_MISSING),
+    'FORCE_MISSING': ([], sample(START + MS, force=None), Status.FORCE_MISSING),
+    'PRESSURE_STALE': ([GOOD], sample(START + MS, pressure_age=101), Status.PRESSURE_STALE),
+    'FORCE_STALE': ([GOOD], sample(START + MS, force_age=101), Status.FORCE_STALE),
+    'PRESSURE_NOT_FINITE': ([GOOD], sample(START + MS, pressure=(3e6, math.nan)), Status.PRESSURE_NOT_FINITE),
+    'FORCE_NOT_FINITE': ([GOOD], sample(START + MS, force=math.inf), Status.FORCE_NOT_FINITE),
+    'VELOCITY_NOT_FINITE': ([GOOD], sample(START + MS, velocity=math.nan), Status.VELOCITY_NOT_FINITE),
+    'PRESSURE_OUT_OF_RANGE': ([GOOD], sample(START + MS, pressure=(4.6e7, 3e6)), Status.PRESSURE_OUT_OF_RANGE),
+    'FORCE_OUT_OF_RANGE': ([GOOD], sample(START + MS, force=-1.1e6), Status.FORCE_OUT_OF_RANGE),
+    'VELOCITY_OUT_OF_RANGE': ([GOOD], sample(START + MS, velocity=-10.1), Status.VELOCITY_OUT_OF_RANGE),
+    'OUTSIDE_IDENTIFIED_RANGE': ([GOOD], sample(START + MS, pressure=(3e6, 7.1e6)), Status.OUTSIDE_IDENTIFIED_RANGE),
+    'STAMP_NOT_INCREASING': ([GOOD], GOOD, Status.STAMP_NOT_INCREASING),
+    'PRESSURE_LEAP': ([GOOD], sample(START + MS, pressure=(3e6, 1.4e7)), Status.PRESSURE_LEAP),
+    'FORCE_LEAP': ([GOOD], sample(START + MS, force=-1.1e5), Status.FORCE_LEAP),
+    'VELOCITY_LEAP': ([GOOD], sample(START + MS, velocity=-1.1), Status.VELOCITY_LEAP),
+    'INPUT_REFUSED': ([GOOD], sample(START + MS)._replace(refused=True), Status.INPUT_REFUSED),
+}
+
+
+def test_every_status_bit_is_provoked_here():
+    assert set(PROVOKED) == {bit.name for bit in Status}
+
+
+@pytest.mark.parametrize('name', PROVOKED)
+def test_a_status_bit_is_set_by_its_cause_alone_and_gone_with_the_next_good_sample(name):
+    before, provoking, expected = PROVOKED[name]
+    after = sample(START + 2 * MS)
+    estimates = run([*before, provoking, after])
+    assert [Status(e.status) for e in estimates] == [Status(0)] * len(before) + [expected, Status(0)]
+    assert estimates[-1] == only(after)
+
+
+@pytest.mark.parametrize(
+    ('change', 'status'),
+    [
+        ({'pressure': math.inf}, Status.PRESSURE_NOT_FINITE | Status.PRESSURE_MISSING),
+        ({'pressure': (math.nan, 9e9)}, Status.PRESSURE_NOT_FINITE | Status.PRESSURE_MISSING),
+        ({'pressure': (3e6, 9e9)}, Status.PRESSURE_OUT_OF_RANGE | Status.PRESSURE_MISSING),
+        ({'pressure': (-1.3e5, 3e6)}, Status.PRESSURE_OUT_OF_RANGE | Status.PRESSURE_MISSING),
+        ({'force': math.nan}, Status.FORCE_NOT_FINITE | Status.FORCE_MISSING),
+        ({'force': 2e6}, Status.FORCE_OUT_OF_RANGE | Status.FORCE_MISSING),
+        ({'velocity': -math.inf}, Status.VELOCITY_NOT_FINITE),
+        ({'velocity': 11.0}, Status.VELOCITY_OUT_OF_RANGE),
+        ({'pressure': None, 'force': None}, Status.PRESSURE_MISSING | Status.FORCE_MISSING),
+        ({'pressure_age': 500, 'force_age': -500}, Status.PRESSURE_STALE | Status.FORCE_STALE),
+    ],
+)
+def test_what_was_never_usable_is_missing_too(change, status):
+    assert Status(only(sample(**change)).status) == status
+
+
+@pytest.mark.parametrize(('age', 'stale'), [(100, False), (101, True), (-100, False), (-101, True), (0, False)])
+def test_an_input_is_stale_further_than_its_timeout_from_the_velocity_before_or_after(age, stale):
+    assert bool(only(sample(pressure_age=age)).status & Status.PRESSURE_STALE) is stale
+    assert bool(only(sample(force_age=age)).status & Status.FORCE_STALE) is stale
+
+
+@pytest.mark.parametrize(('stamp', 'bit'), [(START - 1, True), (START, True), (START + 1, False)])
+def test_a_stamp_must_be_after_the_one_before(stamp, bit):
+    assert bool(last(sample(START), sample(stamp)).status & Status.STAMP_NOT_INCREASING) is bit
+
+
+def test_time_that_jumps_back_is_flagged_once_and_then_goes_on_from_there():
+    stamps_ = [START, START + MS, START - 1000 * MS, START - 999 * MS]
+    statuses = [e.status for e in run([sample(stamp) for stamp in stamps_])]
+    assert statuses == [0, 0, Status.STAMP_NOT_INCREASING, 0]
+
+
+# --- the last usable value ---
+
+
+@pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf, 4.6e7, -1.3e5, 1e308])
+@pytest.mark.parametrize('chamber', [0, 1])
+def test_an_unusable_pressure_never_replaces_the_last_usable_one(bad, chamber):
+    pair = (bad, 5e6) if chamber == 0 else (5e6, bad)
+    estimates = run([sample(START), sample(START + MS, pressure=pair), sample(START + 2 * MS, pressure=pair)])
+    assert {e.coulomb_friction for e in estimates} == {estimates[0].coulomb_friction}
+    assert [e.state for e in estimates] == [FrictionState.SLIDING] * 3
+
+
+@pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf, 1.1e6, -1e308])
+def test_an_unusable_force_sum_never_replaces_the_last_usable_one(bad):
+    at_rest = [sample(START, 0.0, force=12.5), sample(START + MS, 0.0, force=bad), sample(START + 2 * MS, 0.0)]
+    assert [e.friction_force for e in run(at_rest)] == [12.5, 12.5, 30.0]
+
+
+def test_the_last_usable_pressure_grows_old_and_is_then_stale():
+    bad = [sample(START + i * 10 * MS, pressure=math.nan) for i in range(1, 21)]
+    estimates = run([sample(START), *bad])
+    stale = [bool(e.status & Status.PRESSURE_STALE) for e in estimates]
+    assert stale == [False] * 11 + [True] * 10
+    assert estimates[-1].input_age == pytest.approx(0.2)
+
+
+def test_a_stale_pressure_keeps_state_and_friction_but_says_so():
+    fresh, stale = only(sample()), only(sample(pressure_age=5000))
+    assert stale[:8] == (*fresh[:7], Status.PRESSURE_STALE)
+
+
+# --- leaps ---
+
+LEAPS = {  # name: (a value far away, bit)
+    'pressure': (1.5e7, Status.PRESSURE_LEAP),
+    'force': (2e5, Status.FORCE_LEAP),
+    'velocity': (-1.2, Status.VELOCITY_LEAP),
+}
+
+
+@pytest.mark.parametrize('name', LEAPS)
+def test_a_spike_costs_one_sample_and_the_value_before_it_stays_in_use(name):
+    far, bit = LEAPS[name]
+    estimates = run([sample(), sample(START + MS, **{name: far}), sample(START + 2 * MS)])
+    assert [e.status for e in estimates] == [0, bit, 0]
+    assert estimates[1].coulomb_friction == estimates[0].coulomb_friction
+    assert estimates[1].input_age == pytest.approx(0.0 if name == 'velocity' else 1e-3)
+
+
+@pytest.mark.parametrize('name', LEAPS)
+def test_a_step_that_is_real_costs_one_sample_too(name):
+    far, bit = LEAPS[name]
+    stepped = [sample(START + i * MS, **{name: far}) for i in range(1, 4)]
+    extrapolated = Status.OUTSIDE_IDENTIFIED_RANGE if name == 'pressure' else 0
+    assert [e.status for e in run([sample(), *stepped])] == [0, bit, extrapolated, extrapolated]
+
+
+@pytest.mark.parametrize('name', LEAPS)
+def test_the_same_message_again_confirms_nothing(name):
+    far, bit = LEAPS[name]
+    leap = sample(START + MS, **{name: far})
+    if name == 'velocity':
+        again = leap  # the very stamp: a duplicate
+        assert Status(last(sample(), leap, again).status) == bit | Status.STAMP_NOT_INCREASING
+    else:  # held, since no newer one came
+        assert last(sample(), leap, leap._replace(stamp=START + 2 * MS)).status == bit
+
+
+@pytest.mark.parametrize('name', LEAPS)
+def test_after_a_pause_the_same_change_is_no_leap(name):
+    far, bit = LEAPS[name]
+    assert not last(sample(), sample(START + 100 * MS, **{name: far})).status & bit
+
+
+@given(st.lists(good, min_size=2, max_size=6))
+def test_a_rate_that_nothing_reaches_flags_nothing(samples):
+    slow = replace(PARAMETERS, settings=EstimatorSettings(pressure_rate_max=1e15, force_rate_max=1e15))
+    bits = Status.PRESSURE_LEAP | Status.FORCE_LEAP
+    assert not any(e.status & bits for e in run(samples, slow))
+
+
+def test_refused_inputs_leave_no_state_and_no_friction_force():
+    estimate = only(sample()._replace(refused=True))
+    assert (estimate.state, estimate.friction_force, estimate.direction) == (FrictionState.UNKNOWN, 0.0, 0)
+    assert estimate.coulomb_friction == only(sample()).coulomb_friction
+
+
+# --- unknown ---
+
+REST = {'velocity': 0.0}
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        {'velocity': math.nan},
+        {'velocity': math.inf},
+        {'velocity': 10.5},
+        {'pressure': None},
+        {'pressure': math.nan},
+        {'pressure': None, **REST},
+        {'force': None, **REST},
+        {'force': math.nan, **REST},
+        {'force_age': 200, **REST},
+        {'force_age': -200, **REST},
+    ],
+)
+def test_state_is_unknown_and_friction_force_zero_where_the_inputs_do_not_tell(change):
+    estimate = only(sample(**change))
+    assert estimate[4:7] == (0.0, FrictionState.UNKNOWN, 0)
+
+
+@pytest.mark.parametrize('change', [{'force': None}, {'force': math.nan}, {'force_age': 200}])
+def test_a_sliding_rod_needs_no_force_sum(change):
+    estimate = only(sample(**change))
+    assert estimate.state is FrictionState.SLIDING
+    assert estimate.friction_force == estimate.coulomb_friction > 0.0
+
+
+def test_with_an_unknown_state_the_coulomb_friction_is_still_told():
+    estimate = only(sample(velocity=math.nan))
+    assert estimate[1:4] == only(sample())[1:4]
+
+
+def test_all_forces_are_zero_while_there_was_no_pressure():
+    assert only(sample(pressure=None))[1:5] == (0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize('bad', [math.nan, 11.0])
+def test_one_unusable_velocity_does_not_make_a_resting_rod_slide(bad):
+    speeds = [0.0, 1.5e-3, bad, 1.5e-3]
+    states = [e.state.name for e in run([sample(START + i * MS, v, force=10.0) for i, v in enumerate(speeds)])]
+    assert states == ['STUCK', 'STUCK', 'UNKNOWN', 'STUCK']
+
+
+# --- age ---
+
+
+@pytest.mark.parametrize(('pressure_age', 'force_age', 'expected'), [(3, 7, 0.007), (7, 3, 0.007), (-2, -5, -0.002)])
+def test_input_age_is_that_of_the_older_input(pressure_age, force_age, expected):
+    estimate = only(sample(pressure_age=pressure_age, force_age=force_age))
+    assert estimate.input_age == pytest.approx(expected)
+
+
+@pytest.mark.parametrize('change', [{'pressure': None}, {'force': None}, {'pressure': math.nan}, {'force': math.inf}])
+def test_input_age_is_minus_one_while_an_input_is_missing(change):
+    assert only(sample(**change)).input_age == -1.0
+
+
+def test_input_age_is_that_of_the_value_in_use_not_of_the_unusable_newest():
+    estimate = last(sample(START), sample(START + 40 * MS, force=math.nan))
+    assert estimate.input_age == pytest.approx(0.040)
+
+
+# --- parameters ---
+
+
+@pytest.mark.parametrize(
+    ('change', 'complaint'),
+    [
+        ({'stick_velocity': 3e-3}, 'slip_velocity = 0.002 m/s is below stick_velocity = 0.003 m/s'),
+        ({'stick_velocity': -1e-3}, 'stick_velocity = -0.001 m/s is below its lower bound 0.0 m/s'),
+        ({'pressure_timeout': 0.0}, 'pressure_timeout = 0.0 s is below its lower bound 0.0001 s'),
+        ({'force_timeout': 61.0}, 'force_timeout = 61.0 s is above its upper bound 60.0 s'),
+        ({'pressure_max': 0.0}, 'pressure_max = 0.0 Pa is below its lower bound 10000.0 Pa'),
+        ({'pressure_min': 1.0}, 'pressure_min = 1.0 Pa is above its upper bound 0.0 Pa'),
+        ({'velocity_max': math.nan}, 'velocity_max = nan m/s is not finite'),
+        ({'force_max': 0.5}, 'force_max = 0.5 N is below its lower bound 1.0 N'),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused_with_field_value_and_bound(change, complaint):
+    with pytest.raises(ValueError, match=f'^EstimatorSettings.{complaint}'):
+        EstimatorSettings(**change)
+
+
+def test_an_actuator_without_seals_is_refused():
+    with pytest.raises(ValueError, match=r'^EstimatorParameters.seals is empty'):
+        EstimatorParameters(EstimatorSettings(), ())

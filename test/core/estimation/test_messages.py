@@ -1,0 +1,296 @@
+"""Bytes of the messages: the same as rosbags writes and rclpy reads, for every frame name; nothing else is taken."""
+
+import re
+import struct
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from paths import ROOT
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from seal_friction_msgs import msg as messages
+
+from seal_friction_ros.core.estimation import messages as wire
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure, Status
+from seal_friction_ros.core.friction.states import FrictionState
+
+DEFINITIONS = ROOT / 'msg_defs' / 'msg'
+STAMP = 1_700_000_000_123_456_789  # [ns]
+ESTIMATE = FrictionEstimate(STAMP, 40.5, 3.25, 45.75, -40.5, FrictionState.SLIDING, -1, 1028, 0.125)
+# Type -> values, and how to encode them.
+SAMPLES = {
+    wire.PRESSURE_TYPE: ({'chamber_a': 3.5e6, 'chamber_b': -1e4}, Pressure(STAMP, 3.5e6, -1e4), wire.encode_pressure),
+    wire.FORCE_TYPE: ({'force': -12.5}, Force(STAMP, -12.5), wire.encode_force),
+    wire.VELOCITY_TYPE: (
+        {'velocity': 0.0625},
+        wire.Velocity(STAMP, 0.0625, b''),
+        lambda record, frame: wire.encode_velocity(record._replace(frame_id=frame)),
+    ),
+    wire.POSITION_TYPE: ({'position': -0.0125}, wire.Position(STAMP, -0.0125), wire.encode_position),
+    wire.REFERENCE_TYPE: (
+        {'position': 0.01, 'velocity': -0.02, 'acceleration': 0.3},
+        wire.ServoReference(STAMP, 0.01, -0.02, 0.3),
+        lambda record, frame: wire.encode_reference(record._replace(frame_id=frame)),
+    ),
+    wire.FEEDFORWARD_TYPE: (
+        {'force': -33.5, 'scale': 0.75, 'limited': 5},
+        FeedForward(STAMP, -33.5, 0.75, 5),
+        wire.encode_feedforward,
+    ),
+    wire.ESTIMATE_TYPE: (
+        {
+            name: int(value) if name == 'state' else value
+            for name, value in ESTIMATE._asdict().items()
+            if name != 'stamp'
+        },
+        ESTIMATE,
+        wire.encode_estimate,
+    ),
+}
+STAMPED = pytest.mark.parametrize('type_name', SAMPLES)
+FRAMES = [b'abcdefghijklmnopqrstuvwxyz0123456789_/-.'[:length] for length in range(41)]
+
+
+def make_store():
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for path in sorted(DEFINITIONS.glob('*.msg')):
+        store.register(get_types_from_msg(path.read_text(), f'{wire.PACKAGE}/msg/{path.stem}'))
+    return store
+
+
+STORE = make_store()
+
+
+def as_rosbags(type_name: str, frame: bytes):
+    time = STORE.types['builtin_interfaces/msg/Time'](*divmod(STAMP, 10**9))
+    header = STORE.types['std_msgs/msg/Header'](time, frame.decode())
+    return STORE.types[type_name](header=header, **SAMPLES[type_name][0])
+
+
+def as_rclpy(type_name: str, frame: bytes):
+    message = getattr(messages, type_name.rpartition('/')[2])(**SAMPLES[type_name][0])
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(STAMP, 10**9)
+    message.header.frame_id = frame.decode()
+    return message
+
+
+def encode(type_name: str, frame: bytes = b'') -> bytes:
+    _, record, encoder = SAMPLES[type_name]
+    return encoder(record, frame)
+
+
+def decoded(type_name: str, frame: bytes):
+    record = SAMPLES[type_name][1]
+    return record._replace(frame_id=frame) if type_name in (wire.VELOCITY_TYPE, wire.REFERENCE_TYPE) else record
+
+
+# --- the same bytes as others ---
+
+
+@STAMPED
+def test_bytes_are_those_of_rosbags_for_every_frame_name_length(type_name):
+    for frame in FRAMES:
+        assert encode(type_name, frame) == bytes(STORE.serialize_cdr(as_rosbags(type_name, frame), type_name))
+
+
+@STAMPED
+def test_rclpy_reads_what_is_written_for_every_frame_name_length(type_name):
+    for frame in FRAMES:
+        expected = as_rclpy(type_name, frame)
+        assert deserialize_message(encode(type_name, frame), type(expected)) == expected
+
+
+@STAMPED
+def test_what_rclpy_writes_is_read_for_every_frame_name_length(type_name):
+    for frame in FRAMES:
+        data = serialize_message(as_rclpy(type_name, frame))
+        assert wire.DECODERS[type_name](data) == decoded(type_name, frame)
+
+
+@STAMPED
+def test_decoding_undoes_encoding_for_every_frame_name_length(type_name):
+    for frame in FRAMES:
+        assert wire.DECODERS[type_name](encode(type_name, frame)) == decoded(type_name, frame)
+
+
+@STAMPED
+def test_padding_is_zero(type_name):
+    # With a 1 in every byte of name and numbers, zeros are left only where nothing is.
+    ones = struct.unpack('<d', b'\x01' * 8)[0]
+    stamp = 0x01010101 * 10**9 + 0x01010101
+    records = {
+        wire.PRESSURE_TYPE: Pressure(stamp, ones, ones),
+        wire.FORCE_TYPE: Force(stamp, ones),
+        wire.VELOCITY_TYPE: wire.Velocity(stamp, ones, b''),
+        wire.POSITION_TYPE: wire.Position(stamp, ones),
+        wire.REFERENCE_TYPE: wire.ServoReference(stamp, ones, ones, ones),
+        wire.FEEDFORWARD_TYPE: FeedForward(stamp, ones, ones, 0x01010101),
+        wire.ESTIMATE_TYPE: FrictionEstimate(stamp, *[ones] * 4, FrictionState.SLIDING, 1, 0x01010101, ones),
+    }
+    for length in range(41):
+        data = SAMPLES[type_name][2](records[type_name], b'\x01' * length)
+        end_of_name = 16 + length
+        # Counted from the end of the encapsulation, the first number stands at a multiple of 8.
+        body = 4 + -(-(end_of_name + 1 - 4) // 8) * 8
+        assert data[16:end_of_name] == b'\x01' * length
+        assert data[end_of_name:body] == bytes(body - end_of_name)
+        holes = 2 if type_name == wire.ESTIMATE_TYPE else 0
+        assert data[body:].count(0) == holes
+
+
+@STAMPED
+@given(value=st.floats(), stamp=st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1), frame=st.binary(max_size=60))
+def test_every_number_survives_nan_and_infinity_included(type_name, value, stamp, frame):
+    _, record, encoder = SAMPLES[type_name]
+    name = record._fields[1]
+    back = wire.DECODERS[type_name](encoder(record._replace(stamp=stamp, **{name: value}), frame))
+    assert back.stamp == stamp
+    assert struct.pack('<d', getattr(back, name)) == struct.pack('<d', value)
+
+
+@given(st.text(st.characters(exclude_categories=['Cs']), max_size=200))
+@example('')
+@example('{"source": "μ = c Fₙ⁻ⁿ"}')
+def test_a_text_survives_and_is_what_rosbags_writes(text):
+    data = wire.encode_text(text)
+    assert wire.decode_text(data) == text
+    message = STORE.types[wire.CONFIGURATION_TYPE](text)
+    assert data == bytes(STORE.serialize_cdr(message, wire.CONFIGURATION_TYPE))
+
+
+@pytest.mark.parametrize('text', ['', 'a', 'ab', 'abc', 'abcd', 'μ'])
+def test_rclpy_and_we_read_each_others_texts(text):
+    message = messages.EstimatorConfiguration(json=text)
+    assert deserialize_message(wire.encode_text(text), messages.EstimatorConfiguration) == message
+    assert wire.decode_text(serialize_message(message)) == text
+
+
+# --- nothing else is taken ---
+
+
+def decode_or_refuse(type_name: str, data: bytes):
+    try:
+        return wire.DECODERS[type_name](data)
+    except ValueError:  # and nothing but a ValueError
+        return None
+
+
+@pytest.mark.parametrize('type_name', wire.DECODERS)
+@given(data=st.binary(max_size=150))
+def test_garbage_is_refused_with_a_value_error_or_is_the_record_of_its_type(type_name, data):
+    if not data.startswith(b'\x00\x01'):
+        assert decode_or_refuse(type_name, data) is None
+    found = decode_or_refuse(type_name, b'\x00\x01\x00\x00' + data)
+    record_type = type(SAMPLES[type_name][1]) if type_name in SAMPLES else str
+    assert found is None or type(found) is record_type
+
+
+@STAMPED
+@given(position=st.integers(0, 10_000), byte=st.integers(0, 255), cut=st.integers(0, 100))
+def test_a_damaged_message_is_refused_with_a_value_error_or_has_the_size_of_one(type_name, position, byte, cut):
+    data = bytearray(encode(type_name, b'rod'))
+    data[position % len(data)] = byte
+    decode_or_refuse(type_name, bytes(data))
+    shortened = bytes(data[: len(data) - cut])
+    if decode_or_refuse(type_name, shortened) is not None:
+        assert cut <= 7  # a damaged name length may move the end within the padding, no further
+
+
+@STAMPED
+def test_every_truncation_is_refused(type_name):
+    data = encode(type_name, b'rod')
+    for length in range(len(data)):
+        with pytest.raises(ValueError, match='bytes'):
+            wire.DECODERS[type_name](data[:length])
+
+
+@STAMPED
+@pytest.mark.parametrize(('surplus', 'taken'), [(0, True), (1, True), (3, True), (4, False), (100, False)])
+def test_padding_to_a_multiple_of_four_is_taken_more_is_not(type_name, surplus, taken):
+    data = encode(type_name, b'rod') + bytes(surplus)
+    assert (decode_or_refuse(type_name, data) is not None) is taken
+
+
+@STAMPED
+def test_messages_of_other_types_are_refused(type_name):
+    sizes = {name: len(encode(name)) for name in SAMPLES}
+    for other in SAMPLES:
+        if sizes[other] != sizes[type_name]:
+            with pytest.raises(ValueError, match='bytes where the message has'):
+                wire.DECODERS[type_name](encode(other))
+
+
+@pytest.mark.parametrize('encapsulation', [b'\x00\x00', b'\x00\x03', b'\x00\x07', b'\x01\x00', b'\xff\xff'])
+@pytest.mark.parametrize('type_name', wire.DECODERS)
+def test_another_encapsulation_is_refused(type_name, encapsulation):
+    data = wire.encode_text('text') if type_name == wire.CONFIGURATION_TYPE else encode(type_name)
+    with pytest.raises(ValueError, match='little-endian CDR'):
+        wire.DECODERS[type_name](encapsulation + data[2:])
+
+
+@pytest.mark.parametrize('state', [4, 5, 255])
+def test_a_friction_state_that_is_none_is_refused(state):
+    data = bytearray(wire.encode_estimate(ESTIMATE))
+    place = data.index(bytes([FrictionState.SLIDING, 255]))
+    data[place] = state
+    with pytest.raises(ValueError, match=f'{state} is not a valid FrictionState'):
+        wire.decode_estimate(bytes(data))
+
+
+@pytest.mark.parametrize(('nanoseconds', 'length'), [(10**9, 1), (0, 1025), (0, 2**32 - 1)])
+def test_a_header_that_makes_no_sense_is_refused(nanoseconds, length):
+    data = struct.pack('<4siII', b'\x00\x01\x00\x00', 0, nanoseconds, length) + bytes(40)
+    with pytest.raises(ValueError, match='makes no sense'):
+        wire.decode_force(data)
+
+
+@pytest.mark.parametrize(
+    'data',
+    [
+        b'',
+        b'\x00\x01\x00\x00',
+        b'\x00\x01\x00\x00\x00\x00\x00\x00\x00',  # no end of the text
+        b'\x00\x01\x00\x00\x09\x00\x00\x00abc\x00',  # longer than the message
+        b'\x00\x01\x00\x00\x03\x00\x00\x00\xff\xfe\x00',  # not UTF-8
+    ],
+)
+def test_a_text_that_is_none_is_refused(data):
+    with pytest.raises(ValueError):
+        wire.decode_text(data)
+
+
+# --- the message definition ---
+
+
+def constants(kind: str) -> dict[str, int]:
+    text = (DEFINITIONS / 'FrictionEstimate.msg').read_text()
+    return {name: int(value) for name, value in re.findall(rf'^{kind}\s+([A-Z_]+)\s*=\s*(\d+)', text, re.MULTILINE)}
+
+
+def test_states_in_the_message_definition_are_those_of_the_code():
+    assert constants('uint8') == {state.name: state.value for state in FrictionState}
+
+
+def test_status_bits_in_the_message_definition_are_those_of_the_code():
+    assert constants('uint32') == {bit.name: bit.value for bit in Status}
+
+
+def test_status_bits_are_sixteen_different_powers_of_two():
+    assert [bit.value for bit in Status] == [2**i for i in range(16)]
+
+
+def test_the_generated_message_has_the_constants_of_the_code():
+    for member in (*FrictionState, *Status):
+        assert getattr(messages.FrictionEstimate, member.name) == member.value
+
+
+def test_fields_of_the_estimate_stand_in_the_order_of_the_message():
+    names = list(messages.FrictionEstimate.get_fields_and_field_types())
+    assert names == ['header', *FrictionEstimate._fields[1:]]
+
+
+def test_an_empty_frame_name_without_its_end_is_understood():
+    data = struct.pack('<4siII4xd', b'\x00\x01\x00\x00', 3, 4, 0, 0.5)
+    assert wire.decode_velocity(data) == wire.Velocity(3_000_000_004, 0.5, b'')

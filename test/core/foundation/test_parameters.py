@@ -1,0 +1,204 @@
+"""Parameters that cannot exist wrong."""
+
+import math
+from dataclasses import asdict, dataclass, field
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.foundation.parameters import Meaning, check, from_mapping, meanings, parameter
+from seal_friction_ros.core.foundation.units import unit_size
+from seal_friction_ros.core.friction.actuator import PriorArtChart, Seal, Uncertainty
+from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.normal_force import AreaDeformationGain, NormalForceTable
+
+RECORDS = [
+    SealSelection, PriorArtChart, Seal, Uncertainty, EstimatorSettings, CoefficientTable, PowerLaw,
+    AreaDeformationGain, NormalForceTable, SealGeometry,
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Spring:
+    stiffness: float = parameter(unit='N/m', lower=1.0, upper=1e6, description='Force per length.')
+    coils: int = parameter(5, unit='1', lower=1, upper=100, description='Number of coils.')
+    wound: bool = parameter(True, unit='', description='Whether it is wound.')
+    material: str = parameter('steel', unit='', description='What it is of.')
+    lengths: tuple[float, ...] = parameter((1.0,), unit='m', description='Lengths.')
+    names: tuple[str, ...] = parameter((), unit='', description='Names.')
+    made: float = field(init=False, default=0.0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def make(**values) -> Spring:
+    return from_mapping(Spring, {'stiffness': 10.0, **values}, 'spring')
+
+
+@given(st.floats())
+def test_a_number_is_accepted_exactly_inside_its_bounds(value):
+    try:
+        spring = Spring(value)
+    except ValueError:
+        assert not 1.0 <= value <= 1e6
+    else:
+        assert spring.stiffness == value
+        assert 1.0 <= value <= 1e6
+
+
+@pytest.mark.parametrize(
+    ('value', 'complaint'),
+    [
+        (0.5, 'Spring.stiffness = 0.5 N/m is below its lower bound 1.0 N/m'),
+        (2e6, 'Spring.stiffness = 2000000.0 N/m is above its upper bound 1000000.0 N/m'),
+        (math.nan, 'Spring.stiffness = nan N/m is not finite'),
+        (-math.inf, 'Spring.stiffness = -inf N/m is not finite'),
+    ],
+)
+def test_the_complaint_names_field_value_unit_and_bound(value, complaint):
+    with pytest.raises(ValueError, match='^' + complaint.replace('.', r'\.') + '$'):
+        Spring(value)
+
+
+def test_fields_with_a_default_may_be_left_out():
+    assert make() == Spring(10.0)
+
+
+def test_integers_are_taken_for_floats_and_lists_for_tuples():
+    spring = make(stiffness=10, lengths=[1, 2.5], names=['a', 'b'])
+    assert spring == Spring(10.0, lengths=(1.0, 2.5), names=('a', 'b'))
+    assert type(spring.stiffness) is float
+    assert type(spring.lengths) is tuple
+    assert [type(length) for length in spring.lengths] == [float, float]
+
+
+@pytest.mark.parametrize(
+    ('values', 'complaint'),
+    [
+        ({'stiffness': '10'}, "spring.stiffness = '10' is not a number"),
+        ({'stiffness': True}, 'spring.stiffness = True is not a number'),
+        ({'stiffness': None}, 'spring.stiffness = None is not a number'),
+        ({'stiffness': [1.0]}, r'spring.stiffness = \[1.0\] is not a number'),
+        ({'coils': 5.0}, 'spring.coils = 5.0 is not a whole number'),
+        ({'coils': True}, 'spring.coils = True is not a whole number'),
+        ({'wound': 1}, 'spring.wound = 1 is not true or false'),
+        ({'wound': 'yes'}, "spring.wound = 'yes' is not true or false"),
+        ({'material': 3}, 'spring.material = 3 is not a text'),
+        ({'lengths': 1.0}, 'spring.lengths = 1.0 is not a list'),
+        ({'lengths': 'ab'}, "spring.lengths = 'ab' is not a list"),
+        ({'lengths': [1.0, 'x']}, r"spring.lengths\[1\] = 'x' is not a number"),
+        ({'names': ['a', 1]}, r'spring.names\[1\] = 1 is not a text'),
+        ({'coils': 0}, 'spring: Spring.coils = 0 1 is below its lower bound 1 1'),
+        ({'colour': 'red', 'age': 1}, 'spring has no age, colour: it has stiffness, coils'),
+        ({'made': 1.0}, 'spring has no made: it has'),
+        ({3: 4}, 'spring has no 3: it has'),
+    ],
+)
+def test_a_mapping_that_makes_no_sense_is_refused_in_one_line_that_names_the_field(values, complaint):
+    with pytest.raises(ValueError, match=f'^{complaint}') as refusal:
+        make(**{str(k): v for k, v in values.items()}) if 3 not in values else from_mapping(Spring, values, 'spring')
+    assert '\n' not in str(refusal.value)
+
+
+def test_a_whole_number_beyond_any_float_is_beyond_its_bound_too():
+    with pytest.raises(ValueError, match='above its upper bound 100'):
+        make(coils=10**400)
+
+
+def test_what_is_missing_is_named():
+    with pytest.raises(ValueError, match=r'^spring lacks stiffness$'):
+        from_mapping(Spring, {}, 'spring')
+
+
+@pytest.mark.parametrize('values', [None, 5, 'stiffness', ['stiffness'], [('stiffness', 10.0)]])
+def test_what_is_no_mapping_is_refused(values):
+    with pytest.raises(ValueError, match=r'^spring is not a mapping of names to values but '):
+        from_mapping(Spring, values, 'spring')
+
+
+def test_a_field_that_was_made_already_may_not_be_given():
+    assert from_mapping(Spring, {'coils': 7}, 'spring', stiffness=10.0) == Spring(10.0, 7)
+    with pytest.raises(ValueError, match=r'^spring has no stiffness'):
+        from_mapping(Spring, {'stiffness': 1.0}, 'spring', stiffness=10.0)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers(-(2**63), 2**63) | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@given(st.dictionaries(st.sampled_from(['stiffness', 'coils', 'wound', 'material', 'lengths', 'x']), json_values))
+def test_any_mapping_makes_a_valid_record_or_a_value_error(values):
+    try:
+        spring = from_mapping(Spring, values, 'spring')
+    except ValueError:
+        return
+    check(spring)
+    assert type(spring.stiffness) is float
+    assert type(spring.coils) is int
+
+
+def test_a_record_cannot_be_changed():
+    with pytest.raises(AttributeError):
+        Spring(10.0).stiffness = 20.0
+
+
+def test_meanings_come_in_order_of_declaration_of_class_and_instance_alike():
+    names = ['stiffness', 'coils', 'wound', 'material', 'lengths', 'names']
+    assert list(meanings(Spring)) == list(meanings(Spring(10.0))) == names
+    assert meanings(Spring)['stiffness'] == Meaning('N/m', 'Force per length.', 1.0, 1e6, live=True)
+
+
+@pytest.mark.parametrize(
+    ('lower', 'upper', 'text'),
+    [(None, None, ''), (0.0, 1.0, '0.0 to 1.0')],
+)
+def test_bounds_are_told_to_a_reader(lower, upper, text):
+    assert Meaning('', '', lower, upper).bounds_text() == text
+
+
+@pytest.mark.parametrize('record', RECORDS, ids=lambda record: record.__name__)
+def test_every_parameter_has_a_sentence_of_meaning_and_bounds_in_order(record):
+    assert meanings(record)
+    for name, meaning in meanings(record).items():
+        assert meaning.description.endswith('.'), name
+        if meaning.lower is not None and meaning.upper is not None:
+            assert meaning.lower < meaning.upper, name
+
+
+@pytest.mark.parametrize('record', [EstimatorSettings, SealSelection], ids=lambda record: record.__name__)
+def test_defaults_lie_inside_their_bounds_and_make_a_valid_record(record):
+    made = record()
+    check(made)
+    assert from_mapping(record, asdict(made), 'defaults') == made
+    for name, meaning in meanings(record).items():
+        default = getattr(made, name)
+        if meaning.lower is not None:
+            assert meaning.lower <= default <= meaning.upper, name
+
+
+@pytest.mark.parametrize(
+    ('unit', 'size'),
+    [
+        ('psi', 6894.757293168361),
+        ('lbf', 4.4482216152605),
+        ('in', 0.0254),
+        ('bar', 1e5),
+        ('in2', 6.4516e-4),
+        ('N', 1.0),
+    ],
+)
+def test_units_have_their_size_in_si(unit, size):
+    assert unit_size(unit) == pytest.approx(size, rel=1e-15)
+
+
+def test_an_unknown_unit_is_refused_with_what_there_is():
+    with pytest.raises(ValueError, match=r"^unknown unit 'furlong': use one of 1, s, ms"):
+        unit_size('furlong')

@@ -1,0 +1,185 @@
+"""Coulomb friction of a seal and of an actuator."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seal_friction_ros.core.friction.actuator import (
+    MountedSeal,
+    PhysicsBased,
+    PriorArtChart,
+    Seal,
+    Uncertainty,
+    actuator_friction,
+    coulomb_friction,
+)
+from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.geometry import SealGeometry, contact_length, projected_area
+from seal_friction_ros.core.friction.normal_force import AreaDeformationGain
+
+GEOMETRY = SealGeometry(section_diameter=2e-3, ring_inner_diameter=9.8e-3, rod_diameter=10e-3, gland_diameter=13.6e-3)
+LAW = PhysicsBased(GEOMETRY, AreaDeformationGain(0.4, 10.0), PowerLaw(2.0, 0.5))
+
+
+class Proportional:
+    """Friction of 1 N per bar on top of 5 N."""
+
+    def coulomb_friction(self, pressure: float) -> float:
+        return 5.0 + pressure / 1e5
+
+
+class Falling:
+    def coulomb_friction(self, pressure: float) -> float:
+        return 50.0 - pressure / 1e5
+
+
+class NotFinite:
+    def coulomb_friction(self, pressure: float) -> float:
+        return 1.0 if pressure < 1e6 else math.nan
+
+
+def seal(law=None, pressure_min=0.0, pressure_max=1e7) -> Seal:
+    return Seal(
+        name='test',
+        coulomb_law=law or Proportional(),
+        uncertainty=Uncertainty(relative_std=0.1),
+        stiction=2.0,
+        pressure_min=pressure_min,
+        pressure_max=pressure_max,
+    )
+
+
+def on(chamber: str, **kwargs) -> MountedSeal:
+    return MountedSeal(seal(**kwargs), chamber)
+
+
+# --- one seal ---
+
+
+def test_physics_based_friction_is_coefficient_times_normal_force():
+    normal_force = 0.4 * 2e6 * projected_area(GEOMETRY) + 10.0
+    assert LAW.coulomb_friction(2e6) == pytest.approx(2.0 * normal_force**-0.5 * normal_force)
+
+
+def test_prior_art_adds_a_squeeze_part_per_length_and_a_pressure_part_per_area():
+    chart = PriorArtChart(GEOMETRY, 100.0, (0.0, 1e6, 2e6), (1e5, 2e5, 4e5))
+    expected = 100.0 * contact_length(GEOMETRY) + 2e5 * projected_area(GEOMETRY)
+    assert chart.coulomb_friction(1e6) == pytest.approx(expected)
+    assert chart.coulomb_friction(9e6) == chart.coulomb_friction(2e6)
+
+
+@pytest.mark.parametrize(
+    ('frictions', 'complaint'),
+    [
+        ((2e5, 1e5), 'falls with pressure'),
+        ((-1.0, 1e5), '(is below 0 Pa|lower bound 0.0 Pa)'),
+        ((1e5,), 'as many ordinates'),
+    ],
+)
+def test_a_chart_that_makes_no_sense_is_refused(frictions, complaint):
+    with pytest.raises(ValueError, match=f'^PriorArtChart.*{complaint}'):
+        PriorArtChart(GEOMETRY, 100.0, (0.0, 1e6), frictions)
+
+
+@given(st.floats(-1e9, 0.0))
+def test_negative_gauge_pressure_counts_as_none(pressure):
+    assert coulomb_friction(seal(law=LAW), pressure) == coulomb_friction(seal(law=LAW), 0.0)
+
+
+@given(st.floats(0.0, 1e8), st.floats(0.0, 1e8))
+def test_friction_never_falls_with_pressure(a, b):
+    low, high = sorted((a, b))
+    assert LAW.coulomb_friction(low) <= LAW.coulomb_friction(high) * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize('law', [Falling(), NotFinite()])
+def test_a_seal_whose_friction_falls_with_pressure_or_is_not_finite_cannot_be_made(law):
+    with pytest.raises(ValueError, match=r'^Seal test: Coulomb friction falls from .* N to .* N at .* Pa'):
+        seal(law=law)
+
+
+def test_a_fall_above_the_identified_range_is_found_too():
+    dropping = CoefficientTable((10.0, 400.0, 500.0), (0.3, 0.3, 0.1))
+    law = PhysicsBased(GEOMETRY, AreaDeformationGain(0.4, 10.0), dropping)
+    top = (400.0 - 10.0) / 0.4 / projected_area(GEOMETRY)
+    with pytest.raises(ValueError, match='Coulomb friction falls'):
+        seal(law=law, pressure_max=top)
+
+
+def test_an_identified_range_that_is_none_is_refused():
+    with pytest.raises(ValueError, match=r'Seal.pressure_max = 1000.0 Pa is not above pressure_min = 1000.0 Pa'):
+        seal(pressure_min=1000.0, pressure_max=1000.0)
+
+
+# --- uncertainty ---
+
+
+def test_uncertainty_adds_share_and_resolution_in_quadrature():
+    assert Uncertainty(0.03, 4.0).std(100.0) == pytest.approx(5.0)
+
+
+@given(st.floats(0.0, 10.0), st.floats(0.0, 100.0), st.floats(0.0, 1e6))
+def test_std_is_at_least_each_of_its_parts(relative, absolute, friction):
+    std = Uncertainty(relative, absolute).std(friction)
+    assert max(relative * friction, absolute) <= std * (1.0 + 1e-12) + 1e-150
+    assert std <= (relative * friction + absolute) * (1.0 + 1e-12)
+
+
+def test_an_uncertainty_below_nothing_is_refused():
+    with pytest.raises(ValueError, match=r'^Uncertainty.relative_std = -0.1 1 is below its lower bound 0.0 1'):
+        Uncertainty(-0.1)
+
+
+# --- actuator ---
+
+
+def test_each_seal_sees_the_pressure_of_its_own_chamber():
+    seals = (on('a'), on('b'))
+    assert actuator_friction(seals, 1e6, 3e6).coulomb_friction == pytest.approx((5.0 + 10.0) + (5.0 + 30.0))
+    assert actuator_friction((on('a'),), 1e6, 3e6).coulomb_friction == pytest.approx(15.0)
+    assert actuator_friction((on('b'),), 1e6, 3e6).coulomb_friction == pytest.approx(35.0)
+
+
+def test_swapping_chambers_and_pressures_changes_nothing():
+    one, other = (on('a', law=LAW), on('b')), (on('b', law=LAW), on('a'))
+    assert actuator_friction(one, 1e6, 3e6) == actuator_friction(other, 3e6, 1e6)
+
+
+@pytest.mark.parametrize('count', [1, 2, 3, 8])
+def test_friction_std_and_stiction_add_up_over_any_number_of_seals(count):
+    one = actuator_friction((on('a'),), 2e6, 0.0)
+    many = actuator_friction((on('a'),) * count, 2e6, 0.0)
+    assert many.coulomb_friction == pytest.approx(count * one.coulomb_friction)
+    assert many.coulomb_friction_std == pytest.approx(count * one.coulomb_friction_std)
+    assert many.stiction == pytest.approx(count * one.stiction)
+
+
+def test_a_chamber_below_ambient_pressure_gives_the_friction_at_none():
+    below, none = (actuator_friction((on('a'), on('b')), p, 2e6).coulomb_friction for p in (-5e4, 0.0))
+    assert below == none
+
+
+@pytest.mark.parametrize(
+    ('pressure', 'inside'),
+    [(1e6, True), (9e6, True), (0.93e6, True), (9.07e6, True), (0.91e6, False), (9.09e6, False), (-1e5, False)],
+)
+def test_the_identified_range_ends_one_percent_of_itself_beyond_its_ends(pressure, inside):
+    mounted = (on('a', pressure_min=1e6, pressure_max=9e6),)
+    assert actuator_friction(mounted, pressure, 5e6).in_identified_range is inside
+
+
+@pytest.mark.parametrize(('a', 'b', 'inside'), [(5e6, 5e6, True), (2e7, 5e6, False), (5e6, 2e7, False)])
+def test_one_seal_outside_its_range_is_enough(a, b, inside):
+    assert actuator_friction((on('a'), on('b')), a, b).in_identified_range is inside
+
+
+def test_a_chamber_without_a_seal_has_no_say_in_the_range():
+    assert actuator_friction((on('a'),), 5e6, 9e9).in_identified_range
+
+
+@pytest.mark.parametrize('chamber', ['A', 'c', '', 'ab'])
+def test_a_seal_on_no_chamber_is_refused(chamber):
+    with pytest.raises(ValueError, match=f'^chamber = {chamber!r} of seal test is neither a nor b'):
+        on(chamber)

@@ -1,0 +1,333 @@
+"""Identification on readings whose law is known: what it finds, what it does not claim, and how sure it is."""
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.identification.fitting import (
+    BAND_95,
+    band_coverage,
+    changed_levels,
+    climb,
+    collinear_regressors,
+    compare_with_law,
+    cross_validate,
+    fit,
+    identify_stiction,
+    is_beaten,
+    outlying_level,
+    plain_mean,
+    recommended,
+    repeatability,
+    run_drift,
+    spread_of,
+    standard_errors,
+    traded_off,
+)
+from seal_friction_ros.core.identification.ladder import Conditions, ladder
+from seal_friction_ros.core.identification.readings import Readings
+
+POWER = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 0.65}
+LADDER = {r.name: r for r in ladder(with_geometry=False, with_speeds=True, with_exponent=True)}
+LAW = LADDER['pressure_power_law']
+
+
+def noted(scatter=0.0, seed=0, law=LAW, values=POWER, offset=0.0, pressures=11, count=3, seals=2, test_scatter=0.0):
+    """Noted readings of ``count`` tests at even pressures to 70 bar, in both directions; scatter is relative."""
+    rng = np.random.default_rng(seed)
+    pressure = np.repeat(np.tile(np.linspace(0.0, 7e6, pressures), count), 2)
+    test = np.repeat(np.arange(count), 2 * pressures)
+    n = len(pressure)
+    direction = np.tile([1.0, -1.0], n // 2)
+    at = Conditions(np.repeat(pressure[:, np.newaxis], seals, axis=1), None, 0.01 * direction, direction)
+    shares = 1.0 + scatter * rng.normal(size=n) + test_scatter * rng.normal(size=count)[test]
+    return Readings(
+        at=at,
+        force=offset + direction * law.friction(at, values) * shares,
+        source=np.zeros(n, dtype=int),
+        group=test,
+        level=np.tile(np.repeat(np.arange(pressures), 2), count),
+        names=('made',),
+        left_out_by='test',
+        are_samples=False,
+    )
+
+
+def swept(values, law, scatter=20.0, seed=0, n=3000, tied=False, offset=200.0, name='log', least=0.01):
+    """Samples of a swept log of two seals; ``tied``: the pressure follows the speed."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(n) / 50.0
+    velocity = (least + 0.4 * np.abs(np.sin(0.13 * time))) * np.where(np.sin(0.7 * time) >= 0.0, 1.0, -1.0)
+    free = 5e6 * (1.0 + np.sin(0.05 * time))
+    pressure = 1e6 + 2e7 * np.abs(velocity) + 1e5 * rng.normal(size=n) if tied else free
+    both = np.column_stack((pressure, 0.5 * pressure))
+    at = Conditions(both, None, velocity, np.sign(velocity))
+    return Readings(
+        at=at,
+        force=offset + np.sign(velocity) * law.friction(at, values) + scatter * rng.normal(size=n),
+        source=np.zeros(n, dtype=int),
+        group=np.arange(n) * 10 // n,
+        level=np.zeros(n, dtype=int),
+        names=(name,),
+        left_out_by='block',
+        are_samples=True,
+    )
+
+
+# --- fits ---
+
+
+@pytest.mark.parametrize('name', ['constant_coulomb', 'coulomb_viscous', 'coulomb_stribeck', 'coulomb_asymmetric',
+                                  'pressure_power_law', 'pressure_power_law_viscous', 'pressure_power_law_stribeck',
+                                  'pressure_power_law_asymmetric'])  # fmt: skip
+def test_a_law_is_found_again_from_what_it_made_with_its_offset(name):
+    truth = POWER | {'coulomb_friction': 90.0, 'viscous_friction': 800.0, 'stribeck_friction': 60.0,
+                     'stribeck_velocity': 0.03, 'asymmetry': 0.15}  # fmt: skip
+    law = LADDER[name]
+    found = fit(law, swept(truth, law, scatter=0.0))
+    assert found.offsets == pytest.approx([200.0], abs=0.01)
+    assert {p: found.values[p] for p in found.values} == pytest.approx({p: truth[p] for p in found.values}, rel=1e-3)
+
+
+def test_a_term_that_is_not_there_is_exactly_nothing():
+    falling = {'coulomb_friction': 200.0, 'stribeck_friction': 100.0, 'stribeck_velocity': 0.3, 'viscous_friction': 0.0}
+    found = fit(LADDER['coulomb_viscous'], swept(falling, LADDER['coulomb_stribeck']))
+    assert found.values['viscous_friction'] == 0.0  # friction falls with speed: a negative viscous term is no friction
+
+
+def test_standard_errors_are_those_of_repeating_it_all():
+    estimates, errors = [], []
+    for seed in range(60):
+        readings = noted(scatter=0.08, seed=seed, count=6)
+        found = fit(LAW, readings)
+        estimates.append(found.values['friction_at_no_pressure'])
+        errors.append(standard_errors(cross_validate(LAW, readings, found.values))[0])
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(estimates), rel=0.35)
+
+
+def test_standard_errors_know_that_the_readings_of_a_test_are_off_together():
+    """Readings that share a scatter of 10 % tell the level no better than the number of tests allows."""
+    constant = LADDER['constant_coulomb']
+    errors = []
+    for seed in range(40):
+        readings = noted(scatter=0.01, test_scatter=0.1, seed=seed, law=constant, values={'coulomb_friction': 20.0})
+        found = fit(constant, readings)
+        errors.append(standard_errors(cross_validate(constant, readings, found.values))[0] / 20.0)
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(0.1 / np.sqrt(3.0), rel=0.25)
+
+
+# --- which law ---
+
+
+def rungs(*names):
+    return [LADDER[name] for name in names]
+
+
+def test_constant_friction_gets_a_constant():
+    readings = noted(scatter=0.08, law=LADDER['constant_coulomb'], values={'coulomb_friction': 20.0})
+    scores = climb(rungs('constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric'), readings)
+    assert recommended(scores).rung.name == 'constant_coulomb'
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_friction_that_follows_pressure_gets_that_and_no_asymmetry(seed):
+    scores = climb(rungs('constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric'),
+                   noted(scatter=0.08, seed=seed))  # fmt: skip
+    assert recommended(scores).rung.name == 'pressure_power_law'
+
+
+def test_a_stribeck_term_pays_where_it_is_there_and_nowhere_else():
+    values = {'coulomb_friction': 100.0, 'viscous_friction': 500.0, 'stribeck_friction': 200.0,
+              'stribeck_velocity': 0.05}  # fmt: skip
+    names = ('constant_coulomb', 'coulomb_viscous', 'coulomb_stribeck')
+    there = climb(rungs(*names), swept(values, LADDER['coulomb_stribeck']))
+    absent = climb(rungs(*names), swept(values, LADDER['coulomb_viscous']))
+    assert recommended(there).rung.name == 'coulomb_stribeck'
+    assert recommended(absent).rung.name == 'coulomb_viscous'
+
+
+def test_a_law_needs_more_pressures_than_parameters():
+    readings = noted(pressures=2)
+    (score,) = climb([LAW], readings)
+    assert not score.is_scored
+    assert '3 parameters need 3 pressures, there are 2' in score.why_not
+    with pytest.raises(ValueError, match='no law could be fitted'):
+        recommended([score])
+
+
+def test_beaten_is_only_what_is_worse_beyond_the_noise_and_by_a_tenth():
+    best = np.array([1.0, 1.1, 0.9, 1.0])
+    assert is_beaten(best + 0.5, best)
+    assert not is_beaten(best + 0.02, best)
+    assert not is_beaten(best + np.array([2.0, -1.5, 1.0, -0.5]), best)
+    assert not is_beaten(best, best)
+
+
+def test_leaving_out_predicts_what_was_not_seen():
+    """One wild test is badly predicted by the others, however many readings it has."""
+    readings = noted(scatter=0.02)
+    wild = readings.group == 1
+    force = np.where(wild, 1.5 * readings.force, readings.force)
+    readings = Readings(**{**vars(noted(scatter=0.02)), 'force': force})
+    found = fit(LAW, readings)
+    validation = cross_validate(LAW, readings, found.values)
+    assert np.argmax(validation.losses) == 1
+    assert validation.losses[1] > 0.25
+    assert validation.predicted[wild] + validation.deviation[wild] == pytest.approx(
+        (readings.at.direction * (readings.force - found.offsets[0]))[wild], rel=0.05
+    )
+
+
+def test_plain_mean_is_the_mean_of_the_other_tests():
+    readings = noted(scatter=0.05)
+    reference = plain_mean(readings)
+    out = (readings.group == 2) & (readings.level == 4)
+    others = (readings.group != 2) & (readings.level == 4)
+    assert reference.predicted[out] == pytest.approx(np.full(2, np.abs(readings.force[others]).mean()), rel=0.01)
+
+
+# --- how sure ---
+
+
+@pytest.mark.parametrize('scatter', [0.03, 0.08, 0.15])
+def test_the_band_holds_for_new_readings(scatter):
+    """The claim of `coulomb_friction_std`, over many identifications and fresh readings of each."""
+    inside = total = 0
+    for seed in range(25):
+        readings = noted(scatter=scatter, seed=seed)
+        found = fit(LAW, readings)
+        validation = cross_validate(LAW, readings, found.values)
+        spread = spread_of(validation.predicted, validation.deviation, 3)
+        new = noted(scatter=scatter, seed=1000 + seed)
+        friction = found.friction(new.at)
+        inside += np.count_nonzero(np.abs(np.abs(new.force) - friction) <= BAND_95 * spread.std(friction))
+        total += new.count
+    assert 0.93 <= inside / total <= 0.99
+
+
+def test_band_coverage_is_that_of_readings_that_neither_law_nor_band_had_seen():
+    shares = []
+    for seed in range(10):
+        readings = noted(scatter=0.08, seed=seed)
+        shares.append(band_coverage(LAW, readings, fit(LAW, readings).values))
+    assert 0.92 <= np.mean(shares) <= 0.99
+
+
+def test_a_spread_that_does_not_scale_is_absolute_and_one_that_does_is_relative():
+    rng = np.random.default_rng(5)
+    friction = np.linspace(5.0, 100.0, 4000)
+    absolute = spread_of(friction, 3.0 * rng.normal(size=4000), 10**6)
+    relative = spread_of(friction, 0.1 * friction * rng.normal(size=4000), 10**6)
+    somewhere = np.array([20.0, 50.0, 90.0])
+    assert absolute.std(somewhere) == pytest.approx(np.full(3, 3.0), rel=0.1)
+    assert relative.std(somewhere) == pytest.approx(0.1 * somewhere, rel=0.1)
+
+
+def test_what_the_data_cannot_show_is_added_in_square():
+    friction, deviation = np.full(100, 10.0), np.tile([0.3, -0.3], 50)
+    alone, more = spread_of(friction, deviation, 3), spread_of(friction, deviation, 3, 0.12)
+    assert more.std(friction)[0] == pytest.approx(np.hypot(alone.std(friction)[0], 1.2))
+
+
+def test_repeatability_is_the_scatter_at_one_pressure():
+    readings = noted(scatter=0.08, seed=3)
+    assert repeatability(readings, np.zeros(1)) == pytest.approx(0.08, rel=0.2)
+
+
+def test_repeatability_of_a_swept_log_is_the_scatter_within_a_cell():
+    readings = swept({'coulomb_friction': 400.0}, LADDER['constant_coulomb'], scatter=20.0)
+    assert repeatability(readings, np.array([200.0])) == pytest.approx(20.0 / 800.0, rel=0.1)
+
+
+def test_drift_is_the_change_over_the_run():
+    readings = noted(pressures=3, count=10, offset=1.0)
+    rising = readings.force + 0.02 * readings.group * (readings.force - 1.0)
+    drift = run_drift(Readings(**{**vars(noted(pressures=3, count=10)), 'force': rising}), np.array([1.0]))
+    assert set(drift) == {0, 1, 2}
+    assert list(drift.values()) == pytest.approx([0.18 / 1.09] * 3, rel=1e-6)
+
+
+# --- what the data cannot tell ---
+
+
+def test_speed_that_goes_with_pressure_is_said_to_be_collinear():
+    values = {'coulomb_friction': 100.0, 'viscous_friction': 500.0}
+    law = LADDER['coulomb_viscous']
+    tied, free = swept(values, law, tied=True), swept(values, law)
+    (found,) = collinear_regressors(tied, np.zeros((tied.count, 2)))
+    assert (found.one, found.other) == ('speed', 'pressure of the seals')
+    assert found.correlation > 0.99
+    assert not collinear_regressors(free, np.zeros((free.count, 2)))
+    opposed = np.column_stack((1e7 * free.at.velocity, np.zeros(free.count)))
+    assert [c.one for c in collinear_regressors(free, opposed)] == ['velocity']
+
+
+def test_a_fit_to_collinear_data_is_ill_conditioned_and_trades_its_parameters():
+    values = POWER | {'viscous_friction': 50.0, 'pressure_exponent': 2.0 / 3.0}
+    law = {r.name: r for r in ladder(with_geometry=False, with_speeds=True, with_exponent=False)}
+    law = law['pressure_power_law_viscous']
+    tied, free = (fit(law, swept(values, law, scatter=1.0, tied=tied)) for tied in (True, False))
+    assert tied.condition_number > 4.0 * free.condition_number
+    assert {pair[:2] for pair in traded_off(tied)} >= {('friction_at_one_bar', 'viscous_friction')}
+    assert not any('viscous_friction' in pair[:2] for pair in traded_off(free))
+    assert np.diag(tied.correlation) == pytest.approx(np.ones(3))
+
+
+@pytest.mark.parametrize('level', [0, 2, 3])
+def test_the_one_pressure_that_disagrees_is_the_outlier(level):
+    law = {r.name: r for r in ladder(with_geometry=False, with_speeds=False, with_exponent=False)}['pressure_power_law']
+    readings = noted(scatter=0.03, pressures=5, law=law, values=POWER | {'pressure_exponent': 2.0 / 3.0})
+    force = np.where(readings.level == level, 1.7 * readings.force, readings.force)
+    spoiled = Readings(**{**vars(noted(pressures=5)), 'force': force})
+    values = fit(law, spoiled).values
+    assert outlying_level(law, spoiled, values, 0.04).level == level
+    assert outlying_level(law, readings, fit(law, readings).values, 0.04) is None
+
+
+def test_three_pressures_have_no_outlier():
+    law = {r.name: r for r in ladder(with_geometry=False, with_speeds=False, with_exponent=False)}['pressure_power_law']
+    readings = noted(pressures=3)
+    assert outlying_level(law, readings, fit(law, readings).values, 0.04) is None
+
+
+@pytest.mark.parametrize('ratio', [0.6, 0.95, 1.5])
+def test_friction_that_changed_between_two_logs_is_told_by_how_much(ratio):
+    law = LADDER['coulomb_viscous']
+    first = swept({'coulomb_friction': 200.0, 'viscous_friction': 1000.0}, law)
+    other = swept({'coulomb_friction': 200.0 * ratio, 'viscous_friction': 1000.0 * ratio}, law, seed=1, offset=-50.0)
+    change = compare_with_law(fit(law, first), first, other)
+    assert change.ratio == pytest.approx(ratio, abs=0.02)
+    assert change.is_change == (ratio != 0.95)
+    assert change.own_rms == pytest.approx(20.0, rel=0.05)
+
+
+def test_logs_under_other_conditions_are_not_compared():
+    law = LADDER['coulomb_viscous']
+    values = {'coulomb_friction': 200.0, 'viscous_friction': 1000.0}
+    first, other = swept(values, law), swept(values, law, least=1.0)
+    with pytest.raises(ValueError, match='cannot be compared'):
+        compare_with_law(fit(law, first), first, other)
+
+
+def test_sources_that_disagree_at_a_pressure_are_named():
+    one = noted(pressures=3, count=2)
+    part = one.group
+    force = np.where((part == 1) & (one.level == 2), 1.5 * one.force, one.force)
+    both = Readings(**{**vars(noted(pressures=3, count=2)), 'force': force, 'source': part, 'names': ('a', 'b')})
+    (change,) = changed_levels(both)
+    assert (change.name, change.other_name) == ('a', 'b')
+    assert change.other_friction / change.friction == pytest.approx(1.5)
+    assert not changed_levels(one)
+
+
+# --- breakaway ---
+
+
+@pytest.mark.parametrize('law', ['constant', 'load_dependent'])
+def test_breakaway_is_constant_unless_it_follows_the_load(law):
+    readings = noted(scatter=0.01)
+    friction = LAW.friction(readings.at, POWER)
+    more = 3.0 if law == 'constant' else 0.15 * friction
+    static = Readings(**{**vars(noted()), 'force': readings.force + readings.at.direction * more})
+    found = identify_stiction(static, friction, np.zeros(1))
+    assert found.law == law
+    assert (found.stiction, found.ratio) == pytest.approx((1.5, 0.0) if law == 'constant' else (0.0, 0.15), rel=0.1)

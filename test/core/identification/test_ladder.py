@@ -1,0 +1,127 @@
+"""The ladder of laws: what is fitted is what the node runs, and each law has the limits that its physics has."""
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.foundation.units import INCH
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.normal_force import AreaDeformationGain
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.identification.ladder import (
+    Conditions,
+    ladder,
+    normal_forces,
+    pressure_power_law,
+    squeeze_force,
+    stribeck,
+)
+
+THESIS_RING = SealGeometry(0.106 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
+NORMAL_FORCE = {'law': 'area_deformation_gain', 'area_deformation_gain': 0.3925, 'radial_force': 9.3}
+VALUES = {
+    'coulomb_friction': 12.0,
+    'friction_at_no_pressure': 5.0,
+    'friction_at_one_bar': 0.8,
+    'pressure_exponent': 0.7,
+    'coefficient': 2.0,
+    'exponent': 0.56,
+    'viscous_friction': 150.0,
+    'stribeck_friction': 4.0,
+    'stribeck_velocity': 0.02,
+    'asymmetry': 0.1,
+}
+ALL = ladder(with_geometry=True, with_speeds=True, with_exponent=True)
+
+
+def conditions(rows=50) -> Conditions:
+    """Two seals, one on each chamber, at any pressures and speeds."""
+    rng = np.random.default_rng(4)
+    pressure = rng.uniform(0.0, 5e6, (rows, 2))
+    law = AreaDeformationGain(0.3925, 9.3)
+    velocity = rng.uniform(-0.2, 0.2, rows)
+    return Conditions(pressure, normal_forces(pressure, THESIS_RING, law), velocity, np.sign(velocity))
+
+
+def seal_of(rung):
+    """The seal that a seal file with these values makes."""
+    parts = {
+        'constant_coulomb': {'constant_coulomb': {'coulomb_friction_at_any_pressure': 12.0}},
+        'pressure_power_law': {
+            'pressure_power_law': {
+                key: VALUES[key] for key in ('friction_at_no_pressure', 'friction_at_one_bar', 'pressure_exponent')
+            }
+        },
+        'physics_based': {
+            'geometry': {
+                name: getattr(THESIS_RING, name)
+                for name in ('section_diameter', 'ring_inner_diameter', 'rod_diameter', 'gland_diameter')
+            },
+            'normal_force': NORMAL_FORCE,
+            'friction_coefficient': {'law': 'power_law', 'coefficient': 2.0, 'exponent': 0.56},
+        },
+    }
+    names = [p.name for p in rung.parameters]
+    terms = {n: VALUES[n] for n in names if n.startswith(('viscous', 'stribeck', 'asymmetry'))}
+    document = {
+        'name': 'test',
+        'coulomb_law': rung.coulomb_law,
+        **parts[rung.coulomb_law],
+        'uncertainty': {'relative_std': 0.1},
+        'identified_pressure': [0.0, 5e6],
+    }
+    return parse_seal(document | ({'velocity_terms': terms} if terms else {}))
+
+
+@pytest.mark.parametrize('rung', ALL, ids=lambda rung: rung.name)
+def test_what_is_fitted_is_what_the_node_runs(rung):
+    at = conditions()
+    seal = seal_of(rung)
+    mounted = (MountedSeal(seal, 'a'), MountedSeal(seal, 'b'))
+    node = []
+    for (a, b), v in zip(at.pressure, at.velocity, strict=True):
+        found = actuator_friction(mounted, a, b, v)
+        node.append(found.coulomb_friction + found.velocity_friction)
+    assert rung.friction(at, VALUES) == pytest.approx(np.array(node), rel=1e-12)
+
+
+def test_the_ladder_climbs_from_what_the_field_does_to_the_physics():
+    names = [rung.name for rung in ALL]
+    assert names[0] == 'constant_coulomb'
+    order = ['constant_coulomb', 'coulomb_viscous', 'pressure_power_law', 'physics_based', 'physics_based_stribeck']
+    assert [name for name in names if name in order] == order
+    assert names[-1] == 'physics_based_asymmetric'
+    assert all(rung.depends_on_pressure != rung.name.startswith(('constant', 'coulomb')) for rung in ALL)
+
+
+def test_without_geometry_or_speeds_the_laws_that_need_them_are_not_there():
+    bare = ladder(with_geometry=False, with_speeds=False, with_exponent=True)
+    assert [rung.name for rung in bare] == ['constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric']
+    assert not any(rung.needs_geometry or rung.velocity_terms for rung in bare)
+
+
+def test_few_pressures_get_the_exponent_of_an_elastic_contact():
+    (law,) = (r for r in ladder(with_geometry=False, with_speeds=False, with_exponent=False)
+              if r.name == 'pressure_power_law')  # fmt: skip
+    assert [p.name for p in law.parameters] == ['friction_at_no_pressure', 'friction_at_one_bar']
+    assert law.fixed == {'pressure_exponent': pytest.approx(2.0 / 3.0)}
+
+
+def test_at_no_pressure_and_at_one_bar_the_power_law_is_what_its_parameters_say():
+    at = Conditions(np.array([[0.0], [1e5]]), None, np.zeros(2), np.ones(2))
+    assert pressure_power_law(at, VALUES) == pytest.approx([5.0, 5.8])
+
+
+def test_stribeck_friction_has_faded_to_37_percent_at_its_velocity():
+    at = Conditions(np.zeros((2, 1)), None, np.array([0.0, -0.02]), np.ones(2))
+    assert stribeck(at, VALUES) == pytest.approx([4.0, 4.0 * np.exp(-1.0)])
+
+
+def test_squeeze_force_of_the_thesis_ring_is_near_that_of_its_finite_elements():
+    assert squeeze_force(THESIS_RING) == pytest.approx(22.1, abs=0.1)
+    assert squeeze_force(THESIS_RING) == pytest.approx(18.2, rel=0.25)  # [N] Table 4, 0 psi
+
+
+def test_squeeze_force_rises_with_squeeze():
+    tight = SealGeometry(0.110 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
+    assert squeeze_force(tight) > 1.5 * squeeze_force(THESIS_RING)

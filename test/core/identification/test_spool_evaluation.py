@@ -1,0 +1,111 @@
+"""The spool-valve paper's evaluation, on a rig whose friction and resonance are known."""
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.identification.spool_evaluation import (
+    SpoolEvaluation,
+    cycle_starts,
+    evaluate_cycles,
+    moving_average,
+    reference_force,
+    resonance_frequency,
+    without_resonance,
+)
+
+RATE, CYCLES = 20_000.0, 10  # [Hz], paper: 10 cycles
+FREQUENCY, STROKE, SPEED, RAMP = 3.0, 1.8e-3, 34e-3, 0.680  # [Hz], [m], [m/s], [m/s^2] of the paper
+RINGING = 157.0  # [Hz] of the paper
+PAPER = SpoolEvaluation()
+
+
+def rig(speed=SPEED, ringing=RINGING, amplitude=0.8, frictions=None):
+    """Time, displacement and force: friction of a trapezoidal motion to and fro, which makes the chain ring."""
+    n = int(RATE / FREQUENCY)
+    moving = int(STROKE / speed * RATE)
+    ramp = int(speed / RAMP * RATE)
+    profile = np.minimum(np.minimum(np.arange(moving + ramp), np.arange(moving + ramp)[::-1]) / ramp, 1.0)
+    half = np.zeros(n // 2)
+    half[: len(profile)] = profile * STROKE / (profile.sum() / RATE)
+    velocity = np.tile(np.concatenate((half, -half)), CYCLES)
+    time = np.arange(len(velocity)) / RATE
+    displacement = np.cumsum(velocity) / RATE
+    level = np.repeat(np.ones(CYCLES) if frictions is None else frictions, len(velocity) // CYCLES)
+    force = level * np.tanh(velocity / 1e-3)
+    since = time % (0.5 / FREQUENCY)
+    force += amplitude * np.exp(-since / 0.03) * np.sin(2.0 * np.pi * ringing * since)
+    return time, displacement, force
+
+
+@pytest.mark.parametrize('speed', [15e-3, 34e-3, 60e-3])
+@pytest.mark.parametrize('ringing', [120.0, 157.0, 240.0])
+def test_the_resonance_is_recognised_at_any_speed(speed, ringing):
+    time, _, force = rig(speed, ringing)
+    assert resonance_frequency(time, force, PAPER) == pytest.approx(ringing, rel=0.025)
+
+
+def test_noise_and_friction_alone_have_no_resonance():
+    time, _, force = rig(amplitude=0.0)
+    noise = np.random.default_rng(3).normal(scale=0.05, size=len(time))
+    assert resonance_frequency(time, force + noise, PAPER) is None
+    assert resonance_frequency(time, noise, PAPER) is None
+
+
+def test_the_filter_takes_the_resonance_and_leaves_the_friction():
+    time, _, force = rig(amplitude=0.0)
+    ringing = 0.5 * np.sin(2.0 * np.pi * RINGING * time)
+    cleaned = without_resonance(time, force + ringing, RINGING, PAPER)
+    unrung = without_resonance(time, force, RINGING, PAPER)
+    middle = slice(1000, -1000)
+    assert np.std((cleaned - unrung)[middle]) < 0.02 * np.std(ringing)
+    assert np.median(np.abs(unrung - force)[middle]) < 0.02
+
+
+def test_a_resonance_beyond_half_the_sampling_rate_is_refused():
+    with pytest.raises(ValueError, match='not below half the sampling rate'):
+        without_resonance(np.arange(100) / 100.0, np.zeros(100), 60.0, PAPER)
+
+
+def test_moving_average_of_fifty_smooths_white_noise_by_the_root_of_fifty():
+    noise = np.random.default_rng(2).normal(size=100_000)
+    assert np.std(moving_average(noise, 50)) == pytest.approx(1.0 / np.sqrt(50.0), rel=0.05)
+
+
+def test_the_ninth_of_ten_cycles_is_evaluated():
+    frictions = np.ones(CYCLES)
+    frictions[8] = 3.0
+    time, displacement, force = rig(frictions=frictions, amplitude=0.3)
+    ninth = evaluate_cycles(time, displacement, force, PAPER)
+    fifth = evaluate_cycles(time, displacement, force, SpoolEvaluation(evaluated_cycle=5))
+    assert ninth.reference_force == pytest.approx(3.0, rel=0.03)
+    assert fifth.reference_force == pytest.approx(1.0, rel=0.03)
+
+
+def test_normalised_friction_is_one_in_the_middle_of_the_stroke_and_has_the_sign_of_the_velocity():
+    found = evaluate_cycles(*rig(), PAPER)
+    middle = np.abs(found.displacement) <= 0.5e-3
+    assert np.abs(found.normalised[middle]).mean() == pytest.approx(1.0, abs=1e-9)
+    assert np.sign(found.normalised[middle]) == pytest.approx(np.sign(found.velocity[middle]))
+    assert found.resonance == pytest.approx(RINGING, rel=0.025)
+    assert found.displacement.max() == pytest.approx(STROKE / 2.0, rel=0.02)
+
+
+def test_another_measurement_may_give_the_reference():
+    own = evaluate_cycles(*rig(), PAPER)
+    doubled = evaluate_cycles(*rig(), PAPER, reference=2.0 * own.reference_force)
+    assert doubled.normalised == pytest.approx(own.normalised / 2.0)
+
+
+def test_too_few_cycles_and_too_short_strokes_are_refused():
+    time, displacement, force = rig()
+    third = len(time) // 3
+    with pytest.raises(ValueError, match='but cycle 9 is to be evaluated'):
+        evaluate_cycles(time[:third], displacement[:third], force[:third], PAPER)
+    with pytest.raises(ValueError, match='no cycle: drive to and fro'):
+        cycle_starts(np.linspace(0.0, 1.0, 100))
+    with pytest.raises(ValueError, match='does not reach'):
+        reference_force(displacement / 10.0, force, 0.5e-3)
+    with pytest.raises(ValueError, match='not finite'):
+        evaluate_cycles(time, np.where(time > 1.0, np.nan, displacement), force, PAPER)
+    with pytest.raises(ValueError, match='evaluated_cycle = 12 is above cycles = 10'):
+        SpoolEvaluation(evaluated_cycle=12)

@@ -1,0 +1,181 @@
+"""The friction map: computed, and as a law that the live estimate can use."""
+
+import dataclasses
+import math
+import timeit
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.friction.actuator import actuator_friction
+from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.friction.seal_file import mount_seals
+from seal_friction_ros.core.lubrication import friction_map as module
+from seal_friction_ros.core.lubrication.case import Case, MapGrid, Numerics
+from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_friction
+from seal_friction_ros.core.lubrication.transient import Model, rest
+
+CASE = Case(
+    name='inner',
+    numerics=Numerics(cells=96, time_step=1e-3),
+    map=MapGrid(velocity_min=1e-3, velocity_max=0.1, velocities=5, pressure_max=3e5, pressures=2),
+)
+LAW = FrictionMap(
+    speeds=(1e-3, 1e-2, 1e-1),
+    pressures=(0.0, 1e5),
+    frictions=(3.0, 2.0, 1.0, 6.0, 4.0, 2.0),
+    reference_speed=1e-2,
+    memory_length=1e-3,
+)
+
+
+@pytest.fixture(scope='module')
+def rows():
+    return [steady_friction(CASE, pressure) for pressure in (3e5, 0.0)]
+
+
+def test_map_falls_with_speed_and_rises_with_pressure(rows):
+    law = friction_map(CASE, rows, 1e-4)
+    table = np.array(law.frictions).reshape(2, 5)
+    assert (np.diff(table, axis=1) < 0.0).all()
+    assert (np.diff(table, axis=0) > 0.0).all()
+    assert law.pressures == (0.0, 3e5)
+    assert law.presliding_length == pytest.approx(table[0, 0] / CASE.groove.stiffness)
+
+
+def test_symmetrical_seal_without_pressure_rubs_alike_both_ways(rows):
+    assert np.abs(rows[1].direction_difference).max() < 1e-6
+    assert np.abs(rows[0].direction_difference).max() > 0.01
+
+
+def test_rows_that_are_not_of_the_grid_are_refused(rows):
+    with pytest.raises(ValueError, match='the rows are not those'):
+        friction_map(CASE, rows[:1], 0.0)
+
+
+def test_film_remembers_over_about_the_length_of_the_contact():
+    found = memory_length(CASE)
+    assert 0.05e-3 < found.length < 0.6e-3
+    assert found.retried_steps == 0
+
+
+def test_step_of_the_map_that_fails_is_taken_in_halves_and_counted(monkeypatch):
+    really, asked = module.contact_step, []
+
+    def fails_at_first(*arguments):
+        asked.append(arguments[6])
+        if len(asked) in (3, 13):  # a finite step, then the infinite one
+            raise NotConvergedError('told to')
+        return really(*arguments)
+
+    model = Model(CASE)
+    start = rest(model, 0.0).state
+    smoothly, none = module.steady_state(model, start, 0.01)
+    monkeypatch.setattr(module, 'contact_step', fails_at_first)
+    state, retried = module.steady_state(model, start, 0.01)
+    assert (none, retried) == (0, 2)
+    assert asked[3] == asked[4] == 0.5 * asked[2]
+    assert math.isinf(asked[12])
+    assert math.isinf(asked[14])
+    assert state.gap == pytest.approx(smoothly.gap, rel=1e-9)
+
+
+def test_map_that_does_not_converge_is_an_error_that_says_where(monkeypatch):
+    def fails(*_arguments):
+        raise NotConvergedError('told to')
+
+    monkeypatch.setattr(module, 'contact_step', fails)
+    with pytest.raises(NotConvergedError, match=r'^case inner at 0.001 m/s, 3e\+05 Pa: told to$'):
+        steady_friction(CASE, 3e5)
+
+
+def test_law_passes_through_its_table_and_holds_beyond_its_ends():
+    assert LAW.sliding_friction(0.0, 1e-3) == 3.0
+    assert LAW.sliding_friction(1e5, 1e-2) == pytest.approx(4.0)
+    assert LAW.sliding_friction(0.0, math.sqrt(1e-5)) == pytest.approx(2.5)
+    assert LAW.sliding_friction(0.5e5, 1e-2) == pytest.approx(3.0)
+    assert [LAW.sliding_friction(p, v) for p, v in ((0.0, 0.0), (0.0, 5.0), (9e9, 1e-2))] == pytest.approx(
+        [3.0, 1.0, 4.0]
+    )
+    assert LAW.coulomb_friction(0.0) == pytest.approx(2.0)
+
+
+@given(st.floats(0.0, 2e5), st.floats(0.0, 1.0))
+def test_law_stays_within_its_table(pressure, speed):
+    assert 1.0 - 1e-12 <= LAW.sliding_friction(pressure, speed) <= 6.0 + 1e-12
+
+
+def test_friction_follows_a_change_of_speed_over_the_memory_length():
+    assert LAW.lagged(3.0, 0.0, 1e-1, 0.0) == 3.0
+    assert LAW.lagged(3.0, 0.0, 1e-1, 1e-3) == pytest.approx(1.0 + 2.0 / math.e)
+    assert LAW.lagged(3.0, 0.0, 1e-1, 1.0) == pytest.approx(1.0)
+    assert dataclasses.replace(LAW, memory_length=0.0).lagged(3.0, 0.0, 1e-1, 0.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        ({'frictions': (1.0, 2.0)}, '2 values for 3 speeds and 2 pressures'),
+        ({'speeds': (1e-3, 1e-1, 1e-2)}, 'does not increase'),
+        ({'speeds': (1e-3, 2e-3, 1e-1)}, 'not in equal ratios'),
+        ({'pressures': (1e5, 0.0)}, 'does not increase'),
+    ],
+)
+def test_table_without_sense_is_refused(change, words):
+    with pytest.raises(ValueError, match=words):
+        dataclasses.replace(LAW, **change)
+
+
+def document(law: FrictionMap) -> dict:
+    fields = {f.name: getattr(law, f.name) for f in dataclasses.fields(law) if f.init}
+    return {
+        'name': 'mapped',
+        'coulomb_law': 'friction_map',
+        'friction_map': {k: list(v) if isinstance(v, tuple) else v for k, v in fields.items()},
+        'uncertainty': {'relative_std': 0.1},
+        'identified_pressure': [0.0, 1e5],
+    }
+
+
+def test_map_in_a_seal_file_is_a_coulomb_law_of_the_estimator():
+    (mounted,) = mount_seals((document(LAW),), ('a',))
+    assert actuator_friction((mounted,), 1e5, 0.0).coulomb_friction == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize('velocity', [-0.2, -1e-2, -1e-5, 1e-5, 3e-3, 5.0])
+def test_estimator_slides_with_the_friction_of_the_map_at_its_velocity(velocity):
+    seals = mount_seals((document(LAW),), ('a',))
+    friction = actuator_friction(seals, 0.5e5, 0.0, velocity)
+    assert friction.coulomb_friction + friction.velocity_friction == pytest.approx(
+        LAW.sliding_friction(0.5e5, abs(velocity))
+    )
+    assert friction.coulomb_friction_std == pytest.approx(0.1 * LAW.sliding_friction(0.5e5, abs(velocity)))
+    assert actuator_friction(seals, -1e4, 0.0, velocity) == actuator_friction(seals, 0.0, 0.0, velocity)._replace(
+        in_identified_range=False
+    )
+    sample = RodSample(1, velocity, Pressure(1, 0.5e5, 0.0), Force(1, 0.0))
+    parameters = EstimatorParameters(EstimatorSettings(stick_velocity=0.0, slip_velocity=0.0), seals)
+    _, estimate = step(parameters, init(parameters), sample)
+    assert estimate.friction_force == pytest.approx(math.copysign(LAW.sliding_friction(0.5e5, abs(velocity)), velocity))
+
+
+def test_at_rest_the_map_adds_nothing():
+    seals = mount_seals((document(LAW),), ('a',))
+    assert actuator_friction(seals, 0.5e5, 0.0, 0.0).velocity_friction == 0.0
+
+
+def test_map_and_velocity_terms_together_are_refused():
+    with pytest.raises(ValueError, match=r'Seal mapped: its friction_map has the velocity in it: leave out'):
+        mount_seals((document(LAW) | {'velocity_terms': {'viscous_friction': 1.0}},), ('a',))
+
+
+def test_looking_up_the_map_costs_a_few_microseconds():
+    loops = 2000
+    best = min(timeit.repeat(lambda: LAW.sliding_friction(3e4, 0.034), number=loops, repeat=7)) / loops
+    bare = min(timeit.repeat(lambda: math.sqrt(2.0), number=loops, repeat=7)) / loops
+    assert best < 60.0 * bare

@@ -1,0 +1,216 @@
+"""Grease, roughness, flow factors, half-plane, groove, wall, motion: each against its own book."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seal_friction_ros.core.lubrication.contact import film_properties
+from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.flow_factors import (
+    PEKLENIK_NUMBERS,
+    flow_factor_coefficients,
+    pressure_flow_factor,
+    shear_flow_factor,
+)
+from seal_friction_ros.core.lubrication.grease import Grease, apparent_viscosity
+from seal_friction_ros.core.lubrication.groove import Groove
+from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration, MeasuredMotion
+from seal_friction_ros.core.lubrication.krylov import StalledError, gmres
+from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
+from seal_friction_ros.core.lubrication.topography import Topography, contact_pressure
+from seal_friction_ros.core.lubrication.wall import ControlEdge, WallFilm
+
+MODULUS = 14.28e6  # [Pa]
+
+
+def test_grease_of_table_1_flows_as_palacios_says():
+    rate = 1e5  # [1/s]
+    stress = 530.96 + 6.7823 * rate**0.6327 + 94.779e-3 * rate
+    assert apparent_viscosity(Grease().numbers, rate) == pytest.approx(stress / rate, rel=1e-6)
+    assert apparent_viscosity(Grease().numbers, -rate) == apparent_viscosity(Grease().numbers, rate)
+
+
+def test_grease_without_yield_and_thickener_is_newtonian():
+    oil = Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.3)
+    assert {apparent_viscosity(oil.numbers, rate) for rate in (0.0, 1.0, 1e6)} == {0.3}
+
+
+@pytest.mark.parametrize('number', PEKLENIK_NUMBERS)
+def test_flow_factors_tend_to_those_of_a_smooth_gap_and_have_their_slope(number):
+    coefficients = flow_factor_coefficients(number)
+    assert pressure_flow_factor(coefficients, 200.0)[0] == pytest.approx(1.0, abs=1e-3)
+    assert shear_flow_factor(coefficients, 200.0)[0] == pytest.approx(0.0, abs=1e-12)
+    assert shear_flow_factor(coefficients, 5.0)[0] == pytest.approx(
+        shear_flow_factor(coefficients, 5.0 + 1e-9)[0], rel=0.02
+    )
+    for factor in (pressure_flow_factor, shear_flow_factor):
+        for ratio in (0.3, 1.0, 3.0, 8.0):
+            slope = (factor(coefficients, ratio + 1e-6)[0] - factor(coefficients, ratio - 1e-6)[0]) / 2e-6
+            assert factor(coefficients, ratio)[1] == pytest.approx(slope, rel=1e-5, abs=1e-9)
+
+
+def test_isotropic_flow_factors_are_those_of_patir_and_cheng():
+    coefficients = flow_factor_coefficients(1.0)
+    assert pressure_flow_factor(coefficients, 3.0)[0] == pytest.approx(1.0 - 0.9 * math.exp(-1.68))
+    assert shear_flow_factor(coefficients, 2.0)[0] == pytest.approx(1.899 * 2.0**0.98 * math.exp(-1.84 + 0.2))
+
+
+def test_roughness_that_has_no_flow_factors_is_refused():
+    with pytest.raises(
+        ValueError, match=r'^peklenik_number = 2.0 has no Patir-Cheng coefficients here: choose 1, 3, 6, 9'
+    ):
+        Topography(peklenik_number=2.0)
+
+
+def test_roughness_cannot_be_flatter_than_its_longest_wave():
+    with pytest.raises(ValueError, match=r'rms_slope = 0.1 is below 0.5027'):
+        Topography(rms_slope=0.1)
+
+
+@given(st.floats(-2e-6, 6e-6))
+def test_asperities_push_less_the_farther_apart_and_have_their_slope(gap):
+    pressure, slope = contact_pressure(1e6, 1e-6, gap)
+    nearer, farther = contact_pressure(1e6, 1e-6, gap - 1e-12)[0], contact_pressure(1e6, 1e-6, gap + 1e-12)[0]
+    assert nearer > pressure > farther > 0.0
+    assert slope == pytest.approx((farther - nearer) / 2e-12, rel=1e-3)
+
+
+@pytest.mark.parametrize('wall_share', [0.0, 0.5, 1.0])
+def test_mobility_and_carried_height_have_their_slopes(wall_share):
+    t = Topography(wall_share=wall_share)
+    rough = (t.rms_height, 2.0 * wall_share - 1.0, flow_factor_coefficients(1.0))
+    gap, by = np.array([0.5e-6, 2e-6, 9e-6, 30e-6]), 1e-12
+    here, more, less = (film_properties(gap + d, 0.03, Grease().numbers, rough) for d in (0.0, by, -by))
+    assert here[1] == pytest.approx((more[0] - less[0]) / (2.0 * by), rel=1e-4)
+    assert here[3] == pytest.approx((more[2] - less[2]) / (2.0 * by), rel=1e-4)
+
+
+def test_rough_wall_carries_more_than_a_rough_seal():
+    gap = np.array([2e-6])
+    carried = [
+        film_properties(gap, 0.03, Grease().numbers, (2e-6, asymmetry, flow_factor_coefficients(1.0)))[2, 0]
+        for asymmetry in (-1.0, 0.0, 1.0)
+    ]
+    assert carried[0] < carried[1] == 2e-6 < carried[2]
+
+
+def test_hertz_pressure_flattens_the_half_plane_into_a_parabola():
+    cells, length, half_width, radius = 800, 0.6e-3, 0.15e-3, 1e-3
+    plane = HalfPlane(cells, length / cells, MODULUS, 1e-3)
+    x = (np.arange(cells) + 0.5) * length / cells - 0.5 * length
+    largest = MODULUS * half_width / (2.0 * radius)
+    pressure = largest * np.sqrt(np.maximum(0.0, 1.0 - (x / half_width) ** 2))
+    flat = plane.deflection(pressure) + x**2 / (2.0 * radius)
+    inside = np.abs(x) < 0.9 * half_width
+    assert np.ptp(flat[inside]) < 1e-3 * half_width**2 / (2.0 * radius)
+
+
+def test_fast_deflection_is_the_product_with_the_matrix():
+    plane = HalfPlane(113, 3e-6, MODULUS, 1e-3)
+    pressure = np.sin(np.arange(113.0)) * 1e6
+    exact = plane.matrix() @ pressure
+    assert np.allclose(plane.deflection(pressure), exact, rtol=0.0, atol=1e-13 * np.abs(exact).max())
+
+
+def test_half_plane_shallower_than_wide_is_refused():
+    with pytest.raises(ValueError, match=r'depth = 0.0001 m is less than'):
+        HalfPlane(100, 1e-5, MODULUS, 1e-4)
+
+
+def test_gmres_solves_and_says_when_it_cannot():
+    matrix = np.diag(np.arange(1.0, 21.0)) + np.triu(np.full((20, 20), 0.1), 1)
+    right = np.ones(20)
+    assert matrix @ gmres(lambda x: matrix @ x, right, 1e-10, 40) == pytest.approx(right, abs=1e-10)
+    with pytest.raises(StalledError, match=r'after 3 iterations'):
+        gmres(lambda x: matrix @ x, right, 1e-10, 3)
+
+
+def test_groove_with_clearance_has_two_seats_and_a_ridge():
+    groove = Groove(stiffness=1e4, half_clearance=1e-4)
+    assert [groove.force(lag) for lag in (-1e-4, 0.0, 1e-4)] == [0.0, 0.0, 0.0]
+    assert groove.force(-0.5e-4) > 0.0 > groove.force(0.5e-4)
+    assert groove.force(3e-4) == pytest.approx(2.0)
+    for seat in (-1e-4, 1e-4):  # the springs join with their slope
+        assert (groove.force(seat + 1e-9) - groove.force(seat - 1e-9)) / 2e-9 == pytest.approx(1e4, rel=1e-4)
+
+
+def test_groove_without_clearance_is_a_spring():
+    assert Groove(stiffness=1e4).force(-2e-4) == pytest.approx(-2.0)
+
+
+def test_control_edge_falls_by_its_depth_with_its_slope():
+    edge = ControlEdge(position=0.0, slope=0.4, depth=80e-6, rounding=5e-6)
+    place = np.array([-1e-3, 100e-6, 1e-3])
+    fall, slope = edge.fall(place)
+    assert fall == pytest.approx([0.0, 40e-6, 80e-6], abs=0.3e-6)
+    assert slope == pytest.approx([0.0, 0.4, 0.0], abs=1e-3)
+    beyond, _ = edge.fall(place + 1e-9)
+    assert (beyond - fall) / 1e-9 == pytest.approx(slope, abs=1e-6)
+
+
+def test_film_on_the_wall_is_moved_and_never_made():
+    film = WallFilm(0.0, 1e-6, np.full(100, 2e-12))
+    taken = film.ahead(50e-6, 52.5e-6, 30e-6, 50e-6)
+    assert taken.sum() == pytest.approx(2.5 * 2e-12)
+    after = film.moved(taken, 1e-12, 52.5e-6, 30e-6, 32.5e-6, 3e-12)
+    assert after.volume.sum() == pytest.approx(film.volume.sum() - 2.5 * 2e-12 + 1e-12 + 3e-12, rel=1e-14)
+    assert after.volume.min() >= 0.0
+
+
+def test_constant_acceleration_is_the_motion_of_table_1():
+    motion = ConstantAcceleration(cycles=2)
+    assert motion.stroke_time == pytest.approx(1.8e-3 / 34e-3 + 34e-3 / 0.68)
+    times = np.linspace(0.0, motion.duration, 20_001)
+    position = np.array([motion.position(t) for t in times])
+    velocity = np.gradient(position, times)
+    assert (position.min(), position.max()) == pytest.approx((-0.9e-3, 0.9e-3))
+    assert np.abs(velocity).max() == pytest.approx(34e-3, rel=1e-9)
+    assert np.abs(np.gradient(velocity, times)[2:-2]).max() == pytest.approx(0.68, rel=0.01)
+    assert position[0] == position[-1] == pytest.approx(-0.9e-3)
+
+
+def test_motion_that_never_reaches_its_speed_is_refused():
+    with pytest.raises(ValueError, match=r'speed = 0.1 m/s is not reached within distance = 0.0018 m'):
+        ConstantAcceleration(speed=0.1)
+
+
+def test_measured_motion_passes_through_its_samples():
+    motion = MeasuredMotion([5.0, 6.0, 8.0], [0.0, 1.0, 0.0])
+    assert motion.duration == 3.0
+    assert [motion.position(t) for t in (0.0, 0.5, 1.0, 2.0, 9.0)] == [0.0, 0.5, 1.0, 0.5, 0.0]
+
+
+@pytest.mark.parametrize(
+    ('times', 'positions', 'words'),
+    [
+        ([0.0], [0.0], 'give two or more'),
+        ([0.0, 0.0], [1.0, 2.0], 'do not increase'),
+        ([0.0, 1.0], [0.0, math.nan], 'finite'),
+    ],
+)
+def test_measured_motion_without_sense_is_refused(times, positions, words):
+    with pytest.raises(ValueError, match=words):
+        MeasuredMotion(times, positions)
+
+
+def test_transducer_rings_at_its_frequency_and_settles_on_the_force():
+    chain = MeasuringChain(natural_frequency=157.0, damping_ratio=0.02)
+    time = np.arange(0.0, 1.0, 1e-4)
+    friction = np.where(time < 0.1, 0.0, 1.0)
+    shown = transducer_force(chain, time, friction)
+    after = time > 0.1
+    crossings = np.flatnonzero(np.diff(np.sign(shown[after] - 1.0)) != 0)[:20]
+    assert 0.5 / (np.diff(crossings).mean() * 1e-4) == pytest.approx(157.0, rel=0.01)
+    assert shown.max() == pytest.approx(1.0 + math.exp(-math.pi * 0.02), rel=0.01)
+    assert shown[-1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_transducer_follows_a_ramp_the_same_with_any_step():
+    chain = MeasuringChain()
+    fine, coarse = np.linspace(0.0, 0.1, 1001), np.linspace(0.0, 0.1, 11)
+    assert transducer_force(chain, fine, 3.0 * fine)[::100] == pytest.approx(
+        transducer_force(chain, coarse, 3.0 * coarse)
+    )

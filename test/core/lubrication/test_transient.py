@@ -1,0 +1,246 @@
+"""Whole motions: what the spool-valve paper found, as numbers, on a grid coarse enough for a test.
+
+The numbers of the paper's own grid and their errors are in docs/ehl.md.
+"""
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.foundation.errors import NotConvergedError
+from seal_friction_ros.core.lubrication import transient
+from seal_friction_ros.core.lubrication.case import Air, Case, Member, Numerics, Viscoelasticity, parse_case
+from seal_friction_ros.core.lubrication.findings import discretisation_errors, findings
+from seal_friction_ros.core.lubrication.groove import Groove
+from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration, MeasuredMotion
+from seal_friction_ros.core.lubrication.spool import MemberMotion, superposed
+from seal_friction_ros.core.lubrication.study import study_table
+from seal_friction_ros.core.lubrication.transient import RunResult, rest, run, with_solid_shear_stress
+from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
+
+INNER = Case(name='inner', numerics=Numerics(cells=96, time_step=1e-3))
+EDGE = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=2.7e-3), control_edge=ControlEdge())
+
+
+@cache
+def done(case: Case) -> RunResult:
+    return run(case)
+
+
+def test_solid_friction_has_the_largest_share_above_90_percent():
+    assert findings(done(INNER)).solid_share > 0.9
+
+
+def test_solid_friction_falls_and_fluid_friction_rises_with_speed():
+    found = findings(done(INNER))
+    assert found.solid_fast < 0.9 * found.solid_slow
+    assert found.fluid_fast > 2.0 * found.fluid_slow
+
+
+def test_friction_rises_on_deceleration_by_more_than_step_and_grid_blur():
+    found = findings(done(INNER))
+    by_step, by_grid = discretisation_errors(INNER, found, run)
+    assert found.rise_on_deceleration > 0.1
+    assert by_step['rise_on_deceleration'] + by_grid['rise_on_deceleration'] < 0.3 * found.rise_on_deceleration
+
+
+def test_friction_is_the_sum_of_its_shares_and_balances_the_groove_while_sticking():
+    result = done(EDGE)
+    assert result.friction == pytest.approx(result.solid + result.fluid + result.edge, abs=1e-12)
+    stuck = (result.sliding_velocity == 0.0) & (result.edge > -1e-3)
+    spring = np.array([EDGE.groove.force(lag) for lag in result.lag])
+    assert stuck.sum() > 10
+    assert result.friction[stuck] == pytest.approx(spring[stuck], abs=0.01 * np.abs(result.friction).max())
+
+
+def test_after_a_reversal_friction_pushes_along_for_as_long_as_elasticity_says():
+    found = findings(done(INNER))
+    assert found.assisted_length == pytest.approx(found.elastic_length, rel=0.01)
+    softer = dataclasses.replace(INNER, groove=Groove(stiffness=0.5 * INNER.groove.stiffness))
+    assert findings(done(softer)).assisted_length == pytest.approx(2.0 * found.assisted_length, rel=0.1)
+
+
+def test_seal_that_may_lean_either_way_has_a_second_lobe_near_minus_1_4_mm():
+    long_way = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=3e-3))
+    bistable = dataclasses.replace(long_way, groove=Groove(half_clearance=0.14e-3))
+    result = done(bistable)
+    assert findings(result).second_lobe == pytest.approx(-1.4e-3, abs=0.03e-3)
+    forth = (result.time > 0.5 * result.time[-1]) & (result.velocity > 0.0)
+    signs = np.sign(result.friction[forth])
+    assert (np.diff(signs[signs != 0.0]) != 0.0).sum() == 3  # along, against, along, against
+    assert findings(done(long_way)).second_lobe is None
+
+
+def test_pressure_difference_takes_the_second_seat_away():
+    under_air = dataclasses.replace(INNER, groove=Groove(half_clearance=0.14e-3), air=Air(pressure_left=1e5))
+    assert under_air.seated_groove.half_clearance == 0.0
+
+
+def test_control_edge_makes_a_peak_on_the_way_in_and_pushes_on_the_way_out():
+    result, found = done(EDGE), findings(done(EDGE))
+    assert found.edge_peak > 1.15
+    assert found.edge_assist > 0.2
+    away = result.position > EDGE.control_edge.position + 0.5e-3
+    assert np.abs(result.friction[away]).max() < 0.05 * np.abs(result.friction).max()
+
+
+def test_chamfer_gives_back_what_it_took_but_for_what_friction_changes():
+    """Quasi-static and dry, its force is conservative: the same work in and out."""
+    slow = dataclasses.replace(
+        EDGE,
+        motion=ConstantAcceleration(distance=2.7e-3, speed=5e-3, cycles=1),
+        film_supply=FilmSupply(1e-9),
+        seal=dataclasses.replace(EDGE.seal, solid_shear_stress=1e3),
+        numerics=Numerics(cells=96, time_step=2e-3),
+    )
+    result = done(slow)
+    way = result.sliding_velocity * np.diff(result.time, prepend=0.0)
+    works = [float((result.edge * way)[result.velocity * sign > 0.0].sum()) for sign in (1.0, -1.0)]
+    assert works[0] == pytest.approx(-works[1], rel=0.05)
+
+
+def test_starved_film_removes_the_rise_on_deceleration():
+    starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), motion=ConstantAcceleration(cycles=3))
+    found, flooded = findings(done(starved)), findings(done(INNER))
+    assert found.rise_on_deceleration < 0.2 * flooded.rise_on_deceleration
+    assert found.friction > flooded.friction
+
+
+def test_starved_film_is_neither_made_nor_lost():
+    starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), motion=ConstantAcceleration(cycles=1))
+    model = transient.Model(starved)
+    motion = starved.motion
+    moment = rest(model, motion.position(0.0))
+
+    def lubricant(moment) -> float:
+        width = model.contact.half_plane.cell_width
+        return moment.wall_film.volume.sum() + (moment.state.gap * moment.state.saturation).sum() * width
+
+    before = lubricant(moment)
+    for i in range(1, 101):
+        time = i * 1e-3
+        moment, *_ = transient.advance(model, moment, time, motion.position(time))
+        assert lubricant(moment) == pytest.approx(before, rel=1e-12)
+        assert moment.wall_film.volume.min() >= -1e-20
+
+
+def test_viscoelastic_seal_rubs_more_after_a_control_edge_and_no_more_without_one():
+    stiffer = Viscoelasticity(stiffening=1.0, relaxation_time=0.3)
+    after_edge = [
+        findings(done(case)).after_edge for case in (EDGE, dataclasses.replace(EDGE, viscoelasticity=stiffer))
+    ]
+    assert after_edge[1] > 1.1 * after_edge[0]
+    plain = [findings(done(case)).friction for case in (INNER, dataclasses.replace(INNER, viscoelasticity=stiffer))]
+    assert plain[1] == pytest.approx(plain[0], rel=0.02)
+
+
+def test_pressure_raises_the_friction():
+    assert (
+        findings(done(dataclasses.replace(INNER, air=Air(pressure_left=6e5)))).friction
+        > 1.3 * findings(done(INNER)).friction
+    )
+
+
+@pytest.mark.parametrize('case', [INNER, EDGE], ids=['inner', 'edge'])
+def test_no_step_loses_lubricant(case):
+    assert done(case).mass_defect < 1e-12
+
+
+def test_film_and_void_exclude_each_other_at_every_moment():
+    result = done(EDGE)
+    assert (result.film_pressure / 1e6 * (1.0 - result.saturation)).max() <= 1e-12
+    assert result.gap.min() > 0.0
+
+
+def test_friction_over_solid_shear_stress_is_constant_within_15_percent_and_worst_at_the_smallest():
+    one = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1))
+    table = study_table([done(with_solid_shear_stress(one, stress)) for stress in (2.5e6, 0.5e6, 1.5e6)])
+    assert table.solid_shear_stress == (0.5e6, 1.5e6, 2.5e6)
+    assert max(map(abs, table.deviation)) == abs(table.deviation[0]) < 0.15
+    assert max(table.curve_deviation) == table.curve_deviation[0] < 0.15
+    assert list(table.solid_share) == sorted(table.solid_share)
+
+
+def test_measured_motion_of_the_same_course_gives_the_same_friction():
+    motion = ConstantAcceleration(cycles=1)
+    times = np.linspace(0.0, motion.duration, 4001)
+    signal = MeasuredMotion(times.tolist(), [motion.position(t) for t in times])
+    one = dataclasses.replace(INNER, motion=motion)
+    assert run(one, signal).friction == pytest.approx(done(one).friction, abs=2e-3)
+
+
+def test_runs_are_the_same_to_the_bit():
+    one = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1))
+    assert run(one).friction.tobytes() == run(one).friction.tobytes()
+
+
+def test_step_that_fails_is_taken_in_halves_and_counted(monkeypatch):
+    one = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1))
+    really, asked = transient.contact_step, []
+
+    def fails_at_first(*arguments):
+        asked.append(arguments[6])
+        if len(asked) in (3, 4):
+            raise NotConvergedError('told to')
+        return really(*arguments)
+
+    monkeypatch.setattr(transient, 'contact_step', fails_at_first)
+    result = run(one)
+    assert result.retried_steps == 2
+    assert asked[3] == pytest.approx(0.5 * asked[2])
+    assert asked[4] == pytest.approx(0.25 * asked[2])
+    assert len(result.time) == len(done(one).time)
+    assert result.friction[20:] == pytest.approx(done(one).friction[20:], rel=0.01)
+
+
+def test_run_that_does_not_converge_ends_in_an_error_that_says_when(monkeypatch):
+    def fails(*_arguments):
+        raise NotConvergedError('told to')
+
+    monkeypatch.setattr(transient, 'contact_step', fails)
+    with pytest.raises(NotConvergedError, match=r'^case inner at 9\.\d+e-07 s: told to$'):
+        run(INNER)
+
+
+def test_mirrored_pair_of_seals_makes_a_friction_without_preference():
+    members = (Member('edge', shift=0.33e-3), Member('edge', mirrored=True, shift=0.33e-3))
+    motion = ConstantAcceleration(distance=2.7e-3, cycles=2)
+    runs = [run(EDGE, MemberMotion(motion, member)) for member in members]
+    both = superposed(members, runs)
+    last = both.time > motion.duration - motion.stroke_time
+    stroke_before = np.interp(both.time[last] - motion.stroke_time, both.time, both.friction)
+    assert both.friction[last] == pytest.approx(-stroke_before, abs=0.06 * np.abs(both.friction).max())
+    assert both.position.min() == pytest.approx(-1.35e-3, abs=1e-6)
+
+
+def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
+    case = parse_case({'name': 'x', 'groove': {'half_clearance': 1e-4}, 'viscoelasticity': {}})
+    assert isinstance(case, Case)
+    assert (case.grease.yield_stress, case.motion.speed, case.numerics.cells) == (530.96, 34e-3, 226)
+    assert case.seal.modulus == pytest.approx(8.0 * 1.785e6)
+    assert case.groove.half_clearance == 1e-4
+    assert case.viscoelasticity is not None
+    assert case.control_edge is None
+
+
+@pytest.mark.parametrize(
+    ('document', 'words'),
+    [
+        ([], 'a case file is a mapping'),
+        ({'name': 3}, 'name = 3 is not one line of text'),
+        ({'name': 'x', 'grese': {}}, 'case x has no grese: it has air, '),
+        ({'name': 'x', 'grease': {'flow_index': 2.0}}, 'flow_index = 2.0 1 is above its upper bound 1.0'),
+        ({'name': 'x', 'numerics': {'film_width': 2e-3}}, 'section_height = 0.001 m is less than numerics.film_width'),
+        ({'name': 'x', 'film_supply': {}, 'air': {'pressure_left': 1e5}}, 'film_supply needs both sides at ambient'),
+        ({'name': 'x', 'control_edge': {}, 'air': {'pressure_right': 1e5}}, 'control_edge needs both sides at ambient'),
+        ({'name': 'x', 'seal': {'mooney_c01': 0.0}}, 'give the seal a stiffness'),
+        ({'name': 'x', 'seals': []}, 'seals is empty'),
+        ({'name': 'x', 'seals': [{'case': 'y', 'side': 1}]}, r'seals\[0\] has no side'),
+    ],
+)
+def test_case_without_sense_is_refused_in_one_line(document, words):
+    with pytest.raises(ValueError, match=words) as caught:
+        parse_case(document)
+    assert '\n' not in str(caught.value)

@@ -1,0 +1,90 @@
+import math
+from functools import partial
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seal_friction_ros.core.foundation.units import PSI
+from seal_friction_ros.core.servo.motions import Chirp, PullTest, Reference, Sine, Step, Trapezoid, spool_cycles
+
+WAVES = [Sine(0.002, 3.0, 0.01), Trapezoid(), Chirp(duration=2.0), Chirp(start_frequency=9.0, end_frequency=2.0)]
+
+
+@pytest.mark.parametrize('wave', WAVES, ids=lambda w: type(w).__name__)
+@given(time=st.floats(1e-3, 12.0))
+def test_velocity_and_acceleration_are_the_derivatives(wave, time):
+    e = 1e-6  # [s]
+    before, at, after = wave.at(time - e), wave.at(time), wave.at(time + e)
+    if abs(after.acceleration - before.acceleration) > 0.01:
+        return  # a corner of the trapezoid, or the end of a sweep
+    assert (after.position - before.position) / (2 * e) == pytest.approx(at.velocity, abs=1e-6)
+    assert (after.velocity - before.velocity) / (2 * e) == pytest.approx(at.acceleration, abs=1e-2)
+
+
+@pytest.mark.parametrize('wave', [*WAVES, Step(0.1, 1.0, 0.2)], ids=lambda w: type(w).__name__)
+def test_before_time_0_a_wave_stands_still(wave):
+    assert wave.at(-1.0) == Reference(wave.offset, 0.0, 0.0)
+
+
+def test_step_steps_once():
+    wave = Step(0.003, 0.5, 0.001)
+    assert [wave.at(t).position for t in (0.0, 0.4999, 0.5, 9.0)] == [0.001, 0.001, 0.004, 0.004]
+
+
+def test_chirp_sweeps_and_stays():
+    wave = Chirp(amplitude=1.0, start_frequency=1.0, end_frequency=3.0, duration=4.0)
+    assert wave.at(0.0).velocity == pytest.approx(2 * math.pi)
+    assert wave.at(4.0).position == pytest.approx(math.sin(2 * math.pi * 8.0), abs=1e-9)  # 8 turns at 2 Hz in the mean
+    assert wave.at(4.0).velocity == pytest.approx(2 * math.pi * 3.0)
+    assert wave.at(4.0 + 1 / 3).position == pytest.approx(0.0, abs=1e-9)
+    assert wave.at(4.0 - 1e-9).position == pytest.approx(wave.at(4.0).position, abs=1e-6)
+
+
+@pytest.mark.parametrize('distance', [1.8e-3, 2.7e-3])
+def test_spool_cycles_are_those_of_the_paper(distance):
+    wave = spool_cycles(distance)
+    assert (wave.frequency, wave.cycles, wave.speed) == (3.0, 10, 0.034)
+    assert wave.duration == pytest.approx(10 / 3)
+    times = [i * 1e-4 for i in range(34000)]
+    samples = [wave.at(t) for t in times]
+    assert max(s.position for s in samples) == pytest.approx(distance, rel=1e-12)
+    assert min(s.position for s in samples) == 0.0
+    assert max(s.velocity for s in samples) == 0.034
+    assert min(s.velocity for s in samples) == -0.034
+    starts = sum(a.velocity <= 0 < b.velocity for a, b in pairwise(samples))
+    assert starts == 10
+    assert wave.at(0.5 / 3.0 - 1e-6) == Reference(distance, 0.0, 0.0)  # rest at the far end
+    assert wave.at(10 / 3) == Reference(0.0, 0.0, 0.0)
+
+
+def test_pull_test_is_that_of_appendix_a():
+    plan = PullTest()
+    assert plan.duration == (30.0 + 10.0) * 33
+    block = plan.rest_time + 2 * plan.pull_time
+    pressures = [plan.at(block * i + 1.0).pressure / PSI for i in range(33)]
+    assert pressures == pytest.approx([100.0 * i for i in range(11)] * 3)
+    assert plan.at(29.9) == plan.at(0.0)
+    extend, retract = plan.at(32.5), plan.at(37.5)
+    assert (extend.direction, retract.direction) == (1, -1)
+    assert extend.carriage == pytest.approx(0.01)
+    assert retract.carriage == pytest.approx(0.01)
+    assert plan.at(1e9).test == 32
+    assert plan.force(extend, 0.006) == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize(
+    ('make', 'reason'),
+    [
+        (partial(Trapezoid, distance=1e-4), 'not reached within distance'),
+        (partial(Trapezoid, frequency=20.0), 'leaves 0.025 s for a move'),
+        (partial(Sine, amplitude=math.nan), 'not finite'),
+        (partial(Chirp, duration=0.0), 'below its lower bound'),
+        (partial(PullTest, repetitions=0), 'below its lower bound'),
+        (partial(Step, size=11.0), 'above its upper bound'),
+    ],
+)
+def test_wave_that_makes_no_sense_is_refused(make, reason):
+    with pytest.raises(ValueError, match=reason):
+        make()

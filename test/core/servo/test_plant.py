@@ -1,0 +1,349 @@
+"""The servo's valve, cylinder and load against closed forms, an independent solver, and their own energy."""
+
+import dataclasses
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from paths import ROOT
+from scipy.integrate import solve_ivp
+
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.servo.controller import ServoController
+from seal_friction_ros.core.servo.plant import (
+    AMBIENT,
+    Cylinder,
+    Load,
+    ServoValve,
+    coulomb,
+    fastest_rate,
+    inner_step,
+    natural_frequency,
+    orifice_gain,
+    piston_area,
+    signed_root,
+    stored_energy,
+    total_volume,
+)
+from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs
+
+SEAL = parse_seal(yaml.safe_load((ROOT / 'config/seals/ms28775_114.yaml').read_text()))
+SEALS = (MountedSeal(SEAL, 'a'), MountedSeal(SEAL, 'b'))
+LOCK = tuple(MountedSeal(dataclasses.replace(SEAL, stiction=1e6), chamber) for chamber in 'ab')
+SERVO = ServoParameters(seals=SEALS)
+TIGHT_VALVE = ServoValve(null_leakage=0.0)
+TIGHT_CYLINDER = Cylinder(internal_leakage=0.0)
+
+
+def plant(servo, **changes):
+    return init(servo).plant._replace(**changes)
+
+
+def test_table_is_within_1e_5_of_the_laws():
+    worst = max(
+        abs(coulomb(SERVO.constants, a, b) / actuator_friction(SEALS, a, b).coulomb_friction - 1.0)
+        for a in np.linspace(-1e5, 1.3e7, 501)
+        for b in (0.0, 777.7, 3.4e6)
+    )
+    assert worst < 1e-5
+
+
+def test_natural_frequency_is_that_of_merritt_within_1_percent():
+    free = ServoParameters(
+        valve=TIGHT_VALVE, cylinder=TIGHT_CYLINDER, load=Load(viscous_damping=0.0), seals=(), inner_step=2e-5
+    )
+    state = plant(free, velocity=1e-3, direction=1)
+    position = []
+    for _ in range(2000):
+        state = advance(free, state, 0.0)
+        position.append(state.position)
+    position = np.array(position) - np.mean(position)
+    k = np.flatnonzero((position[:-1] < 0.0) & (position[1:] >= 0.0))
+    crossing = k + position[k] / (position[k] - position[k + 1])
+    measured = 2.0 * math.pi * (len(k) - 1) / ((crossing[-1] - crossing[0]) * free.control_period)
+    cylinder = free.cylinder
+    expected = math.sqrt(
+        4.0 * cylinder.bulk_modulus * piston_area(cylinder) ** 2 / (total_volume(cylinder) * free.load.mass)
+    )
+    assert natural_frequency(cylinder, free.load.mass) == expected
+    assert measured == pytest.approx(expected, rel=1e-4)
+
+
+def test_pressure_of_a_locked_piston_rises_as_the_closed_form():
+    # dp/dt = (beta/V) K s sqrt(p_s - p)  =>  sqrt(p_s - p) = sqrt(p_s - p_0) - beta K s t / (2 V)
+    locked = ServoParameters(valve=TIGHT_VALVE, cylinder=TIGHT_CYLINDER, seals=LOCK)
+    valve, cylinder, opening = locked.valve, locked.cylinder, 0.05
+    state = plant(locked, charge_a=1e6, spool=opening)
+    volume = total_volume(cylinder) / 2.0
+    for i in range(1, 5):
+        state = advance(locked, state, opening)
+        fall = cylinder.bulk_modulus * orifice_gain(valve) * opening * i * locked.control_period / (2.0 * volume)
+        root = math.sqrt(valve.supply_pressure - 1e6) - fall
+        assert state.charge_a == pytest.approx(valve.supply_pressure - root**2, rel=1e-9)
+        assert root**2 > valve.transition_pressure
+    assert state.position == 0.0
+
+
+def test_pressure_of_a_locked_piston_leaks_away_as_the_closed_form():
+    # d(p_a - p_b)/dt = -(2 beta/V) (C_i + C_n) (p_a - p_b)
+    locked = ServoParameters(seals=LOCK, cylinder=Cylinder(internal_leakage=5e-14))
+    state = plant(locked)
+    state = state._replace(charge_a=state.charge_a + 1e6, charge_b=state.charge_b - 1e6)
+    for _ in range(100):
+        state = advance(locked, state, 0.0)
+    rate = 4.0 * locked.cylinder.bulk_modulus / total_volume(locked.cylinder) * (5e-14 + 6e-14)
+    expected = 2e6 * math.exp(-rate * 100 * locked.control_period)
+    assert state.charge_a - state.charge_b == pytest.approx(expected, rel=1e-7)
+
+
+def test_spool_follows_its_second_order_step_response():
+    valve = ServoValve(damping_ratio=0.5)
+    servo = ServoParameters(valve=valve, seals=LOCK)
+    state = plant(servo)
+    for i in range(1, 21):
+        state = advance(servo, state, 0.4)
+        t, w, z = i * servo.control_period, valve.natural_frequency, 0.5
+        damped = w * math.sqrt(1 - z * z)
+        expected = 0.4 * (1 - math.exp(-z * w * t) * (math.cos(damped * t) + z * w / damped * math.sin(damped * t)))
+        assert state.spool == pytest.approx(expected, abs=1e-5)
+
+
+def test_spool_stays_within_full_opening():
+    servo = ServoParameters(valve=ServoValve(damping_ratio=0.4), seals=LOCK)
+    state = plant(servo)
+    spool = []
+    for _ in range(200):
+        state = advance(servo, state, 5.0)
+        spool.append(state.spool)
+    assert max(spool) == 1.0
+
+
+def test_root_meets_value_and_slope_at_the_transition():
+    e = 1.0
+    for sign in (1.0, -1.0):
+        assert signed_root(sign * (3e5 - e), 3e5) == pytest.approx(signed_root(sign * (3e5 + e), 3e5), rel=1e-5)
+    inside = (signed_root(3e5, 3e5) - signed_root(3e5 - e, 3e5)) / e
+    outside = (signed_root(3e5 + e, 3e5) - signed_root(3e5, 3e5)) / e
+    assert inside == pytest.approx(outside, rel=1e-4)
+    assert signed_root(0.0, 3e5) == 0.0
+
+
+def wave_commands(n, size=0.03):
+    """There, rest, back, rest: each 20 ms."""
+    return [(size, 0.0, -size, 0.0)[i // 40 % 4] for i in range(n)]
+
+
+@pytest.mark.parametrize('load', [Load(), Load(spring_stiffness=2e4, viscous_damping=200.0)])
+def test_energy_in_is_stored_and_dissipated(load):
+    servo = ServoParameters(load=load, seals=SEALS)
+    start = state = plant(servo)
+    for command in wave_commands(2000):
+        state = advance(servo, state, command, 10.0)
+    stored = stored_energy(servo.constants, state) - stored_energy(servo.constants, start)
+    assert state.energy_in > 1.0
+    assert state.transitions > 40
+    assert abs(state.energy_in - stored - state.energy_dissipated) < 1e-8 * state.energy_in
+
+
+def reference_solution(servo, commands, command_time):
+    """Stick and slip as events of scipy's solver, the equations written again, with the laws and not their tables."""
+    valve, cylinder, load = servo.valve, servo.cylinder, servo.load
+    area, beta, gain = piston_area(cylinder), cylinder.bulk_modulus, orifice_gain(valve)
+    middle = total_volume(cylinder) / 2.0
+    w, z = valve.natural_frequency, valve.damping_ratio
+
+    def root(dp):
+        r = dp / valve.transition_pressure
+        return (
+            math.copysign(math.sqrt(abs(dp)), dp)
+            if abs(r) >= 1
+            else (math.sqrt(valve.transition_pressure) * r * (5 - r * r) / 4)
+        )
+
+    def force(y):
+        return area * (y[2] - y[3]) - load.viscous_damping * y[1]
+
+    def holding(y):
+        friction = actuator_friction(SEALS, y[2], y[3])
+        return friction.coulomb_friction + friction.stiction
+
+    def equations(_, y, direction, u):
+        x, v, pa, pb, s, rate = y
+        source_a, source_b = (valve.supply_pressure, valve.return_pressure)[:: 1 if s > 0 else -1]
+        qa = gain * abs(s) * root(source_a - pa)
+        qb = gain * abs(s) * root(source_b - pb)
+        ends = valve.supply_pressure + valve.return_pressure
+        leak = cylinder.internal_leakage * (pa - pb)
+        qa += valve.null_leakage * (ends - 2 * pa) - leak
+        qb += valve.null_leakage * (ends - 2 * pb) + leak
+        acceleration = (force(y) - direction * actuator_friction(SEALS, pa, pb).coulomb_friction) / load.mass
+        return [
+            v * abs(direction),
+            acceleration * abs(direction),
+            beta / (middle + area * x) * (qa - area * v),
+            beta / (middle - area * x) * (qb + area * v),
+            rate,
+            w * w * (u - s) - 2 * z * w * rate,
+        ]
+
+    y, direction, t = np.array(init(servo).plant[:6]), 0, 0.0
+    for i, u in enumerate(commands):
+        end = (i + 1) * command_time
+        while t < end:
+            event = (lambda _, y, *_a: y[1]) if direction else (lambda _, y, *_a: holding(y) - abs(force(y)))
+            event.terminal, event.direction = True, -direction if direction else -1
+            solution = solve_ivp(
+                equations,
+                (t, end),
+                y,
+                'DOP853',
+                args=(direction, u),
+                events=event,
+                rtol=1e-10,
+                atol=1e-12,
+                max_step=1e-3,
+            )
+            t, y = solution.t[-1], solution.y[:, -1]
+            if solution.status == 1 and direction:
+                y[1] = 0.0
+                direction = 0 if abs(force(y)) <= holding(y) else int(np.sign(force(y)))
+            elif solution.status == 1:
+                direction = int(np.sign(force(y)))
+    return y
+
+
+def test_halving_the_step_halves_the_error_at_least():
+    commands, command_time = [0.05, -0.05, 0.05, -0.05, 0.0], 0.01
+    exact = reference_solution(SERVO, commands, command_time)
+    scale = np.array([1e-4, 1e-2, 1e6, 1e6, 1.0, 1e3])
+    errors = []
+    for steps in (50, 100, 200, 400):
+        state = plant(SERVO)
+        for command in commands:
+            for _ in range(steps):
+                state = inner_step(SERVO.constants, state, command, 0.0, command_time / steps)
+        errors.append(float(np.max(np.abs(np.array(state[:6]) - exact) / scale)))
+    assert state.transitions >= 6
+    assert errors[1] < 1e-4
+    for coarse, fine in pairwise(errors):
+        assert fine < 0.5 * coarse or fine < 1e-8
+
+
+@pytest.mark.parametrize('direction', [1.0, -1.0])
+def test_force_ramp_to_99_percent_of_breakaway_moves_nothing_at_101_it_moves(direction):
+    state = plant(SERVO)
+    breakaway = outputs(SERVO, state).breakaway_force
+    for share in np.linspace(0.0, 0.99, 2000):
+        state = advance(SERVO, state, 0.0, direction * share * breakaway)
+        assert state.position == 0.0
+        assert state.velocity == 0.0
+    at_rest = outputs(SERVO, state, load_force=direction * 0.99 * breakaway)
+    assert at_rest.friction_state == FrictionState.STUCK
+    assert at_rest.friction_force == at_rest.force_sum
+    assert state.transitions == 0
+    for share in np.linspace(0.99, 1.01, 200):
+        state = advance(SERVO, state, 0.0, direction * share * breakaway)
+    assert direction * state.position > 0.0
+
+
+def test_rod_meets_the_stops_and_stays_within():
+    state = plant(SERVO)
+    limit, seen = SERVO.cylinder.stroke / 2.0, set()
+    for i in range(1200):
+        state = advance(SERVO, state, 1.0 if i < 600 else -1.0)
+        assert abs(state.position) <= limit
+        seen.add(state.position)
+        if abs(state.position) == limit:
+            assert state.velocity == 0.0
+    assert {limit, -limit} <= seen
+    assert outputs(SERVO, state).force_sum == 0.0
+
+
+def test_cavitating_chamber_keeps_its_oil():
+    # No flow: the charge depends on the volume alone, p_0 + beta ln(V_0 / V), while the cavity grows and collapses.
+    shut = ServoParameters(valve=TIGHT_VALVE, cylinder=TIGHT_CYLINDER, load=Load(mass=50.0), seals=())
+    state = plant(shut)
+    start, middle, area = state.charge_a, shut.constants.mid_volume, shut.constants.area
+    lowest, collapsed = 0.0, False
+    for i in range(400):
+        state = advance(shut, state, 0.0, 3000.0 if i < 60 else -3000.0)
+        volume = middle + area * state.position
+        expected = start + shut.cylinder.bulk_modulus * math.log(middle / volume)
+        assert state.charge_a == pytest.approx(expected, abs=200.0)
+        lowest = min(lowest, state.charge_a)
+        collapsed = collapsed or (lowest < -1e6 and state.charge_a > 0.0)
+        assert outputs(shut, state).pressure_a + AMBIENT >= 0.99 * shut.cylinder.vapour_pressure
+    assert lowest < -1e6
+    assert collapsed
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-5000.0, 5000.0)), min_size=5, max_size=12),
+    st.sampled_from([SEALS, ()]),
+)
+def test_whatever_is_done_to_it_stays_physical(inputs, seals):
+    servo = dataclasses.replace(SERVO, seals=seals)
+    start = state = plant(servo)
+    turnover = 0.0
+    for command, force in inputs:
+        for _ in range(40):
+            before = state
+            state = advance(servo, state, command, force)
+            turnover += abs(state.energy_in - before.energy_in)
+            out = outputs(servo, state, load_force=force)
+            assert all(map(math.isfinite, state))
+            assert out.pressure_a + AMBIENT > 0.0
+            assert out.pressure_b + AMBIENT > 0.0
+            assert abs(out.position) <= servo.cylinder.stroke / 2.0
+            assert abs(out.spool) <= 1.0
+            assert state.energy_dissipated >= before.energy_dissipated - 1e-9
+    stored = stored_energy(servo.constants, state) - stored_energy(servo.constants, start)
+    assert abs(state.energy_in - stored - state.energy_dissipated) < 1e-4 * turnover + 1e-9
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'inner_step': 5e-4}, r'inner_step = 0.0005 s is too long: at most .* chamber and orifice'),
+        ({'valve': ServoValve(natural_frequency=6e4)}, 'spool of the valve'),
+        ({'inner_step': 1.5e-4}, 'not a multiple'),
+        ({'controller': ServoController(position_gain=3e6)}, 'closed loop is unstable'),
+        ({'control_period': 1e-2}, 'closed loop is unstable'),
+    ],
+)
+def test_servo_that_cannot_work_is_refused_with_the_reason(changes, reason):
+    with pytest.raises(ValueError, match=reason):
+        ServoParameters(seals=SEALS, **changes)
+
+
+@pytest.mark.parametrize(
+    ('part', 'reason'),
+    [
+        (lambda: ServoValve(supply_pressure=0.0), 'below return_pressure'),
+        (lambda: Cylinder(bore_diameter=0.01), 'not above rod_diameter'),
+        (lambda: Cylinder(dead_volume=2e-9), '1 % of the swept volume'),
+        (lambda: Load(mass=-1.0), 'below its lower bound'),
+        (lambda: Load(viscous_damping=math.nan), 'not finite'),
+        (lambda: init(SERVO, 0.03), 'not within the stroke'),
+    ],
+)
+def test_part_that_is_not_physical_is_refused_with_the_reason(part, reason):
+    with pytest.raises(ValueError, match=reason):
+        part()
+
+
+def test_largest_inner_step_that_is_accepted_is_stable():
+    rate, _ = fastest_rate(SERVO.valve, SERVO.cylinder, SERVO.load)
+    longest = ServoParameters(seals=LOCK, inner_step=2e-4, control_period=4e-4)
+    assert rate * 2e-4 > 2.0
+    state = plant(longest, position=-longest.cylinder.stroke / 2.0, spool=1.0)
+    for _ in range(200):
+        state = advance(longest, state, 1.0)
+    assert state.charge_a == pytest.approx(longest.valve.supply_pressure, rel=0.01)

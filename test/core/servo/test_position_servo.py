@@ -1,0 +1,235 @@
+"""The servo as a whole: rest, Figure 25, feed-forward, and references that are no good."""
+
+import dataclasses
+import json
+import math
+import sys
+from functools import cache
+
+import numpy as np
+import pytest
+import yaml
+from paths import ROOT
+from servo import main as time_servo
+
+from seal_friction_ros.core.estimation import estimator, feedforward
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.friction.actuator import MountedSeal, VelocityTerms, actuator_friction
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.servo.controller import ControllerState, Limited, ServoController, control, limit_reference
+from seal_friction_ros.core.servo.motions import Reference, Sine, Step
+from seal_friction_ros.core.servo.position_servo import (
+    ServoParameters,
+    Trajectory,
+    advance,
+    init,
+    measure,
+    outputs,
+    simulate,
+    step,
+)
+from seal_friction_ros.core.servo.tracking import dwell_per_reversal, reversals, tracking_peak, tracking_rms
+
+SEAL = parse_seal(yaml.safe_load((ROOT / 'config/seals/ms28775_114.yaml').read_text()))
+SEALS = (MountedSeal(SEAL, 'a'), MountedSeal(SEAL, 'b'))
+SERVO = ServoParameters(seals=SEALS)
+FREE = ServoParameters(seals=())
+ESTIMATOR = estimator.EstimatorParameters(estimator.EstimatorSettings(), SEALS)
+WAVE = Sine()
+SKIP = 800  # samples until the start is forgotten
+
+
+def references(wave, n=3200):
+    """For the step from sample i; the output of that step is at sample i + 1."""
+    return [wave.at(i * SERVO.control_period) for i in range(n)]
+
+
+def closed_loop(wave, settings, error=1.0):
+    """Servo, estimator and feed-forward in one loop, with the estimate wrong by a factor."""
+    state = init(SERVO)
+    out = outputs(SERVO, state.plant)
+    seen, fed = estimator.init(ESTIMATOR), feedforward.init(settings)
+    rows = []
+    for i, reference in enumerate(references(wave)):
+        stamp = round(i * SERVO.control_period * 1e9)
+        pressure, force = Pressure(stamp, out.pressure_a, out.pressure_b), Force(stamp, out.force_sum)
+        seen, estimate = estimator.step(ESTIMATOR, seen, RodSample(stamp, out.velocity, pressure, force))
+        estimate = estimate._replace(
+            coulomb_friction=error * estimate.coulomb_friction, breakaway_force=error * estimate.breakaway_force
+        )
+        motion = feedforward.Motion(reference.velocity, reference.acceleration, out.velocity)
+        fed, force = feedforward.step(settings, fed, stamp, estimate, motion)
+        state, out = step(SERVO, state, reference, force.force)
+        rows.append((out.position, out.velocity, *[0.0] * 7))
+    return Trajectory(*np.array(rows).T)
+
+
+@cache
+def run(wave, error):
+    if error is None:
+        return simulate(SERVO, init(SERVO), references(wave))[1]
+    return closed_loop(wave, feedforward.FeedForwardSettings(), error)
+
+
+def wanted(wave, n=3200):
+    return np.array([r.position for r in references(wave, n + 1)[1:]])
+
+
+def rms(wave, error):
+    return tracking_rms(wanted(wave)[SKIP:], run(wave, error).position[SKIP:])
+
+
+def dwell(wave, error):
+    return dwell_per_reversal(run(wave, error).velocity[SKIP:], SERVO.control_period)
+
+
+def test_simulate_is_many_steps():
+    state, rows = init(SERVO), []
+    for reference in references(WAVE, 100):
+        state, out = step(SERVO, state, reference, 3.0, 1.0)
+        rows.append((out.position, out.velocity, out.pressure_a, out.pressure_b, out.spool, out.force_sum))
+    last, trajectory = simulate(SERVO, init(SERVO), references(WAVE, 100), 3.0, 1.0)
+    assert last == state
+    np.testing.assert_array_equal(np.array(trajectory[:6]).T, rows)
+
+
+def test_no_chatter_at_rest_with_noise_on_every_sensor():
+    rng = np.random.default_rng(1)
+    c, g = SERVO.constants, SERVO.gains
+    plant, controller, seen = init(SERVO).plant, ControllerState(0.0, 0.0), estimator.init(ESTIMATOR)
+    states = set()
+    noise = rng.normal(size=(20000, 5)) * [1e-6, 2e-4, 2e3, 2e3, 1.0]
+    for i, (x, v, a, b, f) in enumerate(noise.tolist()):
+        exact, out = measure(c, plant), outputs(SERVO, plant)
+        noisy = exact._replace(
+            position=exact.position + x,
+            velocity=exact.velocity + v,
+            pressure_a=exact.pressure_a + a,
+            pressure_b=exact.pressure_b + b,
+        )
+        controller, command = control(g, c, controller, noisy, Reference(1e-4, 0.0, 0.0), 0.0)
+        plant = advance(SERVO, plant, command.spool)
+        stamp = i * 500_000
+        pressure = Pressure(stamp, noisy.pressure_a, noisy.pressure_b)
+        sample = RodSample(stamp, noisy.velocity, pressure, Force(stamp, out.force_sum + f))
+        seen, estimate = estimator.step(ESTIMATOR, seen, sample)
+        states.add((estimate.state, estimate.status) if i > 1000 else (estimate.state, 0))
+    assert plant.transitions == 0
+    assert plant.position == 0.0
+    assert len(states) == 1
+    assert 5.0 < abs(outputs(SERVO, plant).force_sum) < 20.0  # 0.1 mm error: the rod is held against a force
+
+
+def test_figure_25_flat_peaks_with_friction_and_none_without():
+    with_friction = run(WAVE, None)
+    _, without = simulate(FREE, init(FREE), references(WAVE))
+    period = 1.0 / WAVE.frequency
+    assert dwell_per_reversal(with_friction.velocity[SKIP:], SERVO.control_period) > 0.05 * period
+    assert dwell_per_reversal(without.velocity[SKIP:], SERVO.control_period) == 0.0
+    assert reversals(without.velocity[SKIP:]) == reversals(with_friction.velocity[SKIP:]) == 12
+    slow = 0.01 * WAVE.amplitude * 2.0 * math.pi * WAVE.frequency  # the same with a speed that both cross
+    assert dwell_per_reversal(with_friction.velocity[SKIP:], SERVO.control_period, slow) > 0.05 * period
+    assert dwell_per_reversal(without.velocity[SKIP:], SERVO.control_period, slow) < 0.01 * period
+    assert tracking_rms(wanted(WAVE)[SKIP:], without.position[SKIP:]) < 0.02 * WAVE.amplitude
+
+
+def test_feedforward_cuts_tracking_error_by_60_and_dwell_by_80_percent():
+    assert rms(WAVE, 1.0) <= 0.4 * rms(WAVE, None)
+    assert dwell(WAVE, 1.0) <= 0.2 * dwell(WAVE, None)
+
+
+@pytest.mark.parametrize('error', [0.7, 1.3])
+def test_feedforward_of_a_model_30_percent_wrong_is_better_than_none(error):
+    assert rms(WAVE, error) < 0.7 * rms(WAVE, None)
+    assert dwell(WAVE, error) < dwell(WAVE, None)
+    assert reversals(run(WAVE, error).velocity[SKIP:]) == reversals(run(WAVE, None).velocity[SKIP:])
+
+
+@pytest.mark.parametrize('error', [0.7, 1.0, 1.3])
+def test_feedforward_does_not_limit_cycle(error):
+    held = closed_loop(Step(size=0.003, start_time=0.1), feedforward.FeedForwardSettings(), error)
+    assert np.all(held.velocity[1000:] == 0.0)
+    assert abs(held.position[-1] - 0.003) < 1e-3
+
+
+def test_position_error_at_rest_is_within_breakaway_over_gain():
+    _, moved = simulate(SERVO, init(SERVO), references(Step(size=0.003)))
+    assert tracking_peak(np.full(100, 0.003), moved.position[-100:]) < 48.0 / SERVO.controller.position_gain
+
+
+def test_integrator_takes_most_of_that_error():
+    integrating = dataclasses.replace(SERVO, controller=ServoController(integral_gain=1e6))
+    _, moved = simulate(integrating, init(integrating), references(Step(size=0.003), 4000))
+    _, plain = simulate(SERVO, init(SERVO), references(Step(size=0.003)))
+    assert abs(moved.position[-1] - 0.003) < 0.1 * abs(plain.position[-1] - 0.003)
+
+
+@pytest.mark.parametrize(
+    ('wish', 'flag', 'followed'),
+    [
+        (Reference(math.nan, 0.0, 0.0), Limited.REFERENCE_NOT_FINITE, Reference(1e-3, 0.0, 0.0)),
+        (Reference(1e-3, math.inf, 0.0), Limited.REFERENCE_NOT_FINITE, Reference(1e-3, 0.0, 0.0)),
+        (Reference(1e-3, 0.01, 0.5), 0, Reference(1e-3, 0.01, 0.5)),
+        (Reference(2e-3, 0.0, 0.0), Limited.REFERENCE_TOO_FAST, Reference(1.1e-3, 0.2, 0.0)),
+        (Reference(1e-3, 0.9, 0.0), Limited.REFERENCE_TOO_FAST, Reference(1e-3, 0.2, 0.0)),
+        (
+            Reference(-9.0, 0.0, 0.0),
+            Limited.REFERENCE_OUT_OF_STROKE | Limited.REFERENCE_TOO_FAST,
+            Reference(0.9e-3, -0.2, 0.0),
+        ),
+    ],
+)
+def test_bad_reference_is_limited_and_says_so(wish, flag, followed):
+    reference, limited = limit_reference(SERVO.gains, 1e-3, wish)
+    assert reference == pytest.approx(followed)
+    assert limited == flag
+
+
+def test_rod_goes_no_further_than_short_of_the_stop():
+    _, moved = simulate(SERVO, init(SERVO), [Reference(1.0, 0.0, 0.0)] * 1000)
+    assert 0.0235 < moved.position[-1] < 0.0245
+    assert moved.limited[-1] == Limited.REFERENCE_OUT_OF_STROKE
+
+
+def test_feedforward_that_is_not_finite_counts_as_zero():
+    state, out = step(SERVO, init(SERVO), Reference(0.0, 0.0, 0.0), math.nan)
+    assert out.command.limited == Limited.FEEDFORWARD_NOT_FINITE
+    assert state == step(SERVO, init(SERVO), Reference(0.0, 0.0, 0.0))[0]
+
+
+def test_command_beyond_what_supply_and_spool_can_do_is_cut_and_says_so():
+    _, out = step(SERVO, init(SERVO), Reference(0.0, 0.0, 0.0), 1e9)
+    assert out.command.limited == Limited.FORCE
+    assert out.command.force == pytest.approx(SERVO.constants.area * (SERVO.valve.supply_pressure - 1e5))
+    fast = measure(SERVO.constants, init(SERVO).plant)._replace(velocity=5.0)
+    _, command = control(SERVO.gains, SERVO.constants, ControllerState(0.0, 0.0), fast, Reference(0.0, 0.0, 0.0), 0.0)
+    assert command.limited == Limited.FORCE | Limited.SPOOL
+    assert command.spool == 1.0
+
+
+def test_a_breakaway_that_follows_the_load_holds_the_simulated_rod_as_it_does_the_estimate():
+    seal = dataclasses.replace(SEAL, stiction=0.5, stiction_ratio=0.3)
+    servo = ServoParameters(seals=(MountedSeal(seal, 'a'), MountedSeal(seal, 'b')))
+    out = outputs(servo, init(servo).plant)
+    expected = actuator_friction(servo.seals, out.pressure_a, out.pressure_b)
+    assert expected.stiction > 2.0 * seal.stiction + 10.0
+    assert out.breakaway_force == pytest.approx(expected.coulomb_friction + expected.stiction, rel=1e-5)
+    plant = init(servo).plant
+    for share, moves in ((0.99, False), (1.01, True)):
+        for _ in range(200):
+            plant = advance(servo, plant, 0.0, share * out.breakaway_force)
+        assert (plant.position != 0.0) == moves
+
+
+def test_a_seal_whose_friction_depends_on_the_velocity_is_refused():
+    seal = dataclasses.replace(SEAL, velocity_terms=VelocityTerms(viscous_friction=10.0))
+    with pytest.raises(ValueError, match='depends on the velocity'):
+        ServoParameters(seals=(MountedSeal(seal, 'a'),))
+
+
+def test_the_bench_says_how_much_faster_than_time_it_runs(monkeypatch, capsys):
+    monkeypatch.setattr(sys, 'argv', ['servo.py', '--seconds', '0.2', '--json'])
+    time_servo()
+    rows = json.loads(capsys.readouterr().out)['rows']
+    assert len(rows) == 4
+    assert all(min(row['step'], row['simulate']) > 0.0 for row in rows)

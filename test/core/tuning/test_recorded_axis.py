@@ -1,0 +1,191 @@
+"""What a recording tells about the friction of an axis: recordings with a known answer, made from formulas."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Motion
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.tuning.recorded_axis import (
+    Recording,
+    acceleration,
+    delayed,
+    feedforward_force,
+    fit_law,
+    match,
+    near_reversals,
+)
+from seal_friction_ros.core.tuning.settings import MatchSettings
+
+RATE, SECONDS = 500.0, 4.0  # [Hz], [s]
+TIME = np.arange(round(RATE * SECONDS)) / RATE
+SETTINGS = FeedForwardSettings()
+KNOWN = MatchSettings()
+
+
+def recording(
+    *, scale=0.8, mass=5.0, offset=3.0, width=0.0, noise=0.0, frequency=2.0, coulomb=40.0, velocity=None, status=0
+):
+    """A rod that follows its sine, with a friction of ``scale`` times ``coulomb``, smooth over ``width`` [m/s]."""
+    rate, speed = 2.0 * math.pi * frequency, 0.03
+    if velocity is None:
+        velocity, slope = speed * np.cos(rate * TIME), -speed * rate * np.sin(rate * TIME)
+    else:
+        slope = np.gradient(velocity, TIME)
+    pressure_part = coulomb * (1.0 + 0.1 * np.sin(3.0 * TIME))
+    direction = np.tanh(velocity / width) if width else np.sign(velocity)
+    force = scale * pressure_part * direction + mass * slope + offset
+    force = force + noise * np.random.default_rng(5).normal(size=len(TIME))
+    estimates = [
+        FrictionEstimate(
+            round(t * 1e9), c, 3.0, c + 5.0, 0.0, FrictionState.SLIDING if abs(v) > 1e-3 else FrictionState.STUCK,
+            int(np.sign(v)), status, 0.0,
+        )
+        for t, c, v in zip(TIME, pressure_part, velocity, strict=True)
+    ]  # fmt: skip
+    motions = [Motion(float(v), float(a), float(v)) for v, a in zip(velocity, slope, strict=True)]
+    return Recording(tuple(estimates), tuple(motions), force)
+
+
+def test_scale_mass_and_offset_come_back():
+    law = fit_law(recording(noise=2.0))
+    assert law.scale == pytest.approx(0.8, abs=4.0 * law.scale_std)
+    assert law.scale_std < 0.01
+    assert law.mass == pytest.approx(5.0, abs=0.5)  # 0.17 kg is one standard deviation
+    assert law.offset == pytest.approx(3.0, abs=0.3)
+    assert law.mass_is_fitted
+
+
+def test_stated_deviation_is_that_of_the_scale():
+    scales = []
+    for seed in range(40):
+        made = recording()
+        noise = 5.0 * np.random.default_rng(seed).normal(size=len(TIME))
+        law = fit_law(made._replace(force_sum=made.force_sum + noise))
+        scales.append(law.scale)
+    assert np.std(scales) == pytest.approx(law.scale_std, rel=0.35)
+
+
+def test_given_mass_is_taken():
+    law = fit_law(recording(), 5.0)
+    assert (law.mass, law.mass_is_fitted) == (5.0, False)
+    assert law.scale == pytest.approx(0.8, abs=1e-3)
+
+
+def test_one_direction_cannot_tell_an_offset_so_none_is_taken_off():
+    velocity = 0.02 + 0.01 * np.sin(2.0 * math.pi * TIME)
+    law = fit_law(recording(velocity=velocity, offset=0.0))
+    assert law.offset == 0.0
+    assert law.scale == pytest.approx(0.8, rel=1e-2)
+
+
+def test_steady_speed_in_one_direction_tells_no_mass_but_is_no_error():
+    velocity = np.full(len(TIME), 0.02)
+    with pytest.raises(ValueError, match='record several speeds'):
+        fit_law(recording(velocity=velocity, offset=0.0))
+    assert fit_law(recording(velocity=velocity, offset=0.0), 5.0).scale == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize('status', [Status.PRESSURE_STALE, Status.PRESSURE_MISSING])
+def test_unusable_estimates_do_not_count(status):
+    with pytest.raises(ValueError, match='slides in 0 usable samples'):
+        fit_law(recording(status=int(status)))
+
+
+def test_acceleration_is_exact_for_a_parabola_and_unknown_at_gaps_and_faults():
+    velocity = 3.0 * TIME**2
+    slope = acceleration(TIME, velocity)
+    np.testing.assert_allclose(slope[5:-5], 6.0 * TIME[5:-5], atol=1e-9)
+    assert np.isnan(slope[:5]).all()
+    gap = TIME + np.where(np.arange(len(TIME)) > 700, 0.1, 0.0)
+    slope = acceleration(gap, velocity)
+    assert np.isnan(slope[696:706]).all()
+    assert np.isfinite(slope[[694, 707]]).all()
+    faulty = velocity.copy()
+    faulty[900] = math.nan
+    slope = acceleration(TIME, faulty)
+    assert np.isnan(slope[895:906]).all()
+    assert np.isfinite(slope[[894, 906]]).all()
+
+
+def test_acceleration_of_next_to_nothing_is_unknown():
+    assert np.isnan(acceleration(np.zeros(20), np.zeros(20))).all()
+    assert np.isnan(acceleration(np.arange(3.0), np.arange(3.0))).all()
+
+
+def test_reversals_of_the_reference_are_found_also_across_rest():
+    time = np.arange(100.0)
+    velocity = np.select([time < 20, time < 30, time < 60, time < 90], [1.0, 0.0, -1.0, 1.0], 0.0)
+    near = near_reversals(time, velocity)
+    assert list(np.flatnonzero(near)) == [21, 22, 23, 24, 25, 26, 27, 28, 56, 57, 58, 59, 60, 61, 62, 63]
+
+
+def test_reference_that_does_not_reverse_is_refused():
+    with pytest.raises(ValueError, match='reverses 0 times'):
+        near_reversals(TIME, np.ones(len(TIME)))
+
+
+def test_match_takes_the_scale_and_most_of_the_friction():
+    found = match(recording(noise=1.0), SETTINGS, KNOWN)
+    assert found.feedforward.coulomb_scale == 0.8
+    assert found.told == {
+        'coulomb_scale': True, 'lead_time': False, 'smoothing_velocity': True, 'slew_limit': True
+    }  # fmt: skip
+    assert found.without.sliding == pytest.approx(32.0, rel=0.05)
+    assert found.nominal.sliding < 0.1 * found.without.sliding
+    assert found.nominal.reversal < 0.25 * found.without.reversal
+    assert found.better_in_every_case
+
+
+def test_wrong_model_leaves_its_share():
+    found = match(recording(), SETTINGS, KNOWN)
+    for case in found.cases:
+        if case.friction_error:
+            assert case.residual.sliding == pytest.approx(0.3 * found.without.sliding, rel=0.15)
+    assert len(found.cases) == 9
+
+
+def test_smoothing_follows_the_seal():
+    """A seal whose friction rises over a speed wants a feed-forward that does."""
+    sharp = match(recording(), SETTINGS, KNOWN).feedforward.smoothing_velocity
+    soft = match(recording(width=0.008), SETTINGS, KNOWN).feedforward.smoothing_velocity
+    assert sharp < 0.002
+    assert soft == pytest.approx(0.008, rel=0.5)
+
+
+def test_slew_limit_lets_the_force_through_but_no_more():
+    found = match(recording(), SETTINGS, KNOWN).feedforward
+    limited, free = (
+        feedforward_force(s, recording()) for s in (found, dataclasses.replace(found, slew_limit=1e9))
+    )  # fmt: skip
+    assert np.sqrt(np.mean((limited - free) ** 2)) < 0.05 * np.sqrt(np.mean(free**2))
+    half = feedforward_force(dataclasses.replace(found, slew_limit=0.5 * found.slew_limit), recording())
+    assert np.sqrt(np.mean((half - free) ** 2)) > 0.05 * np.sqrt(np.mean(free**2))
+
+
+def test_fast_rod_cannot_tell_the_smoothing_and_keeps_it():
+    velocity = 0.03 * np.sign(np.cos(4.0 * math.pi * TIME)) * (1.0 + 0.2 * np.sin(40.0 * TIME))
+    found = match(recording(velocity=velocity, mass=0.0), SETTINGS, KNOWN)
+    assert found.feedforward.smoothing_velocity >= SETTINGS.smoothing_velocity
+
+
+def test_given_delay_is_the_lead_time_and_else_it_stays():
+    assert match(recording(), SETTINGS, KNOWN).feedforward.lead_time == SETTINGS.lead_time
+    found = match(recording(), SETTINGS, MatchSettings(whole_delay=0.007))
+    assert found.feedforward.lead_time == 0.007
+    assert found.told['lead_time']
+
+
+def test_friction_against_the_model_is_not_taken_for_a_scale():
+    found = match(recording(scale=-0.5), SETTINGS, KNOWN)
+    assert not found.told['coulomb_scale']
+    assert found.feedforward.coulomb_scale == SETTINGS.coulomb_scale
+    assert not found.better_in_every_case
+
+
+def test_delayed_force_comes_later():
+    force = np.arange(5.0)
+    np.testing.assert_allclose(delayed(np.arange(5.0), force, 1.5), [0.0, 0.0, 0.5, 1.5, 2.5])

@@ -1,0 +1,259 @@
+"""Bags: what we write opens elsewhere, what is damaged is said in one line."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from example_bags import write_inputs, write_recorded
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from mcap_ros2.decoder import DecoderFactory
+from paths import ROOT
+from rosbags.highlevel import AnyReader
+
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, decode_text, encode_text
+from seal_friction_ros.offline.bags import mcap_reader
+from seal_friction_ros.offline.bags.bag import (
+    BagError,
+    BagWriter,
+    bag_topics,
+    message_definition,
+    read_messages,
+)
+from seal_friction_ros.offline.bags.mcap_writer import Description, McapOutput
+from seal_friction_ros.offline.replay.replay import replay
+
+MESSAGES = ROOT / 'msg_defs' / 'msg'
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Path:
+    return write_recorded(tmp_path)
+
+
+def test_rosbags_decodes_every_message_with_nothing_but_the_bag(recorded: Path):
+    ours = list(read_messages(recorded))
+    with AnyReader([recorded]) as reader:
+        theirs = [(c, reader.deserialize(data, c.msgtype)) for c, _, data in reader.messages()]
+    assert len(ours) == len(theirs) > 1000
+    for message, (connection, decoded) in zip(ours, theirs, strict=True):
+        assert message.topic == connection.topic
+        record = DECODERS[message.type_name](message.data)
+        if message.type_name == CONFIGURATION_TYPE:
+            assert decoded.json == record
+            continue
+        stamp = decoded.header.stamp.sec * 10**9 + decoded.header.stamp.nanosec
+        assert record.stamp == stamp
+        numbers = {name: value for name, value in record._asdict().items() if name not in ('stamp', 'frame_id')}
+        assert {name: repr(float(getattr(decoded, name))) for name in numbers} == {
+            name: repr(float(value)) for name, value in numbers.items()
+        }
+
+
+def test_the_mcap_reader_decodes_every_message_with_nothing_but_the_file(recorded: Path):
+    with next(recorded.glob('*.mcap')).open('rb') as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == 'ros2'
+        decoded = [(channel.topic, message) for _, channel, _, message in reader.iter_decoded_messages()]
+        summary = reader.get_summary()
+    assert len(decoded) == len(list(read_messages(recorded)))
+    assert {schema.encoding for schema in summary.schemas.values()} == {'ros2msg'}
+    for channel in summary.channels.values():
+        assert 'reliability: reliable' in channel.metadata['offered_qos_profiles']
+    estimates = [message for topic, message in decoded if topic == '/friction_estimate']
+    assert {estimate.header.frame_id for estimate in estimates} == {'rod'}
+
+
+def test_metadata_names_the_file_topics_types_and_counts(recorded: Path):
+    information = yaml.safe_load((recorded / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    assert information['storage_identifier'] == 'mcap'
+    assert information['relative_file_paths'] == ['recorded_0.mcap']
+    counts = {
+        topic['topic_metadata']['name']: topic['message_count'] for topic in information['topics_with_message_count']
+    }
+    assert counts == {topic: info.message_count for topic, info in bag_topics(recorded).items()}
+    assert information['message_count'] == sum(counts.values())
+
+
+@pytest.mark.parametrize('path', sorted(MESSAGES.glob('*.msg')), ids=lambda path: path.stem)
+def test_message_definitions_keep_the_comments_with_the_units(path: Path):
+    text, type_hash = message_definition(f'seal_friction_msgs/msg/{path.stem}')
+    assert text.startswith(path.read_text())
+    assert type_hash.startswith('RIHS01_')
+
+
+def test_messages_come_back_in_the_order_written_even_at_equal_times(tmp_path: Path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        for topic in ('/z', '/a', '/m', '/z'):
+            writer.write(topic, CONFIGURATION_TYPE, 5, encode_text(topic))
+    messages = list(read_messages(tmp_path / 'bag'))
+    assert [m.topic for m in messages] == ['/z', '/a', '/m', '/z']
+    assert [m.log_time for m in messages] == [5, 6, 7, 8]
+
+
+def write_split(path: Path, source: Path, **split: float) -> dict[str, Any]:
+    """Copy a bag into one that is split; its metadata."""
+    with BagWriter(path, **split) as writer:
+        for message in read_messages(source):
+            writer.write(*message)
+    return yaml.safe_load((path / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+
+
+@pytest.mark.parametrize('split', [{'split_size': 50_000}, {'split_duration': 0.7}])
+def test_a_split_bag_is_one_bag_to_every_reader(recorded: Path, tmp_path: Path, split: dict[str, float]):
+    information = write_split(tmp_path / 'split', recorded, **split)
+    names = [f'split_{i}.mcap' for i in range(len(information['files']))]
+    assert len(names) > 3
+    assert information['relative_file_paths'] == names == [file['path'] for file in information['files']]
+    assert {path.name for path in (tmp_path / 'split').iterdir()} == {*names, 'metadata.yaml'}
+    assert list(read_messages(tmp_path / 'split')) == list(read_messages(recorded))
+    assert bag_topics(tmp_path / 'split') == bag_topics(recorded)
+    assert replay(tmp_path / 'split').identical
+    with AnyReader([tmp_path / 'split']) as reader:
+        theirs = [(c.topic, log_time, bytes(data)) for c, log_time, data in reader.messages()]
+    assert theirs == [(m.topic, m.log_time, m.data) for m in read_messages(recorded)]
+
+
+def test_each_file_of_a_split_bag_stands_alone_and_metadata_is_true_of_it(recorded: Path, tmp_path: Path):
+    information = write_split(tmp_path / 'split', recorded, split_size=50_000)
+    for file in information['files']:
+        path = tmp_path / 'split' / file['path']
+        messages = list(read_messages(path))
+        assert file['message_count'] == len(messages) == sum(info.message_count for info in bag_topics(path).values())
+        assert file['starting_time']['nanoseconds_since_epoch'] == messages[0].log_time
+        assert file['duration']['nanoseconds'] == messages[-1].log_time - messages[0].log_time
+        assert path.stat().st_size < 50_000 + 40_000  # definitions and index come on top
+        with path.open('rb') as stream:
+            assert len(list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())) > 50
+    assert information['message_count'] == sum(file['message_count'] for file in information['files'])
+
+
+def test_a_file_lasts_no_longer_than_the_split_duration(recorded: Path, tmp_path: Path):
+    information = write_split(tmp_path / 'split', recorded, split_duration=0.5)
+    assert all(file['duration']['nanoseconds'] <= 500_000_000 for file in information['files'])
+
+
+def test_metadata_is_there_from_the_start_and_lists_each_finished_file_and_new_topic(tmp_path: Path):
+    def information() -> dict[str, Any]:
+        return yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+
+    writer = BagWriter(tmp_path / 'bag', split_duration=1e-9)
+    assert information()['relative_file_paths'] == ['bag_0.mcap']
+    writer.write('/t', CONFIGURATION_TYPE, 1, encode_text('a'))
+    writer.flush()
+    assert [t['topic_metadata']['name'] for t in information()['topics_with_message_count']] == ['/t']
+    for log_time in (5, 9):
+        writer.write('/t', CONFIGURATION_TYPE, log_time, encode_text('b'))
+    assert information()['relative_file_paths'] == ['bag_0.mcap', 'bag_1.mcap']
+    assert information()['message_count'] == 2
+    assert len(list(read_messages(tmp_path / 'bag'))) == 2  # the finished files are a valid bag already
+    writer.close()
+    assert information()['relative_file_paths'] == ['bag_0.mcap', 'bag_1.mcap', 'bag_2.mcap']
+    assert information()['message_count'] == 3
+
+
+def test_what_was_flushed_is_in_the_file_and_whole(tmp_path: Path):
+    writer = BagWriter(tmp_path / 'bag')
+    for number in range(10):
+        writer.write('/t', CONFIGURATION_TYPE, number, encode_text(str(number)))
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        assert list(mcap_reader.messages(file, mcap_reader.scan(file))) == []
+        writer.flush()
+        layout = mcap_reader.scan(file)
+        assert [decode_text(data) for _, _, data in mcap_reader.messages(file, layout)] == list('0123456789')
+        assert layout.sound_size == (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size
+    writer.close()
+
+
+def test_chunks_that_overlap_in_time_come_out_in_order_of_time(tmp_path: Path):
+    with (tmp_path / 'mixed.mcap').open('wb') as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel('/t', 'cdr', writer.register_schema('a/msg/B', 'ros2msg', b''))
+        for times in ([5, 3, 9], [4, 4, 8], [20, 21, 22], [1, 30, 10]):
+            for log_time in times:
+                writer.add_message(channel, log_time, bytes([log_time]), 0)
+            writer.flush()
+        writer.finish()
+    messages = list(read_messages(tmp_path / 'mixed.mcap'))
+    assert [m.log_time for m in messages] == [1, 3, 4, 4, 5, 8, 9, 10, 20, 21, 22, 30]
+    assert [m.data[0] for m in messages] == [m.log_time for m in messages]
+
+
+def test_a_bag_is_never_overwritten(tmp_path: Path):
+    write_inputs(tmp_path / 'bag', 3)
+    before = {p.name: p.read_bytes() for p in (tmp_path / 'bag').iterdir()}
+    with pytest.raises(BagError, match='exists already: not overwriting'):
+        BagWriter(tmp_path / 'bag')
+    assert {p.name: p.read_bytes() for p in (tmp_path / 'bag').iterdir()} == before
+
+
+def test_a_failure_while_writing_leaves_nothing_behind(tmp_path: Path):
+    with pytest.raises(RuntimeError), BagWriter(tmp_path / 'bag'):
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bare_file_reads_like_its_bag(recorded: Path, tmp_path: Path):
+    file = shutil.copy(next(recorded.glob('*.mcap')), tmp_path / 'bare.mcap')
+    assert list(read_messages(Path(file))) == list(read_messages(recorded))
+    assert bag_topics(Path(file)) == bag_topics(recorded)
+
+
+@pytest.mark.parametrize('share', [0.0, 0.001, 0.1, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize('bare', [False, True])
+def test_a_truncated_bag_is_said_in_one_line(recorded: Path, share: float, bare: bool):
+    file = next(recorded.glob('*.mcap'))
+    file.write_bytes(file.read_bytes()[: int(file.stat().st_size * share)])
+    with pytest.raises(BagError) as error:
+        list(read_messages(file if bare else recorded))
+    assert '\n' not in str(error.value)
+    assert str(recorded) in str(error.value)
+
+
+@pytest.mark.parametrize('content', [b'', b'\x00' * 100, b'rosbag2_bagfile_information: {version: 9}', b'[1, 2'])
+def test_bad_metadata_is_said_in_one_line(recorded: Path, content: bytes):
+    (recorded / 'metadata.yaml').write_bytes(content)
+    with pytest.raises(BagError) as error:
+        list(read_messages(recorded))
+    assert '\n' not in str(error.value)
+
+
+def test_what_is_no_bag_is_said_in_one_line(tmp_path: Path):
+    (tmp_path / 'text').write_text('no bag')
+    for path in (tmp_path, tmp_path / 'text', tmp_path / 'absent'):
+        with pytest.raises(BagError) as error:
+            list(read_messages(path))
+        assert '\n' not in str(error.value)
+        assert str(path) in str(error.value)
+
+
+def test_a_file_is_byte_for_byte_what_the_writer_of_the_mcap_library_makes(tmp_path: Path):
+    ours = McapOutput(tmp_path / 'ours.mcap')
+    with (tmp_path / 'library.mcap').open('wb') as stream:
+        theirs = Writer(stream, chunk_size=1 << 40, compression=CompressionType.NONE)
+        theirs.start('ros2', 'seal_friction_ros')
+        channels: dict[str, int] = {}
+        for number in range(3000):
+            topic = f'/{"abc"[number % 3 if number > 1000 else 0]}'  # two come late
+            description = Description(
+                f'x/msg/{topic[1].upper()}', 'ros2msg', b'float64 ' + topic[1:].encode(), {'qos': topic}
+            )
+            if topic not in channels:
+                schema = theirs.register_schema(*description[:3])
+                channels[topic] = theirs.register_channel(topic, 'cdr', schema, description.metadata)
+            data = bytes(number % 50)
+            ours.write(topic, description, 10**9 + number, data)
+            theirs.add_message(channels[topic], 10**9 + number, data, publish_time=10**9 + number)
+            if number % 700 == 699:
+                ours.flush()
+                theirs.flush()
+        ours.flush()
+        theirs.flush()
+        ours.finish('about')
+        theirs.add_metadata('rosbag2', {'serialized_metadata': 'about'})
+        theirs.finish()
+    ours.close()
+    assert (tmp_path / 'ours.mcap').read_bytes() == (tmp_path / 'library.mcap').read_bytes()

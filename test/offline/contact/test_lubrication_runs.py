@@ -1,0 +1,284 @@
+"""``seal_friction ehl``: files in, numbers, pages and seal files out; work that goes on where it was left."""
+
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.messages import (
+    FORCE_TYPE,
+    POSITION_TYPE,
+    PRESSURE_TYPE,
+    VELOCITY_TYPE,
+    Position,
+    Velocity,
+    encode_force,
+    encode_position,
+    encode_pressure,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.lubrication.case import Case, Spool
+from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
+from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
+from seal_friction_ros.core.lubrication.transient import run
+from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.contact import lubrication_runs as ehl
+from seal_friction_ros.offline.contact.lubrication_runs import load_case
+from seal_friction_ros.offline.reports.bag_evaluation import read_run
+
+SMALL = """name: small
+motion: {cycles: 1}
+numerics: {cells: 48, time_step: 2.0e-3}
+study: {solid_shear_stresses: [1.0e+6, 2.0e+6]}
+map: {velocity_min: 1.0e-3, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+5, pressures: 2}
+"""
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> str:
+    path = tmp_path / 'small.yaml'
+    path.write_text(SMALL)
+    return str(path)
+
+
+def answer(capsys, *arguments: str) -> dict:
+    assert main(['ehl', *arguments, '--json', '--jobs', '1']) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'config' / 'ehl').glob('*.yaml')), ids=lambda path: path.stem)
+def test_every_case_of_the_repository_is_one_and_says_what_is_ours(path: Path):
+    case = load_case(path.stem)
+    assert isinstance(case, Case | Spool)
+    assert case.name == path.stem
+    assert case.source
+    if isinstance(case, Spool):
+        assert all(isinstance(load_case(member.case), Case) for member in case.members)
+
+
+def test_run_gives_its_findings_with_their_errors(small, capsys):
+    found = answer(capsys, 'run', small)
+    assert found['friction_N'] > 0.0
+    assert 0.9 < found['solid_share'] < 1.0
+    assert found['step_errors'].keys() == found['grid_errors'].keys() >= {'friction_N', 'rise_on_deceleration'}
+    assert found['mass_defect'] < 1e-12
+    assert found['retried_steps'] == 0
+
+
+def test_study_has_the_keys_of_the_paper_as_one_json_object_and_two_processes_find_what_one_does(tmp_path, capsys):
+    """The processes do not compile, which would take them longer than the work."""
+    tiny = tmp_path / 'tiny.yaml'
+    tiny.write_text(SMALL.replace('cells: 48, time_step: 2.0e-3', 'cells: 32, time_step: 4.0e-3'))
+    command = [
+        sys.executable,
+        '-m',
+        'seal_friction_ros.offline.commands.main',
+        'ehl',
+        'study',
+        str(tiny),
+        '--json',
+        '--jobs',
+        '2',
+    ]
+    environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found['solid_shear_stress_Pa'] == [1e6, 2e6]
+    assert found['friction_N'][1] == pytest.approx(2.0 * found['friction_N'][0], rel=0.1)
+    assert len(found['solid_share']) == 2
+    alone = answer(capsys, 'study', str(tiny))
+    assert found.keys() == alone.keys()
+    assert found['friction_N'] == pytest.approx(alone['friction_N'], rel=1e-9)
+
+
+def test_interrupted_work_goes_on_where_it_was_left(small, tmp_path, capsys, monkeypatch):
+    work = tmp_path / 'work'
+    first = answer(capsys, 'study', small, '--work', str(work))
+    finished = sorted(work.glob('*.json'))
+    assert len(finished) == 2
+    finished[0].unlink()
+    asked = []
+    monkeypatch.setattr(ehl, 'run', lambda case, *rest: asked.append(case) or run(case, *rest))
+    assert answer(capsys, 'study', small, '--work', str(work))['friction_N'] == (first['friction_N'])
+    assert len(asked) == 1
+    for path in finished:
+        path.write_text('{"half": 1}')
+    assert answer(capsys, 'study', small, '--work', str(work)) == first
+
+
+def test_map_becomes_a_seal_file_that_the_estimator_takes(small, tmp_path, capsys):
+    seal_file = tmp_path / 'mapped.yaml'
+    work = ('--work', str(tmp_path / 'work'))
+    found = answer(capsys, 'map', small, '--seal-file', str(seal_file), *work)
+    assert np.array(found['friction_N']).shape == (2, 3)
+    assert found['memory_length_m'] > 0.0
+    seal = parse_seal(read_yaml(seal_file))
+    assert seal.coulomb_law.sliding_friction(0.0, 1e-2) == pytest.approx(found['friction_N'][0][1], rel=1e-5)
+    assert seal.coulomb_law.coulomb_friction(1e5) > seal.coulomb_law.coulomb_friction(0.0)
+    assert answer(capsys, 'map', small, *work) == found
+    assert main(['charts', str(seal_file), '--out', str(tmp_path / 'charts.html')]) == 0
+
+
+def test_recording_with_a_mapped_seal_replays_to_the_same_bytes_and_rubs_less_the_faster_it_slides(small, tmp_path):
+    seal_file = tmp_path / 'mapped.yaml'
+    assert main(['ehl', 'map', small, '--seal-file', str(seal_file), '--jobs', '1']) == 0
+    bag = measured_bag(tmp_path, with_position=True, seal=seal_file)
+    assert main(['replay', str(bag), '--verify']) == 0
+    recorded = read_run(bag)
+    speed, friction = np.abs(recorded.velocity), np.abs(recorded.friction_force)
+    sliding = recorded.state == FrictionState.SLIDING
+    slow, fast = sliding & (speed < 15e-3), sliding & (speed > 30e-3)
+    assert friction[slow].min() > 1.1 * friction[fast].max()
+    assert np.ptp(recorded.coulomb_friction) == 0.0  # that of the pressure alone, at the reference speed
+
+
+def test_map_does_not_overwrite_a_seal_file(small, tmp_path, capsys):
+    there = tmp_path / 'there.yaml'
+    there.write_text('mine')
+    assert main(['ehl', 'map', small, '--seal-file', str(there)]) == 2
+    assert 'exists already: not overwriting it' in capsys.readouterr().err
+    assert there.read_text() == 'mine'
+
+
+def test_every_command_of_the_page_is_one(small, tmp_path, capsys, monkeypatch):
+    """With a small case instead of those of the page, so that it takes no longer than it must."""
+    monkeypatch.chdir(tmp_path)
+    Path('build').mkdir()
+    Path('spool.yaml').write_text('name: spool\nmotion: {distance: 1.8e-3, cycles: 1}\nseals: [{case: small}]\n')
+    swapped = {'inner_seal': small, 'spool': 'spool.yaml', 'BAG': str(measured_bag(tmp_path, with_position=True))}
+    blocks = re.findall(r'```bash\n(.*?)```', (ROOT / 'docs' / 'ehl.md').read_text(), re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines()]
+    assert len(lines) == 5
+    for line in lines:
+        program, *words = line.split()
+        assert program == '.venv/bin/seal_friction'
+        assert main([*(swapped.get(word, word) for word in words), '--jobs', '1']) == 0, line
+    pages = {path.stem: path.read_text() for path in Path('build').glob('*.html')}
+    assert pages.keys() == {'inner_seal', 'spool', 'study', 'map', 'compared'}
+    assert 'Findings' in pages['inner_seal']
+    assert 'grease.flow_index' in pages['inner_seal']
+    assert 'simulation_against_measurement' in pages['compared']
+    figures = [path for path in Path('build').glob('*_figures/*') if path.stat().st_size > 1000]
+    assert {path.name for path in figures} >= {
+        'film.gif', 'film.svg', 'friction_over_position.png', 'spool.png', 'solid_shear_stress.png', 'friction_map.png',
+    }  # fmt: skip
+
+
+def test_every_bench_of_the_page_is_one(small, capsys, monkeypatch):
+    """With a small case, like the commands."""
+    specification = importlib.util.spec_from_file_location('bench_ehl', ROOT / 'bench' / 'ehl.py')
+    bench = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(bench)
+    monkeypatch.setattr(bench, 'single_case', lambda _name, what: ehl.single_case(small, what))
+    monkeypatch.setattr(bench, 'SINGLE', ('small',))
+    monkeypatch.setattr(bench, 'OURS', {'small': ('topography.rms_height', 'seal.crown_radius')})
+    monkeypatch.setattr(bench, 'CELLS', (32, 48))
+    monkeypatch.setattr(bench, 'STEPS', (8e-3, 4e-3))
+    monkeypatch.setattr(bench, 'CALLS', 50)
+    lines = set(re.findall(r'`python (bench/ehl\.py[^`]*)`', (ROOT / 'docs' / 'ehl.md').read_text()))
+    assert len(lines) == 3
+    for line in lines:
+        monkeypatch.setattr(sys, 'argv', [*line.split(), '--json'])
+        bench.main()
+        found = json.loads(capsys.readouterr().out)
+        if '--findings' in line:
+            assert {'friction', 'deviation', 'retried_steps'} <= {row['name'] for row in found}
+        else:
+            assert ('topography.rms_height' if '--influence' in line else 'estimator step, friction_map [us]') in found
+
+
+def test_spool_adds_up_its_seals(small, tmp_path, capsys):
+    spool = tmp_path / 'spool.yaml'
+    spool.write_text(
+        'name: pair\nmotion: {distance: 1.8e-3, cycles: 1}\n'
+        'seals: [{case: small}, {case: small}, {case: small, mirrored: true}]\n'
+    )
+    found = answer(capsys, 'run', str(spool))
+    single = np.abs(run(load_case(small)).friction).max()
+    assert found['largest_friction_N'] == pytest.approx(3.0 * single, rel=0.01)
+    assert found['seals'] == ['small', 'small', 'small, mirrored']
+
+
+def measured_bag(folder: Path, with_position: bool, seal: Path | None = None) -> Path:
+    """A rod on the motion of the paper, with estimates; its force is a square wave about an offset that rings."""
+    motion, step = ConstantAcceleration(cycles=3), 1e-3
+    times = np.arange(round(motion.duration / step)) * step
+    way = np.array([motion.position(t + step) - motion.position(t - step) for t in times])
+    rung = transducer_force(MeasuringChain(natural_frequency=157.0), times, 0.8 * np.sign(way))
+    raw = folder / 'raw'
+    with b.BagWriter(raw) as writer:
+        for i, time in enumerate(times):
+            stamp = 1_000_000_000 + i * 1_000_000
+            velocity = way[i] / (2.0 * step) if i else 0.0
+            pressure = Pressure(stamp, 0.5e5, 0.0)
+            writer.write(b.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode_pressure(pressure, b'rod'))
+            force = Force(stamp, 3.0 + float(rung[i]))
+            writer.write(b.FORCE_TOPIC, FORCE_TYPE, stamp, encode_force(force, b'rod'))
+            if with_position:
+                position = Position(stamp, 0.1 + motion.position(time))
+                writer.write(b.POSITION_TOPIC, POSITION_TYPE, stamp, encode_position(position, b'rod'))
+            data = encode_velocity(Velocity(stamp, velocity, b'rod'))
+            writer.write(b.VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
+    seal = seal or ROOT / 'config' / 'seals' / 'ms28775_114.yaml'
+    assert main(['replay', str(raw), '--seal', str(seal), '--out', str(folder / 'bag')]) == 0
+    return folder / 'bag'
+
+
+@pytest.mark.parametrize('with_position', [True, False])
+def test_measured_motion_of_a_bag_is_run_and_its_force_compared(small, tmp_path, capsys, with_position):
+    bag = measured_bag(tmp_path, with_position)
+    capsys.readouterr()
+    found = answer(capsys, 'run', small, '--bag', str(bag), '--average', '10')
+    assert found['correlation'] > 0.85
+    assert found['measured_mean_N'] == pytest.approx(0.75, abs=0.05)
+    assert found['resonance_Hz'] == pytest.approx(157.0, rel=0.05)  # three cycles do not tell it closer
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['run', 'nowhere'], 'nowhere.yaml: No such file'),
+        (['study', 'spool'], 'a spool has no study'),
+        (['map', 'spool'], 'a spool has no friction map'),
+        (['run', 'spool', '--bag', 'x'], 'a spool cannot be compared with a bag'),
+        (['run', 'inner_seal', '--window', '0', '1'], '--window is only for a --bag'),
+        (['run', 'inner_seal', '--average', '9'], '--average is only for a --bag'),
+        (['map', 'inner_seal', '--seal-file', 'setup.py/x.yaml'], 'setup.py/x.yaml: cannot write into'),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(arguments, words, capsys):
+    assert main(['ehl', *arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count('\n') == 1
+
+
+def test_run_that_does_not_converge_is_an_error_and_no_curve(tmp_path, capsys):
+    """Roughness that the load crushes."""
+    path = tmp_path / 'crushed.yaml'
+    path.write_text(SMALL.replace('small', 'crushed') + 'topography: {rms_height: 0.2e-6, rms_slope: 0.1}\n')
+    page = tmp_path / 'page.html'
+    assert main(['ehl', 'run', str(path), '--out', str(page)]) == 2
+    said = capsys.readouterr()
+    assert said.out == ''
+    assert 'case crushed at' in said.err
+    assert not page.exists()
+
+
+def test_case_of_the_paper_stands_in_full_in_its_file_and_is_what_the_others_build_on():
+    case = load_case('inner_seal')
+    assert replace(case, name='x', source='') == Case(name='x')

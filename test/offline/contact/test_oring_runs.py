@@ -1,0 +1,239 @@
+"""The command ``oring``: a case file to numbers, a seal file and a page; what is wrong is said in one line."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from paths import ROOT
+from rich.progress import Progress
+
+from seal_friction_ros.core.foundation.units import PSI
+from seal_friction_ros.core.friction.actuator import coulomb_friction
+from seal_friction_ros.core.friction.geometry import projected_area
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.oring_contact.case_file import parse_case
+from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.contact.oring_runs import compute_case
+from seal_friction_ros.offline.reports.oring_report import appendix_b
+from seal_friction_ros.offline.reports.seal_charts import dynamic_readings
+
+CASES = ROOT / 'config' / 'oring'
+KEYS = {'pressure_Pa', 'normal_force_N', 'axial_force_N', 'peak_contact_stress_Pa', 'contact_width_m'}
+
+
+def document(**changes) -> dict:
+    """The calibrated case of the thesis on a coarse mesh."""
+    made = yaml.safe_load((CASES / 'ms28775_114.yaml').read_text())
+    made |= {'numerics': {'lines': 13}, 'pressures': [0.0, 1.7e6]} | changes
+    return {key: value for key, value in made.items() if value is not None}
+
+
+def written(folder: Path, made: object) -> Path:
+    path = folder / 'case.yaml'
+    path.write_text(yaml.safe_dump(made))
+    return path
+
+
+@pytest.fixture(scope='module')
+def computed(tmp_path_factory):
+    """Numbers, seal file and page of one run of the command."""
+    folder = tmp_path_factory.mktemp('oring')
+    case = written(folder, document())
+    arguments = [
+        'oring',
+        str(case),
+        '--out',
+        str(folder / 'seal.yaml'),
+        '--report',
+        str(folder / 'page.html'),
+        '--json',
+    ]
+    assert main(arguments) == 0
+    return folder
+
+
+def test_json_has_one_number_for_every_pressure(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(['oring', str(written(tmp_path, document())), '--pressures', '0', '5e5', '--json']) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert set(figures) >= KEYS
+    assert all(len(figures[key]) == 2 for key in KEYS)
+    assert figures['pressure_Pa'] == [0.0, 5e5]
+    for result, wall in ((0, 'rod'), (0, 'gland'), (1, 'rod'), (1, 'gland'), (1, 'wall')):
+        profile = figures[f'{wall}_profile'][result]
+        assert profile['position_m'] == sorted(profile['position_m'])
+        assert len(profile['stress_Pa']) == len(profile['position_m']) > 3
+    assert max(figures['rod_profile'][1]['stress_Pa']) == figures['peak_contact_stress_Pa'][1]
+    assert figures['wall_profile'][0] == {'position_m': [], 'stress_Pa': []}
+    assert figures['normal_force_N'] == sorted(figures['normal_force_N'])
+    area = projected_area(parse_case(document()).case.geometry)
+    assert figures['axial_force_N'][1] == pytest.approx(5e5 * area, rel=0.01)
+
+
+def test_the_seal_file_made_is_a_seal_with_the_computed_normal_force(computed: Path):
+    text = (computed / 'seal.yaml').read_text()
+    seal = parse_seal(yaml.safe_load(text))
+    table = yaml.safe_load(text)['normal_force']
+    assert table['law'] == 'monotone_table'
+    force = table['normal_forces'][0]
+    coefficient = seal.coulomb_law.friction_coefficient_law.coefficient_of_friction(force)
+    assert coulomb_friction(seal, 0.0) == pytest.approx(coefficient * force)
+    assert seal.pressure_max == 1.7e6
+
+
+def test_the_page_stands_alone_and_shows_what_was_asked_for(computed: Path):
+    page = (computed / 'page.html').read_text()
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    names = {path.stem for path in (computed / 'page_figures').iterdir()}
+    assert names == {
+        'deformed_shape', 'contact_stress_profiles', 'contact_stress_walls', 'normal_over_axial_force', 'friction',
+    }  # fmt: skip
+    assert all(f'id="{name}"' in page for name in names)
+    assert 'Against Appendix B of the thesis' in page
+    assert 'ms28775_114_fem' in page
+
+
+def test_the_seal_that_comes_with_the_package_was_made_by_the_command_from_its_case():
+    seal, case = read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114_fem.yaml'), read_yaml(CASES / 'ms28775_114.yaml')
+    assert seal['name'] == case['name']
+    assert seal['normal_force']['pressures'] == pytest.approx(case['pressures'])
+    assert {key: seal['geometry'][key] for key in case['geometry']} == case['geometry']
+    assert seal['friction_coefficient'] == case['friction']['friction_coefficient']
+    force = [case.normal_force for case in appendix_b().values()]
+    assert seal['normal_force']['normal_forces'] == pytest.approx(force, rel=0.05)
+
+
+def test_its_friction_from_geometry_is_within_5_percent_of_the_mean_of_the_tests():
+    seal = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114_fem.yaml'))
+    pressures, friction = dynamic_readings()
+    for pressure in set(pressures):
+        mean = friction[pressures == pressure].mean()
+        assert 2.0 * coulomb_friction(seal, pressure) == pytest.approx(mean, rel=0.05)
+
+
+@pytest.mark.parametrize('name', ['ms28775_114', 'ms28775_114_blind'])
+def test_measured_friction_in_the_case_files_is_that_of_the_tables(name: str):
+    measured = parse_case(read_yaml(CASES / f'{name}.yaml')).measured
+    pressures, friction = dynamic_readings()
+    means = [friction[abs(pressures - p) < 1.0].mean() for p in measured.pressures]
+    assert measured.frictions == pytest.approx(means, rel=1e-3)
+
+
+@pytest.mark.parametrize('path', sorted(CASES.glob('*.yaml')), ids=lambda path: path.stem)
+def test_every_case_that_comes_with_the_package_is_one_and_says_where_it_is_from(path: Path):
+    file = parse_case(read_yaml(path))
+    assert len(file.source) > 80
+    assert file.friction is not None
+    assert file.measured is not None
+
+
+def test_appendix_b_is_read_in_si():
+    case = appendix_b()[1000.0]
+    assert case.peak_stress == pytest.approx(1187.3 * PSI)
+    assert case.normal_force == pytest.approx(91.1 * 4.448, rel=1e-3)
+    assert len(appendix_b()) == 5
+
+
+def test_progress_is_one_step_a_pressure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    steps = []
+    monkeypatch.setattr(Progress, 'advance', lambda _, __, step: steps.append(step))
+    compute_case(written(tmp_path, document()))
+    assert steps == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ('changes', 'message'),
+    [
+        ({'name': 7}, 'case file: name = 7 is not one line of text'),
+        ({'colour': 'black'}, 'case ms28775_114_fem has no colour: it has name, source'),
+        ({'rubber': {'hardness': 70.0, 'elastic_modulus': 5e6}}, 'give one of hardness [Shore A] and elastic_modulus'),
+        ({'rubber': {'hardness': 7.0}}, 'rubber: hardness = 7.0 Shore A is outside 20 to 95'),
+        ({'rubber': None}, 'rubber: give one of hardness'),
+        ({'groove': None}, 'groove is not a mapping'),
+        ({'groove': {'width': 1.5e-3}}, 'case ms28775_114_fem: OringCase.groove: overfilled gland: the rubber has'),
+        (
+            {'geometry': {'section_diameter': 2.6e-3}},
+            'geometry lacks ring_inner_diameter, rod_diameter, gland_diameter',
+        ),
+        ({'numerics': {'lines': 3}}, 'numerics: Numerics.lines = 3  is below its lower bound 9'),
+        ({'pressures': [0.0, 1e8]}, 'extrudes the ring'),
+        ({'pressures': 'all'}, "pressures = 'all' is not a list"),
+        ({'friction': {'stiction': 1.0}}, 'friction_coefficient = None is not a mapping'),
+        ({'measured': {'seals': 1, 'pressures': [1.0], 'frictions': []}}, '0 frictions at 1 pressures'),
+    ],
+)
+def test_an_unusable_case_is_exit_code_2_and_one_line(
+    changes: dict, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    path = written(tmp_path, document(**changes))
+    assert main(['oring', str(path)]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert str(path) in said
+    assert len(said.splitlines()) == 1
+
+
+def test_commands_and_case_file_of_the_docs_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    page = (ROOT / 'docs' / 'oring.md').read_text()
+    with_package, *own = re.findall(r'^\.venv/bin/seal_friction (oring .*?) +#', page, re.MULTILINE)
+    assert f'seal_friction {with_package}\n' in (ROOT / 'README.md').read_text()  # where all commands are run
+    assert len(own) == 2
+    monkeypatch.chdir(tmp_path)
+    (case,) = re.findall(r'```yaml\n(.*?)```', page, re.DOTALL)
+    Path('my_case.yaml').write_text(f'{case}numerics: {{lines: 9}}\n')
+    Path('build').mkdir()
+    assert [main(command.split()) for command in own] == [0, 0]
+    assert parse_seal(read_yaml(Path('build/my_seal.yaml'))).name == 'my_ring'
+
+
+def test_the_tables_of_the_docs_are_those_of_the_bench():
+    page = (ROOT / 'docs' / 'oring.md').read_text()
+    named = {name for names in re.findall(r'bench/oring\.py ([a-z ]+)`', page) for name in names.split()}
+    bench = ROOT / 'bench' / 'oring.py'
+    (makers,) = re.findall(r'makers: .*? = {(.*?)}', bench.read_text(), re.DOTALL)
+    assert named == set(re.findall(r"'([a-z]+)': ", makers))
+    command = [sys.executable, str(bench), 'lines', '--lines', '9', '--json']
+    environment = {**os.environ, 'PYTHONPATH': str(ROOT)}
+    made = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    (row,) = json.loads(made.stdout)['lines']
+    assert row['F_n at 1000 psi [N]'] == pytest.approx(419.2, rel=0.1)
+
+
+def test_what_stops_a_computation_names_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    path = written(tmp_path, document(groove={'width': 2.62e-3}))  # the section fits, the squeezed one does not
+    assert main(['oring', str(path)]) == 2
+    assert f'{path}: case ms28775_114_fem: overfilled gland: the squeezed ring is' in capsys.readouterr().err
+
+
+def test_a_seal_file_that_is_there_is_not_overwritten_and_nothing_is_computed_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    out = tmp_path / 'seal.yaml'
+    out.write_text('mine')
+    assert main(['oring', 'ms28775_114', '--out', str(out)]) == 2
+    assert 'exists already: not overwriting it' in capsys.readouterr().err
+    assert out.read_text() == 'mine'
+
+
+@pytest.mark.parametrize(
+    ('changes', 'message'),
+    [({'friction': None}, 'needs its section friction'), ({'pressures': [0.0]}, 'needs two pressures at least')],
+)
+def test_a_seal_file_needs_friction_and_two_pressures(
+    changes: dict, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    path = written(tmp_path, document(**changes))
+    assert main(['oring', str(path), '--out', str(tmp_path / 'seal.yaml')]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / 'seal.yaml').exists()
+
+
+def test_a_case_of_one_pressure_without_friction_still_makes_a_page(tmp_path: Path):
+    path = written(tmp_path, document(friction=None, measured=None, pressures=[0.0]))
+    assert main(['oring', str(path), '--report', str(tmp_path / 'page.html')]) == 0
+    assert len(list((tmp_path / 'page_figures').glob('*.png'))) == 3

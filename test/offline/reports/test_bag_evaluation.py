@@ -1,0 +1,204 @@
+"""Measured against estimated friction: synthetic bags of known friction and known offset."""
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.estimation.configuration import SealSelection, first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    FORCE_TYPE,
+    PRESSURE_TYPE,
+    VELOCITY_TYPE,
+    Velocity,
+    encode_force,
+    encode_pressure,
+    encode_text,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.friction.actuator import actuator_friction
+from seal_friction_ros.files import load_configuration
+from seal_friction_ros.offline.bags import bag as bags
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter
+from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.reports.bag_evaluation import (
+    as_figures,
+    evaluate,
+    friction_by_pressure,
+    pressure_labels,
+    read_run,
+)
+
+START = 1_700_000_000_123_456_789  # [ns]
+RATE = 200  # [Hz]
+OFFSET = 4.0  # [N] of the force sum
+LEVELS = (1e5, 2.5e6, 6e6)  # [Pa]
+CONFIGURATION = load_configuration(SealSelection(), EstimatorSettings())
+SEALS = CONFIGURATION.parameters().estimator.seals
+
+
+def strokes(directions=(1, -1), speed=0.02, rest=0.5, slide=1.0, error=1.0):
+    """Velocity, pressure and force sum of a rig that rests, is pushed until it breaks away, and slides.
+
+    ``error`` is the true friction over the estimated one.
+    """
+    rows = []
+    for pressure in LEVELS:
+        friction = actuator_friction(SEALS, pressure, pressure)
+        dynamic, static = error * friction.coulomb_friction, error * (friction.coulomb_friction + friction.stiction)
+        for direction in directions:
+            pushes = (direction * static * (k + 1) / (rest * RATE) for k in range(int(rest * RATE)))
+            rows += [(0.0, pressure, push + OFFSET) for push in pushes]
+            rows += [(direction * speed, pressure, direction * dynamic + OFFSET)] * int(slide * RATE)
+    return rows
+
+
+def make_bag(folder: Path, rows, estimates=True) -> Path:
+    inputs = folder / 'inputs'
+    with BagWriter(inputs) as writer:
+        text = encode_text(snapshot_text(first_snapshot(CONFIGURATION)))
+        writer.write(bags.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, START, text)
+        for i, (velocity, pressure, force) in enumerate(rows):
+            stamp = START + i * 1_000_000_000 // RATE
+            data = encode_pressure(Pressure(stamp, pressure, pressure))
+            writer.write(bags.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, data)
+            writer.write(bags.FORCE_TOPIC, FORCE_TYPE, stamp, encode_force(Force(stamp, force)))
+            data = encode_velocity(Velocity(stamp, velocity, b'rod'))
+            writer.write(bags.VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
+    if estimates:
+        replay(inputs, out=folder / 'estimates')
+    return folder / 'estimates' if estimates else inputs
+
+
+def evaluated(folder: Path, rows):
+    return friction_by_pressure(read_run(make_bag(folder, rows)))
+
+
+@pytest.mark.parametrize('error', [1.0, 0.8])
+def test_known_friction_is_recovered_whatever_the_offset_of_the_force_sum(tmp_path, error):
+    result = evaluated(tmp_path, strokes(directions=(1, -1, 1, -1), error=error))
+    assert [level.pressure for level in result.sliding] == pytest.approx(LEVELS)
+    for level, pressure in zip(result.sliding, LEVELS, strict=True):
+        estimated = actuator_friction(SEALS, pressure, pressure).coulomb_friction
+        assert level.measured == pytest.approx(error * estimated, rel=1e-9)
+        assert level.estimated == pytest.approx(estimated, rel=1e-9)
+        assert level.offset == pytest.approx(OFFSET, rel=1e-9)
+        assert level.measured_spread == pytest.approx(0.0, abs=1e-9)
+        assert level.deviation_percent == pytest.approx(100.0 * (1.0 / error - 1.0), abs=1e-6)
+        assert len(level.events) == 4
+
+
+def test_breakaway_is_the_peak_at_rest_before_each_stroke(tmp_path):
+    result = evaluated(tmp_path, strokes())
+    for level, pressure in zip(result.breakaway, LEVELS, strict=True):
+        friction = actuator_friction(SEALS, pressure, pressure)
+        assert level.measured == pytest.approx(friction.coulomb_friction + friction.stiction, rel=1e-9)
+        assert level.deviation_percent == pytest.approx(0.0, abs=1e-6)
+
+
+def test_noise_averages_out_and_shows_as_spread_between_strokes(tmp_path):
+    generator = np.random.default_rng(7)
+    rows = []
+    for _ in range(6):  # twelve strokes a pressure, each two with a friction of their own
+        scale = 1.0 + 0.05 * generator.standard_normal()
+        rows += [(v, p, f + generator.normal(0.0, 1.0)) for v, p, f in strokes(error=scale)]
+    for level in evaluated(tmp_path, rows).sliding:
+        assert level.deviation_percent == pytest.approx(0.0, abs=6.0)
+        assert 0.02 < level.measured_spread / level.measured < 0.12
+
+
+def test_with_one_direction_the_mean_magnitude_is_used_and_said(tmp_path):
+    result = evaluated(tmp_path, strokes(directions=(-1,)))
+    for level, pressure in zip(result.sliding, LEVELS, strict=True):
+        friction = actuator_friction(SEALS, pressure, pressure).coulomb_friction
+        assert not level.both_directions
+        assert level.measured == pytest.approx(friction - OFFSET, rel=1e-9)  # the offset stays in
+    assert any('one direction only' in note for note in result.notes)
+
+
+def test_without_sliding_there_is_a_note_and_no_number(tmp_path):
+    result = evaluated(tmp_path, [(0.0, 1e6, 5.0)] * 300)
+    assert result.sliding == ()
+    assert result.breakaway == ()
+    assert 'No steady sliding' in result.notes[0]
+
+
+def test_in_the_middle_of_a_sine_stroke_inertia_averages_out(tmp_path):
+    friction = actuator_friction(SEALS, 1e6, 1e6).coulomb_friction
+    phases = [2.0 * math.pi * (i + 0.5) / RATE for i in range(5 * RATE)]
+    inertia = 40.0  # [N]
+    rows = [(0.05 * math.sin(x), 1e6, math.copysign(friction, math.sin(x)) + inertia * math.cos(x)) for x in phases]
+    (level,) = evaluated(tmp_path, rows).sliding
+    assert level.measured == pytest.approx(friction, rel=0.01)
+
+
+def test_a_rod_that_only_accelerates_never_slides_steadily(tmp_path):
+    rows = [(0.001 * (i % RATE), 1e6, 30.0) for i in range(5 * RATE)]
+    assert evaluated(tmp_path, rows).sliding == ()
+
+
+def test_inputs_that_are_no_numbers_are_left_out_and_counted(tmp_path):
+    rows = strokes()
+    for i in range(0, len(rows), 7):
+        broken = [list(rows[i]), list(rows[i]), list(rows[i])][i % 3]
+        broken[i % 3] = (math.nan, math.inf)[i % 2]
+        rows[i] = tuple(broken)
+    run = read_run(make_bag(tmp_path, rows))
+    result = friction_by_pressure(run)
+    for level, pressure in zip(result.sliding, LEVELS, strict=True):
+        friction = actuator_friction(SEALS, pressure, pressure).coulomb_friction
+        assert level.measured == pytest.approx(friction, rel=1e-6)
+        assert len(level.events) == 2  # a lost velocity does not cut a stroke in two
+    assert any('unusable inputs' in note for note in result.notes)
+    counts = evaluate(run).status_counts
+    for bit in ('VELOCITY_NOT_FINITE', 'PRESSURE_NOT_FINITE', 'FORCE_NOT_FINITE'):
+        assert counts[bit] > 0
+
+
+def test_rates_shares_ages_and_span_are_those_of_the_bag(tmp_path):
+    run = read_run(make_bag(tmp_path, strokes()))
+    result = evaluate(run)
+    assert result.start == START
+    assert result.duration == pytest.approx(len(run.time) / RATE, rel=0.01)
+    assert result.rates[bags.PRESSURE_TOPIC] == pytest.approx(RATE, rel=0.01)
+    assert sum(result.state_shares.values()) == pytest.approx(1.0)
+    assert result.state_shares['SLIDING'] == pytest.approx(2 / 3, abs=0.01)
+    assert result.input_age == {'p50': 0.0, 'p99': 0.0, 'max': 0.0}
+    assert result.flagged == 0
+    figures = json.loads(json.dumps(as_figures(result), allow_nan=False))
+    assert figures['friction']['sliding'][0]['events'] == 2
+
+
+def test_inputs_are_those_that_the_estimate_was_made_from(tmp_path):
+    run = read_run(make_bag(tmp_path, strokes()))
+    stuck = (run.state == 3) & (np.abs(run.force_sum) < run.breakaway_force)
+    assert np.array_equal(run.friction_force[stuck], run.force_sum[stuck])
+
+
+def test_other_bits_of_a_newer_version_are_counted_not_lost(tmp_path):
+    run = read_run(make_bag(tmp_path, strokes()))
+    run = dataclasses.replace(run, status=np.full_like(run.status, 1 << 20))
+    assert evaluate(run).status_counts['UNKNOWN_BITS'] == len(run.time)
+
+
+def test_a_bag_without_estimates_says_to_replay_first(tmp_path):
+    with pytest.raises(BagError, match=r'no estimates in it.*replay') as error:
+        read_run(make_bag(tmp_path, strokes(), estimates=False))
+    assert '\n' not in str(error.value)
+
+
+def test_levels_are_separated_at_gaps_and_ramps_are_cut():
+    steps = np.array([0.0, 10.0, 6.8e5, 6.9e5, 6.89e6, 6.9e6])
+    assert list(pressure_labels(steps)) == [0, 0, 1, 1, 2, 2]
+    ramp = np.linspace(0.0, 1e6, 500)
+    labels = pressure_labels(ramp)
+    widths = [np.ptp(ramp[labels == label]) for label in np.unique(labels)]
+    assert max(widths) <= 0.1e6
+    assert list(labels) == sorted(labels)
+    assert list(pressure_labels(np.array([2e5]))) == [0]

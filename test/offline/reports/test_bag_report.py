@@ -1,0 +1,257 @@
+"""The page of a bag: self-contained, escaped, the same bytes each time, and quick for long bags."""
+
+import dataclasses
+import json
+import math
+import re
+import time
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from closed_loop_bags import write_closed_loop
+
+from seal_friction_ros.core.estimation.configuration import SealSelection, first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    FORCE_TYPE,
+    PRESSURE_TYPE,
+    VELOCITY_TYPE,
+    Velocity,
+    encode_force,
+    encode_pressure,
+    encode_text,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.friction.actuator import actuator_friction
+from seal_friction_ros.files import load_configuration
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
+from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.reports.bag_evaluation import evaluate, read_run
+from seal_friction_ros.offline.reports.bag_report import number, write_report
+from seal_friction_ros.offline.reports.figures import house_style, render, run_figures, thinned
+
+RATE = 100  # [Hz]
+CONFIGURATION = load_configuration(SealSelection(), EstimatorSettings())
+
+
+def make_bag(folder, *, name='bag', frame=b'rod', topic='/rod_velocity', pressures=(1e6, 4e6), configuration=None):
+    """Two strokes at each pressure, with a lost velocity so that there is something to say."""
+    snapshot = first_snapshot(CONFIGURATION)
+    seals = CONFIGURATION.parameters().estimator.seals
+    rows = []
+    for pressure in pressures:
+        friction = actuator_friction(seals, pressure, pressure)
+        for side in (1, -1):
+            static = friction.coulomb_friction + friction.stiction
+            rows += [(0.0, pressure, side * static * (k + 1) / 40) for k in range(40)]
+            rows += [(side * 0.02, pressure, 1.1 * side * friction.coulomb_friction + 2.0)] * 60
+    rows[70] = (math.nan, *rows[70][1:])
+    with BagWriter(folder / f'{name}_in') as writer:
+        text = encode_text(snapshot_text(snapshot) if configuration is None else configuration)
+        if configuration is None:
+            writer.write('/friction_estimator/configuration', CONFIGURATION_TYPE, 1, text)
+        for i, (velocity, pressure, force) in enumerate(rows):
+            stamp = (i + 1) * 1_000_000_000 // RATE
+            data = encode_pressure(Pressure(stamp, pressure, pressure))
+            writer.write('/cylinder_pressure', PRESSURE_TYPE, stamp, data)
+            writer.write('/force_sum', FORCE_TYPE, stamp, encode_force(Force(stamp, force)))
+            data = encode_velocity(Velocity(stamp, velocity, frame))
+            writer.write(topic, VELOCITY_TYPE, stamp, data)
+    replay(folder / f'{name}_in', out=folder / name)
+    return folder / name
+
+
+class Links(HTMLParser):
+    """Collects what a page refers to, and its tags."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.links, self.tags = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.links += [value for name, value in attrs if name in {'src', 'href', 'srcset', 'data', 'action'}]
+
+
+def test_the_page_is_self_contained_and_each_figure_lies_beside_it(tmp_path):
+    summary = write_report(make_bag(tmp_path), tmp_path / 'out' / 'report.html')
+    page = summary.page.read_text()
+    parsed = Links(page)
+    assert parsed.links
+    assert all(link.startswith('data:image/svg+xml;base64,') for link in parsed.links)
+    assert not {'script', 'link', 'iframe', 'object', 'embed'} & set(parsed.tags)
+    assert 'http' not in re.sub(r'base64,[A-Za-z0-9+/=]+', '', page)
+    assert 'url(' not in page
+    assert '@import' not in page
+    names = {path.stem for path in summary.figures}
+    assert names == {
+        'live_estimate',
+        'friction_over_pressure',
+        'deviation',
+        'friction_over_velocity',
+        'inputs',
+        'status',
+    }
+    assert {path.parent for path in summary.figures} == {tmp_path / 'out' / 'report_figures'}
+    for path in summary.figures:
+        start = path.read_bytes()[:8]
+        assert start.startswith(b'\x89PNG') if path.suffix == '.png' else start.startswith(b'<?xml')
+        assert path.stat().st_size > 5000
+    assert not list((tmp_path / 'out').rglob('*.partial'))
+
+
+def test_the_page_shows_the_numbers_the_seal_and_the_settings(tmp_path):
+    summary = write_report(make_bag(tmp_path), tmp_path / 'report.html')
+    page = summary.page.read_text()
+    for level in summary.numbers['friction']['sliding']:
+        assert f'>{number(level["measured"])}<' in page
+        assert level['deviation_percent'] == pytest.approx(-9.09, abs=0.01)  # the rig has 1.1 times the friction
+        assert level['offset'] == pytest.approx(2.0)
+    assert f'>{number(-9.1, 1, signed=True)}<' in page
+    for word in ('stick_velocity', 'ms28775_114', 'area_deformation_gain', 'velocity not finite', '/force_sum'):
+        assert word in page
+    json.dumps(dataclasses.asdict(summary), default=str, allow_nan=False)
+
+
+def test_the_same_bag_gives_the_same_bytes(tmp_path):
+    bag = make_bag(tmp_path)
+    first = write_report(bag, tmp_path / 'a' / 'report.html')
+    second = write_report(bag, tmp_path / 'b' / 'report.html')
+    for one, other in zip((first.page, *first.figures), (second.page, *second.figures), strict=True):
+        assert one.read_bytes() == other.read_bytes(), one.name
+
+
+def test_what_comes_from_a_bag_is_escaped(tmp_path):
+    evil = '<script>alert(1)</script>"&\''
+    bag = make_bag(tmp_path, frame=evil.encode(), topic=f'/{evil}', name='<b>bag$x$')
+    page = write_report(bag, tmp_path / 'report.html').page.read_text()
+    assert 'alert(1)' in page
+    assert 'script' not in Links(page).tags
+    assert '<b>bag' not in page
+
+
+@pytest.fixture(scope='module')
+def closed_loop(tmp_path_factory):
+    return write_closed_loop(tmp_path_factory.mktemp('bag') / 'closed_loop', seconds=1.5)
+
+
+def test_a_closed_loop_is_shown_with_its_numbers(closed_loop, tmp_path):
+    summary = write_report(closed_loop, tmp_path / 'report.html')
+    page = summary.page.read_text()
+    without, compensated = summary.numbers['tracking']
+    assert '<h2>Tracking</h2>' in page
+    assert {'tracking', 'friction_and_feedforward'} <= {path.stem for path in summary.figures}
+    for stretch in (without, compensated):
+        assert f'>{number(stretch["rms"] * 1e6, 1)}<' in page
+        assert f'>{number(stretch["dwell"] * 1e3, 1)}<' in page
+    assert f'>{number(compensated["rms_change"], 1, signed=True)}<' in page
+    assert compensated['rms_change'] < -60.0
+    assert (without['settings']['coulomb_scale'], compensated['settings']['coulomb_scale']) == (0.0, 0.9)
+    again = write_report(closed_loop, tmp_path / 'again' / 'report.html')
+    for one, other in zip((summary.page, *summary.figures), (again.page, *again.figures), strict=True):
+        assert one.read_bytes() == other.read_bytes(), one.name
+
+
+def test_without_a_reference_there_is_no_tracking(tmp_path):
+    summary = write_report(make_bag(tmp_path), tmp_path / 'report.html')
+    assert 'racking' not in summary.page.read_text()
+    assert summary.numbers['tracking'] == []
+
+
+def test_a_loop_that_was_never_changed_is_shown_alone(tmp_path):
+    bag = write_closed_loop(tmp_path / 'bag', scales=(0.9,), seconds=1.2)
+    summary = write_report(bag, tmp_path / 'report.html')
+    (stretch,) = summary.numbers['tracking']
+    assert stretch['rms_change'] is None
+    assert 'no stretch without feed-forward' in summary.page.read_text()
+    assert 'tracking' in {path.stem for path in summary.figures}
+
+
+def test_a_loop_that_is_too_short_is_said(tmp_path):
+    bag = write_closed_loop(tmp_path / 'bag', seconds=0.3)
+    summary = write_report(bag, tmp_path / 'report.html')
+    assert summary.numbers['tracking'] == []
+    assert 'too short' in summary.page.read_text()
+
+
+def test_a_configuration_that_is_missing_or_not_understood_is_said_or_shown_as_text(tmp_path):
+    with BagWriter(tmp_path / 'bare') as writer:
+        for message in read_messages(make_bag(tmp_path)):
+            if message.type_name != CONFIGURATION_TYPE:
+                writer.write(*message)
+    bag = tmp_path / 'bare'
+    assert 'holds no configuration' in write_report(bag, tmp_path / 'none.html').page.read_text()
+    with BagWriter(tmp_path / 'other') as writer:
+        writer.write('/configuration', CONFIGURATION_TYPE, 0, encode_text('<b>{"version": 99}'))
+        for message in read_messages(bag):
+            writer.write(*message)
+    page = write_report(tmp_path / 'other', tmp_path / 'other.html').page.read_text()
+    assert '<pre>&lt;b&gt;{&quot;version&quot;: 99}</pre>' in page
+
+
+def test_a_report_that_is_there_is_replaced(tmp_path):
+    out = tmp_path / 'report.html'
+    out.write_text('old')
+    write_report(make_bag(tmp_path), out)
+    assert out.read_text().startswith('<!DOCTYPE html>')
+
+
+def test_nothing_is_written_for_a_bag_without_estimates(tmp_path):
+    make_bag(tmp_path)
+    with pytest.raises(BagError, match='replay'):
+        write_report(tmp_path / 'bag_in', tmp_path / 'out' / 'report.html')
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path):
+    bag = make_bag(tmp_path)
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(ValueError, match='cannot write') as error:
+        write_report(bag, tmp_path / 'file' / 'report.html')
+    assert '\n' not in str(error.value)
+
+
+def test_a_bag_in_which_nothing_slides_makes_a_page(tmp_path):
+    with BagWriter(tmp_path / 'still_in') as writer:
+        data = encode_velocity(Velocity(1, 0.0, b''))
+        writer.write('/rod_velocity', VELOCITY_TYPE, 1, data)
+    replay(tmp_path / 'still_in', out=tmp_path / 'still')
+    summary = write_report(tmp_path / 'still', tmp_path / 'still.html')
+    assert 'No steady sliding' in summary.page.read_text()
+    assert summary.numbers['friction']['sliding'] == []
+
+
+def test_thinning_keeps_the_ends_and_every_spike():
+    values = np.zeros(1_000_000)
+    values[[123_456, 777_777]] = 5.0, -7.0
+    values[400_000:500_000] = np.nan
+    kept = thinned(values)
+    assert len(kept) < 4000
+    assert kept[0] == 0
+    assert kept[-1] == len(values) - 1
+    assert {123_456, 777_777} <= set(kept.tolist())
+    assert list(kept) == sorted(kept)
+
+
+def test_figures_of_a_long_bag_stay_small_and_quick(tmp_path):
+    short = read_run(make_bag(tmp_path))
+    times = 2500  # one million estimates
+    step = short.time[-1] + 1.0 / RATE
+    tiled = {
+        field.name: np.tile(getattr(short, field.name), times)
+        for field in dataclasses.fields(short)
+        if isinstance(getattr(short, field.name), np.ndarray)
+    }
+    tiled['time'] += np.repeat(np.arange(times) * step, len(short.time))
+    run = dataclasses.replace(short, **tiled)
+    started = time.monotonic()
+    evaluation = evaluate(run)
+    with house_style():
+        sizes = [len(render(plot.figure)['svg']) for plot in run_figures(run, evaluation)]
+    assert time.monotonic() - started < 30.0
+    assert sum(sizes) < 5_000_000
+    assert len(evaluation.friction.sliding[0].events) == 2 * times

@@ -1,0 +1,98 @@
+"""The page of an identification: every figure that the data allow, said where not, the same bytes each time."""
+
+import re
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+from seal_friction_ros.offline.bags.import_log import Samples, write_samples
+from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.identification.identify import Wishes, identify
+from seal_friction_ros.offline.reports.identification_report import write_identification_report
+
+THESIS = ROOT / 'data' / 'thesis' / 'friction_tests.csv'
+ALL = {'fig24_model_over_pressure', 'measured_against_model', 'residuals', 'ladder', 'fig16_static_and_dynamic',
+       'fig17_prior_art_and_tests', 'fig18_coefficient_of_friction', 'fig19_normal_force'}  # fmt: skip
+
+
+@pytest.fixture(scope='module')
+def thesis(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('thesis')
+    page = folder / 'page.html'
+    arguments = ['identify', str(THESIS), '--seal', 'ms28775_114', '--seal-chambers', 'a,b']
+    assert main([*arguments, '--law', 'physics_based', '--out', str(folder / 's.yaml'), '--report', str(page)]) == 0
+    return page
+
+
+def test_the_thesis_has_every_figure_as_png_and_svg_and_in_the_page(thesis):
+    files = {path.name for path in (thesis.parent / 'page_figures').iterdir()}
+    assert files == {f'{name}.{kind}' for name in ALL for kind in ('png', 'svg')}
+    text = thesis.read_text()
+    assert set(re.findall(r'<figure id="(\w+)">', text)) == ALL
+
+
+def test_the_page_tells_the_check_values_of_the_thesis(thesis):
+    text = thesis.read_text()
+    for words in ('no law: mean of the other readings', 'recommended', 'Condition number', 'identified pressure'):
+        assert words in text
+    assert 'http' not in re.sub(r'data:image/svg\+xml;base64,[^"]+', '', text)  # stands alone
+
+
+def test_without_geometry_or_starts_the_page_says_which_figures_are_missing(tmp_path):
+    dynamic_only = tmp_path / 'dynamic.csv'
+    lines = THESIS.read_text().splitlines()
+    dynamic_only.write_text('\n'.join([lines[0], *(line for line in lines if ',dynamic,' in line)]))
+    found = identify([dynamic_only], Wishes(), 'bare')
+    write_identification_report(found, tmp_path / 'page.html')
+    text = (tmp_path / 'page.html').read_text()
+    assert 'Figures 18 and 19 need the geometry of the ring' in text
+    assert 'Figure 16 (static friction) needs starts from rest' in text
+    assert 'Figure 17 (prior art) needs charts' in text
+
+
+def test_the_same_sources_give_the_same_page(tmp_path):
+    pages = []
+    for name in ('one', 'two'):
+        found = identify([THESIS], Wishes(seal='ms28775_114'), 'same')
+        folder = tmp_path / name
+        folder.mkdir()
+        figures = write_identification_report(found, folder / 'page.html')
+        pages.append([path.read_bytes() for path in (folder / 'page.html', *sorted(figures))])
+    assert pages[0] == pages[1]
+
+
+def test_what_a_file_name_says_is_escaped(tmp_path):
+    evil = tmp_path / '<script>x.csv'
+    evil.write_text(THESIS.read_text())
+    found = identify([evil], Wishes(), 'same')
+    write_identification_report(found, tmp_path / 'page.html')
+    assert '<script>' not in (tmp_path / 'page.html').read_text()
+
+
+def swept() -> Samples:
+    """A rod that goes to and fro under a sine, at a slowly changing pressure, with friction that follows both."""
+    time = np.arange(6000) / 50.0
+    velocity = 0.1 * np.sin(0.4 * time)
+    pressure = 3e6 + 2e6 * np.sin(0.11 * time)
+    noise = np.random.default_rng(1).normal(size=6000)
+    force = np.sign(velocity) * (50.0 + 2e-5 * pressure + 300.0 * np.abs(velocity)) + 5.0 * noise
+    return Samples(1_000_000_000 + (time * 1e9).astype(np.int64), pressure, np.zeros(6000), force, velocity)
+
+
+def test_a_swept_log_shows_friction_over_velocity(tmp_path):
+    write_samples(tmp_path / 'bag', swept(), 'rod')
+    found = identify([tmp_path / 'bag'], Wishes(), 'swept')
+    assert found.data.used.left_out_by == 'block'
+    figures = write_identification_report(found, tmp_path / 'page.html')
+    assert 'friction_over_velocity.svg' in {path.name for path in figures}
+    assert (tmp_path / 'page.html').stat().st_size < 3_000_000
+
+
+def test_nothing_is_left_of_a_report_that_cannot_be_written(tmp_path, capsys):
+    blocked = tmp_path / 'file'
+    blocked.write_text('')
+    arguments = ['identify', str(THESIS), '--out', str(tmp_path / 's.yaml'), '--report', str(blocked / 'page.html')]
+    assert main(arguments) == 2
+    assert not (tmp_path / 's.yaml').exists()
+    assert 'cannot write' in capsys.readouterr().err

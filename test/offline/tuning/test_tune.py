@@ -1,0 +1,291 @@
+"""``seal_friction tune``: the parameter file it writes, the figures it says, and what it does with what is no good."""
+
+import contextlib
+import dataclasses
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from example_bags import default_configuration
+
+from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    FORCE_TYPE,
+    POSITION_TYPE,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    VELOCITY_TYPE,
+    Position,
+    ServoReference,
+    Velocity,
+    encode_force,
+    encode_position,
+    encode_pressure,
+    encode_reference,
+    encode_text,
+    encode_velocity,
+)
+from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.servo import position_servo as servo
+from seal_friction_ros.core.servo.closed_loop import with_wrong_friction
+from seal_friction_ros.core.servo.motions import Sine, Step
+from seal_friction_ros.core.tuning.settings import TuningSettings
+from seal_friction_ros.files import load_parameter_file
+from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.tuning.tune import MADE_BY, read_recording, sensor_noise
+
+SURE = ['--friction-error', '0', '--delay-error', '0']  # one case, so that a search takes seconds
+QUICK = ['--amplitude', '5e-4', '--frequency', '10', '--hold-time', '0.1', *SURE]
+ISSUE_KEYS = {'tracking_rms_without', 'tracking_rms_with', 'dwell_without', 'dwell_with', 'robustness'}
+TRUE_SCALE, TRUE_MASS, OFFSET = 0.8, 5.0, 3.0  # [-], [kg], [N]
+LEAVE_OUT = {
+    'reference': 'ServoReference',
+    'force': 'ForceSum',
+    'pressure': 'CylinderPressure',
+}
+
+
+def write_axis(path: Path, wave=None, seconds=2.0, leave_out='', configuration: Configuration | None = None, sign=1.0):
+    """A simulated axis without feed-forward, with less friction than its model says, recorded by its noisy sensors."""
+    wave = wave or Sine()
+    known = configuration or default_configuration()
+    seals = with_wrong_friction(known.parameters(), TRUE_SCALE - 1.0).estimator.seals
+    plant = servo.ServoParameters(seals=seals, control_period=1e-3)
+    state = servo.init(plant)
+    out = servo.outputs(plant, state.plant)
+    noise = np.random.default_rng(3).normal(size=(round(seconds * 1e3), 4)) * [2e3, 1.0, 2e-4, 1e-6]
+    with b.BagWriter(path) as writer:
+        text = snapshot_text(first_snapshot(known))
+        writer.write(b.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, encode_text(text))
+        for i, (p, f, v, x) in enumerate(noise.tolist()):
+            stamp, reference = i * 1_000_000, wave.at(i * 1e-3)
+            pressure = Pressure(stamp, out.pressure_a + p, out.pressure_b + p)
+            force = Force(stamp, sign * (out.force_sum + f + OFFSET))
+            velocity = Velocity(stamp, out.velocity + v, b'rod')
+            data = {
+                'pressure': (b.PRESSURE_TOPIC, PRESSURE_TYPE, encode_pressure(pressure)),
+                'force': (b.FORCE_TOPIC, FORCE_TYPE, encode_force(force)),
+                'reference': (
+                    b.REFERENCE_TOPIC, REFERENCE_TYPE, encode_reference(ServoReference(stamp, *reference))
+                ),
+                'position': (
+                    b.POSITION_TOPIC, POSITION_TYPE, encode_position(Position(stamp, out.position + x))
+                ),
+                'velocity': (b.VELOCITY_TOPIC, VELOCITY_TYPE, encode_velocity(velocity)),
+            }  # fmt: skip
+            for name, (topic, type_name, message) in data.items():
+                if name != leave_out:
+                    writer.write(topic, type_name, stamp, message)
+            state, out = servo.step(plant, state, reference)
+    return path
+
+
+@pytest.fixture(scope='module')
+def axis(tmp_path_factory) -> Path:
+    return write_axis(tmp_path_factory.mktemp('bags') / 'axis')
+
+
+@pytest.fixture(scope='module')
+def simulated(tmp_path_factory) -> Path:
+    """Folder with what two runs on the simulated servo wrote, and what the second one said."""
+    folder = tmp_path_factory.mktemp('simulated')
+    for run, options in (('one', []), ('two', ['--json'])):
+        (folder / run).mkdir()
+        with contextlib.redirect_stdout(io.StringIO()) as output:
+            assert main(['tune', '--out', str(folder / run / 'feedforward.yaml'), *QUICK, *options]) == 0
+    (folder / 'said.json').write_text(output.getvalue())
+    return folder
+
+
+def said(arguments: list[str], capsys) -> dict:
+    capsys.readouterr()
+    assert main([*arguments, '--json']) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def files_below(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob('*') if path.is_file()}
+
+
+# -- the simulated servo ----------------------------------------------------------------------------------------------
+
+
+def test_two_runs_write_the_same_bytes(simulated: Path):
+    one, two = (files_below(simulated / run) for run in ('one', 'two'))
+    assert {'feedforward.yaml', 'feedforward.html', 'feedforward_figures/tracking.png'} <= set(one)
+    assert one == two
+
+
+def test_file_is_a_parameter_file_of_the_node(simulated: Path):
+    path = simulated / 'one' / 'feedforward.yaml'
+    selection, settings, feedforward = load_parameter_file(path)
+    known = default_configuration()
+    assert (selection, settings) == (known.selection, known.settings)
+    assert feedforward != known.feedforward
+    assert feedforward.force_limit == known.feedforward.force_limit
+    text = path.read_text()
+    assert text.startswith(MADE_BY)
+    assert 'sine of 0.5 mm at 10 Hz' in text
+    assert 'ms28775_114 on chamber a' in text
+    assert all(len(line) <= 120 for line in text.splitlines())
+
+
+def test_report_stands_alone(simulated: Path):
+    page = (simulated / 'one' / 'feedforward.html').read_text()
+    assert page.count('src="data:image/svg+xml;base64,') == 4
+    assert 'http' not in page.split('</style>')[1].replace('http-equiv', '')
+    for words in ('Tracking RMS', 'Dwell', 'Overshoot', 'Reversals at rest', 'coulomb_scale', 'friction model'):
+        assert words in page
+
+
+def test_json_says_what_the_issue_asks_for(simulated: Path):
+    numbers = json.loads((simulated / 'said.json').read_text())
+    assert set(numbers) >= ISSUE_KEYS
+    assert numbers['dwell_without'] == pytest.approx(0.05)  # the rod does not even move
+    assert numbers['tracking_rms_with'] < 0.4 * numbers['tracking_rms_without']
+    assert numbers['dwell_with'] < 0.2 * numbers['dwell_without']
+    (case,) = numbers['robustness']
+    assert set(case) >= {'friction_error', 'delay_error', 'tracking_rms', 'dwell', 'limit_cycle_reversals'}
+    assert case['tracking_rms'] == numbers['tracking_rms_with']
+    written = dataclasses.asdict(load_parameter_file(simulated / 'two' / 'feedforward.yaml')[2])
+    assert numbers['parameters'] == written
+
+
+def test_noise_is_seeded():
+    one, same, other = (sensor_noise(TuningSettings(seed=seed)) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, same)
+    assert not (one == other).any()
+    np.testing.assert_allclose(one.std(axis=0), [2e3, 2e3, 1.0, 2e-4], rtol=0.05)
+
+
+# -- a recorded axis --------------------------------------------------------------------------------------------------
+
+
+def test_bag_tells_the_scale_the_mass_and_the_offset(axis: Path, tmp_path: Path, capsys):
+    numbers = said(['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')], capsys)
+    assert numbers['friction_over_model'] == pytest.approx(TRUE_SCALE, abs=0.01)
+    assert numbers['mass'] == pytest.approx(TRUE_MASS, rel=0.1)
+    assert numbers['force_offset'] == pytest.approx(OFFSET, abs=0.5)
+    assert numbers['residual_with']['sliding'] < 0.15 * numbers['residual_without']['sliding']
+    assert load_parameter_file(tmp_path / 'f.yaml')[2].coulomb_scale == pytest.approx(TRUE_SCALE, abs=0.01)
+
+
+def test_bag_says_what_it_cannot_tell(axis: Path, tmp_path: Path, capsys):
+    numbers = said(['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')], capsys)
+    assert set(numbers) >= ISSUE_KEYS
+    assert numbers['tracking_rms_with'] is numbers['dwell_with'] is None
+    assert not numbers['told_by_bag']['lead_time']
+    assert numbers['parameters']['lead_time'] == default_configuration().feedforward.lead_time
+    assert numbers['recorded_tracking_rms'] > 1e-4
+    assert len(numbers['robustness']) == 9
+    assert 'lead_time' in (tmp_path / 'f.yaml').read_text().split('ros__parameters')[0]
+
+
+def test_what_is_known_besides_the_bag_is_taken(axis: Path, tmp_path: Path, capsys):
+    arguments = ['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml'), '--mass', '5', '--whole-delay', '0.004']
+    numbers = said(arguments, capsys)
+    assert (numbers['mass'], numbers['mass_is_fitted']) == (5.0, False)
+    assert numbers['parameters']['lead_time'] == 0.004
+
+
+def test_recording_is_as_the_pipeline_saw_it(axis: Path):
+    recording, track, configuration = read_recording(axis)
+    assert len(recording.estimates) == len(track.position) == 2000
+    assert recording.motions[50].reference_velocity == Sine().at(0.05).velocity
+    assert np.isfinite(recording.force_sum).all()
+    assert configuration == default_configuration()
+
+
+def test_own_file_is_replaced_and_two_runs_write_the_same_bytes(axis: Path, tmp_path: Path):
+    arguments = ['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')]
+    assert main(arguments) == 0
+    before = files_below(tmp_path)
+    (tmp_path / 'f.yaml').write_text(f'{MADE_BY}\nold')
+    assert main(arguments) == 0
+    assert files_below(tmp_path) == before
+
+
+def test_name_of_a_bag_cannot_break_the_file(tmp_path: Path):
+    bag = write_axis(tmp_path / 'bag\nforce_limit: 9e9 <b>')
+    assert main(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')]) == 0
+    assert load_parameter_file(tmp_path / 'f.yaml')[2].force_limit == default_configuration().feedforward.force_limit
+    assert 'force_limit: 9e9 <b>' not in (tmp_path / 'f.html').read_text()
+
+
+def test_friction_against_the_motion_is_a_failed_check(tmp_path: Path, capsys):
+    bag = write_axis(tmp_path / 'bag', sign=-1.0)
+    assert main(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')]) == 1
+    assert 'NOT better than none' in capsys.readouterr().out
+
+
+# -- what is no good --------------------------------------------------------------------------------------------------
+
+
+def refused(arguments: list[str], folder: Path, capsys) -> str:
+    """One line of what was said; nothing in ``folder`` changed."""
+    before = files_below(folder)
+    capsys.readouterr()
+    assert main(arguments) == 2
+    words = capsys.readouterr().err
+    assert words.count('\n') == 1
+    assert files_below(folder) == before
+    return words
+
+
+@pytest.mark.parametrize('missing', LEAVE_OUT)
+def test_bag_without_an_input_is_refused_and_says_which_to_record(missing: str, tmp_path: Path, capsys):
+    bag = write_axis(tmp_path / 'bag', seconds=0.05, leave_out=missing)
+    words = refused(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')], tmp_path, capsys)
+    assert LEAVE_OUT[missing] in words
+    assert 'record' in words
+
+
+@pytest.mark.parametrize(
+    ('wave', 'seconds', 'words'),
+    [
+        (Step(size=0.001), 0.5, 'reverses 0 times'),
+        (Sine(amplitude=1e-5), 1.0, 'slides in'),
+    ],
+)
+def test_bag_that_shows_no_friction_is_refused_and_says_what_to_record(wave, seconds, words, tmp_path: Path, capsys):
+    bag = write_axis(tmp_path / 'bag', wave, seconds)
+    assert words in refused(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')], tmp_path, capsys)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--amplitude', '5'], 'amplitude'),
+        (['--amplitude', 'nan'], 'amplitude'),
+        (['--amplitude', '0.02'], 'more than'),
+        (['--mass', '5'], '--mass is only for a --bag'),
+        (['--namespace', 'left'], '--namespace is only for a --bag'),
+        (['--params', 'absent.yaml'], 'absent.yaml'),
+    ],
+)
+def test_option_that_makes_no_sense_is_refused(arguments: list[str], words: str, tmp_path: Path, capsys):
+    assert words in refused(['tune', '--out', str(tmp_path / 'f.yaml'), *arguments], tmp_path, capsys)
+
+
+def test_option_of_the_simulator_is_refused_with_a_bag(axis: Path, tmp_path: Path, capsys):
+    arguments = ['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml'), '--frequency', '5']
+    assert '--frequency is not for a --bag' in refused(arguments, tmp_path, capsys)
+
+
+@pytest.mark.parametrize('kind', ['html', 'folder', 'other file', 'other page', 'below a file'])
+def test_target_that_must_not_be_written_is_refused_before_the_work(kind: str, tmp_path: Path, capsys):
+    out = tmp_path / ('f.html' if kind == 'html' else 'f.yaml')
+    if kind == 'folder':
+        out.mkdir()
+    elif kind == 'other file':
+        out.write_text('friction_estimator: {ros__parameters: {stick_velocity: 0.002}}\n')
+    elif kind == 'other page':
+        out.with_suffix('.html').write_text('my notes')
+    elif kind == 'below a file':
+        out.write_text('')
+        out = out / 'g.yaml'
+    assert str(out.with_suffix('')) in refused(['tune', '--out', str(out)], tmp_path, capsys)

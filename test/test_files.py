@@ -1,0 +1,267 @@
+"""The door through which YAML comes in: plain data, or one line that names the file."""
+
+import os
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.files import (
+    config_path,
+    default_configuration,
+    load_configuration,
+    load_parameter_file,
+    read_yaml,
+    share_directory,
+)
+
+GOOD = (ROOT / 'config' / 'seals' / 'ms28775_114.yaml').read_text()
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(content: str | bytes, name: str = 'file.yaml') -> Path:
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write
+
+
+def complaint(function, path: Path) -> str:
+    with pytest.raises(ValueError) as refusal:
+        function(path)
+    text = str(refusal.value)
+    assert '\n' not in text
+    assert str(path) in text
+    return text
+
+
+# --- YAML ---
+
+
+def test_plain_data_comes_back_as_written(written):
+    text = 'a: 1\nb: [1.5, x, null, true]\nc: {d: 2.0e-3}\n'
+    assert read_yaml(written(text)) == {'a': 1, 'b': [1.5, 'x', None, True], 'c': {'d': 2e-3}}
+
+
+@pytest.mark.parametrize(
+    ('content', 'expected'),
+    [
+        ('a: &x [1]\nb: *x\n', 'aliases (*name) are not allowed'),
+        ('a: &x [*x]\n', 'aliases (*name) are not allowed'),
+        ('a: 1\na: 2\n', 'a stands twice in one mapping'),
+        ('x: {b: 1, c: 2, b: 1}\n', 'b stands twice in one mapping'),
+        ('a: [1, 2\n', 'not plain YAML'),
+        ('a: b: c\n', 'not plain YAML'),
+        ('\tx: 1\n', 'not plain YAML'),
+        ('a: 1\n---\nb: 2\n', 'expected a single document'),
+        ('{[1]: 2}\n', 'unhashable key'),
+        ('a: !!python/object/apply:os.system [ls]\n', 'could not determine a constructor'),
+        ('a: !mine 5\n', 'could not determine a constructor'),
+        (b'\xff\xfe\x00binary\x80', 'not plain YAML'),
+        (b'\x7fELF\x02\x01\x01' + bytes(64), 'not plain YAML'),
+        (bytes(range(256)), 'not plain YAML'),
+        ('[' * 50_000, 'not plain YAML'),
+        ('{a: ' * 10_000, 'not plain YAML'),
+        ('- ' * 30_000, 'not plain YAML'),
+    ],
+    ids=lambda value: repr(value)[:24],
+)
+def test_what_is_not_plain_yaml_is_refused_in_one_line_that_names_the_file(written, content, expected):
+    assert expected in complaint(read_yaml, written(content))
+
+
+def test_a_billion_laughs_are_refused(written):
+    laughs = 'a: &a [ha]\n' + ''.join(f'{y}: &{y} [{", ".join([f"*{x}"] * 9)}]\n' for x, y in pairwise('abcdefghi'))
+    assert 'aliases' in complaint(read_yaml, written(laughs))
+
+
+def test_a_huge_file_is_refused_unread(written):
+    assert 'larger than 65536 bytes' in complaint(read_yaml, written(b'# ' + b'x' * (1 << 16)))
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    assert complaint(read_yaml, tmp_path / 'none.yaml').endswith('No such file or directory')
+    assert complaint(read_yaml, tmp_path).endswith('Is a directory')
+
+
+@given(st.binary(max_size=60) | st.text('{}[]:,-?&*!|>\'"%@`#a1. \n\t', max_size=30).map(str.encode))
+def test_any_bytes_are_data_or_a_value_error(tmp_path_factory, content):
+    path = tmp_path_factory.getbasetemp() / 'any.yaml'
+    path.write_bytes(content)
+    try:
+        read_yaml(path)
+    except ValueError as error:
+        reason = str(error)
+    else:
+        return
+    assert reason.startswith(str(path))
+
+
+# --- names and places ---
+
+
+def test_a_bare_name_is_a_shipped_file_and_anything_with_a_slash_or_ending_is_a_path():
+    assert config_path('seals', 'ms28775_114') == ROOT / 'config' / 'seals' / 'ms28775_114.yaml'
+    assert config_path('seals', './x') == Path('x')
+    assert config_path('seals', 'x.yaml') == Path('x.yaml')
+    assert config_path('seals', '~/x.yaml') == Path.home() / 'x.yaml'
+
+
+def test_the_share_folder_of_an_install_is_found_above_the_code(tmp_path):
+    share = tmp_path / 'share' / 'some_package'
+    code = tmp_path / 'lib' / 'python3' / 'site-packages' / 'some_package' / 'code.py'
+    share.mkdir(parents=True)
+    (share / 'package.xml').write_text('<package><name>some_package</name></package>')
+    assert share_directory('some_package', str(code)) == share
+    with pytest.raises(FileNotFoundError, match='no share folder of other_package above'):
+        share_directory('other_package', str(code))
+
+
+# --- configurations ---
+
+
+def load(path: Path):
+    return load_configuration(SealSelection((str(path),), ('a',)), EstimatorSettings())
+
+
+def test_the_default_configuration_is_the_actuator_of_the_thesis():
+    parameters = default_configuration().parameters()
+    seals = parameters.estimator.seals
+    assert [(m.seal.name, m.chamber) for m in seals] == [
+        ('ms28775_114', 'a'),
+        ('ms28775_114', 'b'),
+    ]
+
+
+@pytest.mark.parametrize(
+    ('content', 'expected'),
+    [
+        ('', 'a seal file is a mapping of names to values, not NoneType'),
+        ('- a\n', 'a seal file is a mapping of names to values, not list'),
+        ('just text\n', 'a seal file is a mapping of names to values, not str'),
+        (GOOD.replace('stiction: 2.47685', 'stiction: -1'), 'Seal.stiction = -1.0 N is below its lower bound 0.0 N'),
+        (GOOD.replace('stiction:', 'sticktion:'), 'physics_based has no sticktion'),
+        (GOOD.replace('law: power_law', 'law: power'), "friction_coefficient: law = 'power' is not one of power_law"),
+        (
+            GOOD.replace('exponent: 0.562321', 'exponent: 1'),
+            'PowerLaw.exponent = 1.0 1 is above its upper bound 0.99 1',
+        ),
+        (GOOD + 'stiction: 3.0\n', 'stiction stands twice in one mapping'),
+        (GOOD.replace('stiction: 2.47685', 'stiction: .nan'), 'Seal.stiction = nan N is not finite'),
+    ],
+)
+def test_a_seal_file_that_makes_no_sense_is_refused_in_one_line_with_file_and_field(written, content, expected):
+    assert expected in complaint(load, written(content))
+
+
+def test_an_unknown_seal_is_refused_with_the_path_looked_for():
+    with pytest.raises(ValueError, match=r'config/seals/no_such_seal\.yaml: No such file or directory$'):
+        load_configuration(SealSelection(('no_such_seal',), ('a',)), EstimatorSettings())
+
+
+# --- parameter files ---
+
+
+def test_a_parameter_file_gives_selection_and_settings_of_any_node_name(written):
+    path = written(
+        '/ns/some_node:\n  ros__parameters:\n    seals: [x]\n    seal_chambers: [b]\n    stick_velocity: 0\n'
+    )
+    expected = (SealSelection(('x',), ('b',)), EstimatorSettings(stick_velocity=0.0), FeedForwardSettings())
+    assert load_parameter_file(path) == expected
+
+
+@pytest.mark.parametrize('content', ['{feedforward: {coulomb_scale: 0.5}}', '{feedforward.coulomb_scale: 0.5}'])
+def test_settings_of_the_feed_forward_may_be_nested_or_dotted_as_in_ros(written, content):
+    path = written(f'/**:\n  ros__parameters: {content}\n')
+    assert load_parameter_file(path)[2] == FeedForwardSettings(coulomb_scale=0.5)
+
+
+def test_parameters_of_the_node_that_are_not_the_estimators_are_passed_over(written):
+    path = written('/**:\n  ros__parameters: {record: true, use_stiction: false}\n')
+    expected = (SealSelection(), EstimatorSettings(use_stiction=False), FeedForwardSettings())
+    assert load_parameter_file(path) == expected
+
+
+def test_later_nodes_of_a_parameter_file_overrule_earlier_ones(written):
+    nodes = (
+        '/**:\n  ros__parameters: {force_max: 5.0}\n/left/friction_estimator:\n  ros__parameters: {force_max: 7.0}\n'
+    )
+    assert load_parameter_file(written(nodes))[1].force_max == 7.0
+
+
+def test_what_a_parameter_file_says_of_other_nodes_is_passed_over(written):
+    nodes = '/**:\n  ros__parameters: {force_max: 5.0}\nother:\n  ros__parameters: {force_max: 7.0, gain: 1}\n'
+    assert load_parameter_file(written(nodes))[1].force_max == 5.0
+
+
+def test_a_misspelt_parameter_is_refused_by_name(written):
+    with pytest.raises(ValueError, match='no parameter stick_velocty'):
+        load_parameter_file(written('/**:\n  ros__parameters: {stick_velocty: 0.5}\n'))
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / 'pipe')
+    assert complaint(read_yaml, tmp_path / 'pipe').endswith('not a file')
+
+
+def test_a_link_into_the_source_tree_finds_the_share_folder_of_the_install(tmp_path):
+    for prefix, package in (('source', 'outer'), ('install/share/inner', 'inner')):
+        (tmp_path / prefix).mkdir(parents=True)
+        (tmp_path / prefix / 'package.xml').write_text(f'<name>{package}</name>')
+    (tmp_path / 'source' / 'inner.py').touch()
+    (tmp_path / 'install' / 'lib').mkdir()
+    (tmp_path / 'install' / 'lib' / 'inner.py').symlink_to(tmp_path / 'source' / 'inner.py')
+    assert share_directory('inner', str(tmp_path / 'install' / 'lib' / 'inner.py')) == tmp_path / 'install/share/inner'
+
+
+@pytest.mark.parametrize('content', ['', '5', '[1]', 'a: 5', 'a: {b: 1}', 'a: {ros__parameters: }', 'a: [1]'])
+def test_what_is_no_parameter_file_is_refused(written, content):
+    assert 'not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)' in complaint(
+        load_parameter_file, written(content)
+    )
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'expected'),
+    [
+        ('{stick_velocity: 5.0}', 'EstimatorSettings.stick_velocity = 5.0 m/s is above its upper bound 1.0 m/s'),
+        ('{stick_velocity: fast}', "stick_velocity = 'fast' is not a number"),
+        ('{use_stiction: 1}', 'use_stiction = 1 is not true or false'),
+        ('{seals: ms28775_114}', "seals = 'ms28775_114' is not a list"),
+        ('{seals: [x]}', 'has 2 entries but there are 1 seals'),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_is_refused_with_file_field_and_bound(written, parameters, expected):
+    assert expected in complaint(load_parameter_file, written(f'/**:\n  ros__parameters: {parameters}\n'))
+
+
+@pytest.mark.parametrize(
+    'content',
+    [
+        'a: !!int foo', 'a: !!bool foo', 'a: !!float x', 'a: !!map [b]', 'a: !!timestamp x', 'a: 2001-13-45', 'a: 0x_',
+        'a: ' + '1' * 5000,
+    ],
+    ids=lambda content: content[:16],
+)  # fmt: skip
+def test_a_value_that_does_not_fit_its_tag_is_refused_with_the_file(written, content):
+    assert 'not plain YAML' in complaint(read_yaml, written(content))
+
+
+@pytest.mark.parametrize('name', ['~no_such_user_here/x.yaml'])
+def test_a_path_that_cannot_be_is_refused_by_name(name):
+    with pytest.raises(ValueError, match='no_such_user_here'):
+        load_configuration(SealSelection((name,), ('a',)), EstimatorSettings())
+
+
+@pytest.mark.parametrize('parameters', ['ab', '[[stick_velocity, 0.0]]', '{stick_velocity: 1' + '0' * 400 + '}'])
+def test_parameters_that_are_no_mapping_or_too_large_are_refused_with_the_file(written, parameters):
+    refusal = complaint(load_parameter_file, written(f'/**: {{ros__parameters: {parameters}}}'))
+    assert 'ros__parameters' in refusal or 'stick_velocity' in refusal
