@@ -20,7 +20,7 @@ from one_core import processor_time
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, init, step
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
-from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.findings import Findings, findings
 from seal_friction_ros.core.lubrication.friction_map import friction_map, map_pressures, memory_length, steady_friction

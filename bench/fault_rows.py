@@ -7,8 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from seal_friction_ros.core.estimation.messages import ServoReference, Velocity
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.friction.states import FrictionState
 
 MS = 1_000_000  # [ns] between two ticks: 1 kHz

@@ -23,10 +23,9 @@ from seal_friction_ros.core.estimation.messages import (
     FEEDFORWARD_TYPE,
     INPUTS,
     OUTPUTS,
-    Velocity,
-    encode_input,
+    encode,
 )
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status, Velocity
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
@@ -81,7 +80,7 @@ class Driver(Node):
         """Publish a moment."""
         for topic, messages in tick.items():
             for message in messages:
-                self.inputs[topic].publish(message if isinstance(message, bytes) else encode_input(message))
+                self.inputs[topic].publish(message if isinstance(message, bytes) else encode(message))
 
 
 class Stage(Spun):

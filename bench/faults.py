@@ -42,7 +42,7 @@ from std_msgs.msg import Float64
 
 from seal_friction_ros.core.estimation import records
 from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import encode_input
+from seal_friction_ros.core.estimation.messages import encode
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
@@ -183,7 +183,7 @@ def is_answered(place: Stage) -> bool:
     before = place.driver.estimates
     for topic, messages in good(place.now).items():
         if topic in place.driver.inputs:
-            place.driver.inputs[topic].publish(encode_input(messages[0]))
+            place.driver.inputs[topic].publish(encode(messages[0]))
     return place.spin_until(lambda: place.driver.estimates > before, 0.2)
 
 

@@ -26,18 +26,9 @@ from rich.table import Table
 from rich.text import Text
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    INPUTS,
-    Input,
-    Position,
-    ServoReference,
-    Velocity,
-    encode_input,
-    encode_text,
-)
-from seal_friction_ros.core.estimation.pipeline import encoded, init, receive
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, INPUTS, Input, encode, encode_text
+from seal_friction_ros.core.estimation.pipeline import answered, init
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.recorder import Recorder
@@ -62,7 +53,7 @@ def inputs(stamp: int, number: int) -> Iterator[tuple[str, str, Input, bytes]]:
         'rod_velocity': Velocity(stamp, velocity, b'rod'),
     }
     for topic, record in records.items():
-        yield f'/{topic}', INPUTS[topic], record, encode_input(record, b'rod')
+        yield f'/{topic}', INPUTS[topic], record, encode(record, b'rod')
 
 
 def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
@@ -88,8 +79,8 @@ def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
         time.sleep(max(start + number * PERIOD - time.perf_counter_ns(), 0) * 1e-9)
         for topic, type_name, message, data in inputs(time.time_ns(), number):
             record(topic, type_name, data)
-            state, answer = receive(parameters, state, message)
-            for answer_type, answer_data in encoded(answer):
+            state, answers = answered(parameters, state, message)
+            for answer_type, answer_data in answers:
                 record(ANSWER_TOPICS[answer_type], answer_type, answer_data)
 
 

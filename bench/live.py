@@ -39,8 +39,8 @@ from rich.progress import Progress
 from rich.table import Table
 from seal_friction_msgs.msg import CylinderPressure, ForceSum, FrictionEstimate, FrictionFeedForward, RodVelocity
 
-from seal_friction_ros.core.estimation.messages import Velocity, encode_force, encode_pressure, encode_velocity
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.messages import encode
+from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import PROFILES
 from seal_friction_ros.nodes.executor import spin
@@ -88,8 +88,8 @@ class Asker:
             pressure = self.node.create_publisher(CylinderPressure, 'cylinder_pressure', qos.STREAM)
             force = self.node.create_publisher(ForceSum, 'force_sum', qos.STREAM)
             self.others = [
-                (pressure, lambda stamp: encode_pressure(Pressure(stamp, 2e6, 1e6))),
-                (force, lambda stamp: encode_force(Force(stamp, 10.0))),
+                (pressure, lambda stamp: encode(Pressure(stamp, 2e6, 1e6))),
+                (force, lambda stamp: encode(Force(stamp, 10.0))),
             ]
             self.node.create_subscription(FrictionEstimate, 'friction_estimate', self._hear, qos.STREAM, raw=True)
             self.node.create_subscription(
@@ -127,7 +127,7 @@ class Asker:
         self.stamp += 1_000_000
         for publisher, encoded in self.others:
             publisher.publish(encoded(self.stamp))
-        data = encode_velocity(Velocity(self.stamp, 0.1, b''))
+        data = encode(Velocity(self.stamp, 0.1, b''))
         self.sent[self.stamp] = time.perf_counter_ns()
         self.velocity.publish(data)
 

@@ -27,7 +27,7 @@ from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
-from seal_friction_ros.core.estimation.messages import decode_velocity
+from seal_friction_ros.core.estimation.messages import VELOCITY_TYPE, decode
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.processes import free_domain, running
 from seal_friction_ros.offline.bags.bag import VELOCITY_TOPIC, read_messages
@@ -147,7 +147,9 @@ def figures(
 
 def lost(bag: Path, said: dict[str, str]) -> dict[str, int]:
     """Velocity samples that are not in the recording, by their stamps, and what the estimator reported."""
-    stamps = [decode_velocity(message.data).stamp for message in read_messages(bag) if message.topic == VELOCITY_TOPIC]
+    stamps = [
+        decode(VELOCITY_TYPE, message.data).stamp for message in read_messages(bag) if message.topic == VELOCITY_TOPIC
+    ]
     steps = [round((b - a) / PERIOD) - 1 for a, b in pairwise(stamps)]
     return {'received': len(stamps), 'lost': sum(steps), 'reported missing': int(said['rod_velocity missing'])}
 

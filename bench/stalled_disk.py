@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from seal_friction_ros.core.estimation.pipeline import encoded, init, receive
+from seal_friction_ros.core.estimation.pipeline import answered, init
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.friction_estimator import SWITCH_INTERVAL
 from seal_friction_ros.offline.bags import mcap_writer
@@ -65,8 +65,8 @@ def latencies(bag: Path, seconds: float, disk: StallingDisk) -> tuple[list[float
         time.sleep(max(due - time.perf_counter_ns(), 0) * 1e-9)
         for topic, type_name, message, data in inputs(first + number * PERIOD, number):
             recorder.record(topic, type_name, time.time_ns(), data)
-            state, answer = receive(parameters, state, message)
-            for answer_type, answer_data in encoded(answer):
+            state, answers = answered(parameters, state, message)
+            for answer_type, answer_data in answers:
                 recorder.record(ANSWER_TOPICS[answer_type], answer_type, time.time_ns(), answer_data)
         found.append((time.perf_counter_ns() - due) * 1e-9)
         recorder.now_is_a_good_time()

@@ -27,16 +27,9 @@ from rich.text import Text
 from seal_friction_msgs.msg import RodVelocity
 
 from seal_friction_ros.core.estimation.estimator import step
-from seal_friction_ros.core.estimation.messages import (
-    VELOCITY_TYPE,
-    Velocity,
-    decode_pressure,
-    decode_velocity,
-    encode_pressure,
-    encode_velocity,
-)
-from seal_friction_ros.core.estimation.pipeline import Reference, encoded, init, receive
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, Output, decode, encode
+from seal_friction_ros.core.estimation.pipeline import WantedMotion, init, receive
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Velocity
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.processes import free_domain
@@ -49,22 +42,27 @@ def stages() -> dict[str, Callable[[], object]]:
     """Each stage of the live path but the middleware's, as a function without arguments."""
     parameters = default_configuration().parameters()
     pressure, force, velocity = Pressure(1, 3e6, 1e6), Force(1, 20.0), Velocity(1, 0.1, b'rod')
+
+    def drop(record: Output, frame_id: bytes) -> None:
+        """Emit to nobody."""
+
     sample = RodSample(1, 0.1, pressure, force)
     alone = init(parameters)._replace(pressure=pressure, force=force)
-    guided = alone._replace(reference=Reference(1, 0.1, 0.0))
-    _, answer = receive(parameters, alone, velocity)
-    _, both = receive(parameters, guided, velocity)
-    velocity_bytes, pressure_bytes = encode_velocity(velocity), encode_pressure(pressure, b'rod')
+    guided = alone._replace(reference=WantedMotion(1, 0.1, 0.0))
+    records: list[tuple[Output, bytes]] = []
+    receive(parameters, guided, velocity, lambda record, frame: records.append((record, frame)))
+    estimate, feedforward = records
+    velocity_bytes, pressure_bytes = encode(velocity), encode(pressure, b'rod')
     return {
         'bare call': lambda: None,
-        'decode pressure': lambda: decode_pressure(pressure_bytes),
-        'decode velocity': lambda: decode_velocity(velocity_bytes),
-        'receive pressure': lambda: receive(parameters, alone, pressure),
+        'decode pressure': lambda: decode(PRESSURE_TYPE, pressure_bytes),
+        'decode velocity': lambda: decode(VELOCITY_TYPE, velocity_bytes),
+        'receive pressure': lambda: receive(parameters, alone, pressure, drop),
         'estimator step': lambda: step(parameters.estimator, alone.estimator, sample),
-        'receive velocity': lambda: receive(parameters, alone, velocity),
-        'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity),
-        'encode estimate': lambda: [*encoded(answer)],
-        'encode estimate and feed-forward': lambda: [*encoded(both)],
+        'receive velocity': lambda: receive(parameters, alone, velocity, drop),
+        'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity, drop),
+        'encode estimate': lambda: encode(*estimate),
+        'encode estimate and feed-forward': lambda: [encode(*estimate), encode(*feedforward)],
     }
 
 
@@ -78,7 +76,7 @@ def middleware() -> Iterator[dict[str, Callable[[], object]]]:
     deep = QoSProfile(depth=4 * CALLS)
     publisher = node.create_publisher(RodVelocity, 'rod_velocity', deep)
     subscription = node.create_subscription(RodVelocity, 'rod_velocity', lambda _: None, deep, raw=True)
-    velocity_bytes = encode_velocity(Velocity(1, 0.1, b'rod'))
+    velocity_bytes = encode(Velocity(1, 0.1, b'rod'))
     message = deserialize_message(velocity_bytes, RodVelocity)
     stamps = count()
     with tempfile.TemporaryDirectory() as folder:

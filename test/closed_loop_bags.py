@@ -7,14 +7,13 @@ from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, snapshot_text
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
+    FEEDFORWARD_TYPE,
     INPUTS,
-    Position,
-    ServoReference,
-    Velocity,
-    encode_input,
+    decode,
+    encode,
     encode_text,
 )
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo.motions import Sine, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.files import default_configuration
@@ -60,10 +59,10 @@ def write_closed_loop(
                     (b.VELOCITY_TOPIC, Velocity(stamp, now.velocity, b'rod')),
                 )
                 for topic, record in inputs:
-                    writer.write(topic, INPUTS[topic.strip('/')], stamp, encode_input(record))
-                    known, answer = pipeline.receive(parameters, known, record)
-                    for kind, data in pipeline.encoded(answer):
+                    writer.write(topic, INPUTS[topic.strip('/')], stamp, encode(record))
+                    known, answers = pipeline.answered(parameters, known, record)
+                    for kind, data in answers:
                         writer.write(ANSWER_TOPICS[kind], kind, stamp, data)
-                    force = answer.feedforward.force if answer.feedforward else force
+                        force = decode(kind, data).force if kind == FEEDFORWARD_TYPE else force
                 state, now = step(servo, state, wanted, force)
     return path

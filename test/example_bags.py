@@ -13,17 +13,10 @@ from seal_friction_ros.core.estimation.messages import (
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     VELOCITY_TYPE,
-    Position,
-    ServoReference,
-    Velocity,
-    encode_force,
-    encode_position,
-    encode_pressure,
-    encode_reference,
+    encode,
     encode_text,
-    encode_velocity,
 )
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.replay.replay import replay
@@ -42,15 +35,15 @@ def write_inputs(path: Path, samples: int = 300, configuration: Configuration | 
             velocity = max(abs(math.sin(i / 20)) - 0.3, 0.0) * math.copysign(0.05, math.sin(i / 20))
             if i % 50 != 7:
                 pressure = Pressure(stamp, 2e6 + 1e6 * math.sin(i / 70), math.nan if i % 61 == 5 else 5e5)
-                writer.write(b.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode_pressure(pressure, b'rod'))
+                writer.write(b.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode(pressure, b'rod'))
             force = Force(stamp, 60.0 * math.sin(i / 20 + 0.3))
-            writer.write(b.FORCE_TOPIC, FORCE_TYPE, stamp, encode_force(force, b'rod'))
+            writer.write(b.FORCE_TOPIC, FORCE_TYPE, stamp, encode(force, b'rod'))
             if 100 <= i < 200:
                 reference = ServoReference(stamp, 0.001 * i, velocity, 0.0, b'rod')
-                writer.write(b.REFERENCE_TOPIC, REFERENCE_TYPE, stamp, encode_reference(reference))
-            position = encode_position(Position(stamp, 0.001 * i), b'rod')
+                writer.write(b.REFERENCE_TOPIC, REFERENCE_TYPE, stamp, encode(reference))
+            position = encode(Position(stamp, 0.001 * i), b'rod')
             writer.write(b.POSITION_TOPIC, POSITION_TYPE, stamp, position)
-            data = encode_velocity(Velocity(stamp, velocity, b'rod'))
+            data = encode(Velocity(stamp, velocity, b'rod'))
             writer.write(b.VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
     return path
 

@@ -20,16 +20,9 @@ from seal_friction_ros.core.estimation.messages import (
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     VELOCITY_TYPE,
-    Position,
-    ServoReference,
-    Velocity,
-    encode_force,
-    encode_position,
-    encode_pressure,
-    encode_reference,
-    encode_velocity,
+    encode,
 )
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.offline.bags.bag import (
     FORCE_TOPIC,
@@ -71,19 +64,19 @@ def faults(folder: Path) -> Iterable[BagMessage]:
         velocities = {200: math.nan, 210: -math.inf, 220: 99.0, 225: 0.5}
         if i >= 5 and not 300 <= i < 330:
             sample = Pressure(stamp, pressures.get(i, pressure), pressure / 2)
-            yield BagMessage(PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode_pressure(sample, b'rod'))
+            yield BagMessage(PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode(sample, b'rod'))
         if i >= 8 and not 400 <= i < 430:
             force = Force(stamp, forces.get(i, 60.0 * math.sin(i / 30 + 0.3)))
-            yield BagMessage(FORCE_TOPIC, FORCE_TYPE, stamp, encode_force(force, b'rod'))
+            yield BagMessage(FORCE_TOPIC, FORCE_TYPE, stamp, encode(force, b'rod'))
         if i >= 20 and not 450 <= i < 480:
             wanted = {230: math.nan, 240: math.inf}.get(i, velocity)
             reference = ServoReference(stamp, 0.01 * math.sin(i / 30), wanted, 0.0, b'rod')
-            yield BagMessage(REFERENCE_TOPIC, REFERENCE_TYPE, stamp, encode_reference(reference))
-        position = encode_position(Position(stamp, 0.01 * math.sin(i / 30 - 0.01)), b'rod')
+            yield BagMessage(REFERENCE_TOPIC, REFERENCE_TYPE, stamp, encode(reference))
+        position = encode(Position(stamp, 0.01 * math.sin(i / 30 - 0.01)), b'rod')
         yield BagMessage(POSITION_TOPIC, POSITION_TYPE, stamp, position)
         if not 530 <= i < 560:
             late = stamp - 5 * STEP if i == 500 else stamp
-            data = encode_velocity(Velocity(late, velocities.get(i, velocity), b'rod'))
+            data = encode(Velocity(late, velocities.get(i, velocity), b'rod'))
             yield BagMessage(VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
 
 

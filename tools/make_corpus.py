@@ -19,7 +19,6 @@ from seal_friction_ros.core.estimation.configuration import first_snapshot, snap
 from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
-    DECODERS,
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
     FORCE_TYPE,
@@ -27,20 +26,19 @@ from seal_friction_ros.core.estimation.messages import (
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     VELOCITY_TYPE,
+    decode,
+    encode,
+    encode_text,
+)
+from seal_friction_ros.core.estimation.pipeline import answered, init
+from seal_friction_ros.core.estimation.records import (
+    Force,
+    FrictionEstimate,
     Position,
+    Pressure,
     ServoReference,
     Velocity,
-    encode_estimate,
-    encode_feedforward,
-    encode_force,
-    encode_position,
-    encode_pressure,
-    encode_reference,
-    encode_text,
-    encode_velocity,
 )
-from seal_friction_ros.core.estimation.pipeline import init, receive
-from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.mcap_reader import MAGIC
@@ -48,15 +46,13 @@ from seal_friction_ros.offline.bags.mcap_reader import MAGIC
 CORPUS = Path(__file__).parents[1] / 'test' / 'corpus'
 STAMP = 1_500_000_000
 MESSAGES = {
-    PRESSURE_TYPE: encode_pressure(Pressure(STAMP, 2e6, 5e5), b'rod'),
-    FORCE_TYPE: encode_force(Force(STAMP, 20.0), b'rod'),
-    VELOCITY_TYPE: encode_velocity(Velocity(STAMP, 0.1, b'')),
-    POSITION_TYPE: encode_position(Position(STAMP, 0.01), b'frame'),
-    REFERENCE_TYPE: encode_reference(ServoReference(STAMP, 0.01, 0.1, 0.0, b'rod')),
-    ESTIMATE_TYPE: encode_estimate(
-        FrictionEstimate(STAMP, 40.0, 2.0, 45.0, 40.0, FrictionState.SLIDING, 1, 0, 0.001), b'rod'
-    ),
-    FEEDFORWARD_TYPE: encode_feedforward(FeedForward(STAMP, 36.0, 1.0, 0), b'rod'),
+    PRESSURE_TYPE: encode(Pressure(STAMP, 2e6, 5e5), b'rod'),
+    FORCE_TYPE: encode(Force(STAMP, 20.0), b'rod'),
+    VELOCITY_TYPE: encode(Velocity(STAMP, 0.1, b'')),
+    POSITION_TYPE: encode(Position(STAMP, 0.01), b'frame'),
+    REFERENCE_TYPE: encode(ServoReference(STAMP, 0.01, 0.1, 0.0, b'rod')),
+    ESTIMATE_TYPE: encode(FrictionEstimate(STAMP, 40.0, 2.0, 45.0, 40.0, FrictionState.SLIDING, 1, 0, 0.001), b'rod'),
+    FEEDFORWARD_TYPE: encode(FeedForward(STAMP, 36.0, 1.0, 0), b'rod'),
     CONFIGURATION_TYPE: encode_text('{}'),
 }
 _OF_A_BAG = (PRESSURE_TYPE, VELOCITY_TYPE, ESTIMATE_TYPE)
@@ -182,7 +178,7 @@ def snapshots() -> dict[str, str]:
     state = init(parameters)
     start = snapshot_text(first_snapshot(configuration))
     for type_name in (PRESSURE_TYPE, FORCE_TYPE, REFERENCE_TYPE, VELOCITY_TYPE):
-        state, _ = receive(parameters, state, DECODERS[type_name](MESSAGES[type_name]))
+        state, _ = answered(parameters, state, decode(type_name, MESSAGES[type_name]))
     running = snapshot_text(first_snapshot(configuration)._replace(state=state))
     return {
         'start': start,

@@ -12,17 +12,15 @@ from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.foundation.parameters import meanings
-from seal_friction_ros.core.friction.actuator import (
-    ConstantCoulomb,
-    PressurePowerLaw,
-    PriorArtChart,
-    Uncertainty,
-    VelocityTerms,
-)
-from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, PowerLaw
-from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
+from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
+from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.core.lubrication import case as ehl

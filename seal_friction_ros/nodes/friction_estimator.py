@@ -14,8 +14,18 @@ from std_srvs.srv import Trigger
 from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, Snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, INPUTS, OUTPUTS, encode_text
-from seal_friction_ros.core.estimation.pipeline import Answer, compensate, encoded, init, observe
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    DECODERS,
+    ESTIMATE_TYPE,
+    INPUTS,
+    OUTPUTS,
+    Output,
+    encode,
+    encode_text,
+    type_of,
+)
+from seal_friction_ros.core.estimation.pipeline import init, receive
 from seal_friction_ros.files import FEEDFORWARD_PREFIX, load_configuration
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
@@ -60,6 +70,7 @@ class FrictionEstimator(ManagedNode):
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._topics: dict[str, str] = {}
+        self._sent: list[tuple[str, Output, bytes]] = []
         super().__init__('friction_estimator', self.GROUPS, **kwargs)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
@@ -166,30 +177,27 @@ class FrictionEstimator(ManagedNode):
             self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
             return
         received = self._now()
-        self._state, answer = observe(self._known, self._state, message)
-        published = self._send(answer)
-        if answer.estimate is not None:  # it is on its way before the feed-forward is computed
-            self._state, answer = compensate(self._known, self._state, message, answer)
-            published += self._send(answer._replace(estimate=None))
+        self._sent.clear()
+        self._state = receive(self._known, self._state, message, self._send)
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
         self._recording.record(self._topics[name], type_name, received, data)
-        for answer_type, answer_data in published:
-            self._recording.record(self._topics[answer_type], answer_type, self._now(), answer_data)
         self._statistics.on_input(name, message.stamp)
-        if answer.feedforward is not None:
-            self._statistics.on_feedforward(answer.feedforward)
-        if answer.estimate is not None:
-            self._statistics.on_estimate(answer.estimate, done - taken)
+        for answer_type, answer, answer_data in self._sent:
+            self._recording.record(self._topics[answer_type], answer_type, self._now(), answer_data)
+            if answer_type == ESTIMATE_TYPE:
+                self._statistics.on_estimate(answer, done - taken)
+            else:
+                self._statistics.on_feedforward(answer)
+        if name == 'rod_velocity':
             self._recording.now_is_a_good_time()
 
-    def _send(self, answer: Answer) -> list[tuple[str, bytes]]:
-        """Publish what there is of an answer; what that was."""
-        sent = list(encoded(answer))
-        for type_name, data in sent:
-            self._outputs[type_name].publish(data)
-        return sent
+    def _send(self, answer: Output, frame_id: bytes) -> None:
+        """Publish an answer at once; the rest waits until all answers are out."""
+        type_name, data = type_of(answer), encode(answer, frame_id)
+        self._outputs[type_name].publish(data)
+        self._sent.append((type_name, answer, data))
 
     def _publish(self, type_name: str, data: bytes) -> None:
         self._outputs[type_name].publish(data)

@@ -14,22 +14,8 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import (
-    FEEDFORWARD_TYPE,
-    INPUTS,
-    REFERENCE_TYPE,
-    Position,
-    ServoReference,
-    Velocity,
-    decode_feedforward,
-    decode_reference,
-    encode_force,
-    encode_position,
-    encode_pressure,
-    encode_reference,
-    encode_velocity,
-)
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, INPUTS, REFERENCE_TYPE, decode, encode
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.servo.controller import Limited, ServoController
 from seal_friction_ros.core.servo.motions import Chirp, PullTest, Reference, Sine, Step, Trapezoid, Wave
@@ -260,13 +246,13 @@ class ServoSimulator(ManagedNode):
 
     def _on_feedforward(self, data: bytes) -> None:
         try:
-            self._feedforward = decode_feedforward(data)
+            self._feedforward = decode(FEEDFORWARD_TYPE, data)
         except ValueError as error:
             self._malformed('friction_feedforward', error)
 
     def _on_reference(self, data: bytes) -> None:
         try:
-            self._reference = decode_reference(data)
+            self._reference = decode(REFERENCE_TYPE, data)
         except ValueError as error:
             self._malformed('servo_reference', error)
 
@@ -315,7 +301,7 @@ class ServoSimulator(ManagedNode):
             seconds, nanoseconds = divmod(stamp, _SECOND)
             self._clock_publisher.publish(ClockMessage(clock=Time(sec=seconds, nanosec=nanoseconds)))
         if reference is not None and 'servo_reference' in self._sensor_publishers:
-            data = encode_reference(ServoReference(stamp, *reference, FRAME))
+            data = encode(ServoReference(stamp, *reference, FRAME))
             self._sensor_publishers['servo_reference'].publish(data)
         while len(self._under_way) > self._delay:
             self._publish(*self._under_way.popleft())
@@ -355,13 +341,13 @@ class ServoSimulator(ManagedNode):
     def _publish(self, stamp: int, readings: Readings) -> None:
         send = self._sensor_publishers
         if readings.pressure is not None:
-            send['cylinder_pressure'].publish(encode_pressure(Pressure(stamp, *readings.pressure), FRAME))
+            send['cylinder_pressure'].publish(encode(Pressure(stamp, *readings.pressure), FRAME))
         if readings.force_sum is not None:
-            send['force_sum'].publish(encode_force(Force(stamp, readings.force_sum), FRAME))
+            send['force_sum'].publish(encode(Force(stamp, readings.force_sum), FRAME))
         if readings.position is not None:
-            send['rod_position'].publish(encode_position(Position(stamp, readings.position), FRAME))
+            send['rod_position'].publish(encode(Position(stamp, readings.position), FRAME))
         if readings.velocity is not None:
-            send['rod_velocity'].publish(encode_velocity(Velocity(stamp, readings.velocity, FRAME)))
+            send['rod_velocity'].publish(encode(Velocity(stamp, readings.velocity, FRAME)))
 
     # --- diagnostics ---
 

@@ -1,66 +1,64 @@
-"""Many messages at once through the same functions as one by one (`pipeline.receive`), compiled: the same bytes.
+"""`pipeline.receive` compiled, many messages in one pass: the same source, the same bytes, two hundred times faster.
 
 ``state, answers = receive_all(parameters, state, messages)``. The messages stay as they lie in memory, one array of
-bytes; the answers come as bytes, too. Three passes: what friction is asked for, that friction for all answers
-(`bulk_friction`), and the answers. The state is that of `pipeline`, so blocks of messages follow each other, and single
-messages between them.
+bytes; the answers come as bytes, too. The state is that of `pipeline`, so blocks of messages follow each other, with
+single messages between them.
 
-What one pass does at a message is what `pipeline.receive` does, with the functions that are in `COMPILABLE`; the tests
-hold the two together. What does not fit is refused (`UnsuitedError`), and `pipeline.receive` has the last word on it.
+This module decodes and encodes by `messages.LAYOUTS`; everything between is `pipeline`. Messages that do not fit are
+refused (`UnsuitedError`); `pipeline.receive` then decides about them.
 """
 
-import dataclasses
-from collections import namedtuple
+import struct
 from enum import IntEnum
-from functools import lru_cache
+from functools import cache
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
+from numba import literal_unroll
+from numba.extending import overload
 
-from seal_friction_ros.core.estimation import estimator, feedforward
-from seal_friction_ros.core.estimation.bulk_friction import ActuatorFrictions, actuator_frictions
-from seal_friction_ros.core.estimation.feedforward import FeedForward, Motion
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.messages import (
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    FORCE_TYPE,
+    LAYOUTS,
+    LONGEST_FRAME,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    SECOND,
+    VELOCITY_TYPE,
+    Layout,
+)
 from seal_friction_ros.core.estimation.pipeline import (
     PipelineParameters,
     PipelineState,
-    Reference,
-    is_fading,
-    motion_at,
+    receive_force,
+    receive_pressure,
+    receive_reference,
+    receive_velocity,
+    send,
 )
 from seal_friction_ros.core.estimation.records import (
     NEVER,
-    NO_ESTIMATE,
     Force,
     FrictionEstimate,
     Pressure,
-    RodSample,
-    Status,
+    ServoReference,
+    Velocity,
 )
-from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.compilable import COMPILABLE
-from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.friction.actuator import ActuatorFriction
+from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 
 Bytes = npt.NDArray[np.uint8]
 Integers = npt.NDArray[np.int64]
 
-MOST_MESSAGES = 1 << 16  # that are computed at once: enough to be fast, and memory is bounded
+MOST_MESSAGES = 1 << 16  # in one call: enough to be fast, and memory is bounded
 _LATEST = 1 << 61  # [ns] stamps up to here, as messages have them: differences fit into 64 bits
-_LONGEST_FRAME = 1024  # [bytes] as in `wire`
-
-_observe, _answer, _feedforward = estimator.observe, estimator.answer, feedforward.step
-_wanted_velocity = feedforward.wanted_velocity
-_PRESSURE_MISSING = int(Status.PRESSURE_MISSING)
-_NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
-
-for _function in COMPILABLE:
-    numba.extending.register_jitable(error_model='numpy')(_function)
 
 
 class Kind(IntEnum):
-    """What a message is to the estimator; inputs from FORCE to VELOCITY, those with two values next to each other."""
+    """What a message is to the estimator."""
 
     OTHER = 0
     FORCE = 1
@@ -74,13 +72,22 @@ class Kind(IntEnum):
     """of another estimator"""
 
 
-_PRESSURE, _FORCE, _REFERENCE, _VELOCITY = (
-    int(kind) for kind in (Kind.PRESSURE, Kind.FORCE, Kind.REFERENCE, Kind.VELOCITY)
-)
+_FORCE, _PRESSURE, _REFERENCE, _VELOCITY = int(Kind.FORCE), int(Kind.PRESSURE), int(Kind.REFERENCE), int(Kind.VELOCITY)
+_LAYOUTS = {layout.message_type: layout for layout in LAYOUTS}
+_INPUT_TYPES = {_FORCE: FORCE_TYPE, _PRESSURE: PRESSURE_TYPE, _REFERENCE: REFERENCE_TYPE, _VELOCITY: VELOCITY_TYPE}
+_NUMBERS = tuple(len(_LAYOUTS[_INPUT_TYPES[kind]].codes) if kind in _INPUT_TYPES else 0 for kind in Kind)
+"""How many numbers an input of each kind has, all of them float64."""
+_MOST_NUMBERS = max(_NUMBERS)
+_ANSWERS: dict[type, tuple[int, Layout]] = {
+    FrictionEstimate: (0, _LAYOUTS[ESTIMATE_TYPE]),
+    FeedForward: (1, _LAYOUTS[FEEDFORWARD_TYPE]),
+}
+"""Record of an answer -> its column in `_Outbox`, and its layout."""
+_BODY_SIZES = tuple((layout.size + 7) // 8 * 8 for _, layout in _ANSWERS.values())  # [bytes] padded to 8
 
 
 class UnsuitedError(Exception):
-    """Messages that are not for this way: malformed, or with numbers beyond what compiled code holds."""
+    """Messages that compiled code cannot process: malformed, or with numbers beyond what it holds."""
 
 
 class Messages(NamedTuple):
@@ -96,17 +103,17 @@ class Messages(NamedTuple):
     """[bytes] shape (n,)"""
 
     def taken(self, first: int, end: int) -> 'Messages':
-        """Some that follow each other."""
+        """The messages from number ``first`` to before number ``end``."""
         return Messages(self.data, self.kinds[first:end], self.offsets[first:end], self.sizes[first:end])
 
     def message(self, number: int) -> bytes:
-        """Bytes of one."""
+        """Bytes of one message."""
         offset = self.offsets[number]
         return self.data[offset : offset + self.sizes[number]].tobytes()
 
 
 class Answers(NamedTuple):
-    """What the messages made come out, for each of them; the size is 0 where nothing did."""
+    """What each message made the estimator send; the size is 0 where it sent nothing."""
 
     data: Bytes
     estimate_offsets: Integers
@@ -115,35 +122,60 @@ class Answers(NamedTuple):
     feedforward_sizes: Integers
 
 
+class _Outbox(NamedTuple):
+    """Where compiled code puts answers: three views of the same bytes, and where each answer is in them."""
+
+    small: Any
+    words: Any
+    numbers: Any
+    offsets: Any
+    """of the estimate and the feed-forward to each message, shape (2, n); likewise"""
+    sizes: Any
+    cursor: Any
+    """[bytes] used so far, shape (1,)"""
+    row: Any
+    """an answer as numbers, shape (16,)"""
+    data: Any
+    """the messages, whose stamps and frame names the answers take over"""
+    message_offsets: Any
+
+
 def receive_all(
     parameters: PipelineParameters, state: PipelineState, messages: Messages
 ) -> tuple[PipelineState, Answers]:
-    """Take messages as `pipeline.receive` takes one after the other.
+    """Take messages as `pipeline.receive` takes them one after the other.
 
     Args:
         parameters: Settings and seals.
         state: From `pipeline.init`, a snapshot, or the messages before.
-        messages: At most `MOST_MESSAGES`, or memory is what they need; those that are no input are passed over.
+        messages: At most `MOST_MESSAGES`, which bounds memory; those that are no input are passed over.
 
     Raises:
-        UnsuitedError: A message is not what its kind says, or a stamp is out of bounds.
+        UnsuitedError: A message is not of its kind, a stamp is out of bounds, or an answer is not finite.
     """
     if not _fits(state):
         raise UnsuitedError('a whole number in the state')
-    settings, guiding = _numbers(parameters.estimator.settings), _numbers(parameters.feedforward)
-    kinds, count = messages.kinds, len(messages.kinds)
-    stamps, values, heads = np.zeros(count, np.int64), np.zeros((count, 2)), np.zeros(count, np.int64)
-    wrong, room = _decode(*messages, stamps, values, heads)
+    wrong, room = _check(*messages)
     if wrong >= 0:
         raise UnsuitedError(f'message {wrong}')
-    asked = np.zeros((4, int(np.count_nonzero(kinds == _VELOCITY))))
-    _ask(settings, guiding, state, kinds, stamps, values, asked)
-    frictions, guiding_friction = _frictions(parameters, asked)
-    answers = Answers(np.zeros(room, np.uint8), *np.zeros((4, count), np.int64))
-    views = (answers.data, answers.data.view(np.uint32), answers.data.view(np.float64))
-    inputs = (kinds, stamps, values, messages.data, messages.offsets, heads)
-    state = _make_answers(settings, guiding, state, inputs, frictions, guiding_friction, views, answers[1:])
-    return state, answers
+    small = np.zeros(room, np.uint8)
+    places = np.zeros((2, 2, len(messages.kinds)), np.int64)
+    outbox = _Outbox(
+        small,
+        small.view(np.uint32),
+        small.view(np.float64),
+        places[0],
+        places[1],
+        np.zeros(1, np.int64),
+        np.zeros(16),
+        messages.data,
+        messages.offsets,
+    )
+    state, wrong = _receive_all(for_compiler(parameters), state, messages.kinds, outbox)
+    if wrong >= 0:
+        raise UnsuitedError(f'an answer to message {wrong} is not finite')
+    (estimates, feedforwards), (estimate_sizes, feedforward_sizes) = places
+    return state, Answers(small, estimates, estimate_sizes, feedforwards, feedforward_sizes)
 
 
 def _fits(value: Any) -> bool:
@@ -151,34 +183,6 @@ def _fits(value: Any) -> bool:
     if isinstance(value, tuple):
         return all(map(_fits, value))
     return isinstance(value, float) or value == NEVER or abs(value) <= _LATEST
-
-
-@lru_cache(maxsize=8)
-def _numbers(settings: Any) -> Any:
-    """Settings as a named tuple, which is what can be compiled."""
-    values = dataclasses.asdict(settings)
-    return _record(type(settings).__name__, tuple(values))(**values)
-
-
-@lru_cache(maxsize=8)
-def _record(name: str, fields: tuple[str, ...]) -> Any:
-    return namedtuple(name, fields)
-
-
-def _frictions(parameters: PipelineParameters, asked: FloatArray) -> tuple[ActuatorFrictions, FloatArray]:
-    """Friction for each answer, and the velocity friction [N] at the velocity that the feed-forward is for."""
-    seals = parameters.estimator.seals
-    pressure_a, pressure_b, velocity, wanted = asked
-    with np.errstate(all='ignore'):
-        frictions = actuator_frictions(seals, pressure_a, pressure_b, velocity)
-        guiding = np.zeros(len(wanted))
-        if any(mounted.seal.velocity_law for mounted in seals):
-            known = ~np.isnan(wanted)
-            at_wanted = actuator_frictions(seals, pressure_a, pressure_b, np.where(known, wanted, 0.0))
-            guiding = np.where(known, at_wanted.velocity_friction, 0.0)
-    if not all(np.isfinite(values).all() for values in (*frictions, guiding)):
-        raise UnsuitedError('a friction is not finite')
-    return frictions, guiding
 
 
 # -- compiled ---------------------------------------------------------------------------------------------------------
@@ -194,25 +198,30 @@ def _integer(data: Bytes, offset: int, size: int) -> int:
 
 
 @compiled
+def _number(data: Bytes, offset: int) -> float:
+    """float64 at any byte."""
+    return float(np.int64(_integer(data, offset, 8)).view(np.float64))
+
+
+@compiled
 def _head_size(frame_length: int) -> int:
-    """Bytes of stamp and frame name, padded to where a float64 may begin."""
+    """As `messages.head_size`."""
     return (12 + frame_length + 7) // 8 * 8
 
 
 @compiled
-def _decode(
-    data: Bytes,
-    kinds: Bytes,
-    offsets: Integers,
-    sizes: Integers,
-    stamps: Integers,
-    values: FloatArray,
-    heads: Integers,
-) -> tuple[int, int]:
-    """As `wire` decodes inputs: stamps [ns], the values that count, and sizes of the heads that their answers have.
+def _stamp(data: Bytes, offset: int) -> int:
+    """Stamp [ns] of a message."""
+    seconds = np.int64(np.int32(np.uint32(_integer(data, offset + 4, 4))))
+    return int(seconds * SECOND + _integer(data, offset + 8, 4))
+
+
+@compiled
+def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers) -> tuple[int, int]:
+    """Check inputs as `messages.decode` does.
 
     Returns:
-        The first message that is not what its kind says, or -1; and the room [bytes] that all answers may need.
+        The first message that is not of its kind, or -1; and the room [bytes] that all answers may need.
     """
     room = 0
     for i in range(len(kinds)):
@@ -221,158 +230,110 @@ def _decode(
             continue
         if size < 16 or data[offset] != 0 or data[offset + 1] != 1:
             return i, 0
-        seconds = np.int64(np.int32(np.uint32(_integer(data, offset + 4, 4))))
         nanoseconds, length = _integer(data, offset + 8, 4), _integer(data, offset + 12, 4)
-        if length > _LONGEST_FRAME or nanoseconds >= 1_000_000_000:
+        if length > LONGEST_FRAME or nanoseconds >= SECOND:
             return i, 0
-        body = 4 + _head_size(length)
-        whole = body + (24 if kind == _REFERENCE else 16 if kind == _PRESSURE else 8)
+        whole = 4 + _head_size(length) + 8 * _NUMBERS[kind]
         if not whole <= size <= whole + 3:
             return i, 0
-        stamps[i] = seconds * 1_000_000_000 + nanoseconds
-        body += offset + (8 if kind == _REFERENCE else 0)  # the position wanted is of no use here
-        values[i, 0] = np.int64(_integer(data, body, 8)).view(np.float64)
-        if _PRESSURE <= kind <= _REFERENCE:
-            values[i, 1] = np.int64(_integer(data, body + 8, 8)).view(np.float64)
-        heads[i] = _head_size(length)  # an answer to a name of no bytes has one of one byte, with the same padding
+        head = _head_size(max(length, 1))  # an empty name is answered by one of one byte, its end
         if kind == _VELOCITY:
-            room += 8 + heads[i] + 48
+            room += 8 + head + _BODY_SIZES[0]
         if kind >= _REFERENCE:
-            room += 8 + heads[i] + 24
+            room += 8 + head + _BODY_SIZES[1]
     return -1, room
 
 
 @compiled
-def _newest(
-    kind: int, stamp: int, values: FloatArray, pressure: Pressure, force: Force, reference: Reference
-) -> tuple[Pressure, Force, Reference]:
-    """Inputs in use after a message."""
-    if kind == _PRESSURE:
-        pressure = Pressure(stamp, values[0], values[1])
-    elif kind == _FORCE:
-        force = Force(stamp, values[0])
-    elif kind == _REFERENCE:
-        reference = Reference(stamp, values[0], values[1])
-    return pressure, force, reference
-
-
-@compiled
-def _ask(
-    settings: Any,
-    guiding: Any,
-    state: PipelineState,
-    kinds: Bytes,
-    stamps: Integers,
-    values: FloatArray,
-    asked: FloatArray,
-) -> None:
-    """First pass: pressures [Pa] and velocity [m/s] of each answer, and the velocity of its feed-forward (or NaN)."""
-    known, _, pressure, force, reference, refused = state
-    answers = 0
+def _receive_all(parameters: Any, state: PipelineState, kinds: Bytes, outbox: Any) -> tuple[PipelineState, int]:
+    """The pass; the number of the first message whose answer is not finite, or -1."""
+    data = outbox.data
+    first, second, third = 0.0, 0.0, 0.0
     for i in range(len(kinds)):
-        stamp, kind = stamps[i], kinds[i]
-        pressure, force, reference = _newest(kind, stamp, values[i], pressure, force, reference)
+        kind = kinds[i]
+        if not _FORCE <= kind <= _VELOCITY:
+            continue
+        offset = outbox.message_offsets[i]
+        body = offset + 4 + _head_size(_integer(data, offset + 12, 4))
+        stamp = _stamp(data, offset)
+        first = _number(data, body)
+        if _NUMBERS[kind] > 1:
+            second = _number(data, body + 8)
+        if _NUMBERS[kind] > 2:
+            third = _number(data, body + 16)
         if kind == _VELOCITY:
-            known, seen = _observe(settings, known, RodSample(stamp, values[i, 0], pressure, force, refused))
-            asked[0, answers] = known.pressure.chamber_a
-            asked[1, answers] = known.pressure.chamber_b
-            asked[2, answers] = seen.velocity
-            asked[3, answers] = _wanted_velocity(guiding, motion_at(reference, stamp, values[i, 0]))
-            answers += 1
+            state = receive_velocity(parameters, state, Velocity(stamp, first, i), outbox)
+        elif kind == _PRESSURE:
+            state = receive_pressure(parameters, state, Pressure(stamp, first, second), outbox)
+        elif kind == _FORCE:
+            state = receive_force(parameters, state, Force(stamp, first), outbox)
+        else:
+            state = receive_reference(parameters, state, ServoReference(stamp, first, second, third, i), outbox)
+        if outbox.cursor[0] < 0:
+            return state, i
+    return state, -1
+
+
+@overload(send, jit_options={'error_model': 'numpy'})
+def _send(emit: Any, record: Any, frame_id: Any) -> Any:  # noqa: ARG001  the names are those of `send`
+    """`pipeline.send` in compiled code: the record goes into the outbox. The frame is the number of the message."""
+    column, layout = _ANSWERS[record.instance_class]
+    write = _writer(layout)
+
+    def implementation(emit: Any, record: Any, frame_id: Any) -> None:
+        k = 0  # enumerate cannot be unrolled
+        for value in literal_unroll(record):
+            emit.row[k] = value
+            k += 1  # noqa: SIM113
+        write(emit, column, frame_id)
+
+    return implementation
+
+
+@cache
+def _writer(layout: Layout) -> Any:
+    """Function that writes the answer in ``outbox.row`` by its layout."""
+    offsets, sizes = layout.offsets, tuple(struct.calcsize(code) for code in layout.codes)
+    count, size = len(offsets), layout.size
+    padded = (size + 7) // 8 * 8
+
+    @compiled
+    def write(outbox: Any, column: int, number: int) -> None:
+        slot = outbox.cursor[0]
+        head = _write_head(outbox.small, slot, outbox.data, outbox.message_offsets[number])
+        outbox.offsets[column, number] = slot + 4
+        outbox.sizes[column, number] = 4 + head + size
+        body = slot + 8 + head
+        finite = True
+        for k in range(count):
+            value, place = outbox.row[k + 1], body + offsets[k]
+            finite = finite and np.isfinite(value)
+            if sizes[k] == 8:
+                outbox.numbers[place // 8] = value
+            elif sizes[k] == 4:
+                outbox.words[place // 4] = np.uint32(value)
+            else:
+                outbox.small[place] = np.uint8(np.int64(value))
+        outbox.cursor[0] = body + padded if finite else -1
+
+    return write
 
 
 @compiled
-def _make_answers(
-    settings: Any,
-    guiding: Any,
-    state: PipelineState,
-    inputs: Any,
-    frictions: ActuatorFrictions,
-    guiding_friction: FloatArray,
-    views: Any,
-    places: Any,
-) -> PipelineState:
-    """Last pass: all that `pipeline.receive` does, but for the friction, which is there."""
-    kinds, stamps, values, data, offsets, heads = inputs
-    estimate_offsets, estimate_sizes, feedforward_offsets, feedforward_sizes = places
-    known, guided, pressure, force, reference, refused = state
-    answers = slot = 0
-    for i in range(len(kinds)):
-        stamp, kind = stamps[i], kinds[i]
-        motion = Motion(0.0, 0.0, 0.0, 0.0, 0.0)
-        estimate = NO_ESTIMATE
-        makes_feedforward = False
-        pressure, force, reference = _newest(kind, stamp, values[i], pressure, force, reference)
-        if kind == _REFERENCE:
-            makes_feedforward = is_fading(guiding, known.stamp, stamp)
-            motion = Motion(reference.velocity, reference.acceleration, 0.0, 0.0, 0.0)
-        elif kind == _VELOCITY:
-            known, seen = _observe(settings, known, RodSample(stamp, values[i, 0], pressure, force, refused))
-            friction = _NO_FRICTION
-            if not seen.status & _PRESSURE_MISSING:
-                friction = ActuatorFriction(
-                    frictions.coulomb_friction[answers],
-                    frictions.coulomb_friction_std[answers],
-                    frictions.stiction[answers],
-                    frictions.in_identified_range[answers],
-                    frictions.velocity_friction[answers],
-                )
-            estimate = _answer(settings, known, seen, friction)
-            estimate_offsets[i] = slot + 4
-            estimate_sizes[i] = 4 + heads[i] + 48
-            _write_head(views[0], slot, data, offsets[i])
-            _write_estimate(views, (slot + 8 + heads[i]) // 8, estimate)
-            slot += 8 + heads[i] + 48
-            makes_feedforward = reference.stamp != NEVER or guiding.use_measured_velocity
-            at = motion_at(reference, stamp, values[i, 0])
-            added = guiding_friction[answers] if known.pressure.stamp != NEVER else 0.0
-            motion = Motion(
-                at.reference_velocity, at.reference_acceleration, at.measured_velocity, at.reference_age, added
-            )
-            answers += 1
-        if makes_feedforward:
-            guided, compensation = _feedforward(guiding, guided, stamp, estimate, motion)
-            feedforward_offsets[i] = slot + 4
-            feedforward_sizes[i] = 4 + heads[i] + 20
-            _write_head(views[0], slot, data, offsets[i])
-            _write_feedforward(views, (slot + 8 + heads[i]) // 8, compensation)
-            slot += 8 + heads[i] + 24
-    return PipelineState(known, guided, pressure, force, reference, refused)
+def _write_head(out: Bytes, slot: int, data: Bytes, offset: int) -> int:
+    """Encapsulation, stamp and frame name of the message that is answered, from ``slot`` + 4 on.
 
+    The name ends in a zero byte, whatever its last byte was. The numbers that follow are aligned to 8 bytes.
 
-@compiled
-def _write_head(out: Bytes, slot: int, data: Bytes, offset: int) -> None:
-    """Encapsulation, stamp and frame name of the message that is answered; it ends in a zero whatever stood there."""
+    Returns:
+        Size of stamp and name [bytes].
+    """
     out[slot + 5] = 1
-    length = _integer(data, offset + 12, 4)
     for k in range(8):
         out[slot + 8 + k] = data[offset + 4 + k]
-    if length == 0:
-        length = 1
+    length = max(_integer(data, offset + 12, 4), 1)
     out[slot + 16] = length & 0xFF
     out[slot + 17] = length >> 8
     for k in range(length - 1):
         out[slot + 20 + k] = data[offset + 16 + k]
-
-
-@compiled
-def _write_estimate(views: Any, place: int, estimate: FrictionEstimate) -> None:
-    """Body of a FrictionEstimate; ``place`` is where it begins, in units of 8 bytes."""
-    small, words, numbers = views
-    numbers[place] = estimate.coulomb_friction
-    numbers[place + 1] = estimate.coulomb_friction_std
-    numbers[place + 2] = estimate.breakaway_force
-    numbers[place + 3] = estimate.friction_force
-    small[8 * place + 32] = np.uint8(estimate.state.value)
-    small[8 * place + 33] = np.uint8(estimate.direction)
-    words[2 * place + 9] = estimate.status
-    numbers[place + 5] = estimate.input_age
-
-
-@compiled
-def _write_feedforward(views: Any, place: int, compensation: FeedForward) -> None:
-    """Body of a FrictionFeedForward."""
-    _, words, numbers = views
-    numbers[place] = compensation.force
-    numbers[place + 1] = compensation.scale
-    words[2 * place + 4] = compensation.limited
+    return _head_size(length)

@@ -12,10 +12,11 @@ from typing import Any, NamedTuple, get_type_hints
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
-from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, Reference, init
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, WantedMotion, init
 from seal_friction_ros.core.estimation.records import Force, Pressure
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, parameter
 from seal_friction_ros.core.friction.seal_file import mount_seals
+from seal_friction_ros.core.friction.states import FrictionState
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,7 @@ def _state(document: Any) -> PipelineState:
     """
     seen: EstimatorState = _parsed(EstimatorState, document['estimator'])
     fed: FeedForwardState = _parsed(FeedForwardState, document['feedforward'])
+    FrictionState(fed.estimate.state)
     usable = (seen.pressure, seen.force, seen.velocity, seen.leapt_pressure, seen.leapt_force, seen.leapt_velocity)
     computed = (fed.force, fed.fade, fed.velocity, *fed.estimate)
     if not all(math.isfinite(value) for value in (*computed, *(number for sample in usable for number in sample))):
@@ -133,7 +135,7 @@ def _state(document: Any) -> PipelineState:
         fed,
         _parsed(Pressure, document['pressure']),
         _parsed(Force, document['force']),
-        _parsed(Reference, document['reference']),
+        _parsed(WantedMotion, document['reference']),
         bool(document['refused']),
     )
 

@@ -7,8 +7,8 @@ estimates, live or replayed.
 """
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple
 
 from seal_friction_ros.core.estimation.records import (
     NEVER,
@@ -20,10 +20,16 @@ from seal_friction_ros.core.estimation.records import (
     RodSample,
     Status,
 )
-from seal_friction_ros.core.foundation.compilable import compilable
+from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import check, parameter
-from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, actuator_friction
-from seal_friction_ros.core.friction.states import FrictionState, StateFriction, is_at_rest, state_friction
+from seal_friction_ros.core.friction.actuator import (
+    ActuatorFriction,
+    MountedSeal,
+    SealNumbers,
+    friction_of_seals,
+    numbers_of_seals,
+)
+from seal_friction_ros.core.friction.states import UNKNOWN, StateFriction, is_at_rest, state_friction
 
 
 @dataclass(frozen=True)
@@ -89,12 +95,20 @@ class EstimatorParameters:
         ValueError: There is no seal.
     """
 
+    COMPILED: ClassVar = ('settings', 'seal_numbers', 'depends_on_velocity')
+
     settings: EstimatorSettings
     seals: tuple[MountedSeal, ...]
+    seal_numbers: tuple[SealNumbers, ...] = field(init=False, repr=False, compare=False)
+    depends_on_velocity: bool = field(init=False, repr=False, compare=False)
+    """whether the sliding friction of a seal does"""
 
     def __post_init__(self) -> None:
         if not self.seals:
             raise ValueError('EstimatorParameters.seals is empty: name at least one seal')
+        object.__setattr__(self, 'seal_numbers', numbers_of_seals(self.seals))
+        depends = any(mounted.seal.depends_on_velocity for mounted in self.seals)
+        object.__setattr__(self, 'depends_on_velocity', depends)
 
 
 class Speed(NamedTuple):
@@ -168,11 +182,12 @@ _NO_MOTION = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
 _NO_STATE = _NO_MOTION | _INPUT_REFUSED | _PRESSURE_MISSING
 _NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE
 _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
-_UNKNOWN = StateFriction(FrictionState.UNKNOWN, 0, 0.0)
+_UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
 SHORTEST_INTERVAL = 1e-3  # [s] our choice: below it noise leaps, and stamps of some drivers are no finer
 
 
+@compilable
 def step(
     parameters: EstimatorParameters, state: EstimatorState, sample: RodSample
 ) -> tuple[EstimatorState, FrictionEstimate]:
@@ -197,16 +212,17 @@ def step(
 
     Source: thesis, chapter 7 (Figures 20 and 21); what is done with unusable inputs is our choice.
     """
-    state, seen = observe(parameters.settings, state, sample)
+    settings = parameters.settings
+    state, seen = assess_inputs(settings, state, sample)
     friction = _NO_FRICTION
     if not seen.status & _PRESSURE_MISSING:
         pressure = state.pressure
-        friction = actuator_friction(parameters.seals, pressure.chamber_a, pressure.chamber_b, seen.velocity)
-    return state, answer(parameters.settings, state, seen, friction)
+        friction = friction_of_seals(parameters.seal_numbers, pressure.chamber_a, pressure.chamber_b, seen.velocity)
+    return state, estimate_of(settings, state, seen, friction)
 
 
 @compilable
-def observe(
+def assess_inputs(
     settings: EstimatorSettings, state: EstimatorState, sample: RodSample
 ) -> tuple[EstimatorState, Observation]:
     """First half of a step: which inputs are in use, what is wrong with them, and whether the rod moves."""
@@ -243,7 +259,7 @@ def observe(
 
 
 @compilable
-def answer(
+def estimate_of(
     settings: EstimatorSettings, state: EstimatorState, seen: Observation, friction: ActuatorFriction
 ) -> FrictionEstimate:
     """Second half of a step: what acts on the rod, given the friction of all seals at the pressure in use."""
@@ -270,17 +286,22 @@ def answer(
 
 
 @compilable
+def _largest_change(elapsed: int, largest_rate: float) -> float:
+    """Change that ``largest_rate`` [unit of the change / s] allows over ``elapsed`` [ns]."""
+    seconds = abs(elapsed) * 1e-9
+    return largest_rate * (seconds if seconds > SHORTEST_INTERVAL else SHORTEST_INTERVAL)
+
+
+@compilable
 def _leaps(change: float, elapsed: int, largest_rate: float) -> bool:
-    """Whether a change is faster than ``largest_rate`` [unit of change / s] over ``elapsed`` [ns]."""
-    return abs(change) > largest_rate * max(abs(elapsed) * 1e-9, SHORTEST_INTERVAL)
+    """Whether a change is faster than ``largest_rate`` [unit of the change / s] over ``elapsed`` [ns]."""
+    return abs(change) > _largest_change(elapsed, largest_rate)
 
 
 @compilable
 def _pressure_leaps(settings: EstimatorSettings, newer: Pressure, older: Pressure) -> bool:
-    elapsed, fastest = newer.stamp - older.stamp, settings.pressure_rate_max
-    return _leaps(newer.chamber_a - older.chamber_a, elapsed, fastest) or _leaps(
-        newer.chamber_b - older.chamber_b, elapsed, fastest
-    )
+    most = _largest_change(newer.stamp - older.stamp, settings.pressure_rate_max)
+    return abs(newer.chamber_a - older.chamber_a) > most or abs(newer.chamber_b - older.chamber_b) > most
 
 
 @compilable

@@ -21,9 +21,9 @@ from enum import IntFlag
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
-from seal_friction_ros.core.foundation.compilable import compilable
+from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import check, parameter
-from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.friction.states import UNKNOWN
 
 FASTEST = 100.0  # [m/s] no rod is faster
 LONGEST_STEP = 0.02  # [s] after a longer gap, or a stamp that leaps, fade and slew go on as if this time had passed
@@ -164,7 +164,7 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
     """
     if estimate.status & UNUSABLE:
         return False
-    return not settings.use_measured_velocity or estimate.state != FrictionState.UNKNOWN
+    return not settings.use_measured_velocity or estimate.state != UNKNOWN
 
 
 @compilable

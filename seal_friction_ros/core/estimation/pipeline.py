@@ -1,53 +1,59 @@
 """The path of every message: what comes in, what is kept of it, what goes out. The same for the node and for replay.
 
-``state = init(parameters)``, then ``state, answer = receive(parameters, state, message)`` for every message, in the
-order of receipt. A velocity sample makes an estimate with the pressure and force sum that came last, and, once there
-has been a reference, a feed-forward. While velocity samples fail to come, references make the feed-forward, so that it
-fades out instead of standing still.
+``state = init(parameters)``, then ``state = receive(parameters, state, message, emit)`` for every message, in order of
+receipt. The node passes a function that publishes, replay one that collects.
 
-Inputs that are refused, since several nodes publish them and nobody knows which one is right, still make estimates, so
-that everybody sees it, but these are marked and the feed-forward fades out.
+A velocity sample makes an estimate with the newest pressure and force sum, and, once there has been a reference, a
+feed-forward. The estimate is emitted before the feed-forward is computed. While no velocity sample comes, references
+make the feed-forward, so that it fades out.
+
+Inputs with several publishers are refused, since nobody knows which publisher is right: they still make estimates, so
+that everybody sees it, but the estimates are marked and the feed-forward fades out.
 """
 
 import math
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import estimator, feedforward
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
-from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings, FeedForwardState, Motion
-from seal_friction_ros.core.estimation.messages import (
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    Input,
-    Position,
-    Velocity,
-    encode_estimate,
-    encode_feedforward,
+from seal_friction_ros.core.estimation.estimator import step as estimator_step
+from seal_friction_ros.core.estimation.feedforward import (
+    FeedForwardSettings,
+    FeedForwardState,
+    Motion,
+    wanted_velocity,
 )
+from seal_friction_ros.core.estimation.feedforward import step as feedforward_step
+from seal_friction_ros.core.estimation.messages import Input, Output, encode, type_of
 from seal_friction_ros.core.estimation.records import (
     NEVER,
     NO_ESTIMATE,
     NO_FORCE,
     NO_PRESSURE,
     Force,
-    FrictionEstimate,
+    Position,
     Pressure,
     RodSample,
+    ServoReference,
+    Velocity,
 )
-from seal_friction_ros.core.foundation.compilable import compilable
-from seal_friction_ros.core.friction.actuator import actuator_friction
+from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.friction.actuator import friction_of_seals
+
+Emit = Callable[[Output, bytes], object]
+"""Takes what goes out, and the frame name of the message that it answers."""
 
 
 class PipelineParameters(NamedTuple):
-    """All that is known beforehand."""
+    """Everything that is known beforehand."""
 
     estimator: EstimatorParameters
     feedforward: FeedForwardSettings
 
 
-class Reference(NamedTuple):
-    """How the rod shall move."""
+class WantedMotion(NamedTuple):
+    """Motion that the rod shall make."""
 
     stamp: int
     """[ns] the moment it is for"""
@@ -57,7 +63,7 @@ class Reference(NamedTuple):
     """[m/s^2]"""
 
 
-NO_REFERENCE = Reference(NEVER, 0.0, 0.0)
+NO_REFERENCE = WantedMotion(NEVER, 0.0, 0.0)
 
 
 class PipelineState(NamedTuple):
@@ -67,21 +73,9 @@ class PipelineState(NamedTuple):
     feedforward: FeedForwardState
     pressure: Pressure = NO_PRESSURE
     force: Force = NO_FORCE
-    reference: Reference = NO_REFERENCE
+    reference: WantedMotion = NO_REFERENCE
     refused: bool = False
-    """whether inputs come from somebody who should not send them"""
-
-
-class Answer(NamedTuple):
-    """What a message makes come out."""
-
-    estimate: FrictionEstimate | None
-    feedforward: FeedForward | None
-    frame_id: bytes
-    """frame of the message that is answered"""
-
-
-NOTHING = Answer(None, None, b'')
+    """whether an input has several publishers"""
 
 
 def init(parameters: PipelineParameters) -> PipelineState:
@@ -89,88 +83,105 @@ def init(parameters: PipelineParameters) -> PipelineState:
     return PipelineState(estimator.init(parameters.estimator), feedforward.init(parameters.feedforward))
 
 
-def receive(parameters: PipelineParameters, state: PipelineState, message: Input) -> tuple[PipelineState, Answer]:
-    """Take one message: `observe`, and after a velocity `compensate`.
+def receive(parameters: PipelineParameters, state: PipelineState, message: Input, emit: Emit) -> PipelineState:
+    """Take one message.
 
     Args:
         parameters: Settings and seals.
         state: From `init` or the message before.
-        message: As `wire` decodes it; its values may be anything.
+        message: As `messages.decode` makes it; its values may be anything.
+        emit: Called with each estimate and feed-forward that the message makes; every number in them is finite.
 
     Returns:
-        The next state and what goes out, every number of which is finite.
+        The next state.
     """
-    state, answer = observe(parameters, state, message)
-    return compensate(parameters, state, message, answer) if isinstance(message, Velocity) else (state, answer)
+    return _RECEIVERS[type(message)](parameters, state, message, emit)
 
 
-def observe(parameters: PipelineParameters, state: PipelineState, message: Input) -> tuple[PipelineState, Answer]:
-    """First half of `receive`: everything but the feed-forward that follows an estimate.
+def answered(
+    parameters: PipelineParameters, state: PipelineState, message: Input
+) -> tuple[PipelineState, list[tuple[str, bytes]]]:
+    """`receive` with the answers collected: message type and bytes of each, in the order they are emitted."""
+    answers: list[tuple[str, bytes]] = []
 
-    The node publishes the estimate before it computes that feed-forward.
-    """
-    seen, fed, pressure, force, reference, refused = state  # _replace would take three times as long
-    if isinstance(message, Velocity):
-        sample = RodSample(message.stamp, message.velocity, pressure, force, refused)
-        seen, estimate = estimator.step(parameters.estimator, seen, sample)
-        return PipelineState(seen, fed, pressure, force, reference, refused), Answer(estimate, None, message.frame_id)
-    if isinstance(message, Pressure):
-        return PipelineState(seen, fed, message, force, reference, refused), NOTHING
-    if isinstance(message, Force):
-        return PipelineState(seen, fed, pressure, message, reference, refused), NOTHING
-    if isinstance(message, Position):  # nothing depends on it; it is kept in bags to show how the servo tracks
-        return state, NOTHING
-    reference = Reference(message.stamp, message.velocity, message.acceleration)
-    if not is_fading(parameters.feedforward, seen.stamp, message.stamp):
-        return PipelineState(seen, fed, pressure, force, reference, refused), NOTHING
-    motion = Motion(reference.velocity, reference.acceleration)
-    fed, compensation = feedforward.step(parameters.feedforward, fed, message.stamp, NO_ESTIMATE, motion)
-    return PipelineState(seen, fed, pressure, force, reference, refused), Answer(None, compensation, message.frame_id)
+    def collect(record: Output, frame_id: bytes) -> None:
+        answers.append((type_of(record), encode(record, frame_id)))
+
+    return receive(parameters, state, message, collect), answers
 
 
-def compensate(
-    parameters: PipelineParameters, state: PipelineState, velocity: Velocity, answer: Answer
-) -> tuple[PipelineState, Answer]:
-    """Second half of `receive`: what `observe` answered to a velocity, and the feed-forward that goes with it."""
-    seen, fed, pressure, force, reference, refused = state
-    estimate, _, frame_id = answer
-    if estimate is None or (reference.stamp == NEVER and not parameters.feedforward.use_measured_velocity):
-        return state, answer
-    motion = motion_at(reference, velocity.stamp, velocity.velocity)
-    motion = _with_velocity_friction(parameters, motion, seen.pressure)
-    fed, compensation = feedforward.step(parameters.feedforward, fed, velocity.stamp, estimate, motion)
-    return PipelineState(seen, fed, pressure, force, reference, refused), Answer(estimate, compensation, frame_id)
+def send(emit: Any, record: Any, frame_id: Any) -> None:
+    """Emit a record. Compiled code writes it into an array instead, see `compiled_pipeline`."""
+    emit(record, frame_id)
 
 
 @compilable
-def is_fading(settings: FeedForwardSettings, last_velocity: int, reference: int) -> bool:
-    """Whether a reference makes the feed-forward, since velocities fail to come. Stamps in [ns]."""
-    return last_velocity == NEVER or abs(reference - last_velocity) * 1e-9 > settings.estimate_timeout
+def receive_velocity(parameters: Any, state: PipelineState, velocity: Any, emit: Any) -> PipelineState:
+    """An estimate, and with a reference a feed-forward."""
+    known, guided, pressure, force, reference, refused = state
+    sample = RodSample(velocity.stamp, velocity.velocity, pressure, force, refused)
+    known, estimate = estimator_step(parameters.estimator, known, sample)
+    send(emit, estimate, velocity.frame_id)
+    if reference.stamp != NEVER or parameters.feedforward.use_measured_velocity:
+        motion = _motion(parameters, reference, velocity.stamp, velocity.velocity, known.pressure)
+        guided, compensation = feedforward_step(parameters.feedforward, guided, velocity.stamp, estimate, motion)
+        send(emit, compensation, velocity.frame_id)
+    return PipelineState(known, guided, pressure, force, reference, refused)
 
 
 @compilable
-def motion_at(reference: Reference, stamp: int, measured: float) -> Motion:
-    """Motion at a velocity sample of ``stamp`` [ns] and ``measured`` [m/s], without the velocity friction."""
-    if reference.stamp == NEVER:
-        return Motion(0.0, 0.0, measured, math.inf, 0.0)
-    age = (stamp - reference.stamp) * 1e-9
-    return Motion(reference.velocity, reference.acceleration, measured, age, 0.0)
+def receive_pressure(_parameters: Any, state: PipelineState, newest: Pressure, _emit: Any) -> PipelineState:
+    """Keep the pressure for the next velocity sample."""
+    known, guided, _, force, reference, refused = state
+    return PipelineState(known, guided, newest, force, reference, refused)
 
 
-def _with_velocity_friction(parameters: PipelineParameters, motion: Motion, pressure: Pressure) -> Motion:
-    seals = parameters.estimator.seals
-    if pressure.stamp == NEVER or not any(mounted.seal.velocity_law for mounted in seals):
+@compilable
+def receive_force(_parameters: Any, state: PipelineState, newest: Force, _emit: Any) -> PipelineState:
+    """Keep the force sum for the next velocity sample."""
+    known, guided, pressure, _, reference, refused = state
+    return PipelineState(known, guided, pressure, newest, reference, refused)
+
+
+@compilable
+def receive_reference(parameters: Any, state: PipelineState, wanted: Any, emit: Any) -> PipelineState:
+    """Keep the reference; while no velocity comes, let the feed-forward fade."""
+    known, guided, pressure, force, _, refused = state
+    reference = WantedMotion(wanted.stamp, wanted.velocity, wanted.acceleration)
+    timeout = parameters.feedforward.estimate_timeout
+    if known.stamp == NEVER or abs(reference.stamp - known.stamp) * 1e-9 > timeout:
+        motion = Motion(reference.velocity, reference.acceleration, 0.0, 0.0, 0.0)
+        guided, compensation = feedforward_step(parameters.feedforward, guided, reference.stamp, NO_ESTIMATE, motion)
+        send(emit, compensation, wanted.frame_id)
+    return PipelineState(known, guided, pressure, force, reference, refused)
+
+
+def receive_position(_parameters: Any, state: PipelineState, _position: Position, _emit: Any) -> PipelineState:
+    """Nothing depends on the position; it is recorded to show how the servo tracks."""
+    return state
+
+
+_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, Any], PipelineState]] = {
+    Velocity: receive_velocity,
+    Pressure: receive_pressure,
+    Force: receive_force,
+    ServoReference: receive_reference,
+    Position: receive_position,
+}
+
+
+@compilable
+def _motion(parameters: Any, reference: WantedMotion, stamp: int, measured: float, pressure: Pressure) -> Motion:
+    """Motion at a velocity sample of ``stamp`` [ns] and ``measured`` [m/s], with the velocity friction of the seals."""
+    age = math.inf
+    if reference.stamp != NEVER:
+        age = (stamp - reference.stamp) * 1e-9
+    motion = Motion(reference.velocity, reference.acceleration, measured, age, 0.0)
+    if pressure.stamp == NEVER or not parameters.estimator.depends_on_velocity:
         return motion
-    velocity = feedforward.wanted_velocity(parameters.feedforward, motion)
+    velocity = wanted_velocity(parameters.feedforward, motion)
     if math.isnan(velocity):
         return motion
-    friction = actuator_friction(seals, pressure.chamber_a, pressure.chamber_b, velocity)
-    return motion._replace(velocity_friction=friction.velocity_friction)
-
-
-def encoded(answer: Answer) -> Iterator[tuple[str, bytes]]:
-    """Messages of an answer: message type and bytes, in the order they are published."""
-    if answer.estimate is not None:
-        yield ESTIMATE_TYPE, encode_estimate(answer.estimate, answer.frame_id)
-    if answer.feedforward is not None:
-        yield FEEDFORWARD_TYPE, encode_feedforward(answer.feedforward, answer.frame_id)
+    seals = parameters.estimator.seal_numbers
+    friction = friction_of_seals(seals, pressure.chamber_a, pressure.chamber_b, velocity)
+    return Motion(reference.velocity, reference.acceleration, measured, age, friction.velocity_friction)

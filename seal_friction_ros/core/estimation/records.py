@@ -6,9 +6,9 @@ can be compiled as it stands.
 """
 
 from enum import IntFlag
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.friction.states import UNKNOWN
 
 NEVER = -(2**63)  # [ns] stamp of a record that stands for none
 
@@ -58,6 +58,41 @@ NO_PRESSURE = Pressure(NEVER, 0.0, 0.0)
 NO_FORCE = Force(NEVER, 0.0)
 
 
+class Velocity(NamedTuple):
+    """One rod-velocity sample."""
+
+    stamp: int
+    """[ns]"""
+    velocity: float
+    """[m/s] positive on extension"""
+    frame_id: Any = b''
+    """bytes; in compiled code the number of the message"""
+
+
+class Position(NamedTuple):
+    """One rod-position sample."""
+
+    stamp: int
+    """[ns]"""
+    position: float
+    """[m]"""
+
+
+class ServoReference(NamedTuple):
+    """Motion that the servo shall make at one moment."""
+
+    stamp: int
+    """[ns]"""
+    position: float
+    """[m]"""
+    velocity: float
+    """[m/s]"""
+    acceleration: float
+    """[m/s^2] 0.0 if it is not known"""
+    frame_id: Any = b''
+    """bytes; in compiled code the number of the message"""
+
+
 class RodSample(NamedTuple):
     """One rod-velocity sample with the newest pressure and force sum that came before it."""
 
@@ -84,7 +119,8 @@ class FrictionEstimate(NamedTuple):
     """[N] at least ``coulomb_friction``"""
     friction_force: float
     """[N] ``m a = force_sum - friction_force``"""
-    state: FrictionState
+    state: int
+    """a `FrictionState`"""
     direction: int
     """-1, 0 or 1"""
     status: int
@@ -93,4 +129,4 @@ class FrictionEstimate(NamedTuple):
     """[s] age of the older of pressure and force in use; -1.0 while one is missing"""
 
 
-NO_ESTIMATE = FrictionEstimate(NEVER, 0.0, 0.0, 0.0, 0.0, FrictionState.UNKNOWN, 0, 0, -1.0)
+NO_ESTIMATE = FrictionEstimate(NEVER, 0.0, 0.0, 0.0, 0.0, UNKNOWN, 0, 0, -1.0)

@@ -1,21 +1,222 @@
-"""Compile a numeric function that is written in plain Python on floats, tuples and arrays: twenty times faster.
+"""One source for Python and for compiled code: numeric functions on floats, named tuples and arrays.
 
-The Python function stays the readable reference: with ``NUMBA_DISABLE_JIT=1`` in the environment it runs as it is and
-gives the same numbers (test/core/test_servo_compiled.py).
+- ``@compiled``: the function always runs compiled (simulation, lubricated contact): twenty times faster.
+- ``@compilable``: the function runs as plain Python in the live node, which never loads the compiler, and compiled
+  where `compiled` code calls it (replay of long bags, servo plant): the same source, the same bytes.
+
+What a friction law needs beyond numbers is here too: `bound` binds the parameters of a law to its function, `evaluate`
+calls it, `unrolled` loops over records of different types, and `for_compiler` converts records for compiled code.
+
+With ``NUMBA_DISABLE_JIT=1`` in the environment everything runs as plain Python and gives the same numbers.
 """
 
+import dataclasses
+import inspect
+from bisect import bisect_right
+from collections import namedtuple
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from functools import cache, partial
+from types import FunctionType
+from typing import Any, NamedTuple, TypeVar, cast
 
-import numba
+import numpy as np
 
 Function = TypeVar('Function', bound=Callable[..., Any])
+
+_compilable: list[Callable[..., Any]] = []
+_waiting: list[Callable[..., Any]] = []  # compilable functions that the compiler does not know yet
+
+
+def compilable(function: Function) -> Function:
+    """Decorator: ``function`` uses numbers and named tuples of numbers only, so it can be compiled as it stands.
+
+    Where the order of two values decides, compare them by ``if``: ``min`` and ``max`` of the compiler may choose
+    another one of two zeros, or of a number and NaN, than Python does.
+    """
+    _waiting.append(function)
+    return function
 
 
 def compiled(function: Function) -> Function:
     """Decorator: ``function`` compiled at its first call.
 
     No fast-math: sums keep their order, so both ways round alike. Not kept on disk: numba looks only at the file of a
-    function, not at the files of those it calls, so a change there would go unseen.
+    function, not at the files of the functions it calls, so a change there would go unnoticed.
     """
-    return cast(Function, numba.njit(error_model='numpy')(function))
+    import numba  # noqa: PLC0415  half a second, and the live node does without
+
+    make_known()
+    return cast(Function, numba.njit(error_model='numpy')(_with_unrolled_loops(function)))
+
+
+def make_known() -> None:
+    """Let compiled code call every function that was marked `compilable` up to now."""
+    from numba.extending import register_jitable  # noqa: PLC0415
+
+    _teach_the_compiler()
+    while _waiting:
+        function = _waiting.pop()
+        known = _with_unrolled_loops(function)
+        if known is function:
+            register_jitable(error_model='numpy')(function)
+        else:
+            _stand_in(function, known)
+
+
+def unrolled(records: Any) -> Any:
+    """Loop over ``records``, each of a type of its own: compiled code repeats the body of the loop for each of them."""
+    return records
+
+
+# -- functions with bound parameters ----------------------------------------------------------------------------------
+
+Bound = partial[float]
+"""A scalar function whose parameters are bound, so that only its two arguments are left."""
+
+
+def bound(function: Callable[..., float], record: Any) -> Bound:
+    """``function`` with every parameter but its last two bound to the attribute of ``record`` of that name.
+
+    An attribute is a number, a tuple of numbers (a table), or a record with a ``bound`` function of its own.
+    """
+    values = (getattr(record, name) for name in _parameter_names(function))
+    return partial(function, *(getattr(value, 'bound', value) for value in values))
+
+
+@cache
+def _parameter_names(function: Callable[..., float]) -> tuple[str, ...]:
+    return tuple(inspect.signature(function).parameters)[:-2]
+
+
+def evaluate(function: Bound, first: float, second: float) -> float:
+    """Value of a bound function. Compiled code calls it through this name."""
+    return function(first, second)
+
+
+def for_compiler(value: Any) -> Any:
+    """A record as compiled code takes it.
+
+    Tuples of numbers become arrays, a bound function becomes a record of its parameters, a dataclass a named tuple (of
+    the fields that its ``COMPILED`` names, if it has one); records within records likewise.
+    """
+    if _runs_as_python():
+        return value
+    make_known()
+    if dataclasses.is_dataclass(value):
+        names = getattr(value, 'COMPILED', None) or tuple(field.name for field in dataclasses.fields(value))
+        return _record_type(type(value).__name__, names)(*(for_compiler(getattr(value, name)) for name in names))
+    if isinstance(value, partial):
+        return _bound_type(value.func)(tuple(map(for_compiler, value.args)))
+    if isinstance(value, tuple):
+        if hasattr(value, '_fields'):
+            return type(value)(*map(for_compiler, value))
+        if value and isinstance(value[0], float):
+            return np.array(value)
+        return tuple(map(for_compiler, value))
+    return value
+
+
+class Kept(NamedTuple):
+    """What `keep` gives where everything runs as Python."""
+
+    value: Any
+
+
+def keep(value: Any) -> Any:
+    """A record with ``value``, as `for_compiler` gives it, for its only attribute, ``value``.
+
+    Compiled code gets the record as one pointer, so a call from Python costs the same however large the value is.
+    """
+    return Kept(value) if _runs_as_python() else _kept_type()(value)
+
+
+@cache
+def _kept_type() -> Any:
+    import numba  # noqa: PLC0415
+    from numba.experimental import structref as untyped  # noqa: PLC0415
+
+    structref: Any = untyped
+    unliteral: Any = numba.types.unliteral
+
+    class KeptStruct(numba.types.StructRef):
+        def preprocess_fields(self, fields: Any) -> Any:
+            return tuple((name, unliteral(kind)) for name, kind in fields)
+
+    class KeptProxy(untyped.StructRefProxy):
+        def __new__(cls, value: Any) -> Any:
+            return structref.StructRefProxy.__new__(cls, value)
+
+    structref.register(KeptStruct)
+    structref.define_proxy(KeptProxy, KeptStruct, ['value'])
+    return KeptProxy
+
+
+@cache
+def _record_type(name: str, fields: tuple[str, ...]) -> Any:
+    return namedtuple(name, fields)
+
+
+@cache
+def _bound_type(function: Callable[..., float]) -> Any:
+    """Type of the parameters of ``function``, by which compiled code knows the function."""
+    members = {'__slots__': (), 'function': staticmethod(function)}
+    return type(function.__name__, (namedtuple('bound', ['parameters']),), members)
+
+
+@cache
+def _runs_as_python() -> bool:
+    import numba  # noqa: PLC0415
+
+    config: Any = numba.config
+    return bool(config.DISABLE_JIT)
+
+
+# -- what the compiler is taught --------------------------------------------------------------------------------------
+
+
+def _with_unrolled_loops(function: Function) -> Function:
+    """``function`` itself, or if it loops over `unrolled` records, a copy whose loops the compiler unrolls."""
+    if 'unrolled' not in function.__code__.co_names:
+        return function
+    from numba import literal_unroll  # noqa: PLC0415
+
+    known = function.__globals__ | {'unrolled': literal_unroll}
+    return cast(Function, FunctionType(function.__code__, known, function.__name__, function.__defaults__))
+
+
+def _stand_in(function: Callable[..., Any], known: Callable[..., Any]) -> None:
+    """Compiled code that calls ``function`` calls ``known``."""
+    from numba.extending import overload  # noqa: PLC0415
+
+    @overload(function, strict=False, jit_options={'error_model': 'numpy'})
+    def _implementation(*_: Any, **__: Any) -> Callable[..., Any]:
+        return known
+
+
+@cache
+def _teach_the_compiler() -> None:
+    """Once: what `evaluate` and `bisect_right` are in compiled code."""
+    from numba.extending import overload  # noqa: PLC0415
+
+    @overload(evaluate, jit_options={'error_model': 'numpy'})
+    def _evaluate(function: Any, first: Any, second: Any) -> Callable[..., Any]:  # noqa: ARG001
+        called = _jitted(function.instance_class.function)
+
+        def implementation(function: Any, first: Any, second: Any) -> Any:
+            return called(*function.parameters, first, second)
+
+        return implementation
+
+    @overload(bisect_right)
+    def _bisect_right(knots: Any, x: Any) -> Callable[..., Any]:  # noqa: ARG001
+        def implementation(knots: Any, x: Any) -> Any:
+            return np.searchsorted(knots, x, side='right')
+
+        return implementation
+
+
+@cache
+def _jitted(function: Callable[..., Any]) -> Callable[..., Any]:
+    import numba  # noqa: PLC0415
+
+    return cast(Callable[..., Any], numba.njit(error_model='numpy')(function))

@@ -1,4 +1,4 @@
-"""Monotone interpolation through measured points: no overshoot, no invented bumps."""
+"""Monotone interpolation through measured points: no overshoot, no bump between two points."""
 
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -6,19 +6,51 @@ from itertools import pairwise
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.compiled import bound
+
+Column = tuple[float, ...]
+
+
+def interpolated(
+    knots: Column,
+    cubic: Column,
+    square: Column,
+    slope: Column,
+    value: Column,
+    last: float,
+    x: float,
+    _unused: float = 0.0,
+) -> float:
+    """Piecewise cubic at ``x``; the first or last ordinate beyond the ends.
+
+    Args:
+        knots: Abscissae of the points, increasing, shape (n,).
+        cubic: Coefficient of the third power of the distance from each knot, shape (n - 1,); likewise the next three.
+        square: Of the second power.
+        slope: Of the first power.
+        value: Ordinate at each knot.
+        last: Ordinate at the last knot.
+        x: Abscissa.
+        _unused: A bound function takes two arguments.
+    """
+    if x >= knots[-1]:
+        return last
+    x = max(x, knots[0])
+    i = bisect_right(knots, x) - 1
+    t = x - knots[i]
+    return ((cubic[i] * t + square[i]) * t + slope[i]) * t + value[i]
 
 
 class MonotoneTable:
-    """Monotone piecewise cubic through points [Fritsch1980]_; held constant beyond both ends.
+    """Monotone piecewise cubic through points [Fritsch1980]_; constant beyond both ends.
 
-    The coefficients come from ``scipy.interpolate.PchipInterpolator``; a single value is evaluated here, some twenty
-    times faster than there, since the live estimate asks for one value at a time.
+    ``scipy.interpolate.PchipInterpolator`` gives the coefficients. `interpolated` evaluates one value twenty times
+    faster than SciPy, since the live estimate asks for one value at a time.
 
     Args:
         x: Abscissae, strictly increasing, shape (n,), n >= 2.
         y: Ordinates, shape (n,), finite.
-        name: What the table is, for error messages.
+        name: Name of the table, for error messages.
 
     Raises:
         ValueError: The points are too few, not finite or not in increasing order.
@@ -37,28 +69,13 @@ class MonotoneTable:
             spline = PchipInterpolator(x, y)
         if not np.isfinite(spline.c).all():
             raise ValueError(f'{name}: points too close together or too far apart: {list(x)}')
-        self._knots = [float(v) for v in spline.x]
-        self._cubics = [tuple(float(c) for c in column) for column in spline.c.T]
-        self._last = float(y[-1])
+        self.knots: Column = tuple(float(v) for v in spline.x)
+        self.cubic, self.square, self.slope, self.value = (tuple(map(float, row)) for row in spline.c)
+        self.last = float(y[-1])
         self.end_slope = float(spline.derivative()(x[-1]))
         """Slope at the last point, in units of y over x."""
+        self.bound = bound(interpolated, self)
 
     def __call__(self, x: float) -> float:
-        """Value at ``x``; the first or last ordinate beyond the ends."""
-        knots = self._knots
-        if x >= knots[-1]:
-            return self._last
-        x = max(x, knots[0])
-        interval = bisect_right(knots, x) - 1
-        cubic, square, slope, value = self._cubics[interval]
-        t = x - knots[interval]
-        return ((cubic * t + square) * t + slope) * t + value
-
-    def at_each(self, x: FloatArray) -> FloatArray:
-        """Value at each of ``x``, finite, shape (n,): the same bits as one by one, being sums and products."""
-        knots = np.array(self._knots)
-        inside = np.where(x < knots[0], knots[0], x)
-        interval = np.minimum(np.searchsorted(knots, inside, side='right') - 1, len(self._cubics) - 1)
-        cubic, square, slope, value = np.array(self._cubics).T[:, interval]
-        t = inside - knots[interval]
-        return np.where(x >= knots[-1], self._last, ((cubic * t + square) * t + slope) * t + value)
+        """Value at ``x``."""
+        return self.bound(x)

@@ -7,7 +7,7 @@ From this one place follow the check at construction, the check of a YAML file, 
 import dataclasses
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, TypeVar
 
 Record = TypeVar('Record')
@@ -22,6 +22,10 @@ class Meaning:
     lower: float | None = None
     upper: float | None = None
     live: bool = True
+    symbol: str = ''
+    """in an equation"""
+    start: Callable[[Any], float] | None = None
+    """first guess of a fit, from a `TypicalReading`; None: never fitted"""
 
     def bounds_text(self) -> str:
         """Bounds for a reader, for example ``0.0 to 1.0``; empty if there are none."""
@@ -36,9 +40,11 @@ def parameter(
     lower: float | None = None,
     upper: float | None = None,
     live: bool = True,
+    symbol: str = '',
+    start: Callable[[Any], float] | None = None,
 ) -> Any:
-    """Dataclass field with its unit, bounds (both included) and meaning."""
-    meaning = Meaning(unit, description, lower, upper, live)
+    """Dataclass field with its `Meaning`; both bounds are included."""
+    meaning = Meaning(unit, description, lower, upper, live, symbol, start)
     return dataclasses.field(default=default, metadata={'meaning': meaning})
 
 

@@ -1,130 +1,19 @@
-"""Pressure -> Coulomb friction: of one seal, and of an actuator with any number of seals."""
+"""One seal, the seals of an actuator, and their friction together."""
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
+from seal_friction_ros.core.foundation.compiled import Bound, compilable, evaluate, unrolled
 from seal_friction_ros.core.foundation.parameters import check, parameter
-from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.friction.friction_coefficient import FrictionCoefficientLaw
-from seal_friction_ros.core.friction.friction_map import FrictionMap
-from seal_friction_ros.core.friction.geometry import SealGeometry, contact_length, projected_area
-from seal_friction_ros.core.friction.normal_force import NormalForceLaw
-
-
-class CoulombLaw(Protocol):
-    """A law of the Coulomb friction of one seal."""
-
-    def coulomb_friction(self, pressure: float) -> float:
-        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]."""
-        ...
-
-
-@dataclass(frozen=True)
-class PhysicsBased:
-    """Coulomb friction from geometry, normal force and coefficient of friction: f_c = mu(F_n) F_n.
-
-    Source: thesis, chapter 7.
-    """
-
-    geometry: SealGeometry
-    normal_force_law: NormalForceLaw
-    friction_coefficient_law: FrictionCoefficientLaw
-    projected_area: float = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, 'projected_area', projected_area(self.geometry))
-
-    def coulomb_friction(self, pressure: float) -> float:
-        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]."""
-        normal_force = self.normal_force_law.normal_force(pressure, self.projected_area)
-        return self.friction_coefficient_law.coefficient_of_friction(normal_force) * normal_force
-
-
-@dataclass(frozen=True)
-class ConstantCoulomb:
-    """Coulomb friction that does not depend on pressure: what is mostly assumed today.
-
-    Source: thesis, chapter 1 ("the friction force is usually approximated as a constant value").
-
-    Raises:
-        ValueError: A parameter is out of bounds.
-    """
-
-    coulomb_friction_at_any_pressure: float = parameter(
-        unit='N', lower=0.0, upper=1e6, description='Sliding friction of the seal.'
-    )
-
-    def __post_init__(self) -> None:
-        check(self)
-
-    def coulomb_friction(self, pressure: float) -> float:
-        """Magnitude of the sliding friction [N], whatever the pressure [Pa, gauge, >= 0]."""
-        del pressure
-        return self.coulomb_friction_at_any_pressure
-
-
-@dataclass(frozen=True)
-class PressurePowerLaw:
-    """Coulomb friction that rises as a power of the pressure: f_c = f_0 + k (P / 1 bar)^m. It needs no geometry.
-
-    With m = 2/3 this is an elastic contact [Schallamach1958]_ whose normal force is proportional to the pressure.
-
-    Raises:
-        ValueError: A parameter is out of bounds.
-    """
-
-    friction_at_no_pressure: float = parameter(unit='N', lower=0.0, upper=1e6, description='f_0.')
-    friction_at_one_bar: float = parameter(
-        unit='N', lower=0.0, upper=1e6, description='k, what a pressure of 1 bar adds.'
-    )
-    pressure_exponent: float = parameter(unit='1', lower=0.05, upper=2.0, description='m.')
-
-    def __post_init__(self) -> None:
-        check(self)
-
-    def coulomb_friction(self, pressure: float) -> float:
-        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]."""
-        risen = math.pow(pressure / BAR, self.pressure_exponent)
-        return self.friction_at_no_pressure + self.friction_at_one_bar * risen
-
-
-@dataclass(frozen=True)
-class PriorArtChart:
-    """Coulomb friction read from charts: F = f_c L_r + f_h(P) A_r.
-
-    Source: thesis, chapter 2 (Tables 1 to 3); monotone interpolation between the chart readings is our choice.
-
-    Raises:
-        ValueError: A chart value is out of bounds, or friction falls with pressure.
-    """
-
-    geometry: SealGeometry
-    squeeze_friction: float = parameter(
-        unit='N/m', lower=0.0, upper=1e6, description='f_c, friction per contact length.'
-    )
-    pressures: tuple[float, ...] = parameter(
-        unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures of the chart, increasing.'
-    )
-    pressure_frictions: tuple[float, ...] = parameter(
-        unit='Pa', lower=0.0, upper=1e9, description='f_h, friction per projected area.'
-    )
-    table: MonotoneTable = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        check(self)
-        if list(self.pressure_frictions) != sorted(self.pressure_frictions):
-            raise ValueError(
-                f'PriorArtChart.pressure_frictions = {list(self.pressure_frictions)} Pa falls with pressure'
-            )
-        table = MonotoneTable(self.pressures, self.pressure_frictions, 'PriorArtChart')
-        object.__setattr__(self, 'table', table)
-
-    def coulomb_friction(self, pressure: float) -> float:
-        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]; constant above the chart."""
-        squeeze_part = self.squeeze_friction * contact_length(self.geometry)
-        return squeeze_part + self.table(pressure) * projected_area(self.geometry)
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.law import FrictionLaw
+from seal_friction_ros.core.friction.laws.velocity_terms import (
+    NO_VELOCITY_TERMS,
+    VelocityTermNumbers,
+    VelocityTerms,
+    with_velocity_terms,
+)
 
 
 @dataclass(frozen=True)
@@ -148,57 +37,19 @@ class Uncertainty:
         return math.sqrt((self.relative_std * friction) ** 2 + self.absolute_std**2)
 
 
-@dataclass(frozen=True)
-class VelocityTerms:
-    r"""What the friction of a sliding seal has besides its Coulomb friction.
-
-    .. math:: F = [f_c + \sigma |v| + f_S\,e^{-|v|/v_S}]\,(1 + a\,\mathrm{sgn}(v))
-
-    Source: [Armstrong1994]_ eq. (5) with an exponent of 1, which is our choice, as is one asymmetry of it all.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
-
-    viscous_friction: float = parameter(0.0, unit='N s/m', lower=0.0, upper=1e7, description='sigma, viscous friction.')
-    stribeck_friction: float = parameter(
-        0.0, unit='N', lower=0.0, upper=1e6, description='f_S, what the slowest motion has above Coulomb friction.'
-    )
-    stribeck_velocity: float = parameter(
-        0.01, unit='m/s', lower=1e-6, upper=10.0, description='v_S, speed over which that falls to 37 %.'
-    )
-    asymmetry: float = parameter(
-        0.0, unit='1', lower=-0.9, upper=0.9, description='a, share by which extension has more and retraction less.'
-    )
-
-    def __post_init__(self) -> None:
-        check(self)
-
-    def added(self, coulomb_friction: float, pressure: float, velocity: float) -> float:
-        """Magnitude [N] on top of ``coulomb_friction`` [N] at ``velocity`` [m/s], at any pressure; may be negative."""
-        del pressure
-        if velocity == 0.0:
-            return 0.0
-        speed = abs(velocity)
-        sliding = coulomb_friction + self.viscous_friction * speed
-        if self.stribeck_friction > 0.0:
-            sliding += self.stribeck_friction * math.exp(-speed / self.stribeck_velocity)
-        return sliding * (1.0 + self.asymmetry if velocity > 0.0 else 1.0 - self.asymmetry) - coulomb_friction
-
-
 @dataclass(frozen=True, kw_only=True)
 class Seal:
-    """One seal: its Coulomb law, what comes on top at breakaway, how sure we are, and where that holds.
+    """One seal: its friction law, its breakaway force, its uncertainty, and the range in which it was identified.
 
     Breakaway force is (1 + ``stiction_ratio``) f_c + ``stiction``.
 
     Raises:
-        ValueError: A value is out of bounds, friction falls with pressure inside the identified range, or both the law
-            and the terms say what the velocity does.
+        ValueError: A value is out of bounds, friction falls with pressure inside the identified range, or the law and
+            the velocity terms both depend on the speed.
     """
 
     name: str
-    coulomb_law: CoulombLaw
+    coulomb_law: FrictionLaw
     uncertainty: Uncertainty
     stiction: float = parameter(
         0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway force above Coulomb friction.'
@@ -209,20 +60,23 @@ class Seal:
     velocity_terms: VelocityTerms | None = None
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
-    velocity_law: VelocityTerms | FrictionMap | None = field(init=False, repr=False, compare=False)
-    """what the velocity adds to the Coulomb friction; None if nothing"""
 
     def __post_init__(self) -> None:
         check(self)
-        mapped = self.coulomb_law if isinstance(self.coulomb_law, FrictionMap) else None
-        if mapped and self.velocity_terms:
-            raise ValueError(f'Seal {self.name}: its friction_map has the velocity in it: leave out velocity_terms')
-        object.__setattr__(self, 'velocity_law', mapped or self.velocity_terms)
+        if self.coulomb_law.depends_on_speed and self.velocity_terms:
+            raise ValueError(
+                f'Seal {self.name}: its {self.coulomb_law.NAME} has the velocity in it: leave out velocity_terms'
+            )
         if self.pressure_max <= self.pressure_min:
             raise ValueError(
                 f'Seal.pressure_max = {self.pressure_max} Pa is not above pressure_min = {self.pressure_min} Pa'
             )
         self._check_monotone()
+
+    @property
+    def depends_on_velocity(self) -> bool:
+        """Whether its sliding friction differs from its Coulomb friction."""
+        return self.coulomb_law.depends_on_speed or self.velocity_terms is not None
 
     def _check_monotone(self) -> None:
         # 200 intervals over twice the identified range: a table of points can hide a fall between two of them.
@@ -235,13 +89,47 @@ class Seal:
                 )
 
 
-def coulomb_friction(seal: Seal, pressure: float) -> float:
-    """Magnitude of the sliding friction of one seal [N] at ``pressure`` [Pa, gauge].
+class SealNumbers(NamedTuple):
+    """A mounted seal as numbers."""
 
-    A chamber below ambient pressure presses the seal no less than no pressure does, so negative gauge pressure counts
-    as zero (our choice).
-    """
-    return seal.coulomb_law.coulomb_friction(max(pressure, 0.0))
+    law: Bound
+    coulomb_speed: float
+    """[m/s] at which the Coulomb friction is taken"""
+    law_depends_on_speed: bool
+    velocity_terms: VelocityTermNumbers = NO_VELOCITY_TERMS
+    depends_on_velocity: bool = False
+    """whether the sliding friction differs from the Coulomb friction"""
+    is_on_chamber_a: bool = True
+    scale: float = 1.0
+    """[-] factor on all friction of the seal"""
+    stiction: float = 0.0
+    """[N]"""
+    stiction_ratio: float = 0.0
+    relative_std: float = 0.0
+    absolute_variance: float = 0.0
+    """[N^2]"""
+    square: float = 2.0
+    """the exponent of a square: a constant one the compiler turns into a product, which rounds differently from ``pow``
+    in 1 of 1000 cases"""
+    pressure_low: float = -math.inf
+    """[Pa] ends of the identified range with its margin"""
+    pressure_high: float = math.inf
+    """[Pa]"""
+
+
+def numbers_of_law(law: FrictionLaw, terms: VelocityTerms | None = None) -> SealNumbers:
+    """A seal with this sliding friction and nothing else."""
+    return SealNumbers(
+        law=law.bound,
+        coulomb_speed=law.coulomb_speed,
+        law_depends_on_speed=law.depends_on_speed,
+        velocity_terms=terms.numbers if terms else NO_VELOCITY_TERMS,
+        depends_on_velocity=law.depends_on_speed or terms is not None,
+    )
+
+
+NO_SEALS = (numbers_of_law(ConstantCoulomb(0.0)),)
+"""Without friction, for compiled code, which cannot loop over nothing."""
 
 
 @dataclass(frozen=True)
@@ -254,10 +142,26 @@ class MountedSeal:
 
     seal: Seal
     chamber: str
+    friction_scale: float = 1.0
+    """[-] factor on all friction of the seal, breakaway included"""
+    numbers: SealNumbers = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.chamber not in ('a', 'b'):
             raise ValueError(f'chamber = {self.chamber!r} of seal {self.seal.name} is neither a nor b')
+        seal = self.seal
+        margin = 0.01 * (seal.pressure_max - seal.pressure_min)
+        numbers = numbers_of_law(seal.coulomb_law, seal.velocity_terms)._replace(
+            is_on_chamber_a=self.chamber == 'a',
+            scale=self.friction_scale,
+            stiction=seal.stiction,
+            stiction_ratio=seal.stiction_ratio,
+            relative_std=seal.uncertainty.relative_std,
+            absolute_variance=seal.uncertainty.absolute_std**2,
+            pressure_low=seal.pressure_min - margin,
+            pressure_high=seal.pressure_max + margin,
+        )
+        object.__setattr__(self, 'numbers', numbers)  # frozen: the only way to keep what was built from the fields
 
 
 class ActuatorFriction(NamedTuple):
@@ -274,35 +178,103 @@ class ActuatorFriction(NamedTuple):
     """[N] what sliding at the velocity adds to the magnitude; 0 at rest"""
 
 
-def actuator_friction(
-    seals: tuple[MountedSeal, ...], pressure_a: float, pressure_b: float, velocity: float = 0.0
+@compilable
+def sliding_friction(
+    seal: SealNumbers, coulomb_friction: float, pressure: float, speed: float, direction: int
+) -> float:
+    """Magnitude of the friction of one sliding seal [N], its scale left out.
+
+    Args:
+        seal: The seal.
+        coulomb_friction: By its law at ``pressure`` [N].
+        pressure: [Pa, gauge, >= 0].
+        speed: [m/s, >= 0].
+        direction: 1 on extension, -1 on retraction.
+    """
+    if seal.law_depends_on_speed:
+        return evaluate(seal.law, pressure, speed)
+    viscous, stribeck, stribeck_velocity, asymmetry = seal.velocity_terms
+    return with_velocity_terms(coulomb_friction, speed, direction, viscous, stribeck, stribeck_velocity, asymmetry)
+
+
+@compilable
+def friction_of_seal(
+    seal: SealNumbers, pressure_a: float, pressure_b: float, velocity: float
+) -> tuple[float, float, float, bool, float]:
+    """The numbers of `ActuatorFriction` for one seal; arguments as for `friction_of_seals`."""
+    # One unpacking takes a quarter of the time of an attribute each.
+    law, coulomb_speed, _, _, depends, on_a, scale, stiction, ratio, relative_std, variance, square, low, high = seal
+    pressure = pressure_a if on_a else pressure_b
+    pressing = 0.0 if pressure < 0.0 else pressure
+    by_law = evaluate(law, pressing, coulomb_speed)
+    coulomb = by_law * scale
+    added = 0.0
+    if depends and velocity != 0.0:
+        direction = 1 if velocity > 0.0 else -1
+        added = sliding_friction(seal, by_law, pressing, abs(velocity), direction) * scale - coulomb
+    std = math.sqrt(math.pow(relative_std * (coulomb + added), square) + variance)
+    return coulomb, std, stiction * scale + ratio * coulomb, low <= pressure <= high, added
+
+
+@compilable
+def friction_of_seals(
+    seals: tuple[SealNumbers, ...], pressure_a: float, pressure_b: float, velocity: float
 ) -> ActuatorFriction:
     """Sum over the seals of an actuator.
 
     Standard deviations add up linearly, since the seals of an actuator are of one kind, age and temperature and are
     wrong together (our choice; independent seals would be surer than this). A seal is inside its identified range up
     to 1 % of the range beyond its ends, so that sensor noise at zero pressure does not count as extrapolation (our
-    choice).
+    choice). A chamber below ambient pressure presses the seal no less than no pressure does, so a negative gauge
+    pressure counts as zero (our choice).
 
     Args:
-        seals: Seals and their chambers.
+        seals: The seals.
         pressure_a: Pressure of chamber a [Pa, gauge].
         pressure_b: Pressure of chamber b [Pa, gauge].
         velocity: Rod velocity [m/s], positive on extension. The standard deviation is that of a reading at it.
     """
-    total = std = stiction = added = 0.0
+    coulomb = 0.0
+    std = 0.0
+    stiction = 0.0
     inside = True
-    for mounted in seals:
-        seal = mounted.seal
-        pressure = pressure_a if mounted.chamber == 'a' else pressure_b
-        friction = coulomb_friction(seal, pressure)
-        total += friction
-        stiction += seal.stiction + seal.stiction_ratio * friction
-        if seal.velocity_law is not None:
-            more = seal.velocity_law.added(friction, pressure, velocity)
-            added += more
-            friction += more
-        std += seal.uncertainty.std(friction)
-        margin = 0.01 * (seal.pressure_max - seal.pressure_min)
-        inside = inside and seal.pressure_min - margin <= pressure <= seal.pressure_max + margin
-    return ActuatorFriction(total, std, stiction, inside, added)
+    added = 0.0
+    for seal in unrolled(seals):  # a longer body the compiler does not unroll
+        one, its_std, its_stiction, is_inside, more = friction_of_seal(seal, pressure_a, pressure_b, velocity)
+        coulomb += one
+        std += its_std
+        stiction += its_stiction
+        inside = inside and is_inside
+        added += more
+    return ActuatorFriction(coulomb, std, stiction, inside, added)
+
+
+@compilable
+def sliding_friction_of_seals(
+    seals: tuple[SealNumbers, ...], pressure_a: float, pressure_b: float, speed: float, direction: int
+) -> float:
+    """Magnitude of the friction of all seals [N] sliding at ``speed`` [m/s, >= 0] in ``direction`` (-1 or 1).
+
+    It differs from `friction_of_seals` at a speed of 0: this is the limit of slow sliding, not rest.
+    """
+    total = 0.0
+    for seal in unrolled(seals):
+        pressure = pressure_a if seal.is_on_chamber_a else pressure_b
+        pressing = 0.0 if pressure < 0.0 else pressure
+        friction = evaluate(seal.law, pressing, seal.coulomb_speed)
+        if seal.depends_on_velocity:
+            friction = sliding_friction(seal, friction, pressing, speed, direction)
+        total += friction * seal.scale
+    return total
+
+
+def numbers_of_seals(seals: tuple[MountedSeal, ...]) -> tuple[SealNumbers, ...]:
+    """The seals of an actuator as numbers."""
+    return tuple(mounted.numbers for mounted in seals)
+
+
+def actuator_friction(
+    seals: tuple[MountedSeal, ...], pressure_a: float, pressure_b: float, velocity: float = 0.0
+) -> ActuatorFriction:
+    """`friction_of_seals` for seals that are not numbers yet; same arguments."""
+    return friction_of_seals(numbers_of_seals(seals), pressure_a, pressure_b, velocity)

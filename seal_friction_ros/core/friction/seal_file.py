@@ -1,73 +1,67 @@
-"""The document of a seal file (a mapping, as YAML or JSON give it) -> `Seal`. Laws are chosen by name.
+"""The document of a seal file (a mapping, as YAML or JSON give it) <-> `Seal`. Laws are chosen by name.
 
 A seal file looks like this; every law and every field is in docs/seal_files.md::
 
     name: ms28775_114
     source: where the numbers are from
     geometry: {section_diameter: 2.69e-3, ...}
-    coulomb_law: physics_based          # or pressure_power_law, constant_coulomb, prior_art_chart, friction_map
+    coulomb_law: physics_based          # or another of `FRICTION_LAWS`, with its parameters under the name of the law
     normal_force: {law: area_deformation_gain, area_deformation_gain: 0.39, radial_force: 9.3}
     friction_coefficient: {law: power_law, coefficient: 2.1, exponent: 0.56}
     stiction: 2.5
     uncertainty: {relative_std: 0.08, absolute_std: 0.3}
     identified_pressure: [0.0, 6.9e+6]
 
-``velocity_terms`` and ``stiction_ratio`` may be left out, as may ``identification``, which holds what
-``seal_friction identify`` says of its data and is passed over here.
+``velocity_terms`` and ``stiction_ratio`` are optional, as is ``identification``: what ``seal_friction identify``
+reports about its data. This module ignores it.
 """
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from typing import Any
 
-from seal_friction_ros.core.foundation.parameters import check_names, from_mapping, name_and_source
-from seal_friction_ros.core.friction.actuator import (
-    ConstantCoulomb,
-    CoulombLaw,
-    MountedSeal,
-    PhysicsBased,
-    PressurePowerLaw,
-    PriorArtChart,
-    Seal,
-    Uncertainty,
-    VelocityTerms,
-)
-from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, FrictionCoefficientLaw, PowerLaw
-from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.foundation.parameters import check_names, from_mapping, meanings, name_and_source
+from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.normal_force import AreaDeformationGain, NormalForceTable
-
-NORMAL_FORCE_LAWS: dict[str, type] = {'area_deformation_gain': AreaDeformationGain, 'monotone_table': NormalForceTable}
-FRICTION_COEFFICIENT_LAWS: dict[str, type] = {'power_law': PowerLaw, 'monotone_table': CoefficientTable}
-COULOMB_LAWS = ('physics_based', 'prior_art_chart', 'pressure_power_law', 'constant_coulomb', 'friction_map')
+from seal_friction_ros.core.friction.laws import FRICTION_LAWS
+from seal_friction_ros.core.friction.laws.friction_coefficient import FRICTION_COEFFICIENT_LAWS, FrictionCoefficientLaw
+from seal_friction_ros.core.friction.laws.law import FrictionLaw, Law
+from seal_friction_ros.core.friction.laws.normal_force import NORMAL_FORCE_LAWS, NormalForceLaw
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 
 _COMMON = {
     'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
     'identified_pressure', 'identification',
 }  # fmt: skip
-_PARTS = {
-    'physics_based': {'normal_force', 'friction_coefficient'},
-    'pressure_power_law': {'pressure_power_law'},
-    'constant_coulomb': {'constant_coulomb'},
-    'prior_art_chart': {'chart'},
-    'friction_map': {'friction_map'},
+_PARTS: dict[type, str] = {
+    SealGeometry: 'geometry',
+    NormalForceLaw: 'normal_force',
+    FrictionCoefficientLaw: 'friction_coefficient',
 }
-_WITHOUT_GEOMETRY = {
-    'pressure_power_law': PressurePowerLaw, 'constant_coulomb': ConstantCoulomb, 'friction_map': FrictionMap,
-}  # fmt: skip
+"""Type of a field of a law -> key of the seal file that holds it."""
+_LAWS_OF_PART: dict[type, Mapping[str, type[Law]]] = {
+    NormalForceLaw: NORMAL_FORCE_LAWS,
+    FrictionCoefficientLaw: FRICTION_COEFFICIENT_LAWS,
+}
+
+
+def friction_laws() -> dict[str, type[FrictionLaw]]:
+    """Every friction law by its name in a seal file."""
+    return {law.NAME: law for law in FRICTION_LAWS}
 
 
 def parse_seal(document: Any) -> Seal:
     """Make a seal from the document of a seal file.
 
     Raises:
-        ValueError: The document makes no sense; the message names the seal, the field, its value and its bound.
+        ValueError: The document is not valid; the message names the seal, the field, its value and its bound.
     """
     name, _ = name_and_source(document, 'seal')
     where = f'seal {name}'
-    law_name = _choice(document, 'coulomb_law', COULOMB_LAWS, where)
-    check_names(document, sorted(_COMMON | _PARTS[law_name]), f'{where}: {law_name}')
-    law = _coulomb_law(document, law_name, where)
+    law_type = friction_laws()[_choice(document, 'coulomb_law', friction_laws(), where)]
+    check_names(document, sorted(_COMMON | _keys(law_type)), f'{where}: {law_type.NAME}')
+    law = _friction_law(law_type, document, where)
     terms = None
     if 'velocity_terms' in document:
         terms = from_mapping(VelocityTerms, document['velocity_terms'], f'{where}: velocity_terms')
@@ -82,29 +76,34 @@ def parse_seal(document: Any) -> Seal:
     return from_mapping(Seal, numbers, where, **made)
 
 
-def _coulomb_law(document: Mapping[str, Any], law_name: str, where: str) -> CoulombLaw:
-    if law_name in _WITHOUT_GEOMETRY:
-        if 'geometry' in document:  # the law has no use for it, but a wrong one is still wrong
-            from_mapping(SealGeometry, document['geometry'], f'{where}: geometry')
-        law: CoulombLaw = from_mapping(_WITHOUT_GEOMETRY[law_name], document.get(law_name), f'{where}: {law_name}')
-        return law
-    geometry = from_mapping(SealGeometry, document.get('geometry'), f'{where}: geometry')
-    if law_name == 'physics_based':
-        return PhysicsBased(
-            geometry,
-            _law(document, 'normal_force', NORMAL_FORCE_LAWS, where),
-            parse_friction_coefficient(document, where),
-        )
-    return from_mapping(PriorArtChart, document.get('chart'), f'{where}: chart', geometry=geometry)
+def law_document(law: FrictionLaw) -> dict[str, Any]:
+    """The part of a seal file that describes a friction law: what `parse_seal` makes the law from."""
+    document: dict[str, Any] = {'coulomb_law': law.NAME}
+    for field in _fields(type(law)):
+        if field.type in _PARTS:
+            document[_PARTS[field.type]] = _part_document(getattr(law, field.name))
+    if meanings(law):
+        document[law.PART or law.NAME] = _parameters(law)
+    return document
 
 
 def parse_friction_coefficient(document: Mapping[str, Any], where: str) -> FrictionCoefficientLaw:
-    """Law under ``friction_coefficient`` of a document; ``where`` says what the document is, for the error message.
+    """Law under ``friction_coefficient`` of a document; ``where`` names the document in the error message.
 
     Raises:
-        ValueError: There is none, or it makes no sense.
+        ValueError: It is missing or not valid.
     """
-    law: FrictionCoefficientLaw = _law(document, 'friction_coefficient', FRICTION_COEFFICIENT_LAWS, where)
+    law: FrictionCoefficientLaw = _part(FrictionCoefficientLaw, document, where)
+    return law
+
+
+def parse_normal_force(document: Mapping[str, Any], where: str) -> NormalForceLaw:
+    """Law under ``normal_force`` of a document; likewise.
+
+    Raises:
+        ValueError: It is missing or not valid.
+    """
+    law: NormalForceLaw = _part(NormalForceLaw, document, where)
     return law
 
 
@@ -112,13 +111,58 @@ def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[
     """Seals of an actuator from their documents and the chamber (``a`` or ``b``) of each.
 
     Raises:
-        ValueError: There are not as many chambers as seals, or a document or chamber makes no sense.
+        ValueError: There are not as many chambers as seals, or a document or chamber is not valid.
     """
     if len(documents) != len(chambers):
         raise ValueError(
             f'seals has {len(documents)} entries but seal_chambers has {len(chambers)}: give one chamber a seal'
         )
     return tuple(MountedSeal(parse_seal(d), chamber) for d, chamber in zip(documents, chambers, strict=True))
+
+
+def _fields(law_type: type[FrictionLaw]) -> list[dataclasses.Field[Any]]:
+    return [field for field in dataclasses.fields(law_type) if field.init]
+
+
+def _keys(law_type: type[FrictionLaw]) -> set[str]:
+    """Keys of a seal file that a law takes."""
+    keys = {_PARTS[field.type] for field in _fields(law_type) if field.type in _PARTS}
+    return keys | ({law_type.PART or law_type.NAME} if meanings(law_type) else set())
+
+
+def _friction_law(law_type: type[FrictionLaw], document: Mapping[str, Any], where: str) -> FrictionLaw:
+    parts = {f.name: _part(f.type, document, where) for f in _fields(law_type) if f.type in _PARTS}
+    if 'geometry' in document and 'geometry' not in parts:  # the law does not use it, but a wrong one is still wrong
+        _part(SealGeometry, document, where)
+    if not meanings(law_type):
+        return law_type(**parts)
+    key = law_type.PART or law_type.NAME
+    return from_mapping(law_type, document.get(key), f'{where}: {key}', **parts)
+
+
+def _part(part_type: Any, document: Mapping[str, Any], where: str) -> Any:
+    """Geometry, or the law that ``law`` names, from its key of a seal file."""
+    key = _PARTS[part_type]
+    part, where = document.get(key), f'{where}: {key}'
+    if part_type not in _LAWS_OF_PART:
+        return from_mapping(part_type, part, where)
+    if not isinstance(part, Mapping):
+        raise ValueError(f'{where} = {part!r} is not a mapping of names to values')
+    laws = _LAWS_OF_PART[part_type]
+    law_type = laws[_choice(part, 'law', laws, where)]
+    return from_mapping(law_type, {k: v for k, v in part.items() if k != 'law'}, where)
+
+
+def _part_document(part: Any) -> dict[str, Any]:
+    """Inverse of `_part`."""
+    names = {law: name for laws in _LAWS_OF_PART.values() for name, law in laws.items()}
+    chosen = {'law': names[type(part)]} if type(part) in names else {}
+    return chosen | _parameters(part)
+
+
+def _parameters(record: Any) -> dict[str, Any]:
+    values = {name: getattr(record, name) for name in meanings(record)}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
 
 def _can_be_recorded(value: Any) -> bool:
@@ -135,14 +179,6 @@ def _choice(document: Mapping[str, Any], key: str, choices: Any, where: str) -> 
     if value not in tuple(choices):
         raise ValueError(f'{where}: {key} = {value!r} is not one of {", ".join(choices)}')
     return str(value)
-
-
-def _law(document: Mapping[str, Any], key: str, laws: dict[str, type], where: str) -> Any:
-    part = document.get(key)
-    if not isinstance(part, Mapping):
-        raise ValueError(f'{where}: {key} = {part!r} is not a mapping of names to values')
-    name = _choice(part, 'law', laws, f'{where}: {key}')
-    return from_mapping(laws[name], {k: v for k, v in part.items() if k != 'law'}, f'{where}: {key}')
 
 
 def _range(document: Mapping[str, Any], where: str) -> tuple[Any, Any]:

@@ -3,7 +3,7 @@
 from enum import IntEnum
 from typing import NamedTuple
 
-from seal_friction_ros.core.foundation.compilable import compilable
+from seal_friction_ros.core.foundation.compiled import compilable
 
 
 class FrictionState(IntEnum):
@@ -15,10 +15,14 @@ class FrictionState(IntEnum):
     STUCK = 3
 
 
+UNKNOWN, SLIDING, BREAKAWAY, STUCK = (int(state) for state in FrictionState)
+
+
 class StateFriction(NamedTuple):
     """Friction that acts on the rod, and why."""
 
-    state: FrictionState
+    state: int
+    """a `FrictionState`"""
     direction: int
     """-1, 0 or 1"""
     friction_force: float
@@ -71,8 +75,8 @@ def state_friction(
     """
     if not at_rest:
         direction = sign(velocity)
-        return StateFriction(FrictionState.SLIDING, direction, coulomb_friction * direction)
+        return StateFriction(SLIDING, direction, coulomb_friction * direction)
     direction = sign(force_sum)
     if abs(force_sum) >= breakaway_force:
-        return StateFriction(FrictionState.BREAKAWAY, direction, breakaway_force * direction)
-    return StateFriction(FrictionState.STUCK, direction, force_sum)
+        return StateFriction(BREAKAWAY, direction, breakaway_force * direction)
+    return StateFriction(STUCK, direction, force_sum)

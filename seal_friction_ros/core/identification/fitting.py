@@ -126,7 +126,8 @@ def fit(rung: Rung, readings: Readings, known: Values | None = None, *, is_close
             best = found
     if best is None or not np.isfinite(best.x).all():
         raise ValueError(f'{rung.name}: the fit does not end in finite numbers')
-    size = np.abs([p.start(_mean_friction(readings), readings.at) for p in rung.parameters])
+    typical = readings.at.typical(_mean_friction(readings))
+    size = np.abs([p.start(typical) for p in rung.parameters])
     at_zero = (lower == 0.0) & (np.abs(best.x) < 1e-6 * size)
     values = values_of(rung, np.where(at_zero, 0.0, best.x))  # a term that does not pay is nothing, not 1e-18
     jacobian: FloatArray = np.asarray(best.jac)
@@ -143,7 +144,8 @@ _TRIED = (0.2, 1.0, 4.0)  # Stribeck velocities that a fit begins from, as facto
 
 def _starts(rung: Rung, readings: Readings, known: Values) -> Iterator[FloatArray]:
     """First guesses: what is known from a lower rung, and several Stribeck velocities."""
-    guess = {p.name: p.start(_mean_friction(readings), readings.at) for p in rung.parameters}
+    typical = readings.at.typical(_mean_friction(readings))
+    guess = {p.name: p.start(typical) for p in rung.parameters}
     guess |= {name: value for name, value in known.items() if name in guess}
     for factor in _TRIED if 'stribeck_velocity' in guess else (1.0,):
         tried = guess | {name: factor * guess[name] for name in ('stribeck_velocity',) if name in guess}
@@ -594,9 +596,9 @@ def _relative_slope(found: Fit, readings: Readings, inside: BoolArray) -> FloatA
     result = np.empty(len(found.rung.parameters))
     for i, parameter in enumerate(found.rung.parameters):
         value = found.values[parameter.name]
-        step = 1e-4 * (abs(value) or 1.0)
-        moved = replace(found, values=found.values | {parameter.name: value + step})
-        result[i] = (_level_law(moved, readings, inside) / middle - 1.0) / 1e-4
+        share = 1e-4 if value + 1e-4 * (abs(value) or 1.0) <= parameter.upper else -1e-4
+        moved = replace(found, values=found.values | {parameter.name: value + share * (abs(value) or 1.0)})
+        result[i] = (_level_law(moved, readings, inside) / middle - 1.0) / share
     return result
 
 

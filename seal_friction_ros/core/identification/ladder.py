@@ -1,26 +1,38 @@
-"""The ladder of friction laws that identification climbs, from what the field does today to what the physics says.
+"""The ladder of friction laws that identification climbs, from the simplest to the physics.
 
-Each law is a function of the conditions of a reading and of its parameters, for all readings at once; the parameters
-are of one seal, the friction is that of all seals of the rig. `core/coulomb.py` has the same laws for one sample at a
-time; a test holds the two together.
+Each rung is a law of the registry (`FRICTION_LAWS`), with or without velocity terms. Fits and the live node evaluate
+the same function of the law. Parameters are those of one seal, friction is that of all seals of the rig.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area, squeeze
-from seal_friction_ros.core.friction.normal_force import NormalForceLaw
+from seal_friction_ros.core.foundation.compiled import for_compiler
+from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.friction.actuator import (
+    SealNumbers,
+    numbers_of_law,
+    sliding_friction_of_seals,
+)
+from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
+from seal_friction_ros.core.friction.laws import FRICTION_LAWS
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.law import FrictionLaw, TypicalReading
+from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
+from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
+from seal_friction_ros.core.friction.laws.pressure_power_law import ELASTIC_EXPONENT, PressurePowerLaw
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 
-ELASTIC_EXPONENT = 2.0 / 3.0  # of the normal force: friction of an elastic contact [Schallamach1958]_
+COMPILED_FROM = 100  # pressures from which on a fit is faster compiled: a law compiles in about a second
 
 
 class Conditions(NamedTuple):
-    """Under what each reading was taken; n readings, k seals."""
+    """Conditions of each reading; n readings, k seals."""
 
     pressure: FloatArray
     """[Pa, gauge, >= 0] that each seal sees, shape (n, k)"""
@@ -36,198 +48,187 @@ class Conditions(NamedTuple):
         normal_force = None if self.normal_force is None else self.normal_force[index]
         return Conditions(self.pressure[index], normal_force, self.velocity[index], self.direction[index])
 
+    def typical(self, friction: float) -> TypicalReading:
+        """Sizes that occur in the readings, with their mean ``friction`` of one seal [N]."""
+        return TypicalReading(
+            friction,
+            float(self.pressure.max()),
+            float(np.nanmax(np.abs(self.velocity), initial=0.0)),
+            math.nan if self.normal_force is None else float(self.normal_force.mean()),
+        )
+
 
 Values = Mapping[str, float]
-Law = Callable[[Conditions, Values], FloatArray]
 
 
-class Parameter(NamedTuple):
-    """A parameter to be fitted."""
+class FittedParameter(NamedTuple):
+    """A parameter that is fitted."""
 
     name: str
     unit: str
     lower: float
     upper: float
-    start: Callable[[float, Conditions], float]
-    """first guess, from the mean friction of one seal [N] and the conditions"""
+    start: Callable[[TypicalReading], float]
+    """first guess"""
     symbol: str
 
 
-# -- the laws ---------------------------------------------------------------------------------------------------------
+def fitted_parameters(record_type: type) -> tuple[FittedParameter, ...]:
+    """Parameters of a law, or of the velocity terms, that have a first guess."""
+    return tuple(
+        FittedParameter(name, m.unit, float(m.lower or 0.0), float(m.upper or 0.0), m.start, m.symbol)
+        for name, m in meanings(record_type).items()
+        if m.start is not None
+    )
 
 
-def constant_coulomb(at: Conditions, value: Values) -> FloatArray:
-    """f_c = f_0: friction that does not depend on pressure [N], shape (n,).
+@dataclass(frozen=True, eq=False)
+class Rung:
+    """One law of the ladder: a friction law, and the velocity terms on top of it."""
 
-    Source: thesis, chapter 1, as what is mostly assumed.
-    """
-    return np.full(len(at.direction), value['coulomb_friction'] * at.pressure.shape[1])
+    name: str
+    words: str
+    law_type: type[FrictionLaw]
+    parameters: tuple[FittedParameter, ...]
+    fixed: Values = field(default_factory=dict)
+    """parameters that are not fitted"""
+    parts: Mapping[str, Any] = field(default_factory=dict)
+    """fields of the law that are known beforehand: geometry, normal force"""
+
+    @property
+    def coulomb_law(self) -> str:
+        """Name of the law in a seal file."""
+        return self.law_type.NAME
+
+    @property
+    def needs_geometry(self) -> bool:
+        """Whether it needs the normal force."""
+        return bool(self.parts)
+
+    @property
+    def depends_on_pressure(self) -> bool:
+        """Whether its Coulomb friction does."""
+        return self.law_type is not ConstantCoulomb
+
+    @property
+    def velocity_terms(self) -> tuple[str, ...]:
+        """Parameters of the velocity terms among those that are fitted."""
+        fitted = {parameter.name for parameter in self.parameters}
+        return tuple(name for name in meanings(VelocityTerms) if name in fitted)
+
+    def law(self, values: Values) -> FrictionLaw:
+        """The friction law of one seal.
+
+        Args:
+            values: Parameters by name; others are passed over.
+
+        Raises:
+            ValueError: A value is out of bounds.
+        """
+        part_name, part_type = self.law_type.FITTED_PART or ('', self.law_type)
+        fitted: Any = part_type(**self._chosen(part_type, values), **({} if part_name else self.parts))
+        return self.law_type(**self.parts, **{part_name: fitted}) if part_name else fitted
+
+    def terms(self, values: Values) -> VelocityTerms | None:
+        """The velocity terms of one seal; None if the rung has none."""
+        return VelocityTerms(**{name: values[name] for name in self.velocity_terms}) if self.velocity_terms else None
+
+    def friction(self, at: Conditions, values: Values) -> FloatArray:
+        """Magnitude of the sliding friction of all seals [N], shape (n,)."""
+        return frictions(self._seal(values, self.terms(values)), at)
+
+    def coulomb_friction(self, at: Conditions, values: Values) -> FloatArray:
+        """Magnitude of the Coulomb friction of all seals [N], shape (n,)."""
+        return frictions(self._seal(values, None), at)
+
+    def _chosen(self, record_type: type, values: Values) -> dict[str, float]:
+        known = {**values, **self.fixed}
+        return {f.name: known[f.name] for f in fields(record_type) if f.init and f.name in known}
+
+    def _seal(self, values: Values, terms: VelocityTerms | None) -> SealNumbers:
+        return numbers_of_law(self.law(values), terms)
 
 
-def pressure_power_law(at: Conditions, value: Values) -> FloatArray:
-    """f_c = f_0 + k (P / 1 bar)^m, summed over the seals [N], shape (n,). Our choice; m = 2/3 is an elastic contact."""
-    risen = (at.pressure / BAR) ** value['pressure_exponent']
-    friction = value['friction_at_no_pressure'] + value['friction_at_one_bar'] * risen
-    return np.asarray(friction.sum(axis=1))
+def frictions(seal: SealNumbers, at: Conditions) -> FloatArray:
+    """Magnitude of the friction [N] of k seals of one kind that slide, shape (n,). Without a speed it counts as 0."""
+    speed, direction = np.nan_to_num(np.abs(at.velocity)), at.direction.astype(np.int64)
+    if at.pressure.size >= COMPILED_FROM:
+        from seal_friction_ros.core.identification.compiled_friction import sum_over_seals  # noqa: PLC0415
 
-
-def physics_based(at: Conditions, value: Values) -> FloatArray:
-    """f_c = mu(F_n) F_n with mu = c (F_n / 1 N)^-n, summed over the seals [N], shape (n,).
-
-    The normal force F_n = G P A_r + F_rad is computed, not fitted: friction alone does not tell it from mu.
-
-    Source: thesis, chapter 7.
-    """
-    friction = value['coefficient'] * _known_normal_force(at) ** (1.0 - value['exponent'])
-    return np.asarray(friction.sum(axis=1))
-
-
-def _known_normal_force(at: Conditions) -> FloatArray:
-    if at.normal_force is None:
-        raise ValueError('Conditions.normal_force is not given: this law needs the geometry of the seals')
-    return at.normal_force
-
-
-def viscous(at: Conditions, value: Values) -> FloatArray:
-    """Viscous friction sigma |v| per seal, summed over the seals [N], shape (n,)."""
-    return np.asarray(at.pressure.shape[1] * value['viscous_friction'] * np.abs(at.velocity))
-
-
-def stribeck(at: Conditions, value: Values) -> FloatArray:
-    """f_S exp(-|v| / v_S) per seal, summed over the seals [N], shape (n,).
-
-    Source: [Armstrong1994]_ eq. (5); an exponent of 1 is our choice.
-    """
-    faded = np.exp(-np.abs(at.velocity) / value['stribeck_velocity'])
-    return np.asarray(at.pressure.shape[1] * value['stribeck_friction'] * faded)
-
-
-def asymmetry(at: Conditions, value: Values) -> FloatArray:
-    """1 + a sgn(v): factor on it all, shape (n,). One factor for every term is our choice."""
-    return 1.0 + value['asymmetry'] * at.direction
+        return np.asarray(sum_over_seals(for_compiler((seal,)), at.pressure, speed, direction))
+    rows = zip(at.pressure.tolist(), speed.tolist(), direction.tolist(), strict=True)
+    return np.array([sum(sliding_friction_of_seals((seal,), p, p, v, d) for p in each) for each, v, d in rows])
 
 
 # -- the ladder -------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Rung:
-    """One law of the ladder: a Coulomb law, what the velocity adds, and whether the directions differ."""
-
-    name: str
-    words: str
-    coulomb_law: str
-    """the law's name in a seal file"""
-    coulomb: Law
-    parameters: tuple[Parameter, ...]
-    fixed: Values = field(default_factory=dict)
-    """parameters that are not fitted"""
-    velocity_terms: tuple[Law, ...] = ()
-    is_asymmetric: bool = False
-
-    @property
-    def needs_geometry(self) -> bool:
-        """Whether it needs the normal force."""
-        return self.coulomb is physics_based
-
-    @property
-    def depends_on_pressure(self) -> bool:
-        """Whether its Coulomb friction does."""
-        return self.coulomb is not constant_coulomb
-
-    def friction(self, at: Conditions, value: Values) -> FloatArray:
-        """Magnitude of the friction of all seals [N], shape (n,)."""
-        total = self.coulomb(at, value)
-        for term in self.velocity_terms:
-            total = total + term(at, value)
-        return total * asymmetry(at, value) if self.is_asymmetric else total
-
-
-def _highest(at: Conditions) -> float:
-    return max(float(at.pressure.max()) / BAR, 1e-6)
-
-
-def _fastest(at: Conditions) -> float:
-    return max(float(np.nanmax(np.abs(at.velocity), initial=0.0)), 1e-6)
-
-
-def _mean_normal_force(at: Conditions) -> float:
-    return float(_known_normal_force(at).mean())
-
-
-_CONSTANT = (Parameter('coulomb_friction', 'N', 0.0, 1e6, lambda mean, _: mean, 'f_0'),)
-_POWER = (
-    Parameter('friction_at_no_pressure', 'N', 0.0, 1e6, lambda mean, _: 0.5 * mean, 'f_0'),
-    Parameter(
-        'friction_at_one_bar', 'N', 0.0, 1e6, lambda mean, at: 0.7 * mean / _highest(at) ** ELASTIC_EXPONENT, 'k'
-    ),
-    Parameter('pressure_exponent', '1', 0.05, 2.0, lambda *_: ELASTIC_EXPONENT, 'm'),
-)
-_PHYSICS = (
-    Parameter('coefficient', '1', 1e-6, 100.0, lambda mean, at: mean / _mean_normal_force(at) ** 0.6, 'c'),
-    Parameter('exponent', '1', 0.0, 0.99, lambda *_: 0.4, 'n'),
-)
-_VISCOUS = (Parameter('viscous_friction', 'N s/m', 0.0, 1e7, lambda mean, at: 0.2 * mean / _fastest(at), 'sigma'),)
-_STRIBECK = (
-    Parameter('stribeck_friction', 'N', 0.0, 1e6, lambda mean, _: 0.2 * mean, 'f_S'),
-    Parameter('stribeck_velocity', 'm/s', 1e-4, 1.0, lambda _, at: min(0.1 * _fastest(at), 1.0), 'v_S'),
-)
-_ASYMMETRY = (Parameter('asymmetry', '1', -0.9, 0.9, lambda *_: 0.0, 'a'),)
-
-
-def ladder(*, with_geometry: bool, with_speeds: bool, with_exponent: bool) -> tuple[Rung, ...]:
-    """Every rung that the data could carry, from the lowest.
-
-    What the velocity adds is tried on the constant Coulomb friction first, so that pressure is not given the credit for
-    it, and then on the highest law of the pressure.
+def ladder(
+    *,
+    geometry: SealGeometry | None = None,
+    normal_force_law: NormalForceLaw | None = None,
+    with_speeds: bool,
+    with_exponent: bool,
+) -> tuple[Rung, ...]:
+    """Laws from the lowest to the highest: constant, then pressure, then physics, each with what the data allow.
 
     Args:
-        with_geometry: The normal force is known, so the physics-based law and what stands on it is there too.
-        with_speeds: Speeds were measured and are not all the same, so terms of the velocity are there too.
-        with_exponent: There are enough pressures to tell an exponent from; else the power law has the exponent 2/3 of
-            an elastic contact.
+        geometry: Of the ring, where it is known; else there is no law that needs it.
+        normal_force_law: Likewise.
+        with_speeds: Whether the readings differ in speed, so that terms of the velocity can be told.
+        with_exponent: Whether there are pressures enough to tell the exponent of the pressure, else it is 2/3.
     """
-    power = _POWER if with_exponent else _POWER[:2]
-    fixed = {} if with_exponent else {'pressure_exponent': ELASTIC_EXPONENT}
-    constant = Rung('constant_coulomb', 'constant', 'constant_coulomb', constant_coulomb, _CONSTANT)
-    by_pressure = Rung(
-        'pressure_power_law', 'power of the pressure', 'pressure_power_law', pressure_power_law, power, fixed
-    )
-    by_physics = Rung('physics_based', 'mu(F_n) F_n', 'physics_based', physics_based, _PHYSICS)
-    highest = by_physics if with_geometry else by_pressure
+    parts = {'geometry': geometry, 'normal_force_law': normal_force_law} if geometry and normal_force_law else {}
+    bases = [_base(law_type, parts, with_speeds, with_exponent) for law_type in FRICTION_LAWS]
+    known = [base for base in bases if base is not None]
+    constant, laws = known[0], known[1:]
+    highest = next(base for base in laws if base.law_type is (PhysicsBased if parts else PressurePowerLaw))
     on_constant = _velocity_rungs(constant, 'coulomb') if with_speeds else []
-    laws = [by_pressure, by_physics] if with_geometry else [by_pressure]
-    on_highest = _velocity_rungs(highest, highest.name) if with_speeds else [_asymmetric(highest, highest.name)]
+    on_highest = (
+        _velocity_rungs(highest, highest.name) if with_speeds else [_with_terms(highest, highest.name, ('asymmetry',))]
+    )
     return (constant, *on_constant, *laws, *on_highest)
+
+
+def _base(law_type: type[FrictionLaw], parts: Mapping[str, Any], with_speeds: bool, with_exponent: bool) -> Rung | None:
+    """Rung of a law without velocity terms; None if nothing of it is fitted, or what it needs is not known."""
+    part_name, part_type = law_type.FITTED_PART or ('', law_type)
+    parameters = fitted_parameters(part_type)
+    needed = [f.name for f in fields(law_type) if f.init and f.name != part_name and f.name not in meanings(law_type)]
+    depends_on_speed = 'reference_speed' in meanings(law_type)
+    if not parameters or not set(needed) <= set(parts) or (depends_on_speed and not with_speeds):
+        return None
+    fixed = {}
+    if law_type is PressurePowerLaw and not with_exponent:
+        fixed = {'pressure_exponent': ELASTIC_EXPONENT}
+        parameters = tuple(p for p in parameters if p.name not in fixed)
+    held = {name: parts[name] for name in needed}
+    return Rung(law_type.NAME, law_type.FORMULA, law_type, parameters, fixed, held)
 
 
 def _velocity_rungs(base: Rung, name: str) -> list[Rung]:
     """Viscous friction on top of a law, then Stribeck friction or an asymmetry on top of that."""
-    with_viscous = replace(
-        base,
-        name=f'{name}_viscous',
-        words=f'{base.words} + viscous',
-        parameters=(*base.parameters, *_VISCOUS),
-        velocity_terms=(viscous,),
-    )
-    with_stribeck = replace(
-        with_viscous,
-        name=f'{name}_stribeck',
-        words=f'{with_viscous.words} + Stribeck',
-        parameters=(*with_viscous.parameters, *_STRIBECK),
-        velocity_terms=(viscous, stribeck),
-    )
-    return [with_viscous, with_stribeck, _asymmetric(with_viscous, name)]
+    viscous = _with_terms(base, name, ('viscous',))
+    return [viscous, _with_terms(viscous, name, ('stribeck',)), _with_terms(viscous, name, ('asymmetry',))]
 
 
-def _asymmetric(base: Rung, name: str) -> Rung:
-    return replace(
-        base,
-        name=f'{name}_asymmetric',
-        words=f'{base.words} + asymmetry',
-        parameters=(*base.parameters, *_ASYMMETRY),
-        is_asymmetric=True,
-    )
+_TERMS = {
+    'viscous': ('viscous', '_viscous', ('viscous_friction',)),
+    'stribeck': ('Stribeck', '_stribeck', ('stribeck_friction', 'stribeck_velocity')),
+    'asymmetry': ('asymmetry', '_asymmetric', ('asymmetry',)),
+}
+
+
+def _with_terms(base: Rung, name: str, terms: Sequence[str]) -> Rung:
+    for term in terms:
+        words, suffix, names = _TERMS[term]
+        base = replace(
+            base,
+            name=f'{name}{suffix}',
+            words=f'{base.words} + {words}',
+            parameters=(*base.parameters, *(p for p in fitted_parameters(VelocityTerms) if p.name in names)),
+        )
+    return base
 
 
 def values_of(rung: Rung, vector: Sequence[float] | FloatArray) -> dict[str, float]:
@@ -245,17 +246,3 @@ def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForce
     forces = np.array([law.normal_force(float(p), area) for p in distinct])
     result: FloatArray = forces[back].reshape(pressure.shape)
     return result
-
-
-def squeeze_force(geometry: SealGeometry) -> float:
-    """Normal force of a squeezed ring without pressure, summed over the circumference [N].
-
-    F = pi D d E (1.25 C^1.5 + 50 C^6), with D the mean diameter of the gap and C the squeeze.
-
-    Source: [Lindley1967]_, for a ring between two parallel walls. Against the finite elements of the thesis (18.2 N at
-    7.5 % squeeze) it gives 22 N.
-    """
-    mean_diameter = (geometry.rod_diameter + geometry.gland_diameter) / 2.0
-    share = squeeze(geometry)
-    line_load = geometry.section_diameter * geometry.elastic_modulus * (1.25 * share**1.5 + 50.0 * share**6)
-    return float(np.pi * mean_diameter * line_load)

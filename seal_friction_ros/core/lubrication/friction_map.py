@@ -9,7 +9,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
-from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.case import Case, MapGrid
 from seal_friction_ros.core.lubrication.contact import ContactState, contact_step
 from seal_friction_ros.core.lubrication.transient import Model, fluid_force, rest, solid_limit

@@ -21,8 +21,8 @@ from typing import Any
 
 from seal_friction_ros.core.foundation.parameters import check, check_names, from_mapping, name_and_source, parameter
 from seal_friction_ros.core.friction.actuator import Uncertainty
-from seal_friction_ros.core.friction.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.friction.seal_file import parse_friction_coefficient
 from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness

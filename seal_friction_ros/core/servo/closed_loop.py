@@ -16,12 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation import pipeline
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import ServoReference, Velocity
+from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
+from seal_friction_ros.core.estimation.messages import Input, Output
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.friction.actuator import CoulombLaw, MountedSeal
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.motions import Reference, Sine, Step, Trapezoid, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters
@@ -57,18 +56,6 @@ class Run(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ScaledLaw:
-    """A Coulomb law that is wrong by a factor."""
-
-    law: CoulombLaw
-    factor: float
-
-    def coulomb_friction(self, pressure: float) -> float:
-        """Magnitude of the sliding friction [N] at ``pressure`` [Pa, gauge, >= 0]."""
-        return self.factor * self.law.coulomb_friction(pressure)
-
-
-@dataclass(frozen=True)
 class Stopped:
     """A wave that stands still from a moment on."""
 
@@ -88,16 +75,7 @@ def with_wrong_friction(parameters: PipelineParameters, error: float) -> Pipelin
         parameters: The right ones.
         error: Share [-] above -1.
     """
-    if not error:
-        return parameters
-    factor = 1.0 + error
-    seals = tuple(
-        MountedSeal(
-            replace(m.seal, coulomb_law=ScaledLaw(m.seal.coulomb_law, factor), stiction=factor * m.seal.stiction),
-            m.chamber,
-        )
-        for m in parameters.estimator.seals
-    )
+    seals = tuple(replace(m, friction_scale=(1.0 + error) * m.friction_scale) for m in parameters.estimator.seals)
     return parameters._replace(estimator=replace(parameters.estimator, seals=seals))
 
 
@@ -142,17 +120,26 @@ def closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: Float
     seen = pipeline.init(parameters)
     state = servo.init(plant, wave.at(0.0).position)
     out = servo.outputs(plant, state.plant)
+    newest = FeedForward(0, 0.0, 0.0, 0)
+
+    def take(record: Output, _: bytes) -> None:
+        nonlocal newest
+        newest = record if isinstance(record, FeedForward) else newest
+
     rows = []
     for i in range(samples):
         stamp = round(i * period * 1e9)
         reference = wave.at(i * period)
         a, b, f, v = errors[i % len(errors)]
-        seen, _ = pipeline.receive(parameters, seen, Pressure(stamp, out.pressure_a + a, out.pressure_b + b))
-        seen, _ = pipeline.receive(parameters, seen, Force(stamp, out.force_sum + f))
-        if i:
-            seen, _ = pipeline.receive(parameters, seen, ServoReference(stamp, *reference))
-        seen, answer = pipeline.receive(parameters, seen, Velocity(stamp, out.velocity + v, b''))
-        forces.append(answer.feedforward.force if answer.feedforward is not None else 0.0)
+        messages: list[Input] = [
+            Pressure(stamp, out.pressure_a + a, out.pressure_b + b),
+            Force(stamp, out.force_sum + f),
+        ]
+        messages += [ServoReference(stamp, *reference)] if i else []
+        messages.append(Velocity(stamp, out.velocity + v))
+        for message in messages:
+            seen = pipeline.receive(parameters, seen, message, take)
+        forces.append(newest.force)
         force = (1.0 - part) * forces[-1 - back] + part * forces[-2 - back]
         state, out = servo.step(plant, state, reference, force)
         wanted = wave.at((i + 1) * period).position

@@ -22,13 +22,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.foundation.units import INCH, PSI
-from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.actuator import (
+    NO_SEALS,
+    MountedSeal,
+    friction_of_seals,
+    numbers_of_seals,
+    sliding_friction_of_seals,
+)
 
 AMBIENT = 101325.0  # [Pa, absolute] zero of gauge pressure
-TABLE_INTERVALS = 8192
 CREEP_SPEED = 1e-9  # [m/s] a rod that slides slower than this, and ever slower, is at rest
 MAX_EVENTS = 16  # in one inner step; then the rod is held to its end
 
@@ -182,13 +188,8 @@ class Constants(NamedTuple):
     stiffness: float
     spring_position: float
     damping: float
-    table_interval: float
-    coulomb_a: Any
-    """Coulomb friction [N] of the seals on chamber a at multiples of ``table_interval`` [Pa]."""
-    coulomb_b: Any
-    breakaway_a: Any
-    """Breakaway force [N], likewise."""
-    breakaway_b: Any
+    seals: Any
+    """the seals as compiled code takes them"""
 
 
 class PlantState(NamedTuple):
@@ -216,20 +217,8 @@ class PlantState(NamedTuple):
 
 
 def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[MountedSeal, ...]) -> Constants:
-    """Numbers for the equations.
-
-    The seals' laws become tables up to twice the largest pressure that they or the supply know. A
-    table of 8192 intervals, read linearly and on with its last slope, is within 1e-5 of the laws in
-    seal_friction_ros/core and keeps them monotone: the price of compiling the equations.
-    """
+    """Numbers for the equations."""
     beta = cylinder.bulk_modulus
-    highest = max([valve.supply_pressure, 1e6] + [m.seal.pressure_max for m in seals])
-    interval = 2.0 * highest / TABLE_INTERVALS
-    pressures = [i * interval for i in range(TABLE_INTERVALS + 1)]
-    on_a = tuple(m for m in seals if m.chamber == 'a')
-    on_b = tuple(m for m in seals if m.chamber == 'b')
-    frictions_a = [actuator_friction(on_a, p, 0.0) for p in pressures]
-    frictions_b = [actuator_friction(on_b, 0.0, p) for p in pressures]
     return Constants(
         supply=valve.supply_pressure,
         ret=valve.return_pressure,
@@ -251,11 +240,7 @@ def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[Mo
         stiffness=load.spring_stiffness,
         spring_position=load.spring_position,
         damping=load.viscous_damping,
-        table_interval=interval,
-        coulomb_a=np.array([f.coulomb_friction for f in frictions_a]),
-        coulomb_b=np.array([f.coulomb_friction for f in frictions_b]),
-        breakaway_a=np.array([f.coulomb_friction + f.stiction for f in frictions_a]),
-        breakaway_b=np.array([f.coulomb_friction + f.stiction for f in frictions_b]),
+        seals=for_compiler(numbers_of_seals(seals) or NO_SEALS),
     )
 
 
@@ -294,29 +279,15 @@ def chamber_pressure(charge: float, vapour: float) -> float:
 
 
 @compiled
-def coulomb(c: Constants, pressure_a: float, pressure_b: float) -> float:
-    """Coulomb friction of all seals [N]: `coulomb.actuator_friction`, from its tables."""
-    return from_table(c.coulomb_a, pressure_a / c.table_interval) + from_table(
-        c.coulomb_b, pressure_b / c.table_interval
-    )
+def holding_force(c: Constants, pressure_a: float, pressure_b: float, direction: int) -> float:
+    """Force up to which the seals hold a rod at rest against a push in ``direction`` [N].
 
-
-@compiled
-def breakaway(c: Constants, pressure_a: float, pressure_b: float) -> float:
-    """Breakaway force of all seals [N], likewise."""
-    return from_table(c.breakaway_a, pressure_a / c.table_interval) + from_table(
-        c.breakaway_b, pressure_b / c.table_interval
-    )
-
-
-@compiled
-def from_table(values: Any, place: float) -> float:
-    """Linear between ``values`` at 0, 1, 2, ...; the first below, on with the last slope above."""
-    if place <= 0.0:
-        return float(values[0])
-    i = min(int(place), TABLE_INTERVALS - 1)
-    low = float(values[i])
-    return low + (float(values[i + 1]) - low) * (place - i)
+    The breakaway force, or the friction of the slowest motion where that is larger (our choice: otherwise the rod would
+    break away and stop at once).
+    """
+    at_rest = friction_of_seals(c.seals, pressure_a, pressure_b, 0.0)
+    slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, direction)
+    return max(at_rest.coulomb_friction + at_rest.stiction, slowest)
 
 
 @compiled
@@ -355,7 +326,7 @@ def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, lo
     r"""Time derivatives of the first eight numbers of `PlantState`.
 
     .. math::
-        \dot x &= v, \qquad m \dot v = \Sigma F - d f_c(p_a, p_b) \quad (\text{stuck, } d = 0: \dot x = \dot v = 0) \\
+        \dot x &= v, \qquad m \dot v = \Sigma F - d f(p_a, p_b, v) \quad (\text{stuck, } d = 0: \dot x = \dot v = 0) \\
         \dot p_a &= \beta / V_a\, (Q_a - C_i (p_a - p_b) - C_e p_a - A v), \quad V_a = V_t/2 + A x \\
         \ddot s &= \omega^2 (u - s) - 2 \zeta \omega \dot s
 
@@ -381,7 +352,9 @@ def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, lo
     charge_flow_a = flow_a if charge_a >= c.vapour else flow_a * math.exp((c.vapour - charge_a) / beta)
     charge_flow_b = flow_b if charge_b >= c.vapour else flow_b * math.exp((c.vapour - charge_b) / beta)
 
-    friction = direction * coulomb(c, a, b)
+    friction = 0.0
+    if direction != 0:
+        friction = direction * sliding_friction_of_seals(c.seals, a, b, max(velocity * direction, 0.0), direction)
     acceleration = (active_force(c, y, load_force) - friction) / c.mass if direction != 0 else 0.0
 
     density_a, density_b = math.exp(a / beta), math.exp(b / beta)
@@ -436,11 +409,12 @@ def smooth_step(
 def margin(c: Constants, y: tuple[float, ...], direction: int, load_force: float) -> float:
     """How far the friction state is from its end. A stuck one has ended below zero, a sliding one at zero already.
 
-    Stuck: breakaway force minus force sum [N]. Sliding: the smaller of speed [m/s] and way to the stop ahead [m].
+    Stuck: holding force minus force sum [N]. Sliding: the smaller of speed [m/s] and distance to the stop ahead [m].
     """
     if direction == 0:
-        holding = breakaway(c, chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour))
-        return holding - abs(force_sum(c, y, load_force))
+        force = force_sum(c, y, load_force)
+        pressure_a, pressure_b = chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour)
+        return holding_force(c, pressure_a, pressure_b, 1 if force > 0.0 else -1) - abs(force)
     return min(y[1] * direction, c.limit - y[0] * direction)
 
 
@@ -572,23 +546,41 @@ def stored_energy(c: Constants, state: PlantState) -> float:
     return energy
 
 
-def fastest_rate(valve: ServoValve, cylinder: Cylinder, load: Load) -> tuple[float, str]:
-    """Largest rate of the equations [1/s] and what has it: what the inner step must resolve.
+def fastest_rate(
+    valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[MountedSeal, ...] = ()
+) -> tuple[float, str]:
+    """Largest rate of the equations [1/s] and which part has it: what the inner step must resolve.
 
     Spool: its natural frequency. Chamber: the slope of a laminar orifice, 5/4 K / sqrt(p_t), and the leakages on the
-    smallest volume, plus the oscillation of the mass on the oil at a stop.
+    smallest volume, plus the oscillation of the mass on the oil at a stop, plus the damping of load and seals.
     """
     beta, volume = cylinder.bulk_modulus, cylinder.dead_volume
     slope = 1.25 * orifice_gain(valve) / math.sqrt(valve.transition_pressure)
     leakage = 2.0 * valve.null_leakage + 2.0 * cylinder.internal_leakage + cylinder.external_leakage
     largest = total_volume(cylinder) - volume
     stiffness = beta * piston_area(cylinder) ** 2 * (1.0 / volume + 1.0 / largest) + load.spring_stiffness
-    oscillation = math.sqrt(stiffness / load.mass) + load.viscous_damping / load.mass
+    damping = (load.viscous_damping + steepest_friction(seals, valve.supply_pressure)) / load.mass
+    oscillation = math.sqrt(stiffness / load.mass) + damping
     chamber = beta / volume * (slope + leakage)
     spool = valve.natural_frequency * max(1.0, 2.0 * valve.damping_ratio)
     hydraulics = chamber + oscillation
     text = (
         f'chamber and orifice {chamber:.4g} 1/s (lower rated_flow, or higher dead_volume or transition_pressure) '
-        f'plus hydraulic oscillation {oscillation:.4g} 1/s'
+        f'plus hydraulic oscillation and damping {oscillation:.4g} 1/s'
     )
     return (spool, 'spool of the valve') if spool > hydraulics else (hydraulics, text)
+
+
+def steepest_friction(seals: tuple[MountedSeal, ...], highest_pressure: float) -> float:
+    """Largest rise of the friction of the seals with speed [N s/m], on a grid of speeds and pressures (our choice)."""
+    if not any(mounted.seal.depends_on_velocity for mounted in seals):
+        return 0.0
+    numbers, speeds = numbers_of_seals(seals), np.geomspace(1e-6, 10.0, 141)
+    steepest = 0.0
+    for pressure in np.linspace(0.0, highest_pressure, 5).tolist():
+        for direction in (-1, 1):
+            friction: FloatArray = np.array(
+                [sliding_friction_of_seals(numbers, pressure, pressure, v, direction) for v in speeds.tolist()]
+            )
+            steepest = max(steepest, float(np.max(np.diff(friction) / np.diff(speeds))))
+    return steepest

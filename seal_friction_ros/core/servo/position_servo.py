@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.foundation.compiled import compiled, keep
 from seal_friction_ros.core.foundation.parameters import check, parameter
-from seal_friction_ros.core.friction.actuator import MountedSeal
-from seal_friction_ros.core.friction.states import FrictionState, state_friction
+from seal_friction_ros.core.friction.actuator import MountedSeal, friction_of_seals
+from seal_friction_ros.core.friction.states import state_friction
 from seal_friction_ros.core.servo.controller import (
     Command,
     ControllerState,
@@ -33,10 +33,8 @@ from seal_friction_ros.core.servo.plant import (
     Load,
     PlantState,
     ServoValve,
-    breakaway,
     chamber_pressure,
     constants,
-    coulomb,
     fastest_rate,
     force_sum,
     init_plant,
@@ -52,7 +50,7 @@ class ServoParameters:
 
     Raises:
         ValueError: A value is out of bounds, an inner step does not divide the sample or is too long for the fastest
-            part of the plant, a seal has friction that depends on the velocity, or the closed loop is unstable.
+            part of the plant, or the closed loop is unstable.
     """
 
     valve: ServoValve = field(default_factory=ServoValve)
@@ -69,6 +67,8 @@ class ServoParameters:
     inner_steps: int = field(init=False, repr=False, compare=False)
     constants: Constants = field(init=False, repr=False, compare=False)
     gains: Gains = field(init=False, repr=False, compare=False)
+    kept: Any = field(init=False, repr=False, compare=False)
+    """constants and gains, for compiled code"""
 
     def __post_init__(self) -> None:
         check(self)
@@ -79,7 +79,6 @@ class ServoParameters:
                 f'inner_step = {self.inner_step} s'
             )
         self._check_inner_step()
-        self._check_seals()
         c = constants(self.valve, self.cylinder, self.load, self.seals)
         g = gains(self.controller, c, self.control_period)
         radius = spectral_radius(g, c)
@@ -88,19 +87,11 @@ class ServoParameters:
                 f'ServoParameters: the closed loop is unstable, its largest eigenvalue from sample to sample is '
                 f'{radius:.4f}: lower position_gain, velocity_compensation or force_bandwidth, or control_period'
             )
-        for name, value in (('inner_steps', steps), ('constants', c), ('gains', g)):
+        for name, value in (('inner_steps', steps), ('constants', c), ('gains', g), ('kept', keep((c, g)))):
             object.__setattr__(self, name, value)  # frozen: the only way to keep what was built from the fields
 
-    def _check_seals(self) -> None:
-        moving = sorted({mounted.seal.name for mounted in self.seals if mounted.seal.velocity_law})
-        if moving:
-            raise ValueError(
-                f'ServoParameters.seals: friction of {", ".join(moving)} depends on the velocity, which the simulated '
-                'servo does not have: take a seal file without velocity terms or friction map'
-            )
-
     def _check_inner_step(self) -> None:
-        rate, part = fastest_rate(self.valve, self.cylinder, self.load)
+        rate, part = fastest_rate(self.valve, self.cylinder, self.load, self.seals)
         if rate * self.inner_step > LARGEST_RATE_TIMES_STEP:
             raise ValueError(
                 f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
@@ -136,7 +127,8 @@ class ServoOutputs(NamedTuple):
     """[N]"""
     breakaway_force: float
     """[N]"""
-    friction_state: FrictionState
+    friction_state: int
+    """a `FrictionState`"""
     direction: int
     """-1, 0 or 1"""
     command: Command
@@ -156,9 +148,10 @@ def init(parameters: ServoParameters, position: float = 0.0) -> ServoState:
 
 @compiled
 def advance_plant(
-    c: Constants, state: PlantState, command: float, load_force: float, inner_step_time: float, inner_steps: int
+    kept: Any, state: PlantState, command: float, load_force: float, inner_step_time: float, inner_steps: int
 ) -> PlantState:
     """``inner_steps`` inner steps with spool command and load force held."""
+    c, _gains = kept.value
     for _ in range(inner_steps):
         state = inner_step(c, state, command, load_force, inner_step_time)
     return state
@@ -167,9 +160,17 @@ def advance_plant(
 def advance(parameters: ServoParameters, state: PlantState, spool: float, load_force: float = 0.0) -> PlantState:
     """Valve, cylinder and load over one sample, with the spool command [-1 to 1] and a force on the rod [N] held."""
     command = min(max(spool, -1.0), 1.0)
-    return advance_plant(
-        parameters.constants, state, command, load_force, parameters.inner_step, parameters.inner_steps
-    )
+    return advance_plant(parameters.kept, state, command, load_force, parameters.inner_step, parameters.inner_steps)
+
+
+class RodForces(NamedTuple):
+    """Forces on the rod and of its seals [N]."""
+
+    force_sum: float
+    coulomb_friction: float
+    breakaway_force: float
+    sliding_friction: float
+    """at the velocity of the rod, as a magnitude; at rest the Coulomb friction"""
 
 
 @compiled
@@ -184,27 +185,31 @@ def measure(c: Constants, state: PlantState) -> Measurement:
 
 
 @compiled
-def observe(c: Constants, plant: PlantState, load_force: float) -> tuple[float, float, float]:
-    """Force sum, Coulomb friction and breakaway force [N] in a state of the plant."""
+def rod_forces(kept: Any, plant: PlantState, load_force: float) -> RodForces:
+    """Forces in a state of the plant."""
+    c, _gains = kept.value
     y = plant[:8]
     a, b = chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour)
-    return force_sum(c, y, load_force), coulomb(c, a, b), breakaway(c, a, b)
+    friction = friction_of_seals(c.seals, a, b, plant.velocity)
+    coulomb = friction.coulomb_friction
+    sliding = coulomb + friction.velocity_friction
+    return RodForces(force_sum(c, y, load_force), coulomb, coulomb + friction.stiction, sliding)
 
 
 @compiled
 def _step(
-    c: Constants,
-    g: Gains,
+    kept: Any,
     state: ServoState,
     reference: Reference,
     feedforward: float,
     load_force: float,
     inner_step_time: float,
     inner_steps: int,
-) -> tuple[ServoState, Command, tuple[float, float, float]]:
+) -> tuple[ServoState, Command, RodForces]:
+    c, g = kept.value
     controller, command = control(g, c, state.controller, measure(c, state.plant), reference, feedforward)
-    plant = advance_plant(c, state.plant, command.spool, load_force, inner_step_time, inner_steps)
-    return ServoState(plant, controller), command, observe(c, plant, load_force)
+    plant = advance_plant(kept, state.plant, command.spool, load_force, inner_step_time, inner_steps)
+    return ServoState(plant, controller), command, rod_forces(kept, plant, load_force)
 
 
 def step(
@@ -223,11 +228,10 @@ def step(
         feedforward: Friction feed-forward [N], positive on extension; likewise.
         load_force: Force from outside on the rod [N], positive on extension, held through the step.
     """
-    c, g = parameters.constants, parameters.gains
     state, command, forces = _step(
-        c, g, state, reference, feedforward, load_force, parameters.inner_step, parameters.inner_steps
+        parameters.kept, state, reference, feedforward, load_force, parameters.inner_step, parameters.inner_steps
     )
-    return state, _outputs(c, state.plant, command, *forces)
+    return state, _outputs(parameters.constants, state.plant, command, forces)
 
 
 NO_COMMAND = Command(0.0, 0.0, 0)
@@ -237,24 +241,25 @@ def outputs(
     parameters: ServoParameters, plant: PlantState, command: Command = NO_COMMAND, load_force: float = 0.0
 ) -> ServoOutputs:
     """What the servo does in a state of its plant."""
-    return _outputs(parameters.constants, plant, command, *observe(parameters.constants, plant, load_force))
+    c = parameters.constants
+    return _outputs(c, plant, command, rod_forces(parameters.kept, plant, load_force))
 
 
-def _outputs(
-    c: Constants, plant: PlantState, command: Command, force: float, friction: float, holding: float
-) -> ServoOutputs:
-    """Friction as the estimator's own equation has it, at rest where V = 0 exactly."""
-    acting = state_friction(plant.velocity, force, plant.velocity == 0.0, friction, holding)
+def _outputs(c: Constants, plant: PlantState, command: Command, forces: RodForces) -> ServoOutputs:
+    """Friction by the equation of the estimator, at rest where V = 0 exactly."""
+    acting = state_friction(
+        plant.velocity, forces.force_sum, plant.velocity == 0.0, forces.sliding_friction, forces.breakaway_force
+    )
     return ServoOutputs(
         plant.position,
         plant.velocity,
         max(plant.charge_a, c.vapour),
         max(plant.charge_b, c.vapour),
         plant.spool,
-        force,
+        forces.force_sum,
         acting.friction_force,
-        friction,
-        holding,
+        forces.coulomb_friction,
+        forces.breakaway_force,
         acting.state,
         acting.direction,
         command,
@@ -277,8 +282,7 @@ class Trajectory(NamedTuple):
 
 @compiled
 def _simulate(
-    c: Constants,
-    g: Gains,
+    kept: Any,
     state: ServoState,
     inputs: Any,
     inner_step_time: float,
@@ -288,12 +292,12 @@ def _simulate(
     for i in range(len(inputs)):
         row = inputs[i]
         wanted = Reference(row[0], row[1], row[2])
-        state, command, forces = _step(c, g, state, wanted, row[3], row[4], inner_step_time, inner_steps)
-        measured = measure(c, state.plant)
+        state, command, forces = _step(kept, state, wanted, row[3], row[4], inner_step_time, inner_steps)
+        measured = measure(kept.value[0], state.plant)
         rows[i, 0], rows[i, 1] = measured.position, measured.velocity
         rows[i, 2], rows[i, 3] = measured.pressure_a, measured.pressure_b
         rows[i, 4] = state.plant.spool
-        rows[i, 5], rows[i, 6], rows[i, 7] = forces
+        rows[i, 5], rows[i, 6], rows[i, 7] = forces.force_sum, forces.coulomb_friction, forces.breakaway_force
         rows[i, 8] = command.limited
     return state
 
@@ -318,6 +322,5 @@ def simulate(
     inputs = np.empty((len(wanted), 5))
     inputs[:, :3], inputs[:, 3], inputs[:, 4] = wanted, feedforward, load_force
     rows = np.empty((len(wanted), len(Trajectory._fields)))
-    c, g = parameters.constants, parameters.gains
-    state = _simulate(c, g, state, inputs, parameters.inner_step, parameters.inner_steps, rows)
+    state = _simulate(parameters.kept, state, inputs, parameters.inner_step, parameters.inner_steps, rows)
     return state, Trajectory(*rows.T)

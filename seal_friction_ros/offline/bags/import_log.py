@@ -29,16 +29,8 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from seal_friction_ros.core.estimation.messages import (
-    FORCE_TYPE,
-    PRESSURE_TYPE,
-    VELOCITY_TYPE,
-    Velocity,
-    encode_force,
-    encode_pressure,
-    encode_velocity,
-)
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
+from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, parameter
 from seal_friction_ros.core.foundation.units import unit_size
@@ -434,11 +426,11 @@ def write_samples(out: Path, samples: Samples, frame_id: str) -> ImportSummary:
     with BagWriter(out) as writer, progress(f'import {out.name}', len(samples.stamp)) as advance:
         for count, row in enumerate(zip(*(array.tolist() for array in samples), strict=True), start=1):
             stamp, chamber_a, chamber_b, force_sum, velocity = row
-            pressure = encode_pressure(Pressure(stamp, chamber_a, chamber_b), frame)
-            force = encode_force(Force(stamp, force_sum), frame)
+            pressure = encode(Pressure(stamp, chamber_a, chamber_b), frame)
+            force = encode(Force(stamp, force_sum), frame)
             writer.write(PRESSURE_TOPIC, PRESSURE_TYPE, stamp, pressure)
             writer.write(FORCE_TOPIC, FORCE_TYPE, stamp, force)
-            writer.write(VELOCITY_TOPIC, VELOCITY_TYPE, stamp, encode_velocity(Velocity(stamp, velocity, frame)))
+            writer.write(VELOCITY_TOPIC, VELOCITY_TYPE, stamp, encode(Velocity(stamp, velocity, frame)))
             if count % 1000 == 0:
                 advance(1000)
     finite = np.logical_and.reduce([np.isfinite(array) for array in samples[1:]])

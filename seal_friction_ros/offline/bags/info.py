@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, ESTIMATE_TYPE, decode_estimate, decode_text
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, ESTIMATE_TYPE, decode, decode_text
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
@@ -46,7 +46,7 @@ def bag_info(bag: Path) -> BagInfo:
         times = [times[0] if times else message.log_time, message.log_time]
         try:
             if message.type_name == ESTIMATE_TYPE:
-                estimate = decode_estimate(message.data)
+                estimate = decode(ESTIMATE_TYPE, message.data)
                 states[FrictionState(estimate.state).name] += 1
                 status.update([str(bit.name) for bit in Status if estimate.status & bit] or ['all good'])
             elif message.type_name == CONFIGURATION_TYPE:

@@ -19,7 +19,7 @@ import numpy as np
 
 from seal_friction_ros import core
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.identification.spool_evaluation import (
     SpoolEvaluation,
     moving_average,

@@ -18,8 +18,8 @@ from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.normal_force import NormalForceLaw
-from seal_friction_ros.core.friction.seal_file import NORMAL_FORCE_LAWS, parse_seal
+from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
+from seal_friction_ros.core.friction.seal_file import law_document, parse_normal_force, parse_seal
 from seal_friction_ros.core.identification.fitting import (
     CHANGED,
     ILL_CONDITIONED,
@@ -50,7 +50,7 @@ from seal_friction_ros.core.identification.fitting import (
     standard_errors,
     traded_off,
 )
-from seal_friction_ros.core.identification.ladder import Rung, ladder, normal_forces, squeeze_force
+from seal_friction_ros.core.identification.ladder import Rung, ladder, normal_forces
 from seal_friction_ros.core.identification.readings import Prepared, Readings, level_friction
 from seal_friction_ros.core.identification.signal_preparation import OffsetLine, offset_line
 from seal_friction_ros.files import config_path, read_yaml
@@ -254,14 +254,9 @@ def normal_force_law(document: Mapping[str, Any]) -> NormalForceLaw:
     """Law of the normal force from the part of a seal file.
 
     Raises:
-        ValueError: It makes no sense.
+        ValueError: It is not valid.
     """
-    name = document.get('law')
-    if name not in NORMAL_FORCE_LAWS:
-        raise ValueError(f'normal_force: law = {name!r} is not one of {", ".join(NORMAL_FORCE_LAWS)}')
-    values = {key: value for key, value in document.items() if key != 'law'}
-    law: NormalForceLaw = from_mapping(NORMAL_FORCE_LAWS[name], values, 'normal_force')
-    return law
+    return parse_normal_force({'normal_force': document}, 'seal')
 
 
 def _with_normal_force(readings: Readings, ring: Ring | None) -> Readings:
@@ -284,7 +279,7 @@ def _one_state(sources: Sources) -> tuple[Prepared, tuple[Change, ...], tuple[in
         together = sources.prepare()
         _refuse_changed_levels(together.readings)
         return together, (), index
-    rungs = {rung.name: rung for rung in _rungs(first.readings, with_geometry=False)}
+    rungs = {rung.name: rung for rung in _rungs(first.readings)}
     law = fit(rungs.get('pressure_power_law_viscous', rungs['pressure_power_law']), first.readings)
     changes = tuple(compare_with_law(law, first.readings, sources.prepare([i]).readings) for i in index[1:])
     kept = (0, *(i for i, change in zip(index[1:], changes, strict=True) if not change.is_change))
@@ -312,18 +307,23 @@ def _refuse_changed_levels(readings: Readings) -> None:
         )
 
 
-def _rungs(readings: Readings, *, with_geometry: bool) -> tuple[Rung, ...]:
+def _rungs(readings: Readings, ring: Ring | None = None) -> tuple[Rung, ...]:
     speed = np.abs(readings.at.velocity)
     with_speeds = bool(np.isfinite(speed).all()) and float(speed.max()) > SPEEDS_DIFFER * float(speed.min())
     with_exponent = readings.are_samples or len(np.unique(readings.level)) >= PRESSURES_FOR_AN_EXPONENT
-    return ladder(with_geometry=with_geometry, with_speeds=with_speeds, with_exponent=with_exponent)
+    return ladder(
+        geometry=ring.geometry if ring else None,
+        normal_force_law=normal_force_law(ring.normal_force) if ring else None,
+        with_speeds=with_speeds,
+        with_exponent=with_exponent,
+    )
 
 
 def _outlier(readings: Readings) -> Outlier | None:
     """Pressure that disagrees with all others, if there are enough of them to say so."""
     if readings.are_samples or len(np.unique(readings.level)) < 4:
         return None
-    rung = next(rung for rung in _rungs(readings, with_geometry=False) if rung.name == 'pressure_power_law')
+    rung = next(rung for rung in _rungs(readings) if rung.name == 'pressure_power_law')
     found = fit(rung, readings)
     floor = repeatability(readings, found.offsets)
     return outlying_level(rung, readings, found.values, floor if math.isfinite(floor) else 0.0)
@@ -345,7 +345,7 @@ def choose(data: Data, law: str | None) -> Choice:
     Raises:
         ValueError: No law could be fitted, or none means anything, or there is none of that name.
     """
-    scores = _climbed(_rungs(data.used, with_geometry=data.ring is not None), data.used)
+    scores = _climbed(_rungs(data.used, data.ring), data.used)
     best = recommended(scores)
     chosen = best if law is None else _wished(scores, law)
     assert chosen.fit is not None  # noqa: S101
@@ -425,7 +425,7 @@ def _stiction(data: Data, found: Fit) -> Stiction | None:
         breakaway = breakaway.taken(breakaway.level != data.outlier.level)
     if len(np.unique(breakaway.group)) < 2:
         return None
-    return identify_stiction(breakaway, found.rung.coulomb(breakaway.at, found.values), found.offsets)
+    return identify_stiction(breakaway, found.rung.coulomb_friction(breakaway.at, found.values), found.offsets)
 
 
 def _offset_line(readings: Readings) -> OffsetLine | None:
@@ -460,10 +460,9 @@ def seal_document(data: Data, choice: Choice, worth: Worth, name: str) -> dict[s
     document: dict[str, Any] = {'name': name, 'source': _source_text(data, choice)}
     if data.ring is not None:
         document['geometry'] = dataclasses.asdict(data.ring.geometry)
-    document['coulomb_law'] = choice.rung.coulomb_law
-    document |= _law_part(choice.rung, values, data.ring)
+    document |= law_document(choice.rung.law(values))
     stiction, ratio = (0.0, 0.0) if worth.stiction is None else worth.stiction[1:3]
-    terms = {key: values[key] for key in _VELOCITY_TERMS if key in values}
+    terms = {key: values[key] for key in choice.rung.velocity_terms}
     if terms:
         document['velocity_terms'] = terms
         if worth.stiction is None:
@@ -477,20 +476,6 @@ def seal_document(data: Data, choice: Choice, worth: Worth, name: str) -> dict[s
     document['identified_pressure'] = [_rounded(float(pressure.min())), _rounded(float(pressure.max()))]
     parse_seal(document)
     return document
-
-
-_VELOCITY_TERMS = ('viscous_friction', 'stribeck_friction', 'stribeck_velocity', 'asymmetry')
-
-
-def _law_part(rung: Rung, values: Mapping[str, float], ring: Ring | None) -> dict[str, Any]:
-    if rung.coulomb_law == 'constant_coulomb':
-        return {'constant_coulomb': {'coulomb_friction_at_any_pressure': values['coulomb_friction']}}
-    if rung.coulomb_law == 'pressure_power_law':
-        names = ('friction_at_no_pressure', 'friction_at_one_bar', 'pressure_exponent')
-        return {'pressure_power_law': {key: values[key] for key in names}}
-    assert ring is not None  # noqa: S101
-    law = {'law': 'power_law', 'coefficient': values['coefficient'], 'exponent': values['exponent']}
-    return {'normal_force': ring.normal_force, 'friction_coefficient': law}
 
 
 def _source_text(data: Data, choice: Choice) -> str:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
-from seal_friction_ros.core.estimation.messages import decode_force, decode_pressure, decode_text, decode_velocity
+from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, decode, decode_text
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import UNITS
@@ -287,13 +287,13 @@ class _BagReader:
     def _take(self, message: BagMessage) -> None:
         topic, topics = message.topic, self._topics
         if topic == topics.velocity:
-            sample = decode_velocity(message.data)
+            sample = decode(VELOCITY_TYPE, message.data)
             self._rows.append((sample.stamp, sample.velocity, *self._pressure, self._force))
         elif topic == topics.pressure:
-            pressure = decode_pressure(message.data)
+            pressure = decode(PRESSURE_TYPE, message.data)
             self._pressure = pressure.chamber_a, pressure.chamber_b
         elif topic == topics.force:
-            self._force = decode_force(message.data).force
+            self._force = decode(FORCE_TYPE, message.data).force
         elif topic == topics.configuration:
             configuration = parse_snapshot(decode_text(message.data)).configuration
             self.chambers = configuration.selection.seal_chambers

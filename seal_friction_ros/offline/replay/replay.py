@@ -17,13 +17,13 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
-    DECODERS,
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
+    decode,
     decode_text,
     encode_text,
 )
-from seal_friction_ros.core.estimation.pipeline import encoded, init, receive
+from seal_friction_ros.core.estimation.pipeline import answered, init
 from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
@@ -85,12 +85,11 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
         data = encode_text(snapshot_text(first_snapshot(configuration)))
         yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, data), ())
     for message in messages:
-        answers: tuple[tuple[str, bytes], ...] = ()
+        answers: list[tuple[str, bytes]] = []
         used = message
         try:
             if message.topic in inputs:
-                state, answer = receive(parameters, state, DECODERS[message.type_name](message.data))
-                answers = tuple(encoded(answer))
+                state, answers = answered(parameters, state, decode(message.type_name, message.data))
             elif message.topic == topics.configuration:
                 configuration, state = parse_snapshot(decode_text(message.data))
                 if override:
@@ -99,7 +98,7 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
                     parameters = configuration.parameters()
         except ValueError as error:
             raise BagError(f'message on {message.topic} at {message.log_time} ns: {error}') from None
-        yield Step(used, answers)
+        yield Step(used, tuple(answers))
 
 
 BULK_FROM = 500_000

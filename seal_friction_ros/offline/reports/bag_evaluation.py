@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
-from seal_friction_ros.core.estimation.messages import DECODERS, Velocity
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.estimation.messages import DECODERS
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status, Velocity
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, read_messages

@@ -10,9 +10,10 @@ from matplotlib.patches import Patch
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.friction.actuator import MountedSeal, PriorArtChart
+from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.geometry import projected_area
-from seal_friction_ros.core.friction.normal_force import AreaDeformationGain
+from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain
+from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification.fitting import BAND_95, Score, offsets_of
 from seal_friction_ros.core.identification.ladder import normal_forces

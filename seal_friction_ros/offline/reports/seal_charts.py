@@ -14,15 +14,10 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, PSI
-from seal_friction_ros.core.friction.actuator import (
-    ActuatorFriction,
-    MountedSeal,
-    PhysicsBased,
-    PriorArtChart,
-    Seal,
-    actuator_friction,
-)
+from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, Seal, actuator_friction
 from seal_friction_ros.core.friction.geometry import contact_length, projected_area, squeeze, stretch
+from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
+from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import is_at_rest, state_friction
 from seal_friction_ros.files import read_yaml, share_directory
@@ -313,7 +308,7 @@ def sliding_figure(shown: Charted) -> Plot:
     velocity = np.linspace(-STATE_VELOCITY, STATE_VELOCITY, 2001)
     friction = friction_over_velocity(shown, pressure, velocity)
     unit, size = force_unit(float(friction[-1]))
-    where = 'at any speed' if shown.seal.velocity_law is None else f'at {STATE_VELOCITY * 1e3:.0f} mm/s'
+    where = 'at any speed' if not shown.seal.depends_on_velocity else f'at {STATE_VELOCITY * 1e3:.0f} mm/s'
     figure, ax = new_figure(f'Sliding: {friction[-1] / size:.3g} {unit} against the motion, {where}', 3.6)
     ax.plot(velocity / INCH, friction / size, color=BLUE, lw=1.8, drawstyle='steps-mid')
     _cross(ax)

@@ -22,13 +22,10 @@ from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
-    Position,
-    ServoReference,
-    Velocity,
-    decode_estimate,
+    decode,
     decode_text,
 )
-from seal_friction_ros.core.estimation.records import Force, FrictionEstimate
+from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Position, ServoReference, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.servo.closed_loop import Axis
@@ -226,7 +223,7 @@ class _Collector:
         (data,) = (data for type_name, data in step.answers if type_name == ESTIMATE_TYPE)
         reference = self._reference
         age = (sample.stamp - reference.stamp) * 1e-9
-        self.estimates.append(decode_estimate(data))
+        self.estimates.append(decode(ESTIMATE_TYPE, data))
         self._motions.append(Motion(reference.velocity, reference.acceleration, sample.velocity, age))
         self._rows.append((self._force, reference.position, self._position))
 

@@ -6,6 +6,7 @@ import math
 import struct
 
 import pytest
+from answers import receive_one
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
@@ -19,8 +20,8 @@ from seal_friction_ros.core.estimation.configuration import (
 )
 from seal_friction_ros.core.estimation.estimator import NO_SPEED, EstimatorSettings, EstimatorState, Speed
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
-from seal_friction_ros.core.estimation.messages import ServoReference, Velocity, decode_text, encode_text
-from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, PipelineState, Reference, init, receive
+from seal_friction_ros.core.estimation.messages import decode_text, encode_text
+from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, PipelineState, WantedMotion, init
 from seal_friction_ros.core.estimation.records import (
     NEVER,
     NO_ESTIMATE,
@@ -29,6 +30,8 @@ from seal_friction_ros.core.estimation.records import (
     Force,
     FrictionEstimate,
     Pressure,
+    ServoReference,
+    Velocity,
 )
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import load_configuration, read_yaml
@@ -45,7 +48,7 @@ SNAPSHOT = Snapshot(
         FeedForwardState(5, 12.5, 0.75, ESTIMATE, -0.02),
         Pressure(3, math.nan, -0.0),
         NO_FORCE,
-        Reference(4, -0.02, math.inf),
+        WantedMotion(4, -0.02, math.inf),
         refused=True,
     ),
 )
@@ -72,7 +75,7 @@ states = st.builds(
     st.builds(FeedForwardState, stamps_or_never, usable, usable, st.just(NO_ESTIMATE) | estimates, usable),
     st.just(NO_PRESSURE) | st.builds(Pressure, stamps, anything, anything),
     st.just(NO_FORCE) | st.builds(Force, stamps, anything),
-    st.just(NO_REFERENCE) | st.builds(Reference, stamps, anything, anything),
+    st.just(NO_REFERENCE) | st.builds(WantedMotion, stamps, anything, anything),
     st.booleans(),
 )
 
@@ -146,10 +149,10 @@ def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
     before = [Pressure(0, 3e6, 3e6), Force(0, 12.0), ServoReference(0, 0.0, 0.02, 0.0), Velocity(1, 5e-4, b'')]
     state = init(parameters)
     for message in before:
-        state, _ = receive(parameters, state, message)
+        state, _ = receive_one(parameters, state, message)
     back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state)))
-    straight = receive(parameters, state, Velocity(2000, 1.5e-3, b'rod'))
-    taken_up = receive(back.configuration.parameters(), back.state, Velocity(2000, 1.5e-3, b'rod'))
+    straight = receive_one(parameters, state, Velocity(2000, 1.5e-3, b'rod'))
+    taken_up = receive_one(back.configuration.parameters(), back.state, Velocity(2000, 1.5e-3, b'rod'))
     assert straight[1].feedforward.force > 0.0
     assert taken_up == straight
 

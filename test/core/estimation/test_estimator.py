@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.estimation.messages import decode_estimate, encode_estimate
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, decode, encode
 from seal_friction_ros.core.estimation.records import (
     NO_FORCE,
     NO_PRESSURE,
@@ -103,15 +103,15 @@ def test_whatever_comes_in_what_goes_out_is_finite_consistent_and_can_be_sent(pa
         assert estimate.direction in (-1, 0, 1)
         assert estimate.friction_force * estimate.direction >= 0.0
         assert 0 <= estimate.status < 2 * max(Status)
-        if estimate.state is FrictionState.UNKNOWN:
+        if estimate.state == FrictionState.UNKNOWN:
             assert (estimate.direction, estimate.friction_force) == (0, 0.0)
             assert estimate.status
-        assert decode_estimate(encode_estimate(estimate)) == estimate
+        assert decode(ESTIMATE_TYPE, encode(estimate)) == estimate
 
 
 @given(all_parameters, st.lists(any_sample, min_size=1, max_size=6))
 def test_the_same_samples_give_the_same_bytes(parameters, samples):
-    once, again = ([encode_estimate(e) for e in run(samples, parameters)] for _ in range(2))
+    once, again = ([encode(e) for e in run(samples, parameters)] for _ in range(2))
     assert once == again
 
 
@@ -154,7 +154,7 @@ seals_and_settings = st.builds(
 @given(seals_and_settings, st.lists(good, min_size=1, max_size=5))
 def test_sliding_friction_takes_power_from_the_rod(parameters, samples):
     for one, estimate in zip(samples, run(samples, parameters), strict=True):
-        if estimate.state is FrictionState.SLIDING:
+        if estimate.state == FrictionState.SLIDING:
             assert estimate.friction_force * one.velocity > 0.0
             assert abs(estimate.friction_force) == estimate.coulomb_friction
 
@@ -170,7 +170,7 @@ def test_friction_at_rest_never_pushes_the_rod_along(parameters, samples):
 @given(seals_and_settings, st.lists(good, min_size=1, max_size=5))
 def test_a_stuck_rod_feels_exactly_the_force_sum(parameters, samples):
     for one, estimate in zip(samples, run(samples, parameters), strict=True):
-        if estimate.state is FrictionState.STUCK:
+        if estimate.state == FrictionState.STUCK:
             assert estimate.friction_force == one.force.force
             assert abs(one.force.force) < estimate.breakaway_force
 
@@ -211,7 +211,9 @@ def test_without_stiction_the_rod_breaks_away_at_the_coulomb_friction(one):
 
 def test_a_rod_that_rests_is_pushed_and_slides_goes_through_the_three_states():
     pushes = [(0.0, 0.0), (0.0, 20.0), (0.0, 60.0), (1.5e-3, 60.0), (0.05, 60.0), (1.5e-3, 60.0), (5e-4, 10.0)]
-    states = [e.state.name for e in run([sample(START + i * MS, v, 3e6, f) for i, (v, f) in enumerate(pushes)])]
+    states = [
+        FrictionState(e.state).name for e in run([sample(START + i * MS, v, 3e6, f) for i, (v, f) in enumerate(pushes)])
+    ]
     assert states == ['STUCK', 'STUCK', 'BREAKAWAY', 'BREAKAWAY', 'SLIDING', 'SLIDING', 'STUCK']
 
 
@@ -403,7 +405,7 @@ def test_state_is_unknown_and_friction_force_zero_where_the_inputs_do_not_tell(c
 @pytest.mark.parametrize('change', [{'force': None}, {'force': math.nan}, {'force_age': 200}])
 def test_a_sliding_rod_needs_no_force_sum(change):
     estimate = only(sample(**change))
-    assert estimate.state is FrictionState.SLIDING
+    assert estimate.state == FrictionState.SLIDING
     assert estimate.friction_force == estimate.coulomb_friction > 0.0
 
 
@@ -419,7 +421,8 @@ def test_all_forces_are_zero_while_there_was_no_pressure():
 @pytest.mark.parametrize('bad', [math.nan, 11.0])
 def test_one_unusable_velocity_does_not_make_a_resting_rod_slide(bad):
     speeds = [0.0, 1.5e-3, bad, 1.5e-3]
-    states = [e.state.name for e in run([sample(START + i * MS, v, force=10.0) for i, v in enumerate(speeds)])]
+    estimates = run([sample(START + i * MS, v, force=10.0) for i, v in enumerate(speeds)])
+    states = [FrictionState(e.state).name for e in estimates]
     assert states == ['STUCK', 'STUCK', 'UNKNOWN', 'STUCK']
 
 

@@ -4,20 +4,14 @@ import math
 from dataclasses import replace
 
 import pytest
+from answers import NOTHING, receive_one
 
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Limited
-from seal_friction_ros.core.estimation.messages import (
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    Position,
-    ServoReference,
-    Velocity,
-    decode_estimate,
-    decode_feedforward,
-)
-from seal_friction_ros.core.estimation.pipeline import NOTHING, PipelineParameters, encoded, init, receive
-from seal_friction_ros.core.estimation.records import Force, Pressure, Status
-from seal_friction_ros.core.friction.actuator import MountedSeal, VelocityTerms, actuator_friction
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, type_of
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init, receive
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Status, Velocity
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.files import default_configuration
 
 PARAMETERS = default_configuration().parameters()
@@ -29,7 +23,7 @@ def run(messages, parameters=PARAMETERS):
     """Answers to a run of messages that are not empty, in order."""
     state, answers = init(parameters), []
     for message in messages:
-        state, answer = receive(parameters, state, message)
+        state, answer = receive_one(parameters, state, message)
         if answer is not NOTHING:
             answers.append(answer)
     return answers
@@ -68,12 +62,11 @@ def test_with_a_reference_each_velocity_makes_both_and_the_force_helps_the_motio
     assert run(ticks(0, 300, speed=-0.05))[-1].feedforward.force == pytest.approx(-last.feedforward.force, rel=1e-6)
 
 
-def test_the_messages_are_those_of_the_answer():
-    answer = run(ticks(0, 1))[-1]
-    (kind, estimate), (other_kind, feedforward) = encoded(answer)
-    assert (kind, decode_estimate(estimate)) == (ESTIMATE_TYPE, answer.estimate)
-    assert (other_kind, decode_feedforward(feedforward)) == (FEEDFORWARD_TYPE, answer.feedforward)
-    assert [*encoded(NOTHING)] == []
+def test_the_estimate_is_emitted_before_the_feed_forward():
+    emitted, state = [], init(PARAMETERS)
+    for message in ticks(0, 1):
+        state = receive(PARAMETERS, state, message, lambda record, frame: emitted.append((type_of(record), frame)))
+    assert emitted[-2:] == [(ESTIMATE_TYPE, b'rod'), (FEEDFORWARD_TYPE, b'rod')]
 
 
 def test_when_velocities_stop_references_fade_the_force_out():

@@ -11,10 +11,11 @@ from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.foundation.parameters import Meaning, check, from_mapping, meanings, parameter
 from seal_friction_ros.core.foundation.units import unit_size
-from seal_friction_ros.core.friction.actuator import PriorArtChart, Seal, Uncertainty
-from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.actuator import Seal, Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 
 RECORDS = [
     SealSelection, PriorArtChart, Seal, Uncertainty, EstimatorSettings, CoefficientTable, PowerLaw,

@@ -6,38 +6,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seal_friction_ros.core.friction.actuator import (
-    MountedSeal,
-    PhysicsBased,
-    PriorArtChart,
-    Seal,
-    Uncertainty,
-    actuator_friction,
-    coulomb_friction,
-)
-from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty, actuator_friction
 from seal_friction_ros.core.friction.geometry import SealGeometry, contact_length, projected_area
-from seal_friction_ros.core.friction.normal_force import AreaDeformationGain
+from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.laws.law import FrictionLaw
+from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain
+from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
+from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 
 GEOMETRY = SealGeometry(section_diameter=2e-3, ring_inner_diameter=9.8e-3, rod_diameter=10e-3, gland_diameter=13.6e-3)
 LAW = PhysicsBased(GEOMETRY, AreaDeformationGain(0.4, 10.0), PowerLaw(2.0, 0.5))
 
 
-class Proportional:
+class Proportional(FrictionLaw):
     """Friction of 1 N per bar on top of 5 N."""
 
-    def coulomb_friction(self, pressure: float) -> float:
-        return 5.0 + pressure / 1e5
+    function = staticmethod(lambda pressure, _: 5.0 + pressure / 1e5)
 
 
-class Falling:
-    def coulomb_friction(self, pressure: float) -> float:
-        return 50.0 - pressure / 1e5
+class Falling(FrictionLaw):
+    function = staticmethod(lambda pressure, _: 50.0 - pressure / 1e5)
 
 
-class NotFinite:
-    def coulomb_friction(self, pressure: float) -> float:
-        return 1.0 if pressure < 1e6 else math.nan
+class NotFinite(FrictionLaw):
+    function = staticmethod(lambda pressure, _: 1.0 if pressure < 1e6 else math.nan)
 
 
 def seal(law=None, pressure_min=0.0, pressure_max=1e7) -> Seal:
@@ -85,7 +77,8 @@ def test_a_chart_that_makes_no_sense_is_refused(frictions, complaint):
 
 @given(st.floats(-1e9, 0.0))
 def test_negative_gauge_pressure_counts_as_none(pressure):
-    assert coulomb_friction(seal(law=LAW), pressure) == coulomb_friction(seal(law=LAW), 0.0)
+    seals = (on('a', law=LAW),)
+    assert actuator_friction(seals, pressure, 0.0).coulomb_friction == LAW.coulomb_friction(0.0)
 
 
 @given(st.floats(0.0, 1e8), st.floats(0.0, 1e8))

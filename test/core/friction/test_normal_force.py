@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seal_friction_ros.core.friction.normal_force import (
+from seal_friction_ros.core.friction.laws.normal_force import (
     AreaDeformationGain,
     NormalForceTable,
 )

@@ -9,15 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
 
-from seal_friction_ros.core.friction.actuator import (
-    MountedSeal,
-    PhysicsBased,
-    PriorArtChart,
-    actuator_friction,
-    coulomb_friction,
-)
-from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, PowerLaw
-from seal_friction_ros.core.friction.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
+from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
+from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
+from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import mount_seals, parse_seal
 from seal_friction_ros.files import read_yaml
 
@@ -82,7 +78,7 @@ def ids(value):
 def test_every_shipped_seal_file_makes_a_seal_of_its_own_name(path):
     seal = parse_seal(read_yaml(path))
     assert seal.name == path.stem
-    assert coulomb_friction(seal, 0.0) > 0.0
+    assert seal.coulomb_law.coulomb_friction(0.0) > 0.0
 
 
 def test_laws_are_chosen_by_name():
@@ -105,9 +101,9 @@ BY_PRESSURE = {
 
 
 def test_laws_that_need_no_geometry_do_without_it():
-    assert coulomb_friction(parse_seal(CONSTANT), 4e6) == 12.0
-    assert coulomb_friction(parse_seal(BY_PRESSURE), 1e5) == pytest.approx(5.8)
-    assert coulomb_friction(parse_seal(BY_PRESSURE), -5e4) == 5.0
+    assert parse_seal(CONSTANT).coulomb_law.coulomb_friction(4e6) == 12.0
+    assert parse_seal(BY_PRESSURE).coulomb_law.coulomb_friction(1e5) == pytest.approx(5.8)
+    assert actuator_friction((MountedSeal(parse_seal(BY_PRESSURE), 'a'),), -5e4, 0.0).coulomb_friction == 5.0
     assert parse_seal(changed(BY_PRESSURE, 'geometry', POWER['geometry'])).name == 'x'
     assert 'squeeze' in complaint(changed(BY_PRESSURE, 'geometry', {**POWER['geometry'], 'section_diameter': 1e-3}))
 
@@ -155,7 +151,8 @@ def test_what_identification_says_of_itself_is_passed_over():
 
 def test_laws_of_different_kinds_go_together():
     mixed = changed(POWER, 'friction_coefficient', TABLE['friction_coefficient'])
-    assert coulomb_friction(parse_seal(mixed), 3e6) == pytest.approx(coulomb_friction(parse_seal(TABLE), 3e6), rel=0.05)
+    expected = parse_seal(TABLE).coulomb_law.coulomb_friction(3e6)
+    assert parse_seal(mixed).coulomb_law.coulomb_friction(3e6) == pytest.approx(expected, rel=0.05)
 
 
 def test_stiction_and_source_may_be_left_out():
@@ -213,7 +210,7 @@ def test_an_unknown_field_is_refused_by_name(part):
 @pytest.mark.parametrize(
     ('path', 'value', 'expected'),
     [
-        ('coulomb_law', 'magic', "coulomb_law = 'magic' is not one of physics_based, prior_art_chart"),
+        ('coulomb_law', 'magic', "coulomb_law = 'magic' is not one of constant_coulomb, pressure_power_law"),
         ('coulomb_law', REMOVED, 'coulomb_law = None is not one of'),
         ('coulomb_law', ['physics_based'], "coulomb_law = ['physics_based'] is not one of"),
         (
@@ -307,7 +304,7 @@ def test_any_value_anywhere_makes_a_seal_or_a_value_error(place, value):
         seal = parse_seal(changed(document, path, value))
     except ValueError:
         return
-    assert math.isfinite(coulomb_friction(seal, 5e6))
+    assert math.isfinite(seal.coulomb_law.coulomb_friction(5e6))
 
 
 def test_an_integer_too_large_for_a_float_is_refused_by_name():

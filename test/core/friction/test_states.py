@@ -52,7 +52,7 @@ def test_a_zero_band_without_stiction_is_the_equation_of_the_thesis_exactly(velo
 @given(st.floats(-1e3, 1e3), st.booleans())
 def test_at_the_threshold_itself_the_rod_breaks_away(force_sum, was):
     result = with_zero_band(0.0, force_sum, abs(force_sum), was)
-    assert result.state is FrictionState.BREAKAWAY
+    assert result.state == FrictionState.BREAKAWAY
     assert result.friction_force == force_sum
 
 

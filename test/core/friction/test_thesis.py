@@ -9,10 +9,10 @@ import pytest
 from paths import ROOT
 
 from seal_friction_ros.core.foundation.units import INCH, LBF, PSI
-from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction, coulomb_friction
-from seal_friction_ros.core.friction.friction_coefficient import power_law_from_points
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import contact_length, projected_area, squeeze
-from seal_friction_ros.core.friction.normal_force import AreaDeformationGain
+from seal_friction_ros.core.friction.laws.friction_coefficient import power_law_from_points
+from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import read_yaml
 
@@ -165,7 +165,7 @@ def test_coefficient_of_friction_falls_from_0_30_to_0_073():
 
 @pytest.mark.parametrize('row', PRIOR_ART, ids=lambda row: f'{row["pressure_psi"]:g}psi')
 def test_prior_art_gives_column_f_of_table_3_within_its_rounding(row):
-    friction = coulomb_friction(PRIOR_ART_SEAL, row['pressure_psi'] * PSI) / LBF
+    friction = PRIOR_ART_SEAL.coulomb_law.coulomb_friction(row['pressure_psi'] * PSI) / LBF
     assert friction == pytest.approx(row['F_lbf'], abs=0.05)
     squeeze_part = 0.5 * contact_length(GEOMETRY) / INCH
     assert friction - squeeze_part == pytest.approx(row['F_H_lbf'], abs=0.06)  # one entry is cut, not rounded

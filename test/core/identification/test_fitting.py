@@ -27,7 +27,8 @@ from seal_friction_ros.core.identification.ladder import Conditions, ladder
 from seal_friction_ros.core.identification.readings import Readings
 
 POWER = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 0.65}
-LADDER = {r.name: r for r in ladder(with_geometry=False, with_speeds=True, with_exponent=True)}
+CONSTANT = 'coulomb_friction_at_any_pressure'
+LADDER = {r.name: r for r in ladder(with_speeds=True, with_exponent=True)}
 LAW = LADDER['pressure_power_law']
 
 
@@ -80,7 +81,7 @@ def swept(values, law, scatter=20.0, seed=0, n=3000, tied=False, offset=200.0, n
                                   'pressure_power_law', 'pressure_power_law_viscous', 'pressure_power_law_stribeck',
                                   'pressure_power_law_asymmetric'])  # fmt: skip
 def test_a_law_is_found_again_from_what_it_made_with_its_offset(name):
-    truth = POWER | {'coulomb_friction': 90.0, 'viscous_friction': 800.0, 'stribeck_friction': 60.0,
+    truth = POWER | {CONSTANT: 90.0, 'viscous_friction': 800.0, 'stribeck_friction': 60.0,
                      'stribeck_velocity': 0.03, 'asymmetry': 0.15}  # fmt: skip
     law = LADDER[name]
     found = fit(law, swept(truth, law, scatter=0.0))
@@ -89,7 +90,12 @@ def test_a_law_is_found_again_from_what_it_made_with_its_offset(name):
 
 
 def test_a_term_that_is_not_there_is_exactly_nothing():
-    falling = {'coulomb_friction': 200.0, 'stribeck_friction': 100.0, 'stribeck_velocity': 0.3, 'viscous_friction': 0.0}
+    falling = {
+        CONSTANT: 200.0,
+        'stribeck_friction': 100.0,
+        'stribeck_velocity': 0.3,
+        'viscous_friction': 0.0,
+    }
     found = fit(LADDER['coulomb_viscous'], swept(falling, LADDER['coulomb_stribeck']))
     assert found.values['viscous_friction'] == 0.0  # friction falls with speed: a negative viscous term is no friction
 
@@ -109,7 +115,7 @@ def test_standard_errors_know_that_the_readings_of_a_test_are_off_together():
     constant = LADDER['constant_coulomb']
     errors = []
     for seed in range(40):
-        readings = noted(scatter=0.01, test_scatter=0.1, seed=seed, law=constant, values={'coulomb_friction': 20.0})
+        readings = noted(scatter=0.01, test_scatter=0.1, seed=seed, law=constant, values={CONSTANT: 20.0})
         found = fit(constant, readings)
         errors.append(standard_errors(cross_validate(constant, readings, found.values))[0] / 20.0)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(0.1 / np.sqrt(3.0), rel=0.25)
@@ -123,7 +129,7 @@ def rungs(*names):
 
 
 def test_constant_friction_gets_a_constant():
-    readings = noted(scatter=0.08, law=LADDER['constant_coulomb'], values={'coulomb_friction': 20.0})
+    readings = noted(scatter=0.08, law=LADDER['constant_coulomb'], values={CONSTANT: 20.0})
     scores = climb(rungs('constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric'), readings)
     assert recommended(scores).rung.name == 'constant_coulomb'
 
@@ -136,7 +142,7 @@ def test_friction_that_follows_pressure_gets_that_and_no_asymmetry(seed):
 
 
 def test_a_stribeck_term_pays_where_it_is_there_and_nowhere_else():
-    values = {'coulomb_friction': 100.0, 'viscous_friction': 500.0, 'stribeck_friction': 200.0,
+    values = {CONSTANT: 100.0, 'viscous_friction': 500.0, 'stribeck_friction': 200.0,
               'stribeck_velocity': 0.05}  # fmt: skip
     names = ('constant_coulomb', 'coulomb_viscous', 'coulomb_stribeck')
     there = climb(rungs(*names), swept(values, LADDER['coulomb_stribeck']))
@@ -234,7 +240,7 @@ def test_repeatability_is_the_scatter_at_one_pressure():
 
 
 def test_repeatability_of_a_swept_log_is_the_scatter_within_a_cell():
-    readings = swept({'coulomb_friction': 400.0}, LADDER['constant_coulomb'], scatter=20.0)
+    readings = swept({CONSTANT: 400.0}, LADDER['constant_coulomb'], scatter=20.0)
     assert repeatability(readings, np.array([200.0])) == pytest.approx(20.0 / 800.0, rel=0.1)
 
 
@@ -250,7 +256,7 @@ def test_drift_is_the_change_over_the_run():
 
 
 def test_speed_that_goes_with_pressure_is_said_to_be_collinear():
-    values = {'coulomb_friction': 100.0, 'viscous_friction': 500.0}
+    values = {CONSTANT: 100.0, 'viscous_friction': 500.0}
     law = LADDER['coulomb_viscous']
     tied, free = swept(values, law, tied=True), swept(values, law)
     (found,) = collinear_regressors(tied, np.zeros((tied.count, 2)))
@@ -263,7 +269,7 @@ def test_speed_that_goes_with_pressure_is_said_to_be_collinear():
 
 def test_a_fit_to_collinear_data_is_ill_conditioned_and_trades_its_parameters():
     values = POWER | {'viscous_friction': 50.0, 'pressure_exponent': 2.0 / 3.0}
-    law = {r.name: r for r in ladder(with_geometry=False, with_speeds=True, with_exponent=False)}
+    law = {r.name: r for r in ladder(with_speeds=True, with_exponent=False)}
     law = law['pressure_power_law_viscous']
     tied, free = (fit(law, swept(values, law, scatter=1.0, tied=tied)) for tied in (True, False))
     assert tied.condition_number > 4.0 * free.condition_number
@@ -274,7 +280,7 @@ def test_a_fit_to_collinear_data_is_ill_conditioned_and_trades_its_parameters():
 
 @pytest.mark.parametrize('level', [0, 2, 3])
 def test_the_one_pressure_that_disagrees_is_the_outlier(level):
-    law = {r.name: r for r in ladder(with_geometry=False, with_speeds=False, with_exponent=False)}['pressure_power_law']
+    law = {r.name: r for r in ladder(with_speeds=False, with_exponent=False)}['pressure_power_law']
     readings = noted(scatter=0.03, pressures=5, law=law, values=POWER | {'pressure_exponent': 2.0 / 3.0})
     force = np.where(readings.level == level, 1.7 * readings.force, readings.force)
     spoiled = Readings(**{**vars(noted(pressures=5)), 'force': force})
@@ -284,7 +290,7 @@ def test_the_one_pressure_that_disagrees_is_the_outlier(level):
 
 
 def test_three_pressures_have_no_outlier():
-    law = {r.name: r for r in ladder(with_geometry=False, with_speeds=False, with_exponent=False)}['pressure_power_law']
+    law = {r.name: r for r in ladder(with_speeds=False, with_exponent=False)}['pressure_power_law']
     readings = noted(pressures=3)
     assert outlying_level(law, readings, fit(law, readings).values, 0.04) is None
 
@@ -292,8 +298,13 @@ def test_three_pressures_have_no_outlier():
 @pytest.mark.parametrize('ratio', [0.6, 0.95, 1.5])
 def test_friction_that_changed_between_two_logs_is_told_by_how_much(ratio):
     law = LADDER['coulomb_viscous']
-    first = swept({'coulomb_friction': 200.0, 'viscous_friction': 1000.0}, law)
-    other = swept({'coulomb_friction': 200.0 * ratio, 'viscous_friction': 1000.0 * ratio}, law, seed=1, offset=-50.0)
+    first = swept({CONSTANT: 200.0, 'viscous_friction': 1000.0}, law)
+    other = swept(
+        {CONSTANT: 200.0 * ratio, 'viscous_friction': 1000.0 * ratio},
+        law,
+        seed=1,
+        offset=-50.0,
+    )
     change = compare_with_law(fit(law, first), first, other)
     assert change.ratio == pytest.approx(ratio, abs=0.02)
     assert change.is_change == (ratio != 0.95)
@@ -302,7 +313,7 @@ def test_friction_that_changed_between_two_logs_is_told_by_how_much(ratio):
 
 def test_logs_under_other_conditions_are_not_compared():
     law = LADDER['coulomb_viscous']
-    values = {'coulomb_friction': 200.0, 'viscous_friction': 1000.0}
+    values = {CONSTANT: 200.0, 'viscous_friction': 1000.0}
     first, other = swept(values, law), swept(values, law, least=1.0)
     with pytest.raises(ValueError, match='cannot be compared'):
         compare_with_law(fit(law, first), first, other)

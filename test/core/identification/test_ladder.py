@@ -6,21 +6,14 @@ import pytest
 from seal_friction_ros.core.foundation.units import INCH
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.normal_force import AreaDeformationGain
+from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, squeeze_force
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.identification.ladder import (
-    Conditions,
-    ladder,
-    normal_forces,
-    pressure_power_law,
-    squeeze_force,
-    stribeck,
-)
+from seal_friction_ros.core.identification.ladder import COMPILED_FROM, Conditions, ladder, normal_forces
 
 THESIS_RING = SealGeometry(0.106 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
 NORMAL_FORCE = {'law': 'area_deformation_gain', 'area_deformation_gain': 0.3925, 'radial_force': 9.3}
 VALUES = {
-    'coulomb_friction': 12.0,
+    'coulomb_friction_at_any_pressure': 12.0,
     'friction_at_no_pressure': 5.0,
     'friction_at_one_bar': 0.8,
     'pressure_exponent': 0.7,
@@ -31,16 +24,16 @@ VALUES = {
     'stribeck_velocity': 0.02,
     'asymmetry': 0.1,
 }
-ALL = ladder(with_geometry=True, with_speeds=True, with_exponent=True)
+NORMAL_FORCE_LAW = AreaDeformationGain(0.3925, 9.3)
+ALL = ladder(geometry=THESIS_RING, normal_force_law=NORMAL_FORCE_LAW, with_speeds=True, with_exponent=True)
 
 
 def conditions(rows=50) -> Conditions:
     """Two seals, one on each chamber, at any pressures and speeds."""
     rng = np.random.default_rng(4)
     pressure = rng.uniform(0.0, 5e6, (rows, 2))
-    law = AreaDeformationGain(0.3925, 9.3)
     velocity = rng.uniform(-0.2, 0.2, rows)
-    return Conditions(pressure, normal_forces(pressure, THESIS_RING, law), velocity, np.sign(velocity))
+    return Conditions(pressure, normal_forces(pressure, THESIS_RING, NORMAL_FORCE_LAW), velocity, np.sign(velocity))
 
 
 def seal_of(rung):
@@ -95,26 +88,36 @@ def test_the_ladder_climbs_from_what_the_field_does_to_the_physics():
 
 
 def test_without_geometry_or_speeds_the_laws_that_need_them_are_not_there():
-    bare = ladder(with_geometry=False, with_speeds=False, with_exponent=True)
+    bare = ladder(with_speeds=False, with_exponent=True)
     assert [rung.name for rung in bare] == ['constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric']
-    assert not any(rung.needs_geometry or rung.velocity_terms for rung in bare)
+    assert not any(rung.needs_geometry or 'viscous_friction' in rung.velocity_terms for rung in bare)
 
 
 def test_few_pressures_get_the_exponent_of_an_elastic_contact():
-    (law,) = (r for r in ladder(with_geometry=False, with_speeds=False, with_exponent=False)
+    (law,) = (r for r in ladder(with_speeds=False, with_exponent=False)
               if r.name == 'pressure_power_law')  # fmt: skip
     assert [p.name for p in law.parameters] == ['friction_at_no_pressure', 'friction_at_one_bar']
     assert law.fixed == {'pressure_exponent': pytest.approx(2.0 / 3.0)}
 
 
 def test_at_no_pressure_and_at_one_bar_the_power_law_is_what_its_parameters_say():
+    (law,) = (r for r in ALL if r.name == 'pressure_power_law')
     at = Conditions(np.array([[0.0], [1e5]]), None, np.zeros(2), np.ones(2))
-    assert pressure_power_law(at, VALUES) == pytest.approx([5.0, 5.8])
+    assert law.friction(at, VALUES) == pytest.approx([5.0, 5.8])
 
 
 def test_stribeck_friction_has_faded_to_37_percent_at_its_velocity():
-    at = Conditions(np.zeros((2, 1)), None, np.array([0.0, -0.02]), np.ones(2))
-    assert stribeck(at, VALUES) == pytest.approx([4.0, 4.0 * np.exp(-1.0)])
+    (law,) = (r for r in ALL if r.name == 'coulomb_stribeck')
+    at = Conditions(np.zeros((2, 1)), None, np.array([0.0, -0.02]), np.array([1.0, -1.0]))
+    viscous = np.array([0.0, 0.02 * 150.0])
+    assert law.friction(at, VALUES) - 12.0 - viscous == pytest.approx([4.0, 4.0 * np.exp(-1.0)])
+
+
+@pytest.mark.parametrize('rung', ALL, ids=lambda rung: rung.name)
+def test_many_readings_are_computed_by_compiled_code_to_the_same_bits(rung):
+    at, part = conditions(rows=400), COMPILED_FROM // 2 - 1
+    few = [rung.friction(at.taken(np.arange(i, min(i + part, 400))), VALUES) for i in range(0, 400, part)]
+    assert rung.friction(at, VALUES).tobytes() == np.concatenate(few).tobytes()
 
 
 def test_squeeze_force_of_the_thesis_ring_is_near_that_of_its_finite_elements():

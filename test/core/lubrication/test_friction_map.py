@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import timeit
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorParameters, Est
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.actuator import actuator_friction
-from seal_friction_ros.core.friction.friction_map import FrictionMap
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.core.lubrication import friction_map as module
 from seal_friction_ros.core.lubrication.case import Case, MapGrid, Numerics
@@ -172,10 +171,3 @@ def test_at_rest_the_map_adds_nothing():
 def test_map_and_velocity_terms_together_are_refused():
     with pytest.raises(ValueError, match=r'Seal mapped: its friction_map has the velocity in it: leave out'):
         mount_seals((document(LAW) | {'velocity_terms': {'viscous_friction': 1.0}},), ('a',))
-
-
-def test_looking_up_the_map_costs_a_few_microseconds():
-    loops = 2000
-    best = min(timeit.repeat(lambda: LAW.sliding_friction(3e4, 0.034), number=loops, repeat=7)) / loops
-    bare = min(timeit.repeat(lambda: math.sqrt(2.0), number=loops, repeat=7)) / loops
-    assert best < 60.0 * bare

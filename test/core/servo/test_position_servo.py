@@ -14,10 +14,14 @@ from servo import main as time_servo
 
 from seal_friction_ros.core.estimation import estimator, feedforward
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
-from seal_friction_ros.core.friction.actuator import MountedSeal, VelocityTerms, actuator_friction
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.servo.controller import ControllerState, Limited, ServoController, control, limit_reference
 from seal_friction_ros.core.servo.motions import Reference, Sine, Step
+from seal_friction_ros.core.servo.plant import Cylinder, Load, ServoValve, stored_energy
 from seal_friction_ros.core.servo.position_servo import (
     ServoParameters,
     Trajectory,
@@ -221,9 +225,52 @@ def test_a_breakaway_that_follows_the_load_holds_the_simulated_rod_as_it_does_th
         assert (plant.position != 0.0) == moves
 
 
-def test_a_seal_whose_friction_depends_on_the_velocity_is_refused():
-    seal = dataclasses.replace(SEAL, velocity_terms=VelocityTerms(viscous_friction=10.0))
-    with pytest.raises(ValueError, match='depends on the velocity'):
+MAP = FrictionMap(
+    speeds=(1e-3, 1e-2, 1e-1), pressures=(0.0, 7e6), frictions=(9.0, 7.0, 8.0, 32.0, 28.0, 30.0), reference_speed=0.02
+)
+BY_VELOCITY = {
+    'velocity terms': dataclasses.replace(SEAL, velocity_terms=VelocityTerms(150.0, 4.0, 0.01, 0.1)),
+    'friction map': dataclasses.replace(SEAL, coulomb_law=MAP),
+}
+
+
+@pytest.mark.parametrize('name', BY_VELOCITY)
+def test_friction_that_depends_on_the_velocity_is_that_of_the_estimator_and_balances_the_energy(name):
+    servo = ServoParameters(seals=(MountedSeal(BY_VELOCITY[name], 'a'), MountedSeal(SEAL, 'b')), inner_step=2.5e-5)
+    state = start = init(servo)
+    wave, seen = Sine(0.002, 4.0), set()
+    for i in range(1500):
+        state, out = step(servo, state, wave.at(i * servo.control_period))
+        friction = actuator_friction(servo.seals, out.pressure_a, out.pressure_b, out.velocity)
+        sliding = friction.coulomb_friction + friction.velocity_friction
+        assert out.coulomb_friction == friction.coulomb_friction
+        assert out.velocity == 0.0 or out.friction_force == pytest.approx(math.copysign(sliding, out.velocity))
+        seen.add(out.direction if out.velocity else 0)
+    assert seen == {-1, 0, 1}
+    c, end = servo.constants, state.plant
+    stored = stored_energy(c, end) - stored_energy(c, start.plant)
+    assert end.energy_in > 0.1
+    assert abs(end.energy_in - stored - end.energy_dissipated) < 1e-6 * end.energy_in
+
+
+def test_viscous_seals_brake_a_coasting_rod_as_the_closed_form_has_it():
+    seal = dataclasses.replace(SEAL, coulomb_law=ConstantCoulomb(0.0), stiction=0.0, velocity_terms=VelocityTerms(50.0))
+    servo = ServoParameters(
+        valve=ServoValve(null_leakage=0.0, rated_flow=1e-8),
+        cylinder=Cylinder(internal_leakage=1e-8, stroke=0.2, dead_volume=1e-2),  # both chambers at one pressure
+        load=Load(mass=5.0, viscous_damping=0.0),
+        seals=(MountedSeal(seal, 'a'), MountedSeal(seal, 'b')),
+    )
+    plant = init(servo).plant._replace(velocity=0.1, direction=1)
+    for _ in range(60):
+        plant = advance(servo, plant, 0.0)
+    elapsed = 60 * servo.control_period
+    assert plant.velocity == pytest.approx(0.1 * math.exp(-2 * 50.0 / 5.0 * elapsed), rel=0.02)
+
+
+def test_friction_that_rises_too_steeply_for_the_inner_step_is_refused_with_the_step_that_suits():
+    seal = dataclasses.replace(SEAL, velocity_terms=VelocityTerms(viscous_friction=1e6))
+    with pytest.raises(ValueError, match=r'inner_step = 0.0001 s is too long: at most .*damping'):
         ServoParameters(seals=(MountedSeal(seal, 'a'),))
 
 

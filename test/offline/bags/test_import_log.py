@@ -10,7 +10,7 @@ import yaml
 from paths import ROOT
 from scipy.optimize import least_squares
 
-from seal_friction_ros.core.estimation.messages import DECODERS, decode_velocity
+from seal_friction_ros.core.estimation.messages import DECODERS, VELOCITY_TYPE, decode
 from seal_friction_ros.core.foundation import units
 from seal_friction_ros.core.friction.geometry import projected_area, squeeze
 from seal_friction_ros.core.friction.seal_file import parse_seal
@@ -101,7 +101,7 @@ def test_order_topics_stamps_and_frame(tmp_path):
     messages = list(read_messages(bag))
     assert [m.topic for m in messages] == [PRESSURE_TOPIC, FORCE_TOPIC, VELOCITY_TOPIC] * 3
     assert [m.log_time for m in messages[:4]] == [1_000_000_000, 1_000_000_001, 1_000_000_002, 1_020_000_000]
-    assert decode_velocity(messages[2].data).frame_id == b'piston_rod'
+    assert decode(VELOCITY_TYPE, messages[2].data).frame_id == b'piston_rod'
 
 
 def test_the_same_log_gives_the_same_bytes(tmp_path):

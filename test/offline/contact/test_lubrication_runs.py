@@ -13,19 +13,8 @@ import numpy as np
 import pytest
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import (
-    FORCE_TYPE,
-    POSITION_TYPE,
-    PRESSURE_TYPE,
-    VELOCITY_TYPE,
-    Position,
-    Velocity,
-    encode_force,
-    encode_position,
-    encode_pressure,
-    encode_velocity,
-)
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.messages import FORCE_TYPE, POSITION_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, Velocity
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.lubrication.case import Case, Spool
@@ -225,13 +214,13 @@ def measured_bag(folder: Path, with_position: bool, seal: Path | None = None) ->
             stamp = 1_000_000_000 + i * 1_000_000
             velocity = way[i] / (2.0 * step) if i else 0.0
             pressure = Pressure(stamp, 0.5e5, 0.0)
-            writer.write(b.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode_pressure(pressure, b'rod'))
+            writer.write(b.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode(pressure, b'rod'))
             force = Force(stamp, 3.0 + float(rung[i]))
-            writer.write(b.FORCE_TOPIC, FORCE_TYPE, stamp, encode_force(force, b'rod'))
+            writer.write(b.FORCE_TOPIC, FORCE_TYPE, stamp, encode(force, b'rod'))
             if with_position:
                 position = Position(stamp, 0.1 + motion.position(time))
-                writer.write(b.POSITION_TOPIC, POSITION_TYPE, stamp, encode_position(position, b'rod'))
-            data = encode_velocity(Velocity(stamp, velocity, b'rod'))
+                writer.write(b.POSITION_TOPIC, POSITION_TYPE, stamp, encode(position, b'rod'))
+            data = encode(Velocity(stamp, velocity, b'rod'))
             writer.write(b.VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
     seal = seal or ROOT / 'config' / 'seals' / 'ms28775_114.yaml'
     assert main(['replay', str(raw), '--seal', str(seal), '--out', str(folder / 'bag')]) == 0

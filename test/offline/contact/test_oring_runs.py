@@ -13,7 +13,6 @@ from paths import ROOT
 from rich.progress import Progress
 
 from seal_friction_ros.core.foundation.units import PSI
-from seal_friction_ros.core.friction.actuator import coulomb_friction
 from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.oring_contact.case_file import parse_case
@@ -82,7 +81,7 @@ def test_the_seal_file_made_is_a_seal_with_the_computed_normal_force(computed: P
     assert table['law'] == 'monotone_table'
     force = table['normal_forces'][0]
     coefficient = seal.coulomb_law.friction_coefficient_law.coefficient_of_friction(force)
-    assert coulomb_friction(seal, 0.0) == pytest.approx(coefficient * force)
+    assert seal.coulomb_law.coulomb_friction(0.0) == pytest.approx(coefficient * force)
     assert seal.pressure_max == 1.7e6
 
 
@@ -113,7 +112,7 @@ def test_its_friction_from_geometry_is_within_5_percent_of_the_mean_of_the_tests
     pressures, friction = dynamic_readings()
     for pressure in set(pressures):
         mean = friction[pressures == pressure].mean()
-        assert 2.0 * coulomb_friction(seal, pressure) == pytest.approx(mean, rel=0.05)
+        assert 2.0 * seal.coulomb_law.coulomb_friction(pressure) == pytest.approx(mean, rel=0.05)
 
 
 @pytest.mark.parametrize('name', ['ms28775_114', 'ms28775_114_blind'])

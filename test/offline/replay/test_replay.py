@@ -10,7 +10,7 @@ from paths import ROOT
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
-    decode_estimate,
+    decode,
     decode_text,
     encode_text,
 )
@@ -123,8 +123,8 @@ def test_a_damaged_message_is_named_and_nothing_is_written(recorded: Path, tmp_p
 def test_a_seal_given_replaces_every_seal_of_the_bag(recorded: Path, tmp_path: Path):
     seal = ROOT / 'config' / 'seals' / 'ms28775_114_prior_art.yaml'
     replay(recorded, chosen_configuration(None, seal), out=tmp_path / 'out')
-    ours = [decode_estimate(data) for data in estimates(recorded)]
-    charts = [decode_estimate(data) for data in estimates(tmp_path / 'out')]
+    ours = [decode(ESTIMATE_TYPE, data) for data in estimates(recorded)]
+    charts = [decode(ESTIMATE_TYPE, data) for data in estimates(tmp_path / 'out')]
     good = [(a, b) for a, b in zip(ours, charts, strict=True) if not a.status & Status.PRESSURE_MISSING]
     assert len(good) > 290
     assert all(b.coulomb_friction > 1.2 * a.coulomb_friction for a, b in good)

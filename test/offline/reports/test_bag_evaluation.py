@@ -15,13 +15,10 @@ from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,
     PRESSURE_TYPE,
     VELOCITY_TYPE,
-    Velocity,
-    encode_force,
-    encode_pressure,
+    encode,
     encode_text,
-    encode_velocity,
 )
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags import bag as bags
@@ -66,10 +63,10 @@ def make_bag(folder: Path, rows, estimates=True) -> Path:
         writer.write(bags.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, START, text)
         for i, (velocity, pressure, force) in enumerate(rows):
             stamp = START + i * 1_000_000_000 // RATE
-            data = encode_pressure(Pressure(stamp, pressure, pressure))
+            data = encode(Pressure(stamp, pressure, pressure))
             writer.write(bags.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, data)
-            writer.write(bags.FORCE_TOPIC, FORCE_TYPE, stamp, encode_force(Force(stamp, force)))
-            data = encode_velocity(Velocity(stamp, velocity, b'rod'))
+            writer.write(bags.FORCE_TOPIC, FORCE_TYPE, stamp, encode(Force(stamp, force)))
+            data = encode(Velocity(stamp, velocity, b'rod'))
             writer.write(bags.VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
     if estimates:
         replay(inputs, out=folder / 'estimates')

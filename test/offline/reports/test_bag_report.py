@@ -18,13 +18,10 @@ from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,
     PRESSURE_TYPE,
     VELOCITY_TYPE,
-    Velocity,
-    encode_force,
-    encode_pressure,
+    encode,
     encode_text,
-    encode_velocity,
 )
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
@@ -55,10 +52,10 @@ def make_bag(folder, *, name='bag', frame=b'rod', topic='/rod_velocity', pressur
             writer.write('/friction_estimator/configuration', CONFIGURATION_TYPE, 1, text)
         for i, (velocity, pressure, force) in enumerate(rows):
             stamp = (i + 1) * 1_000_000_000 // RATE
-            data = encode_pressure(Pressure(stamp, pressure, pressure))
+            data = encode(Pressure(stamp, pressure, pressure))
             writer.write('/cylinder_pressure', PRESSURE_TYPE, stamp, data)
-            writer.write('/force_sum', FORCE_TYPE, stamp, encode_force(Force(stamp, force)))
-            data = encode_velocity(Velocity(stamp, velocity, frame))
+            writer.write('/force_sum', FORCE_TYPE, stamp, encode(Force(stamp, force)))
+            data = encode(Velocity(stamp, velocity, frame))
             writer.write(topic, VELOCITY_TYPE, stamp, data)
     replay(folder / f'{name}_in', out=folder / name)
     return folder / name
@@ -217,7 +214,7 @@ def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path):
 
 def test_a_bag_in_which_nothing_slides_makes_a_page(tmp_path):
     with BagWriter(tmp_path / 'still_in') as writer:
-        data = encode_velocity(Velocity(1, 0.0, b''))
+        data = encode(Velocity(1, 0.0, b''))
         writer.write('/rod_velocity', VELOCITY_TYPE, 1, data)
     replay(tmp_path / 'still_in', out=tmp_path / 'still')
     summary = write_report(tmp_path / 'still', tmp_path / 'still.html')

@@ -2,16 +2,8 @@
 
 from pathlib import Path
 
-from seal_friction_ros.core.estimation.messages import (
-    FORCE_TYPE,
-    PRESSURE_TYPE,
-    VELOCITY_TYPE,
-    Velocity,
-    encode_force,
-    encode_pressure,
-    encode_velocity,
-)
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
+from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
 from seal_friction_ros.offline.bags.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagWriter
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_report import write_report
@@ -26,9 +18,9 @@ def test_absurd_velocities_pressures_and_forces_do_not_keep_the_report_from_bein
             pressure = Pressure(stamp, ABSURD if i == 50 else 1e6, 1e6)
             force = Force(stamp, -ABSURD if i == 70 else 10.0)
             velocity = Velocity(stamp, {90: ABSURD, 91: -ABSURD}.get(i, 0.05), b'rod')
-            writer.write(PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode_pressure(pressure))
-            writer.write(FORCE_TOPIC, FORCE_TYPE, stamp, encode_force(force))
-            writer.write(VELOCITY_TOPIC, VELOCITY_TYPE, stamp, encode_velocity(velocity))
+            writer.write(PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode(pressure))
+            writer.write(FORCE_TOPIC, FORCE_TYPE, stamp, encode(force))
+            writer.write(VELOCITY_TOPIC, VELOCITY_TYPE, stamp, encode(velocity))
     replay(tmp_path / 'inputs', out=tmp_path / 'out')
     summary = write_report(tmp_path / 'out', tmp_path / 'report.html')
     assert summary.page.read_text().startswith('<!DOCTYPE html>')

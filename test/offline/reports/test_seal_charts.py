@@ -10,7 +10,8 @@ import pytest
 import yaml
 
 from seal_friction_ros.core.foundation.units import INCH, LBF, PSI
-from seal_friction_ros.core.friction.actuator import MountedSeal, VelocityTerms
+from seal_friction_ros.core.friction.actuator import MountedSeal
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.reports.seal_charts import (

@@ -18,17 +18,10 @@ from seal_friction_ros.core.estimation.messages import (
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     VELOCITY_TYPE,
-    Position,
-    ServoReference,
-    Velocity,
-    encode_force,
-    encode_position,
-    encode_pressure,
-    encode_reference,
+    encode,
     encode_text,
-    encode_velocity,
 )
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.closed_loop import with_wrong_friction
 from seal_friction_ros.core.servo.motions import Sine, Step
@@ -67,15 +60,15 @@ def write_axis(path: Path, wave=None, seconds=2.0, leave_out='', configuration: 
             force = Force(stamp, sign * (out.force_sum + f + OFFSET))
             velocity = Velocity(stamp, out.velocity + v, b'rod')
             data = {
-                'pressure': (b.PRESSURE_TOPIC, PRESSURE_TYPE, encode_pressure(pressure)),
-                'force': (b.FORCE_TOPIC, FORCE_TYPE, encode_force(force)),
+                'pressure': (b.PRESSURE_TOPIC, PRESSURE_TYPE, encode(pressure)),
+                'force': (b.FORCE_TOPIC, FORCE_TYPE, encode(force)),
                 'reference': (
-                    b.REFERENCE_TOPIC, REFERENCE_TYPE, encode_reference(ServoReference(stamp, *reference))
+                    b.REFERENCE_TOPIC, REFERENCE_TYPE, encode(ServoReference(stamp, *reference))
                 ),
                 'position': (
-                    b.POSITION_TOPIC, POSITION_TYPE, encode_position(Position(stamp, out.position + x))
+                    b.POSITION_TOPIC, POSITION_TYPE, encode(Position(stamp, out.position + x))
                 ),
-                'velocity': (b.VELOCITY_TOPIC, VELOCITY_TYPE, encode_velocity(velocity)),
+                'velocity': (b.VELOCITY_TOPIC, VELOCITY_TYPE, encode(velocity)),
             }  # fmt: skip
             for name, (topic, type_name, message) in data.items():
                 if name != leave_out:

@@ -2,46 +2,65 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from statistics import linear_regression
-from typing import Protocol
 
+from seal_friction_ros.core.foundation.compiled import Bound, evaluate
 from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
-from seal_friction_ros.core.foundation.parameters import check, parameter
-
-
-class FrictionCoefficientLaw(Protocol):
-    """A law of the coefficient of friction."""
-
-    def coefficient_of_friction(self, normal_force: float) -> float:
-        """Coefficient of dynamic friction [-] at ``normal_force`` [N, > 0]."""
-        ...
+from seal_friction_ros.core.foundation.parameters import parameter
+from seal_friction_ros.core.friction.laws.law import Law
 
 
 @dataclass(frozen=True)
-class PowerLaw:
+class FrictionCoefficientLaw(Law):
+    """Coefficient of dynamic friction [-] from normal force [N, > 0]."""
+
+    def coefficient_of_friction(self, normal_force: float) -> float:
+        """Coefficient of dynamic friction [-] at ``normal_force`` [N, > 0]."""
+        return self.bound(normal_force, 0.0)
+
+
+def falling_coefficient(coefficient: float, exponent: float, normal_force: float, _unused: float) -> float:
+    """Mu = c (F_n / 1 N)^-n [-]."""
+    return coefficient * math.pow(normal_force, -exponent)
+
+
+@dataclass(frozen=True)
+class PowerLaw(FrictionCoefficientLaw):
     """Coefficient of friction falling as a power of the normal force: mu = c (F_n / 1 N)^-n.
 
     An elastic contact whose real area grows as F_n^(2/3) gives n = 1/3 [Schallamach1958]_; n < 1 keeps the friction
     itself rising with normal force.
-
-    Raises:
-        ValueError: A parameter is out of bounds.
     """
 
-    coefficient: float = parameter(unit='1', lower=1e-6, upper=100.0, description='c, coefficient of friction at 1 N.')
-    exponent: float = parameter(unit='1', lower=0.0, upper=0.99, description='n; 0 is a constant coefficient.')
+    function = staticmethod(falling_coefficient)
 
-    def __post_init__(self) -> None:
-        check(self)
+    coefficient: float = parameter(
+        unit='1',
+        lower=1e-6,
+        upper=100.0,
+        description='c, coefficient of friction at 1 N.',
+        symbol='c',
+        start=lambda typical: typical.friction / typical.normal_force**0.6,
+    )
+    exponent: float = parameter(
+        unit='1',
+        lower=0.0,
+        upper=0.99,
+        description='n; 0 is a constant coefficient.',
+        symbol='n',
+        start=lambda _: 0.4,
+    )
 
-    def coefficient_of_friction(self, normal_force: float) -> float:
-        """Coefficient of dynamic friction [-] at ``normal_force`` [N, > 0]."""
-        return self.coefficient * math.pow(normal_force, -self.exponent)
+
+def coefficient_table(table: Bound, normal_force: float, _unused: float) -> float:
+    """Interpolated coefficient [-], constant beyond both ends."""
+    return evaluate(table, normal_force, 0.0)
 
 
 @dataclass(frozen=True)
-class CoefficientTable:
+class CoefficientTable(FrictionCoefficientLaw):
     """Coefficient of friction by monotone interpolation over normal force, constant beyond both ends.
 
     Source: thesis, chapter 7 ("mu defined at multiple F_n values") and Figure 18.
@@ -50,22 +69,26 @@ class CoefficientTable:
         ValueError: Fewer than two points, forces that do not increase, or a coefficient that is not positive.
     """
 
+    function = staticmethod(coefficient_table)
+
     normal_forces: tuple[float, ...] = parameter(
         unit='N', lower=0.0, upper=1e9, description='Normal forces, increasing.'
     )
     coefficients: tuple[float, ...] = parameter(
         unit='1', lower=1e-6, upper=100.0, description='Coefficient of friction at each of them.'
     )
-    table: MonotoneTable = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
-        check(self)
-        table = MonotoneTable(self.normal_forces, self.coefficients, 'CoefficientTable')
-        object.__setattr__(self, 'table', table)  # frozen: the only way to keep what was built from the fields
+    @cached_property
+    def table(self) -> MonotoneTable:
+        """Coefficient over normal force."""
+        return MonotoneTable(self.normal_forces, self.coefficients, 'CoefficientTable')
 
-    def coefficient_of_friction(self, normal_force: float) -> float:
-        """Coefficient of dynamic friction [-] at ``normal_force`` [N, > 0]."""
-        return self.table(normal_force)
+
+FRICTION_COEFFICIENT_LAWS: dict[str, type[FrictionCoefficientLaw]] = {
+    'power_law': PowerLaw,
+    'monotone_table': CoefficientTable,
+}
+"""Name in a seal file -> law."""
 
 
 def power_law_from_points(normal_forces: Sequence[float], frictions: Sequence[float]) -> PowerLaw:

@@ -1,0 +1,112 @@
+"""Pressure -> normal force of one seal on the wall it slides on."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+from seal_friction_ros.core.foundation.compiled import Bound, evaluate
+from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
+from seal_friction_ros.core.foundation.parameters import parameter
+from seal_friction_ros.core.friction.geometry import SealGeometry, squeeze
+from seal_friction_ros.core.friction.laws.law import Law
+
+
+@dataclass(frozen=True)
+class NormalForceLaw(Law):
+    """Normal force of one seal [N] from pressure [Pa, gauge, >= 0] and projected area [m^2]."""
+
+    def normal_force(self, pressure: float, projected_area: float) -> float:
+        """Normal force [N] at ``pressure`` [Pa, gauge, >= 0] on ``projected_area`` [m^2]."""
+        return self.bound(pressure, projected_area)
+
+
+def linear_normal_force(
+    area_deformation_gain: float, radial_force: float, pressure: float, projected_area: float
+) -> float:
+    """F_n = G P A_r + F_rad [N]."""
+    return area_deformation_gain * (pressure * projected_area) + radial_force
+
+
+@dataclass(frozen=True)
+class AreaDeformationGain(NormalForceLaw):
+    """Normal force linear in the axial force: F_n = G F_ax + F_rad with F_ax = P A_r.
+
+    Source: thesis, chapters 6.2 and 7.
+    """
+
+    function = staticmethod(linear_normal_force)
+
+    area_deformation_gain: float = parameter(unit='1', lower=0.0, upper=100.0, description='G, slope of F_n over F_ax.')
+    radial_force: float = parameter(unit='N', lower=1e-6, upper=1e6, description='F_rad, normal force at no pressure.')
+
+
+def normal_force_table(
+    table: Bound, last_pressure: float, end_slope: float, pressure: float, _projected_area: float
+) -> float:
+    """Interpolated normal force [N]; above the last pressure it rises with the slope that it has there."""
+    beyond = pressure - last_pressure
+    beyond = max(beyond, 0.0)
+    return evaluate(table, pressure, 0.0) + end_slope * beyond
+
+
+@dataclass(frozen=True)
+class NormalForceTable(NormalForceLaw):
+    """Normal force by monotone interpolation of computed or measured values over pressure.
+
+    Above the last pressure the normal force rises with the slope that it has there (our choice: rubber under pressure
+    behaves as a fluid, so the normal force keeps rising).
+
+    Raises:
+        ValueError: Fewer than two points, or pressures or forces that do not increase, or a force that is not positive.
+    """
+
+    function = staticmethod(normal_force_table)
+
+    pressures: tuple[float, ...] = parameter(
+        unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures, increasing.'
+    )
+    normal_forces: tuple[float, ...] = parameter(
+        unit='N', lower=1e-6, upper=1e9, description='Normal force at each pressure, not decreasing.'
+    )
+
+    def check_together(self) -> None:
+        """Check that the normal force does not fall with pressure."""
+        if list(self.normal_forces) != sorted(self.normal_forces):
+            raise ValueError(f'NormalForceTable.normal_forces = {list(self.normal_forces)} N falls with pressure')
+
+    @cached_property
+    def table(self) -> MonotoneTable:
+        """Normal force over pressure."""
+        return MonotoneTable(self.pressures, self.normal_forces, 'NormalForceTable')
+
+    @property
+    def last_pressure(self) -> float:
+        """Last pressure of the table [Pa, gauge]."""
+        return self.pressures[-1]
+
+    @property
+    def end_slope(self) -> float:
+        """Slope of the table at its last pressure [N/Pa]."""
+        return self.table.end_slope
+
+
+NORMAL_FORCE_LAWS: dict[str, type[NormalForceLaw]] = {
+    'area_deformation_gain': AreaDeformationGain,
+    'monotone_table': NormalForceTable,
+}
+"""Name in a seal file -> law."""
+
+
+def squeeze_force(geometry: SealGeometry) -> float:
+    """Normal force of a squeezed ring without pressure, summed over the circumference [N].
+
+    F = pi D d E (1.25 C^1.5 + 50 C^6), with D the mean diameter of the gap and C the squeeze.
+
+    Source: [Lindley1967]_, for a ring between two parallel walls. Against the finite elements of the thesis (18.2 N at
+    7.5 % squeeze) it gives 22 N.
+    """
+    mean_diameter = (geometry.rod_diameter + geometry.gland_diameter) / 2.0
+    share = squeeze(geometry)
+    strain_part = 1.25 * math.pow(share, 1.5) + 50.0 * math.pow(share, 6.0)
+    line_load = geometry.section_diameter * geometry.elastic_modulus * strain_part
+    return math.pi * mean_diameter * line_load

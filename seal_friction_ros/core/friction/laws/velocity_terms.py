@@ -1,0 +1,97 @@
+"""What the velocity adds to a law that does not depend on the speed: viscous and Stribeck friction, asymmetry."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.foundation.parameters import check, parameter
+
+
+@compilable
+def with_velocity_terms(
+    coulomb_friction: float,
+    speed: float,
+    direction: int,
+    viscous_friction: float,
+    stribeck_friction: float,
+    stribeck_velocity: float,
+    asymmetry: float,
+) -> float:
+    """Sliding friction [N]: the equation of `VelocityTerms`."""
+    sliding = coulomb_friction + viscous_friction * speed
+    if stribeck_friction > 0.0:
+        sliding += stribeck_friction * math.exp(-speed / stribeck_velocity)
+    return sliding * (1.0 + asymmetry if direction > 0 else 1.0 - asymmetry)
+
+
+class VelocityTermNumbers(NamedTuple):
+    """`VelocityTerms` as numbers."""
+
+    viscous_friction: float
+    stribeck_friction: float
+    stribeck_velocity: float
+    asymmetry: float
+
+
+NO_VELOCITY_TERMS = VelocityTermNumbers(0.0, 0.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class VelocityTerms:
+    r"""Sliding friction of a seal beyond its Coulomb friction.
+
+    .. math:: F = [f_c + \sigma |v| + f_S\,e^{-|v|/v_S}]\,(1 + a\,\mathrm{sgn}(v))
+
+    Source: [Armstrong1994]_ eq. (5) with an exponent of 1, which is our choice, as is one asymmetry for all terms.
+
+    Raises:
+        ValueError: A value is out of bounds.
+    """
+
+    viscous_friction: float = parameter(
+        0.0,
+        unit='N s/m',
+        lower=0.0,
+        upper=1e7,
+        description='sigma, viscous friction.',
+        symbol='sigma',
+        start=lambda typical: 0.2 * typical.friction / max(typical.speed, 1e-6),
+    )
+    stribeck_friction: float = parameter(
+        0.0,
+        unit='N',
+        lower=0.0,
+        upper=1e6,
+        description='f_S, friction of the slowest motion above Coulomb friction.',
+        symbol='f_S',
+        start=lambda typical: 0.2 * typical.friction,
+    )
+    stribeck_velocity: float = parameter(
+        0.01,
+        unit='m/s',
+        lower=1e-6,
+        upper=10.0,
+        description='v_S, speed at which Stribeck friction has fallen to 37 %.',
+        symbol='v_S',
+        start=lambda typical: min(0.1 * max(typical.speed, 1e-6), 1.0),
+    )
+    asymmetry: float = parameter(
+        0.0,
+        unit='1',
+        lower=-0.9,
+        upper=0.9,
+        description='a, share by which friction is larger on extension and smaller on retraction.',
+        symbol='a',
+        start=lambda _: 0.0,
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @property
+    def numbers(self) -> VelocityTermNumbers:
+        """The terms as numbers."""
+        return VelocityTermNumbers(
+            self.viscous_friction, self.stribeck_friction, self.stribeck_velocity, self.asymmetry
+        )

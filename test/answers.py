@@ -1,0 +1,30 @@
+"""Answers of the pipeline to one message, collected for tests."""
+
+from typing import Any, NamedTuple
+
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, receive
+from seal_friction_ros.core.estimation.records import FrictionEstimate
+
+
+class Answer(NamedTuple):
+    """What one message makes the pipeline emit."""
+
+    estimate: FrictionEstimate | None
+    feedforward: FeedForward | None
+    frame_id: bytes
+
+
+NOTHING = Answer(None, None, b'')
+
+
+def receive_one(parameters: PipelineParameters, state: PipelineState, message: Any) -> tuple[PipelineState, Answer]:
+    """The next state and the answer."""
+    answer = NOTHING
+
+    def take(record: Any, frame_id: bytes) -> None:
+        nonlocal answer
+        field = 'estimate' if isinstance(record, FrictionEstimate) else 'feedforward'
+        answer = answer._replace(**{field: record, 'frame_id': frame_id})
+
+    return receive(parameters, state, message, take), answer
