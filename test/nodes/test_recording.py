@@ -11,7 +11,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.nodes.parameters import RecordingOptions
+from seal_friction_ros.core.estimation.node_options import RecordingOptions
 from seal_friction_ros.nodes.recording import Recording
 from seal_friction_ros.offline.bags import mcap_writer
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
@@ -81,14 +81,6 @@ def test_a_request_to_stop_is_answered_though_the_disk_stalls_and_the_bag_is_fin
             assert g.spin_until(lambda: g.probe.values('recorder').get('message', '') == 'writing the end of a bag')
         assert g.spin_until(lambda: g.probe.values('recorder').get('message', '') == 'not recording')
     assert len(list(read_messages(tmp_path / 'bag'))) == 1
-
-
-@pytest.mark.parametrize(
-    ('split', 'words'), [({'record_split_size': 1000}, '1000000'), ({'record_split_duration': 1.0}, '10')]
-)
-def test_a_split_that_would_make_thousands_of_files_is_refused(split: dict[str, float], words: str):
-    with pytest.raises(ValueError, match=words):
-        RecordingOptions(**split)
 
 
 def test_a_recording_is_split_as_the_parameters_say(tmp_path: Path):

@@ -1,4 +1,4 @@
-"""Parameters that cannot exist wrong."""
+"""Parameters are checked at construction; errors name field, value and bound."""
 
 import math
 from dataclasses import asdict, dataclass, field
@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.foundation.parameters import Meaning, check, from_mapping, meanings, parameter
+from seal_friction_ros.core.foundation.parameters import (
+    Meaning,
+    ParameterGroup,
+    check,
+    from_mapping,
+    meanings,
+    parameter,
+    similar_names,
+)
 from seal_friction_ros.core.foundation.units import unit_size
 from seal_friction_ros.core.friction.actuator import PriorArtChart, Seal, Uncertainty
 from seal_friction_ros.core.friction.friction_coefficient import CoefficientTable, PowerLaw
@@ -97,12 +105,48 @@ def test_integers_are_taken_for_floats_and_lists_for_tuples():
         ({'colour': 'red', 'age': 1}, 'spring has no age, colour: it has stiffness, coils'),
         ({'made': 1.0}, 'spring has no made: it has'),
         ({3: 4}, 'spring has no 3: it has'),
+        ({'stifness': 1.0}, 'spring has no stifness: it has .*, names; did you mean stiffness?'),
+        (
+            {'Coil': 1, 'matrial': 'x', 'zzz': 1},
+            r'spring has no Coil, matrial, zzz: .*; did you mean coils, material\?$',
+        ),
+        ({'zzz': 1}, 'spring has no zzz: it has [a-z, ]*$'),
+        ({'two\nlines': 1}, r"spring has no 'two\\nlines': it has"),
     ],
 )
 def test_a_mapping_that_makes_no_sense_is_refused_in_one_line_that_names_the_field(values, complaint):
     with pytest.raises(ValueError, match=f'^{complaint}') as refusal:
         make(**{str(k): v for k, v in values.items()}) if 3 not in values else from_mapping(Spring, values, 'spring')
     assert '\n' not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ('name', 'expected'),
+    [
+        ('coils', 'spring.coils'),
+        ('damper.coils', 'spring.coils'),
+        ('coil', 'spring.coils'),
+        ('spring_coils', 'spring.coils'),
+        ('damper.leng', 'damper.length'),
+        ('spring.leng', 'spring.length'),
+        ('mas', 'mass'),
+        ('x', None),
+    ],
+)
+def test_a_similar_name_has_few_other_letters_or_another_prefix(name, expected):
+    known = ['coil_spacing', 'spring.coils', 'spring.length', 'damper.length', 'mass']
+    assert similar_names([name], known).get(name) == expected
+
+
+def test_a_group_prefixes_its_names_and_knows_the_fixed_ones():
+    @dataclass(frozen=True)
+    class Clock:
+        period: float = parameter(1.0, unit='s', description='Period.')
+        name: str = parameter('', unit='', live=False, description='Name.')
+
+    assert ParameterGroup(Clock, 'clock.').names() == {'clock.period': 'period', 'clock.name': 'name'}
+    assert ParameterGroup(Clock, 'clock.').fixed() == {'clock.name'}
+    assert ParameterGroup(Clock, live=False).fixed() == {'period', 'name'}
 
 
 def test_a_whole_number_beyond_any_float_is_beyond_its_bound_too():
