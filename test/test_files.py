@@ -75,20 +75,20 @@ def test_plain_data_comes_back_as_written(written):
     ],
     ids=lambda value: repr(value)[:24],
 )
-def test_what_is_not_plain_yaml_is_refused_in_one_line_that_names_the_file(written, content, expected):
+def test_a_file_that_is_not_plain_yaml_is_rejected_in_one_line_that_names_the_file(written, content, expected):
     assert expected in complaint(read_yaml, written(content))
 
 
-def test_a_billion_laughs_are_refused(written):
+def test_nested_aliases_are_rejected(written):
     laughs = 'a: &a [ha]\n' + ''.join(f'{y}: &{y} [{", ".join([f"*{x}"] * 9)}]\n' for x, y in pairwise('abcdefghi'))
     assert 'aliases' in complaint(read_yaml, written(laughs))
 
 
-def test_a_huge_file_is_refused_unread(written):
+def test_a_huge_file_is_rejected_before_parsing(written):
     assert 'larger than 65536 bytes' in complaint(read_yaml, written(b'# ' + b'x' * (1 << 16)))
 
 
-def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+def test_a_missing_file_and_a_folder_are_rejected(tmp_path):
     assert complaint(read_yaml, tmp_path / 'none.yaml').endswith('No such file or directory')
     assert complaint(read_yaml, tmp_path).endswith('Is a directory')
 
@@ -160,11 +160,11 @@ def test_the_default_configuration_is_the_actuator_of_the_thesis():
         (GOOD.replace('stiction: 2.47685', 'stiction: .nan'), 'Seal.stiction = nan N is not finite'),
     ],
 )
-def test_a_seal_file_that_makes_no_sense_is_refused_in_one_line_with_file_and_field(written, content, expected):
+def test_an_invalid_seal_file_is_rejected_in_one_line_with_file_and_field(written, content, expected):
     assert expected in complaint(load, written(content))
 
 
-def test_an_unknown_seal_is_refused_with_the_path_looked_for():
+def test_an_unknown_seal_is_rejected_with_the_path_that_was_tried():
     with pytest.raises(ValueError, match=r'config/seals/no_such_seal\.yaml: No such file or directory$'):
         load_configuration(SealSelection(('no_such_seal',), ('a',)), EstimatorSettings())
 
@@ -208,14 +208,14 @@ def test_parameters_of_the_node_that_a_replay_does_not_need_are_accepted(written
     assert load_parameter_file(path) == expected
 
 
-def test_later_nodes_of_a_parameter_file_overrule_earlier_ones(written):
+def test_later_sections_of_a_parameter_file_override_earlier_ones(written):
     nodes = (
         '/**:\n  ros__parameters: {force_max: 5.0}\n/left/friction_estimator:\n  ros__parameters: {force_max: 7.0}\n'
     )
     assert load_parameter_file(written(nodes))[1].force_max == 7.0
 
 
-def test_what_a_parameter_file_says_of_other_nodes_is_passed_over(written):
+def test_sections_of_other_nodes_in_a_parameter_file_are_ignored(written):
     nodes = '/**:\n  ros__parameters: {force_max: 5.0}\nother:\n  ros__parameters: {force_max: 7.0, gain: 1}\n'
     assert load_parameter_file(written(nodes))[1].force_max == 5.0
 
@@ -233,12 +233,12 @@ def test_what_a_parameter_file_says_of_other_nodes_is_passed_over(written):
         ('zzz', 'friction_estimator has no parameter zzz'),
     ],
 )
-def test_an_unknown_parameter_is_refused_with_the_name_that_was_meant(written, name, expected):
+def test_an_unknown_parameter_is_rejected_with_a_suggestion(written, name, expected):
     refusal = complaint(load_parameter_file, written(f'/**:\n  ros__parameters: {{{name}: 0.5}}\n'))
     assert refusal.endswith(expected)
 
 
-def test_thousands_of_unknown_parameters_are_refused_without_delay(written):
+def test_thousands_of_unknown_parameters_are_rejected_without_delay(written):
     names = ', '.join(f'stick_velocit{number}: 1' for number in range(2500))
     before = time.monotonic()
     refusal = complaint(load_parameter_file, written(f'/**: {{ros__parameters: {{{names}}}}}'))
@@ -246,7 +246,7 @@ def test_thousands_of_unknown_parameters_are_refused_without_delay(written):
     assert 'stick_velocit2499' in refusal
 
 
-def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+def test_a_pipe_is_rejected_without_waiting(tmp_path):
     os.mkfifo(tmp_path / 'pipe')
     assert complaint(read_yaml, tmp_path / 'pipe').endswith('not a file')
 
@@ -262,7 +262,7 @@ def test_a_link_into_the_source_tree_finds_the_share_folder_of_the_install(tmp_p
 
 
 @pytest.mark.parametrize('content', ['', '5', '[1]', 'a: 5', 'a: {b: 1}', 'a: {ros__parameters: }', 'a: [1]'])
-def test_what_is_no_parameter_file_is_refused(written, content):
+def test_a_file_that_is_not_a_parameter_file_is_rejected(written, content):
     assert 'not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)' in complaint(
         load_parameter_file, written(content)
     )
@@ -281,7 +281,7 @@ def test_what_is_no_parameter_file_is_refused(written, content):
         ('{refuse_second_publisher: 1}', 'refuse_second_publisher = 1 is not true or false'),
     ],
 )
-def test_a_parameter_that_makes_no_sense_is_refused_with_file_field_and_bound(written, parameters, expected):
+def test_an_invalid_parameter_is_rejected_with_file_field_and_bound(written, parameters, expected):
     assert expected in complaint(load_parameter_file, written(f'/**:\n  ros__parameters: {parameters}\n'))
 
 
@@ -293,17 +293,17 @@ def test_a_parameter_that_makes_no_sense_is_refused_with_file_field_and_bound(wr
     ],
     ids=lambda content: content[:16],
 )  # fmt: skip
-def test_a_value_that_does_not_fit_its_tag_is_refused_with_the_file(written, content):
+def test_a_value_that_contradicts_its_tag_is_rejected_with_the_file(written, content):
     assert 'not plain YAML' in complaint(read_yaml, written(content))
 
 
 @pytest.mark.parametrize('name', ['~no_such_user_here/x.yaml'])
-def test_a_path_that_cannot_be_is_refused_by_name(name):
+def test_a_path_of_an_unknown_user_is_rejected_with_its_name(name):
     with pytest.raises(ValueError, match='no_such_user_here'):
         load_configuration(SealSelection((name,), ('a',)), EstimatorSettings())
 
 
 @pytest.mark.parametrize('parameters', ['ab', '[[stick_velocity, 0.0]]', '{stick_velocity: 1' + '0' * 400 + '}'])
-def test_parameters_that_are_no_mapping_or_too_large_are_refused_with_the_file(written, parameters):
+def test_parameters_that_are_not_a_mapping_or_too_large_are_rejected_with_the_file(written, parameters):
     refusal = complaint(load_parameter_file, written(f'/**: {{ros__parameters: {parameters}}}'))
     assert 'ros__parameters' in refusal or 'stick_velocity' in refusal

@@ -49,7 +49,7 @@ def test_each_velocity_sample_is_answered_by_an_estimate_with_its_header():
         assert (estimate.state, estimate.direction, estimate.status) == (FrictionEstimate.SLIDING, 1, 0)
 
 
-def test_it_says_stuck_and_breakaway_of_a_rod_at_rest():
+def test_a_rod_at_rest_is_stuck_or_breaks_away():
     with graph() as g:
         g.connect()
         stuck = g.estimate(SECOND, 0.0, force=-5.0)
@@ -148,7 +148,7 @@ def test_settings_change_while_running_and_the_new_configuration_is_published():
         ),
     ],
 )
-def test_changes_that_make_no_sense_are_refused_whole_with_the_reason(parameters: list[Parameter], words: list[str]):
+def test_invalid_changes_are_rejected_as_a_whole_with_the_reason(parameters: list[Parameter], words: list[str]):
     with graph() as g:
         request = SetParametersAtomically.Request(parameters=parameters)
         result = g.call(SetParametersAtomically, 'friction_estimator/set_parameters_atomically', request).result
@@ -173,14 +173,14 @@ def test_parameters_carry_unit_bounds_and_description():
         ({'pressure_timeout': 'soon'}, ['pressure_timeout', 'soon']),
     ],
 )
-def test_a_parameter_override_that_makes_no_sense_starts_nothing(parameters: dict[str, object], words: list[str]):
+def test_an_invalid_parameter_override_prevents_the_start(parameters: dict[str, object], words: list[str]):
     with pytest.raises(ValueError) as error, graph(parameters):
         pass
     assert [word for word in words if word not in str(error.value)] == []
     assert '\n' not in str(error.value)
 
 
-def test_an_unknown_parameter_is_logged_with_the_name_that_was_meant(capfd):
+def test_an_unknown_parameter_is_logged_with_a_suggestion(capfd):
     with graph({'stick_velocty': 0.5, 'wave': 'sine'}):
         logged = capfd.readouterr().err
         assert 'no parameter stick_velocty (did you mean stick_velocity?), wave (a parameter of servo_sim' in logged
@@ -221,7 +221,7 @@ def test_quality_of_service_can_be_overridden():
         assert g.estimator.get_parameter('qos_overrides./rod_velocity.subscription.depth').value == 7
 
 
-def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_path: Path):
+def test_a_recording_started_by_service_during_motion_replays_bit_for_bit(tmp_path: Path):
     with graph({'record_directory': str(tmp_path)}) as g:
         g.connect()
         for i in range(5):
@@ -237,7 +237,7 @@ def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_pat
     assert replay(Path(started.message)).identical
 
 
-def test_a_parameter_change_amid_a_recording_replays_to_the_byte(tmp_path: Path):
+def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Path):
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
         g.connect()
         g.estimate(SECOND, 0.003)
@@ -253,7 +253,7 @@ def test_a_parameter_change_amid_a_recording_replays_to_the_byte(tmp_path: Path)
     assert replay(tmp_path / 'bag').identical
 
 
-def test_a_bag_is_never_overwritten_and_the_estimate_goes_on(tmp_path: Path):
+def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path):
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'precious').write_text('data')
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
@@ -264,14 +264,14 @@ def test_a_bag_is_never_overwritten_and_the_estimate_goes_on(tmp_path: Path):
     assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['precious']
 
 
-def test_simulated_time_is_honoured_and_stops_nothing():
+def test_simulated_time_that_stands_still_does_not_stop_the_node():
     with graph({'use_sim_time': True}) as g:
         g.connect()
         assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
         assert g.spin_until(lambda: g.probe.values('estimate').get('estimates') == '1')
 
 
-def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_path: Path, capfd):
+def test_an_invalid_seal_file_prevents_the_start_and_the_log_names_the_field(tmp_path: Path, capfd):
     seal = tmp_path / 'seal.yaml'
     text = ROOT.joinpath('config/seals/ms28775_114.yaml').read_text()
     seal.write_text(text.replace('exponent: 0.562321', 'exponent: 1.7'))

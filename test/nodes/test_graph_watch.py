@@ -27,7 +27,7 @@ def boolean(name: str, value: bool) -> Parameter:
     return Parameter(name=name, value=ParameterValue(type=BOOL, bool_value=value))
 
 
-def test_a_best_effort_publisher_is_heard_too():
+def test_a_best_effort_publisher_is_heard():
     with graph(qos=qos_profile_sensor_data) as g:
         assert g.spin_until(lambda: g.probe.velocity.get_subscription_count() == 1)
         g.connect()
@@ -36,7 +36,7 @@ def test_a_best_effort_publisher_is_heard_too():
         assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
-def test_a_second_publisher_is_named_and_harmless_unless_it_is_refused(tmp_path: Path):
+def test_a_second_publisher_is_named_and_harmless_unless_refused(tmp_path: Path):
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
         g.connect()
         assert g.estimate(SECOND, 0.1).status == 0
@@ -64,7 +64,7 @@ def test_a_second_publisher_is_named_and_harmless_unless_it_is_refused(tmp_path:
     assert replay(tmp_path / 'bag').identical  # the refusal is in the recording
 
 
-def test_an_input_that_cannot_be_heard_is_said_with_the_node_and_the_reason():
+def test_an_input_of_another_type_is_reported_with_the_node_and_the_reason():
     with graph() as g:
         context = Context()  # within one, the middleware itself refuses a second type
         rclpy.init(context=context, domain_id=g.context.get_domain_id())

@@ -33,18 +33,18 @@ def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
 @pytest.mark.parametrize(
     ('split', 'words'), [({'record_split_size': 1000}, '1000000'), ({'record_split_duration': 1.0}, '10')]
 )
-def test_a_split_that_would_make_thousands_of_files_is_refused(split: dict[str, float], words: str):
+def test_a_split_into_thousands_of_files_is_rejected(split: dict[str, float], words: str):
     with pytest.raises(ValueError, match=words):
         RecordingOptions(**split)
 
 
 @pytest.mark.parametrize('name', ['../escaped', '/absolute', '..', '.', 'two\nlines'])
-def test_a_bag_name_that_leads_elsewhere_is_refused(name: str):
+def test_a_bag_name_outside_the_folder_is_rejected(name: str):
     with pytest.raises(ValueError, match='record_name'):
         RecordingOptions(record_name=name)
 
 
 @pytest.mark.parametrize('priority', [-1, 100])
-def test_a_priority_out_of_bounds_is_refused(priority: int):
+def test_a_priority_out_of_bounds_is_rejected(priority: int):
     with pytest.raises(ValueError, match='realtime_priority'):
         StartOptions(realtime_priority=priority)

@@ -68,16 +68,16 @@ def test_a_number_is_accepted_exactly_inside_its_bounds(value):
         (-math.inf, 'Spring.stiffness = -inf N/m is not finite'),
     ],
 )
-def test_the_complaint_names_field_value_unit_and_bound(value, complaint):
+def test_the_error_names_field_value_unit_and_bound(value, complaint):
     with pytest.raises(ValueError, match='^' + complaint.replace('.', r'\.') + '$'):
         Spring(value)
 
 
-def test_fields_with_a_default_may_be_left_out():
+def test_fields_with_a_default_are_optional():
     assert make() == Spring(10.0)
 
 
-def test_integers_are_taken_for_floats_and_lists_for_tuples():
+def test_integers_convert_to_floats_and_lists_to_tuples():
     spring = make(stiffness=10, lengths=[1, 2.5], names=['a', 'b'])
     assert spring == Spring(10.0, lengths=(1.0, 2.5), names=('a', 'b'))
     assert type(spring.stiffness) is float
@@ -114,7 +114,7 @@ def test_integers_are_taken_for_floats_and_lists_for_tuples():
         ({'two\nlines': 1}, r"spring has no 'two\\nlines': it has"),
     ],
 )
-def test_a_mapping_that_makes_no_sense_is_refused_in_one_line_that_names_the_field(values, complaint):
+def test_an_invalid_mapping_is_rejected_in_one_line_that_names_the_field(values, complaint):
     with pytest.raises(ValueError, match=f'^{complaint}') as refusal:
         make(**{str(k): v for k, v in values.items()}) if 3 not in values else from_mapping(Spring, values, 'spring')
     assert '\n' not in str(refusal.value)
@@ -149,23 +149,23 @@ def test_a_group_prefixes_its_names_and_knows_the_fixed_ones():
     assert ParameterGroup(Clock, live=False).fixed() == {'period', 'name'}
 
 
-def test_a_whole_number_beyond_any_float_is_beyond_its_bound_too():
+def test_an_integer_too_large_for_a_float_violates_its_bound():
     with pytest.raises(ValueError, match='above its upper bound 100'):
         make(coils=10**400)
 
 
-def test_what_is_missing_is_named():
+def test_a_missing_field_is_named():
     with pytest.raises(ValueError, match=r'^spring lacks stiffness$'):
         from_mapping(Spring, {}, 'spring')
 
 
 @pytest.mark.parametrize('values', [None, 5, 'stiffness', ['stiffness'], [('stiffness', 10.0)]])
-def test_what_is_no_mapping_is_refused(values):
+def test_a_value_that_is_not_a_mapping_is_rejected(values):
     with pytest.raises(ValueError, match=r'^spring is not a mapping of names to values but '):
         from_mapping(Spring, values, 'spring')
 
 
-def test_a_field_that_was_made_already_may_not_be_given():
+def test_a_field_that_the_caller_sets_is_rejected_in_the_mapping():
     assert from_mapping(Spring, {'coils': 7}, 'spring', stiffness=10.0) == Spring(10.0, 7)
     with pytest.raises(ValueError, match=r'^spring has no stiffness'):
         from_mapping(Spring, {'stiffness': 1.0}, 'spring', stiffness=10.0)
@@ -204,12 +204,12 @@ def test_meanings_come_in_order_of_declaration_of_class_and_instance_alike():
     ('lower', 'upper', 'text'),
     [(None, None, ''), (0.0, 1.0, '0.0 to 1.0')],
 )
-def test_bounds_are_told_to_a_reader(lower, upper, text):
+def test_bounds_have_a_text(lower, upper, text):
     assert Meaning('', '', lower, upper).bounds_text() == text
 
 
 @pytest.mark.parametrize('record', RECORDS, ids=lambda record: record.__name__)
-def test_every_parameter_has_a_sentence_of_meaning_and_bounds_in_order(record):
+def test_every_parameter_has_a_description_and_ordered_bounds(record):
     assert meanings(record)
     for name, meaning in meanings(record).items():
         assert meaning.description.endswith('.'), name
@@ -243,6 +243,6 @@ def test_units_have_their_size_in_si(unit, size):
     assert unit_size(unit) == pytest.approx(size, rel=1e-15)
 
 
-def test_an_unknown_unit_is_refused_with_what_there_is():
+def test_an_unknown_unit_is_rejected_with_the_known_ones():
     with pytest.raises(ValueError, match=r"^unknown unit 'furlong': use one of 1, s, ms"):
         unit_size('furlong')
