@@ -99,12 +99,15 @@ class GraphWatch:
         return [reason for name in silent_inputs for reason in self._retry(name)]
 
     def _retry(self, name: str) -> list[str]:
+        """Why an input is not heard; subscribe with best effort if its publisher offers nothing better."""
         topic, requested = self._inputs[name].topic_name, self._inputs[name].qos_profile
         reasons = []
         for publisher in self._find(topic):
             if offers_best_effort_only(publisher) and requested.reliability == ReliabilityPolicy.RELIABLE:
                 if is_named(publisher) or name in self._without_node_name:
-                    self._accept_best_effort(name, topic, full_name(publisher))
+                    self._best_effort[name] = who = full_name(publisher)
+                    self._node.get_logger().warning(f'{topic}: {who} offers best effort only: accepted')
+                    self._subscribe(name, qos.best_effort(qos.STREAM))
                 else:
                     self._without_node_name.add(name)  # the name may be known at the next call
                 break
@@ -112,11 +115,6 @@ class GraphWatch:
             if reason:
                 reasons.append(f'{topic}: {reason}')
         return reasons
-
-    def _accept_best_effort(self, name: str, topic: str, publisher: str) -> None:
-        self._best_effort[name] = publisher
-        self._node.get_logger().warning(f'{topic}: {publisher} offers best effort only: subscribing with best effort')
-        self._subscribe(name, qos.best_effort(qos.STREAM))
 
     def _find(self, topic: str) -> list[TopicEndpointInfo]:
         """Discovered publishers of a topic, in order of their names."""

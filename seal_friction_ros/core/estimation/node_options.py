@@ -29,7 +29,7 @@ class StartOptions:
         lower=0,
         upper=99,
         live=False,
-        description='SCHED_FIFO priority of the whole process, set at configuration; 0: none.',
+        description='SCHED_FIFO priority of the whole process from configuration on; 0: none.',
     )
 
     def __post_init__(self) -> None:
@@ -60,23 +60,13 @@ class RecordingOptions:
     record: bool = parameter(False, unit='', live=False, description='Start recording at activation.')
     record_directory: str = parameter('.', unit='', description='Parent folder of the bags.')
     record_name: str = parameter(
-        '',
-        unit='',
-        description='Name of the bag; an existing bag is never overwritten. Empty: friction_ and the start time.',
+        '', unit='', description='Name of the bag, never overwritten. Empty: friction_ and the start time.'
     )
     record_split_size: int = parameter(
-        0,
-        unit='bytes',
-        lower=0,
-        upper=10**15,
-        description='Largest size of one file of the bag; 0: no limit.',
+        0, unit='bytes', lower=0, upper=10**15, description='Largest size of one file of the bag; 0: no limit.'
     )
     record_split_duration: float = parameter(
-        0.0,
-        unit='s',
-        lower=0.0,
-        upper=1e9,
-        description='Longest duration of one file of the bag; 0: no limit.',
+        0.0, unit='s', lower=0.0, upper=1e9, description='Longest duration of one file of the bag; 0: no limit.'
     )
 
     def __post_init__(self) -> None:
