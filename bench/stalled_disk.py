@@ -69,7 +69,7 @@ def latencies(bag: Path, seconds: float, disk: StallingDisk) -> tuple[list[float
             for answer_type, answer_data in answers:
                 recorder.record(ANSWER_TOPICS[answer_type], answer_type, time.time_ns(), answer_data)
         found.append((time.perf_counter_ns() - due) * 1e-9)
-        recorder.now_is_a_good_time()
+        recorder.flush_if_idle()
     recorder.close()
     return found, recorder
 

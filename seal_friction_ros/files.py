@@ -1,6 +1,7 @@
-"""The door through which YAML comes in, for nodes and tools alike: seal files and parameter files."""
+"""Reads YAML for nodes and commands: seal files and ROS parameter files."""
 
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -9,43 +10,34 @@ import yaml
 from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.foundation.parameters import from_mapping, meanings, plain
+from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, ROS_PARAMETERS
+from seal_friction_ros.core.foundation.parameters import from_mapping, printable, similar_names
 from seal_friction_ros.core.friction.actuator import MountedSeal
 
-_CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # what PyYAML lets out for '!!int foo'
-_OF_THE_NODE = (
-    'autostart',
-    'record',
-    'record_directory',
-    'record_name',
-    'record_split_size',
-    'record_split_duration',
-    'use_sim_time',
-    'qos_overrides',
-)
+_CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # PyYAML raises these for '!!int foo'
 DEFAULT_FEEDFORWARD = FeedForwardSettings()
-_LARGEST_YAML = 1 << 16  # [bytes] a seal or parameter file has a few thousand
+_LARGEST_YAML = 1 << 16  # [bytes] seal and parameter files have a few thousand
 _DEEPEST_YAML = 40  # levels
-_LONGEST_SCALAR = 1 << 14  # characters without quotes: a number of base 60 takes the square of its length
+_LONGEST_SCALAR = 1 << 14  # characters without quotes: the time to parse a base-60 number grows with its length squared
 
 
-class _PlainLoader(yaml.CSafeLoader):
-    """Safe loader that takes no duplicate keys."""
+class _UniqueKeyLoader(yaml.CSafeLoader):
+    """Safe loader that rejects duplicate keys."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-        """Mapping of a node, unless a key stands in it twice."""
+        """Mapping of a node; raises YAMLError for a duplicate key."""
         keys = Counter(str(key.value) for key, _ in node.value)
-        doubled = sorted(key for key, count in keys.items() if count > 1)
-        if doubled:
-            raise yaml.YAMLError(f'{", ".join(doubled)} stands twice in one mapping')
+        duplicates = sorted(key for key, count in keys.items() if count > 1)
+        if duplicates:
+            raise yaml.YAMLError(f'{", ".join(duplicates)} stands twice in one mapping')
         return super().construct_mapping(node, deep)
 
 
-def _check_plain(text: str) -> None:
-    """Refuse what takes more memory or time to load than its length suggests.
+def _check_cost(text: str) -> None:
+    """Check that the memory and the time to load a text are proportional to its length.
 
     Raises:
-        yaml.YAMLError: The text has aliases (a few lines of them can unfold to gigabytes), or is too deep.
+        yaml.YAMLError: The text has aliases (a few lines can expand to gigabytes), too many levels, or a long scalar.
     """
     depth = 0
     for event in yaml.parse(text, Loader=yaml.CSafeLoader):
@@ -63,13 +55,13 @@ def read_yaml(path: Path, largest: int = _LARGEST_YAML) -> Any:
 
     Args:
         path: The file.
-        largest: Size beyond which it is refused [bytes].
+        largest: Largest size accepted [bytes].
 
     Raises:
-        ValueError: The file is missing, not readable, too large or not plain YAML; one line that names it.
+        ValueError: The file is missing, not readable, too large or not plain YAML; one line that names the file.
     """
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe or a device never ends
+        if path.exists() and not (path.is_file() or path.is_dir()):  # reading a pipe or a device may never end
             raise ValueError(f'{path}: not a file')
         with path.open('rb') as file:
             data = file.read(largest + 1)
@@ -79,30 +71,30 @@ def read_yaml(path: Path, largest: int = _LARGEST_YAML) -> Any:
 
 
 def parse_yaml(data: bytes, where: str, largest: int = _LARGEST_YAML) -> Any:
-    """Document in YAML, plain data only; ``where`` it is from is for the error message.
+    """Document in YAML, plain data only; ``where`` names its source in the error message.
 
     Raises:
-        ValueError: It is larger than ``largest`` bytes, or not plain YAML.
+        ValueError: The document is larger than ``largest`` bytes, or not plain YAML.
     """
     if len(data) > largest:
         raise ValueError(f'{where}: larger than {largest} bytes, not a file of this kind')
     try:
         text = data.decode('utf-8')
-        _check_plain(text)
-        return _PlainLoader(text).get_single_data()
+        _check_cost(text)
+        return _UniqueKeyLoader(text).get_single_data()
     except (yaml.YAMLError, RecursionError, *_CONSTRUCTOR_ERRORS) as error:
         raise ValueError(f'{where}: not plain YAML: {" ".join(str(error).split())}') from None
 
 
 def share_directory(package: str, module_file: str) -> Path:
-    """Folder that holds what a package installs besides code.
+    """Share folder of a package: ``share/<package>`` of an install prefix, or the source tree itself.
 
-    Looked for beside and above the code: ``share/<package>`` of an install prefix, or the source tree itself.
+    The search goes upward from the folder of ``module_file``.
 
     Raises:
-        FileNotFoundError: There is none.
+        FileNotFoundError: The search finds no share folder.
     """
-    paths = (Path(module_file), Path(module_file).resolve())  # a colcon --symlink-install has links into the source
+    paths = (Path(module_file), Path(module_file).resolve())  # colcon --symlink-install links into the source tree
     for parent in (parent for path in paths for parent in path.parents):
         for candidate in (parent / 'share' / package, parent):
             manifest = candidate / 'package.xml'
@@ -112,7 +104,11 @@ def share_directory(package: str, module_file: str) -> Path:
 
 
 def config_path(kind: str, name: str) -> Path:
-    """Path of a configuration file: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``."""
+    """Path of a configuration file: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``.
+
+    Raises:
+        ValueError: The path starts with an unknown user (``~user``).
+    """
     if '/' in name or name.endswith('.yaml'):
         try:
             return Path(name).expanduser()
@@ -127,7 +123,7 @@ def load_configuration(
     """Configuration with the seal files that ``selection`` names.
 
     Raises:
-        ValueError: A seal file cannot be read or makes no sense; one line that names file, field, value and bound.
+        ValueError: A seal file cannot be read or is invalid; one line that names file, field, value and bound.
     """
     paths = [config_path('seals', name) for name in selection.seals]
     configuration = Configuration(selection, tuple(read_yaml(path) for path in paths), settings, feedforward)
@@ -148,22 +144,18 @@ def load_seals(selection: SealSelection) -> tuple[MountedSeal, ...]:
 
 
 def default_configuration() -> Configuration:
-    """Configuration of a node that was told nothing."""
+    """Configuration of a node without parameter overrides."""
     return load_configuration(SealSelection(), EstimatorSettings())
 
 
-FEEDFORWARD_PREFIX = 'feedforward.'
-"""What the ROS parameters of the feed-forward begin with."""
-
-
 def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, FeedForwardSettings]:
-    """What the parts of a ROS parameter file that are for ``friction_estimator`` or every node say.
+    """Seals, estimator and feed-forward from a ROS parameter file of ``friction_estimator``.
 
-    A file with one node only is for that node, whatever its name. Parameters of the node that are not the estimator's
-    (recording, QoS) are passed over.
+    The sections ``friction_estimator``, ``*`` and ``**`` of any namespace count, and the only section of a file
+    whatever its name. Later sections override earlier ones. All parameters of the node are checked.
 
     Raises:
-        ValueError: The file is no parameter file, or a value makes no sense.
+        ValueError: The file is not a parameter file, the node has no such parameter, or a value is invalid.
     """
     document = read_yaml(path)
     values: dict[str, Any] = {}
@@ -173,27 +165,41 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, F
                 values.update(_flat(content['ros__parameters']))
     except (AttributeError, KeyError, TypeError):
         raise ValueError(f'{path}: not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)') from None
-    chosen: dict[type, dict[str, Any]] = {SealSelection: {}, EstimatorSettings: {}, FeedForwardSettings: {}}
-    known: dict[str, tuple[type, str]] = {
-        name: (record, name) for record in (SealSelection, EstimatorSettings) for name in meanings(record)
-    }
-    known |= {FEEDFORWARD_PREFIX + name: (FeedForwardSettings, name) for name in meanings(FeedForwardSettings)}
-    unknown = sorted(name for name in values if name not in known and name.split('.')[0] not in _OF_THE_NODE)
+    groups = FRICTION_ESTIMATOR_PARAMETERS
+    known = {name for group in groups for name in group.names()}
+    unknown = [name for name in values if name not in known and name.split('.')[0] not in ROS_PARAMETERS]
     if unknown:
-        raise ValueError(f'{path}: friction_estimator has no parameter {", ".join(map(plain, unknown))}')
-    for name, value in values.items():
-        if name in known:
-            record, field = known[name]
-            chosen[record][field] = value
-    return (
-        from_mapping(SealSelection, chosen[SealSelection], str(path)),
-        from_mapping(EstimatorSettings, chosen[EstimatorSettings], str(path)),
-        from_mapping(FeedForwardSettings, chosen[FeedForwardSettings], str(path)),
+        raise ValueError(f'{path}: {unknown_parameters("friction_estimator", unknown)}')
+    made: dict[type, Any] = {}
+    for group in groups:
+        given = {field: values[name] for name, field in group.names().items() if name in values}
+        made[group.record_type] = from_mapping(group.record_type, given, str(path))
+    return made[SealSelection], made[EstimatorSettings], made[FeedForwardSettings]
+
+
+def unknown_parameters(node: str, names: Iterable[str]) -> str:
+    """One line that says which parameters a node lacks, with the node that has them or the most similar name.
+
+    Args:
+        node: ``friction_estimator`` or ``servo_simulator``.
+        names: Parameters that the node does not have.
+    """
+    from seal_friction_ros.core.servo.simulator_options import (  # noqa: PLC0415  loads scipy, which the node does not
+        SERVO_SIMULATOR_PARAMETERS,
     )
+
+    tables = {'friction_estimator': FRICTION_ESTIMATOR_PARAMETERS, 'servo_simulator': SERVO_SIMULATOR_PARAMETERS}
+    owners = {name: other for other, groups in tables.items() for group in groups for name in group.names()}
+    names = sorted(names)
+    similar = similar_names(names, [name for group in tables[node] for name in group.names()])
+    hints = {name: f' (did you mean {other}?)' for name, other in similar.items()}
+    hints |= {name: f' (a parameter of {owners[name]})' for name in names if name in owners}
+    texts = [printable(name) + hints.get(name, '') for name in names]
+    return f'{node} has no parameter {", ".join(texts)}'
 
 
 def _flat(values: Any, above: str = '') -> dict[str, Any]:
-    """Parameters with the dotted names that ROS gives to nested ones."""
+    """Nested parameters with their dotted ROS names."""
     flat: dict[str, Any] = {}
     for name, value in values.items():
         flat |= _flat(value, f'{above}{name}.') if isinstance(value, dict) else {f'{above}{name}': value}

@@ -15,7 +15,7 @@ NOT_PHYSICS = {
     'shutil', 'socket', 'subprocess', 'sys', 'tempfile', 'threading', 'time', 'uuid', 'yaml',
 }  # fmt: skip
 THIRD_PARTY_OF_CORE = {'numpy', 'scipy', 'numba'}
-SHARED_WITH_NODES = {f'{PACKAGE}.offline.recorder', f'{PACKAGE}.offline.bag'}
+SHARED_WITH_NODES = {f'{PACKAGE}.offline.bags.recorder', f'{PACKAGE}.offline.bags.bag'}
 
 
 def imported(source: str) -> set[str]:

@@ -8,9 +8,7 @@ import re
 import sys
 from pathlib import Path
 
-from seal_friction_ros.core.estimation.configuration import SealSelection
-from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
@@ -33,13 +31,8 @@ from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
 from seal_friction_ros.core.oring_contact.case_file import Measured
 from seal_friction_ros.core.oring_contact.material import Rubber
-from seal_friction_ros.core.servo.controller import ServoController
-from seal_friction_ros.core.servo.motions import Chirp, PullTest, Sine, Step, Trapezoid
-from seal_friction_ros.core.servo.plant import Cylinder, Load, ServoValve
-from seal_friction_ros.core.servo.sensors import SensorSettings
+from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
 from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
-from seal_friction_ros.nodes.parameters import InputOptions, RecordingOptions, StartOptions
-from seal_friction_ros.nodes.servo_simulator import SimulatorSettings
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'bench'))
 from fault_rows import SIGNAL_ROWS, Row
@@ -47,25 +40,9 @@ from faults import REQUIRED, TRIALS
 
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
-    SealSelection,
-    EstimatorSettings,
-    FeedForwardSettings,
+    *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
     TuningSettings,
     MatchSettings,
-    StartOptions,
-    SimulatorSettings,
-    SensorSettings,
-    ServoValve,
-    Cylinder,
-    Load,
-    ServoController,
-    Sine,
-    Step,
-    Trapezoid,
-    Chirp,
-    PullTest,
-    InputOptions,
-    RecordingOptions,
     SealGeometry,
     AreaDeformationGain,
     NormalForceTable,

@@ -1,7 +1,6 @@
-"""Plays the inputs of a bag onto the graph: at the bag's pace, faster, or as fast as the estimator answers.
+"""Plays the inputs of a bag: at the pace of the bag, faster, or as fast as the estimator answers.
 
-``ros2 bag play`` does this too where it is installed; this one also runs from wheels, never overtakes the estimator,
-and waits until it is there.
+In contrast to ``ros2 bag play`` it runs from wheels, waits for the estimator and never overtakes it.
 """
 
 import argparse
@@ -19,20 +18,20 @@ from seal_friction_msgs.msg import FrictionEstimate
 from seal_friction_ros.core.estimation.messages import INPUTS, VELOCITY_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
-from seal_friction_ros.nodes.live_statistics import latency_values
+from seal_friction_ros.nodes.estimator_diagnostics import latency_values
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, read_messages
 
-_UNANSWERED = 20  # [samples] so many velocities may be under way: well below the depth of the queues
-_PATIENCE = 5.0  # [s] to wait for the answer to a sample before giving up
+_MOST_UNANSWERED = 20  # [samples] velocity samples sent ahead of their estimates, well below the depth of the queues
+_ANSWER_TIMEOUT = 5.0  # [s]
 
 
 class BagPlayer(Node):
-    """Publishes messages as they are in a bag and watches the estimates that answer them."""
+    """Publishes messages of a bag unchanged, and measures the time until each estimate arrives."""
 
     def __init__(self) -> None:
         super().__init__('bag_player')
-        self._publishers_of = {
+        self._input_publishers = {
             type_name: self.create_publisher(message_class(type_name), topic, qos.STREAM)
             for topic, type_name in INPUTS.items()
         }
@@ -55,48 +54,48 @@ class BagPlayer(Node):
 
     @property
     def answered(self) -> int:
-        """Velocity samples that an estimate has come for; they come in order."""
+        """Number of velocity samples with an estimate; estimates arrive in order."""
         return len(self.round_trips)
 
     def publish(self, message: BagMessage) -> None:
         """Publish one message, byte for byte."""
         if message.type_name == VELOCITY_TYPE:
             self.sent.append(time.perf_counter_ns())
-        self._publishers_of[message.type_name].publish(message.data)
+        self._input_publishers[message.type_name].publish(message.data)
 
     def wait_for_estimator(self, timeout: float) -> bool:
-        """Wait at most ``timeout`` [s] until the estimator is connected to each of our topics, and says so.
+        """Wait at most ``timeout`` [s] until the estimator reports a publisher on each input.
 
-        That we see its subscription is not enough: while it does not yet see our publisher, the messages of one topic
-        come later than those of another, and the estimates are not those of the bag.
+        A discovered subscription is not sufficient: until the estimator has discovered every publisher, messages of
+        different topics can arrive in another order than in the bag.
         """
         deadline = time.monotonic() + timeout
         while time.monotonic() < deadline:
-            subscribed = all(p.get_subscription_count() for p in self._publishers_of.values())
+            subscribed = all(p.get_subscription_count() for p in self._input_publishers.values())
             if subscribed and self._connected:
                 return True
             rclpy.spin_once(self, timeout_sec=0.02)
         return False
 
     def wait_for_answers(self, wanted: int) -> bool:
-        """Wait until ``wanted`` estimates have come; False if none comes for a while."""
+        """Wait for ``wanted`` estimates; False if no further one arrives within the answer timeout."""
         before, since = self.answered, time.monotonic()
         while self.answered < wanted:
             rclpy.spin_once(self, timeout_sec=0.1)
             if self.answered != before:
                 before, since = self.answered, time.monotonic()
-            elif time.monotonic() - since > _PATIENCE:
+            elif time.monotonic() - since > _ANSWER_TIMEOUT:
                 return False
         return True
 
 
 def play(player: BagPlayer, bag: Path, rate: float) -> dict[str, str]:
-    """Play a bag; return the number of velocity samples, all answered, and the round trip from each to its estimate.
+    """Play a bag; return the number of velocity samples and the round-trip time from sample to estimate.
 
     Args:
-        player: The node.
-        bag: The bag.
-        rate: Times the bag's own pace; 0 for as fast as the estimator answers.
+        player: Node that publishes.
+        bag: Folder of the bag.
+        rate: Multiple of the pace of the bag; 0: as fast as the estimator answers.
 
     Raises:
         BagError: The bag cannot be read, or the estimator stopped answering.
@@ -112,7 +111,7 @@ def play(player: BagPlayer, bag: Path, rate: float) -> dict[str, str]:
         while (wait := due - time.monotonic()) > 0.0:
             rclpy.spin_once(player, timeout_sec=wait)
         player.publish(message)
-        _await(player, bag, _UNANSWERED)
+        _await(player, bag, _MOST_UNANSWERED)
     _await(player, bag, 0)
     return {'velocity samples': str(len(player.sent)), **latency_values(player.round_trips, 'round trip')}
 
@@ -123,14 +122,14 @@ def _await(player: BagPlayer, bag: Path, unanswered: int) -> None:
 
 
 def main() -> int:
-    """Run ``bag_player BAG [--rate R] [--wait S]``; figures of the run as JSON on stdout."""
+    """Run ``bag_player BAG [--rate R] [--wait S]``; prints the result of `play` as JSON."""
     parser = argparse.ArgumentParser(prog='bag_player', description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('bag', type=Path, help='bag to play; only the inputs of the estimator are')
-    parser.add_argument('--rate', type=float, default=1.0, help='times the pace of the bag; 0: as fast as answered')
-    parser.add_argument('--wait', type=float, default=10.0, help='how long to wait for an estimator [s]')
+    parser.add_argument('bag', type=Path, help='bag; only the inputs of the estimator are played')
+    parser.add_argument('--rate', type=float, default=1.0, help='multiple of the pace; 0: as fast as answered')
+    parser.add_argument('--wait', type=float, default=10.0, help='longest wait for an estimator [s]')
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
     if not 0.0 <= arguments.rate < float('inf'):
-        parser.error(f'--rate {arguments.rate}: not a rate')
+        parser.error(f'--rate {arguments.rate}: must be finite and not negative')
     set_up_discovery()
     rclpy.init()
     player = BagPlayer()

@@ -1,18 +1,19 @@
-"""How the middleware is set up where no ROS distribution has done that: config/fastdds.xml, and this machine only."""
+"""Middleware settings for ROS 2 from wheels: ``config/fastdds.xml``, and discovery on this machine only."""
 
 import os
 
 from seal_friction_ros.files import share_directory
 
 PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
-"""Variables of the environment that name a file of profiles for Fast DDS."""
+"""Environment variables that name a profile file of Fast DDS."""
 
 
 def set_up_discovery() -> None:
-    """Look for nodes on this machine only, and find them at once, unless the environment says otherwise.
+    """Restrict discovery to this machine and speed it up, unless the environment has other settings.
 
-    The Fast DDS of the wheels has no security plugins, so whoever is found can command. A distribution is left as its
-    user set it up. To be called before the first context is initialised; processes started later inherit it.
+    The Fast DDS of the wheels has no security plugins, so every discovered node could send commands. The settings of a
+    ROS distribution are not changed. Call this function before the first context is initialised; child processes
+    inherit the settings.
     """
     if 'ROS_DISTRO' in os.environ:
         return

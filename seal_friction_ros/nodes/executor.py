@@ -1,4 +1,4 @@
-"""How the nodes of this package are spun and how they stop."""
+"""Runs a node: start, spin, and orderly stop on SIGINT and SIGTERM."""
 
 import gc
 import signal
@@ -23,16 +23,16 @@ except ImportError:  # ROS 2 Jazzy
     EventsExecutor = None
 
 AnyNode = TypeVar('AnyNode', bound=Node)
-_LONG = 86400.0  # [s] a wait without end overflows the clock of the events executor and dispatches nothing
+_LONG_WAIT = 86400.0  # [s] an infinite wait overflows the clock of the events executor, which then dispatches nothing
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def spin(node: Node, stopped: Future, context: Context | None = None) -> None:
-    """Spin until ``stopped`` is done, by the events executor where there is one: a third of the processor time."""
+    """Spin until ``stopped`` is done; the events executor, if available, takes a third of the processor time."""
     executor = (EventsExecutor or SingleThreadedExecutor)(context=context)
     executor.add_node(node)
     while rclpy.ok(context=context) and not stopped.done():
-        executor.spin_until_future_complete(stopped, timeout_sec=_LONG)
+        executor.spin_until_future_complete(stopped, timeout_sec=_LONG_WAIT)
 
 
 def run(
@@ -41,38 +41,38 @@ def run(
     stop: Callable[[AnyNode], None],
     args: list[str] | None = None,
 ) -> int:
-    """Make a node, start it, spin it, and on SIGINT or SIGTERM stop it in order, between two callbacks.
+    """Create, start and spin a node; on SIGINT or SIGTERM stop it between two callbacks.
 
     Args:
-        make_node: Makes the node; a ValueError it raises ends the process with one line.
-        start: Called with the node before spinning; False for a node that could not start, and has said why.
-        stop: Called with the node at the end, whatever happened.
+        make_node: Creates the node; its ValueError ends the process with one line.
+        start: Called with the node before spinning; False if the node could not start and logged the reason.
+        stop: Called with the node at the end, also after an error.
         args: Command line with ``--ros-args``.
 
     Returns:
         Exit code: 0, or 2 for a node that could not start.
     """
-    # A thread waits for the signals. ROS's own handler would take the graph away from under a callback that publishes;
-    # Python's own would wait for the executor to come back from C++.
-    said, heard = socket.socketpair()
-    said.setblocking(False)
-    signal.set_wakeup_fd(said.fileno())
+    # A thread waits for the signals. The handler of ROS would shut the context down during a callback that publishes;
+    # the handler of Python would wait until the executor returns from C++.
+    sender, receiver = socket.socketpair()
+    sender.setblocking(False)
+    signal.set_wakeup_fd(sender.fileno())
     for number in _SIGNALS:
         signal.signal(number, lambda *_: None)
     try:
         set_up_discovery()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
-    except (ValueError, RuntimeError) as error:  # RCLError, of a parameter file for example, is a RuntimeError
+    except (ValueError, RuntimeError) as error:  # RCLError (of a parameter file, for example) is a RuntimeError
         print(f'not started: {" ".join(str(error).split())}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
     stopped = Future()
-    threading.Thread(target=_await_signal, args=(heard, stopped), daemon=True).start()
+    threading.Thread(target=_await_signal, args=(receiver, stopped), daemon=True).start()
     try:
         if not start(node):
             return 2
-        gc.freeze()  # what lives until the end is not looked through again: with numba 60 ms each time
+        gc.freeze()  # the collector skips permanent objects; with numba they would cost 60 ms each time
         spin(node, stopped)
     except ExternalShutdownException:
         pass
@@ -83,6 +83,6 @@ def run(
     return 0
 
 
-def _await_signal(heard: socket.socket, stopped: Future) -> None:
-    heard.recv(1)
+def _await_signal(receiver: socket.socket, stopped: Future) -> None:
+    receiver.recv(1)
     stopped.set_result(None)

@@ -1,4 +1,4 @@
-"""The live estimate: pressure, velocity, force sum and reference in, friction and feed-forward out, all recorded."""
+"""Live node: estimates friction and feed-forward from pressure, velocity, force sum and reference, and records all."""
 
 import sys
 import time
@@ -6,9 +6,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, Snapshot, snapshot_text
@@ -25,70 +25,59 @@ from seal_friction_ros.core.estimation.messages import (
     encode_text,
     type_of,
 )
-from seal_friction_ros.core.estimation.pipeline import init, receive
-from seal_friction_ros.files import FEEDFORWARD_PREFIX, load_configuration
-from seal_friction_ros.nodes import qos
-from seal_friction_ros.nodes.executor import run
-from seal_friction_ros.nodes.live_statistics import LiveStatistics
-from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
-from seal_friction_ros.nodes.parameters import Group, InputOptions, RecordingOptions
-from seal_friction_ros.nodes.publishers import (
-    full_name,
-    incompatibility,
-    is_named,
-    offers_best_effort_only,
-    publishers,
-    why_unheard,
+from seal_friction_ros.core.estimation.node_options import (
+    FRICTION_ESTIMATOR_PARAMETERS,
+    InputOptions,
+    RecordingOptions,
 )
+from seal_friction_ros.core.estimation.pipeline import init, receive
+from seal_friction_ros.files import load_configuration
+from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
+from seal_friction_ros.nodes.executor import run
+from seal_friction_ros.nodes.graph_watch import GraphWatch
+from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 
-SWITCH_INTERVAL = 5e-5  # [s] the recorder keeps a sample waiting no longer than this; Python's own choice is 5 ms
+SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
 
 
 class FrictionEstimator(ManagedNode):
-    """Lifecycle node around ``core.pipeline``.
+    """Lifecycle node around `core.estimation.pipeline`.
 
     Raises:
-        ValueError: A parameter is of the wrong type or out of bounds.
+        ValueError: A parameter has the wrong type or is out of bounds.
     """
 
-    GROUPS = (
-        Group(SealSelection),
-        Group(EstimatorSettings),
-        Group(FeedForwardSettings, FEEDFORWARD_PREFIX),
-        Group(InputOptions),
-        Group(RecordingOptions),
-    )
-
     def __init__(self, **kwargs: Any) -> None:
-        self._said: dict[str, str] = {}
-        self._deaf_to: set[str] = set()
-        self._unnamed: set[str] = set()
-        self._best_effort: dict[str, str] = {}
+        self._logged_errors: dict[str, str] = {}
         self._recording = Recording()
         self._configuration: Configuration | None = None
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._topics: dict[str, str] = {}
         self._sent: list[tuple[str, Output, bytes]] = []
-        super().__init__('friction_estimator', self.GROUPS, **kwargs)
+        super().__init__('friction_estimator', FRICTION_ESTIMATOR_PARAMETERS, **kwargs)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
 
     # --- lifecycle ---
 
     def make(self) -> None:
-        """Read the seal files; make publishers and subscriptions."""
+        """Read the seal files; create publishers and subscriptions."""
         settings = self.settings(EstimatorSettings), self.settings(FeedForwardSettings)
         configuration = load_configuration(self.settings(SealSelection), *settings)
-        self._statistics = LiveStatistics()
+        self._statistics = EstimatorDiagnostics()
+        self._watch = GraphWatch(self, self._inputs, self._outputs, self._subscribe)
         for topic, type_name in OUTPUTS.items():
             self._outputs[type_name] = self.create_lifecycle_publisher(
                 message_class(type_name),
                 topic,
                 qos.STREAM,
                 qos_overriding_options=qos.overridable(),
-                event_callbacks=PublisherEventCallbacks(incompatible_qos=partial(self._on_deaf, type_name)),
+                event_callbacks=PublisherEventCallbacks(
+                    incompatible_qos=partial(self._watch.on_incompatible_subscriber, type_name)
+                ),
             )
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
@@ -99,23 +88,21 @@ class FrictionEstimator(ManagedNode):
         self._configuration = configuration
 
     def release(self) -> None:
-        """Give publishers and subscriptions back."""
+        """Destroy publishers and subscriptions."""
         for subscription in self._inputs.values():
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
         self._inputs.clear()
         self._outputs.clear()
-        for noted in (self._deaf_to, self._unnamed, self._best_effort):
-            noted.clear()
         self._configuration = None
 
     def start(self) -> None:
-        """Start estimating, from a state in which nothing is known, and recording if asked to."""
+        """Start to estimate from the initial state, and to record if ``record`` is set."""
         self._known = self._configuration.parameters()
-        self._state = init(self._known)._replace(refused=self._is_refused(self._crowd()))
-        self._statistics = LiveStatistics()
-        self._said.clear()
+        self._state = init(self._known)._replace(refused=self._is_refused(self._watch.duplicate_publishers()))
+        self._statistics = EstimatorDiagnostics()
+        self._logged_errors.clear()
         self._now = self._ros_time if self.get_parameter('use_sim_time').value else time.time_ns
         if self.settings(RecordingOptions).record:
             self._start_recording()
@@ -145,20 +132,6 @@ class FrictionEstimator(ManagedNode):
             event_callbacks=SubscriptionEventCallbacks(matched=self.on_matched),
         )
         self._topics[name] = self._inputs[name].topic_name
-
-    def _on_deaf(self, type_name: str, _: Any) -> None:
-        self._deaf_to.add(type_name)  # the name of the node comes later, see diagnostics
-
-    def _who_is_deaf(self) -> list[str]:
-        """Nodes that want more than a publisher offers, so hear nothing, in words."""
-        deaf = []
-        for type_name in sorted(self._deaf_to):
-            topic, offered = self._topics[type_name], self._outputs[type_name].qos_profile
-            for subscriber in self.get_subscriptions_info_by_topic(topic):
-                reason = incompatibility(offered, subscriber.qos_profile)
-                if reason:
-                    deaf.append(f'{topic}: {full_name(subscriber)} wants incompatible quality of service ({reason})')
-        return deaf
 
     def _ros_time(self) -> int:
         return self.get_clock().now().nanoseconds
@@ -191,7 +164,7 @@ class FrictionEstimator(ManagedNode):
             else:
                 self._statistics.on_feedforward(answer)
         if name == 'rod_velocity':
-            self._recording.now_is_a_good_time()
+            self._recording.flush_if_idle()
 
     def _send(self, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once; the rest waits until all answers are out."""
@@ -206,8 +179,8 @@ class FrictionEstimator(ManagedNode):
     # --- parameters ---
 
     def on_change(self) -> None:
-        """Take changed settings over, between two samples."""
-        self._look_at_publishers()
+        """Apply changed settings, between two samples."""
+        self._refuse_inputs(self._watch.duplicate_publishers())
         settings, feedforward = self.settings(EstimatorSettings), self.settings(FeedForwardSettings)
         changed = replace(self._configuration, settings=settings, feedforward=feedforward)
         if changed == self._configuration:
@@ -224,7 +197,7 @@ class FrictionEstimator(ManagedNode):
     # --- recording ---
 
     def _start_recording(self) -> tuple[bool, str]:
-        """Start a bag, which begins with a snapshot; whether that went well, and where the bag is or why not."""
+        """Start a bag, which begins with a snapshot; success, and the folder of the bag or the error."""
         try:
             path = self._recording.start(self.settings(RecordingOptions))
         except ValueError as error:
@@ -253,85 +226,35 @@ class FrictionEstimator(ManagedNode):
     # --- diagnostics ---
 
     def diagnostics(self) -> dict[str, DiagnosticStatus]:
-        """What comes in and goes out, and the recorder."""
-        crowd = self._look_at_publishers()
-        counts = {name: self._publisher_count(name) for name in INPUTS}
+        """Status of the estimate, of its inputs and outputs, and of the recorder."""
+        graph = self._watch.findings(self._statistics.silent_inputs, retry=self.active)
+        self._refuse_inputs(graph.duplicates)
+        estimate = self._statistics.report(self.active, self.active and self._state.refused, graph)
         recorder = self._recording.report()
-        unheard = (self._listen_to_the_silent() if self.active else []) + self._who_is_deaf()
-        estimate = self._statistics.report(self.active, counts)
-        if self.active and self._state.refused:
-            estimate.level = DiagnosticStatus.ERROR
-        elif (crowd or unheard) and estimate.level == DiagnosticStatus.OK:
-            estimate.level = DiagnosticStatus.WARN
-        estimate.values += [
-            KeyValue(key=f'{name} best effort only, from', value=who) for name, who in self._best_effort.items()
-        ]
-        estimate.message = '; '.join([*crowd, *unheard, estimate.message])
-        self._say_once('publishers', '; '.join(crowd))
-        self._say_once('unheard', '; '.join(unheard))
-        self._say_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
+        self._log_error_once('publishers', '; '.join(graph.duplicates))
+        self._log_error_once('unheard', '; '.join(graph.unheard))
+        self._log_error_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
         return {'estimate': estimate, 'recorder': recorder}
 
     def end_interval(self) -> None:
-        """Count anew what is told of the last second."""
+        """Start a new interval of rates and latencies."""
         self._statistics.start_interval()
 
-    def _say_once(self, what: str, words: str) -> None:
-        """Log an error when it comes up or changes, not each second."""
-        if words and words != self._said.get(what):
-            self.get_logger().error(words)
-        self._said[what] = words
+    def _log_error_once(self, subject: str, error: str) -> None:
+        """Log an error when it appears or changes, not every second."""
+        if error and error != self._logged_errors.get(subject):
+            self.get_logger().error(error)
+        self._logged_errors[subject] = error
 
-    def _publisher_count(self, name: str) -> int:
-        # Connected publishers; ROS 2 Jazzy only knows the discovered ones.
-        count = getattr(self._inputs[name], 'get_publisher_count', None)
-        return int(count()) if count is not None else self.count_publishers(self._topics[name])
+    def _is_refused(self, duplicates: list[str]) -> bool:
+        return bool(duplicates) and self.settings(InputOptions).refuse_second_publisher
 
-    def _crowd(self) -> list[str]:
-        """Topics with several publishers, in words."""
-        crowded = [self._topics[name] for name in INPUTS if self._publisher_count(name) > 1]
-        answers = [self._topics[type_name] for type_name in OUTPUTS.values()]  # of a second estimator
-        crowded += [topic for topic in answers if self.count_publishers(topic) > 1]
-        crowd = []
-        for topic in crowded:
-            names = ', '.join(full_name(publisher) for publisher in publishers(self, topic))
-            crowd.append(f'{topic} has several publishers: {names}')
-        return crowd
-
-    def _is_refused(self, crowd: list[str]) -> bool:
-        return bool(crowd) and self.settings(InputOptions).refuse_second_publisher
-
-    def _look_at_publishers(self) -> list[str]:
-        """Topics with several publishers, in words; refuse the inputs if the parameter says so."""
-        crowd = self._crowd()
-        refused = self._is_refused(crowd)
+    def _refuse_inputs(self, duplicates: list[str]) -> None:
+        """Reject the inputs while ``refuse_second_publisher`` is set and topics have several publishers."""
+        refused = self._is_refused(duplicates)
         if self.active and refused != self._state.refused:
             self._state = self._state._replace(refused=refused)
-            self._publish_configuration()  # so that a replay refuses from here on, too
-        return crowd
-
-    def _listen_to_the_silent(self) -> list[str]:
-        """Subscribe anew where a publisher offers only best effort, or no longer; why others cannot be heard."""
-        unheard = []
-        for name in list(self._best_effort):
-            if not any(map(offers_best_effort_only, publishers(self, self._topics[name]))):
-                del self._best_effort[name]
-                self._subscribe(name, qos.STREAM)
-        for name in self._statistics.silent_inputs:
-            topic, wanted = self._topics[name], self._inputs[name].qos_profile
-            for publisher in publishers(self, topic):
-                if offers_best_effort_only(publisher) and wanted.reliability == ReliabilityPolicy.RELIABLE:
-                    if not is_named(publisher) and name not in self._unnamed:
-                        self._unnamed.add(name)  # it may have a name by the next time
-                        break
-                    self._best_effort[name] = who = full_name(publisher)
-                    self.get_logger().warning(f'{topic}: {who} offers best effort only: taken as such')
-                    self._subscribe(name, qos.best_effort(qos.STREAM))
-                    break
-                reason = why_unheard(publisher, INPUTS[name], wanted)
-                if reason:
-                    unheard.append(f'{topic}: {reason}')
-        return unheard
+            self._publish_configuration()  # a replay rejects the inputs from the same message on
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""What the nodes of this package have in common: lifecycle, parameters from dataclasses, diagnostics once a second."""
+"""Base class of the nodes: lifecycle, parameters from dataclasses, diagnostics once a second."""
 
 from typing import Any, TypeVar
 
@@ -10,7 +10,10 @@ from rclpy.exceptions import ParameterException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
-from seal_friction_ros.nodes.parameters import Group, StartOptions, declare, read
+from seal_friction_ros.core.estimation.node_options import StartOptions
+from seal_friction_ros.core.foundation.parameters import ParameterGroup
+from seal_friction_ros.files import unknown_parameters
+from seal_friction_ros.nodes.parameters import declare, read
 from seal_friction_ros.nodes.realtime import take_realtime_priority
 
 Record = TypeVar('Record')
@@ -19,83 +22,95 @@ _DIAGNOSTICS_PERIOD = 1.0  # [s]
 
 
 def message_class(type_name: str) -> Any:
-    """Class of a message of this project, for rclpy, from its full name."""
+    """Python class of a message of this project, from its full type name."""
     return getattr(seal_friction_msgs.msg, type_name.rpartition('/')[2])
 
 
 class ManagedNode(LifecycleNode):
-    """Lifecycle node that configures and activates itself unless told not to, and refuses parameters without sense.
+    """Lifecycle node that configures and activates automatically (``autostart``) and rejects invalid parameters.
 
-    A node of its own overrides `make`, `release`, `start`, `finish`, `diagnostics` and, if it likes, `check_change` and
-    `on_change`.
+    A subclass overrides `make`, `release`, `start`, `finish`, `diagnostics` and optionally `check_change`, `on_change`
+    and `end_interval`.
+
+    Args:
+        name: Default name of the node, also its name in `unknown_parameters`.
+        groups: Parameters of the node, `StartOptions` among them.
+        kwargs: Arguments of `rclpy.lifecycle.LifecycleNode`.
 
     Raises:
-        ValueError: A parameter is of the wrong type or out of bounds.
+        ValueError: A parameter has the wrong type or is out of bounds.
     """
 
-    def __init__(self, name: str, groups: tuple[Group, ...], **kwargs: Any) -> None:
+    def __init__(self, name: str, groups: tuple[ParameterGroup, ...], **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
         self.active = False
         self.configured = False
-        self._groups = {group.record_type: group for group in (Group(StartOptions), *groups)}
+        self._groups = {group.record_type: group for group in groups}
         self._diagnostics_timer: Any = None
         self._diagnostics_publisher: Any = None
         try:
-            for group in self._groups.values():
+            for group in groups:
                 declare(self, group)
         except ParameterException as error:
             raise ValueError(str(error)) from None
-        # rclpy passes over what nobody declares, so a misspelt name would leave its default without a word.
+        # rclpy ignores overrides of undeclared parameters silently.
         given = getattr(self, '_parameter_overrides', {})
-        unknown = sorted(n for n in given if not n.startswith('qos_overrides') and not self.has_parameter(n))
+        unknown = [n for n in given if not n.startswith('qos_overrides') and not self.has_parameter(n)]
         if unknown:
-            self.get_logger().warning(f'no such parameter: {", ".join(unknown)}')
+            self.get_logger().warning(f'ignored: {unknown_parameters(name, unknown)}')
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.add_post_set_parameters_callback(self._on_parameters_set)
 
-    # --- what a node of its own does ---
+    # --- overridden by subclasses ---
 
     def make(self) -> None:
-        """Make what the node needs while it is configured.
+        """Create everything that the node needs while it is configured.
 
         Raises:
-            Exception: It cannot be made: said in the log, and the node stays unconfigured.
+            Exception: The creation failed: the node logs the error and stays unconfigured.
         """
 
     def release(self) -> None:
-        """Give back whatever `make` made, also after it failed half-way."""
+        """Destroy everything that `make` created, also after `make` failed half-way."""
 
     def start(self) -> None:
-        """Begin to work: called while the node gets active."""
+        """Start work; called during activation."""
 
     def finish(self) -> None:
-        """End work: called before the node gets inactive, and at its end whatever happened."""
+        """Stop work; called before deactivation and at the end of the process."""
 
     def diagnostics(self) -> dict[str, DiagnosticStatus]:
-        """State of each part of the node, by the name of the part."""
+        """Status of each part of the node, by the name of the part."""
         return {}
 
     def end_interval(self) -> None:
-        """Begin a new interval of what is counted between two diagnostics; called once a second."""
+        """Start a new counting interval; called once a second after the diagnostics."""
 
     def check_change(self, changed: dict[type, Any]) -> None:
-        """Refuse, by a ValueError, a change of parameters that makes no sense with the others."""
+        """Reject changed records that contradict other parameters.
+
+        Args:
+            changed: Record of each group with a changed parameter, by its type.
+
+        Raises:
+            ValueError: The change is invalid.
+        """
 
     def on_change(self) -> None:
-        """Take changed parameters over; called while the node is configured."""
+        """Apply changed parameters; called while the node is configured."""
 
     # --- parameters ---
 
     def settings(self, record_type: type[Record], **changed: Any) -> Record:
-        """The dataclass made from the parameters as they are, with ``changed`` in place of those it names.
+        """The dataclass made from the present parameters; ``changed`` overrides fields.
 
         Raises:
-            ValueError: The values make no sense.
+            ValueError: A value is invalid.
         """
         return read(self, record_type, self._groups[record_type].prefix, **changed)
 
     def _on_set_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Accept or refuse a set of changes as a whole."""
+        """Accept or reject a set of changes as a whole."""
         values = {p.name: p.value for p in parameters}
         made: dict[type, Any] = {}
         for record_type, group in self._groups.items():
@@ -124,22 +139,22 @@ class ManagedNode(LifecycleNode):
     # --- lifecycle ---
 
     def autostart(self) -> bool:
-        """Configure and activate, if the parameters say so; False if that failed, which is logged."""
+        """Configure and activate if ``autostart`` is set; False if a transition failed, with the error logged."""
         if not self.settings(StartOptions).autostart:
             return True
         success = TransitionCallbackReturn.SUCCESS
         return self.trigger_configure() == success and self.trigger_activate() == success
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Make what the node needs."""
+        """Create everything that the node needs."""
         try:
             self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
             self.make()
             take_realtime_priority(self.settings(StartOptions).realtime_priority)
-            # By steady time diagnostics go on while simulated time stands still.
+            # Steady time: diagnostics continue while simulated time stands still.
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._diagnostics_timer = self.create_timer(_DIAGNOSTICS_PERIOD, self._on_timer, clock=steady)
-        except Exception as error:  # noqa: BLE001  rclpy swallows what a transition raises, so it is said here
+        except Exception as error:  # noqa: BLE001  rclpy swallows exceptions of transitions
             self.get_logger().error(str(error))
             self._release()
             return TransitionCallbackReturn.FAILURE
@@ -147,28 +162,28 @@ class ManagedNode(LifecycleNode):
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to work."""
+        """Start work."""
         result = super().on_activate(state)
         try:
             self.start()
-        except Exception as error:  # noqa: BLE001  as above
+        except Exception as error:  # noqa: BLE001  see above
             self.get_logger().error(f'not activated: {error!r}')
             return TransitionCallbackReturn.FAILURE
         self.active = True
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """End work."""
+        """Stop work."""
         self.finish()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give back what was made."""
+        """Destroy everything that was created."""
         self._release()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """End work and give everything back."""
+        """Stop work and destroy everything that was created."""
         self.finish()
         self._release()
         return super().on_shutdown(state)
@@ -183,7 +198,7 @@ class ManagedNode(LifecycleNode):
         self.release()
 
     def on_matched(self, _: Any) -> None:
-        """Say at once, in diagnostics, that a publisher came or went."""
+        """Publish diagnostics immediately when a publisher appears or disappears."""
         if self._diagnostics_timer is not None:
             self.publish_diagnostics()
 
@@ -192,7 +207,7 @@ class ManagedNode(LifecycleNode):
         self.end_interval()
 
     def publish_diagnostics(self) -> None:
-        """Say now how the node is."""
+        """Publish the present diagnostics."""
         message = DiagnosticArray()
         for part, status in self.diagnostics().items():
             status.name = f'{self.get_fully_qualified_name()}: {part}'

@@ -1,126 +1,40 @@
-"""ROS parameters declared from the dataclasses that hold them: one place for default, unit, bounds and meaning."""
+"""ROS parameters declared and read from the dataclasses that hold them."""
 
 import dataclasses
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
 
-from seal_friction_ros.core.foundation.parameters import Meaning, check, meanings, parameter
+from seal_friction_ros.core.foundation.parameters import Meaning, ParameterGroup, meanings
 
 Record = TypeVar('Record')
 
 
-@dataclasses.dataclass(frozen=True)
-class StartOptions:
-    """How a node starts, one field per ROS parameter."""
-
-    autostart: bool = parameter(True, unit='', live=False, description='Configure and activate by itself at start.')
-    realtime_priority: int = parameter(
-        0,
-        unit='',
-        lower=0,
-        upper=99,
-        live=False,
-        description='SCHED_FIFO priority of the whole process from configuration on; 0: none.',
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class InputOptions:
-    """Who may send inputs, one field per ROS parameter."""
-
-    refuse_second_publisher: bool = parameter(
-        False,
-        unit='',
-        description='While an input, or what this node publishes, has more than one publisher, no input counts: '
-        'the estimate is invalid and the feed-forward fades out.',
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class RecordingOptions:
-    """What is recorded and where, one field per ROS parameter.
-
-    Raises:
-        ValueError: The name of the bag is not a plain name: it could lead out of the folder. Or files would be so small
-            that a bag has thousands of them.
-    """
-
-    record: bool = parameter(False, unit='', live=False, description='Record from activation on.')
-    record_directory: str = parameter('.', unit='', description='Folder in which bags are made.')
-    record_name: str = parameter(
-        '', unit='', description='Name of the bag; never overwritten. Empty: friction_ and the time of its start.'
-    )
-    record_split_size: int = parameter(
-        0,
-        unit='bytes',
-        lower=0,
-        upper=10**15,
-        description='A new file of the bag begins where one would grow larger; 0: never.',
-    )
-    record_split_duration: float = parameter(
-        0.0,
-        unit='s',
-        lower=0.0,
-        upper=1e9,
-        description='A new file of the bag begins where one would become longer; 0: never.',
-    )
-
-    def __post_init__(self) -> None:
-        check(self)
-        for name, least in (('record_split_size', 1_000_000), ('record_split_duration', 10.0)):
-            value = getattr(self, name)
-            if 0 < value < least:
-                raise ValueError(f'RecordingOptions.{name} = {value} makes too many files: 0 or at least {least}')
-        if '/' in self.record_name or not self.record_name.isprintable() or self.record_name in ('.', '..'):
-            raise ValueError(f'RecordingOptions.record_name = {self.record_name!r} is not a plain name of a folder')
-
-
-class Group(NamedTuple):
-    """ROS parameters that one dataclass holds."""
-
-    record_type: type
-    prefix: str = ''
-    """what their names begin with, its dot included"""
-    live: bool = True
-    """False: none of them changes while the node is configured"""
-
-    def names(self) -> dict[str, str]:
-        """Name of each ROS parameter -> field of the dataclass."""
-        return {self.prefix + name: name for name in meanings(self.record_type)}
-
-    def fixed(self) -> set[str]:
-        """ROS parameters that do not change while the node is configured."""
-        described = meanings(self.record_type).items()
-        return {self.prefix + name for name, meaning in described if not (self.live and meaning.live)}
-
-
-def declare(node: Node, group: Group) -> None:
-    """Declare every described field of a dataclass as a parameter of the node.
+def declare(node: Node, group: ParameterGroup) -> None:
+    """Declare the parameters of a group.
 
     Raises:
         rclpy.exceptions.ParameterException: An override has the wrong type or is out of bounds.
     """
     defaults = {field.name: field.default for field in dataclasses.fields(group.record_type)}
-    fixed = group.fixed()
-    for name, meaning in meanings(group.record_type).items():
-        default = defaults[name]
+    described, fixed = meanings(group.record_type), group.fixed()
+    for name, field in group.names().items():
+        default = defaults[field]
         value = list(default) if isinstance(default, tuple) else default
-        where = group.prefix + name
-        node.declare_parameter(where, value, _descriptor(meaning, default, where not in fixed))
+        node.declare_parameter(name, value, _descriptor(described[field], default, name not in fixed))
 
 
 def read(node: Node, record_type: type[Record], prefix: str = '', **changed: Any) -> Record:
-    """Make the dataclass from the parameters of the node, with ``changed`` in place of those it names.
+    """Make the dataclass from the parameters of the node; ``changed`` overrides fields.
 
     Raises:
-        ValueError: The values make no sense; one line that names field, value and bound.
+        ValueError: A value is invalid; one line that names field, value and bound.
     """
     try:
         values = {name: changed.get(name, node.get_parameter(prefix + name).value) for name in meanings(record_type)}
-    except ParameterUninitializedException as error:  # an empty list has no type, so it counts as none
+    except ParameterUninitializedException as error:  # an empty list has no type: rclpy treats it as not set
         raise ValueError(f'{record_type.__name__}: a list is empty: {error}') from None
     return record_type(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
 

@@ -1,13 +1,13 @@
-"""Quality of service of the topics, and how a user overrides it."""
+"""Quality of service (QoS) of the topics."""
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 STREAM = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
-"""Inputs and estimates: nothing lost; a hundred samples are a tenth of a second at 1 kHz."""
+"""Inputs and estimates: reliable; 100 samples are 0.1 s at 1 kHz."""
 
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Configuration: whoever comes late still gets the last one."""
+"""Configuration: late subscribers receive the last message."""
 
 CLOCK = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 """Simulated time."""
@@ -19,5 +19,5 @@ def overridable() -> QoSOverridingOptions:
 
 
 def best_effort(profile: QoSProfile) -> QoSProfile:
-    """Return the same profile for a publisher that does not offer reliability."""
+    """The same profile with best-effort reliability."""
     return QoSProfile(depth=profile.depth, reliability=ReliabilityPolicy.BEST_EFFORT, durability=profile.durability)

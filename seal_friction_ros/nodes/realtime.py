@@ -1,4 +1,4 @@
-"""Real-time priority, for a node in a control loop on a machine that has other work."""
+"""Real-time priority for a node in a control loop on a shared machine."""
 
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -6,13 +6,13 @@ from pathlib import Path
 
 
 def take_realtime_priority(priority: int) -> None:
-    """Put every thread of this process, and those it makes from now on, under SCHED_FIFO.
+    """Schedule every present and future thread of this process with SCHED_FIFO.
 
     Args:
-        priority: 1 (lowest) to 99; 0 leaves everything as it is.
+        priority: 1 (lowest) to 99; 0 changes nothing.
 
     Raises:
-        ValueError: The system does not grant it.
+        ValueError: The system does not grant the priority.
     """
     if not priority:
         return
@@ -21,18 +21,18 @@ def take_realtime_priority(priority: int) -> None:
             os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))
     except (OSError, AttributeError) as error:
         raise ValueError(
-            f'realtime_priority = {priority} is not granted: {error}: give the user an rtprio limit of as much '
-            '(/etc/security/limits.conf) or the process CAP_SYS_NICE, or set it to 0'
+            f'realtime_priority = {priority} is not granted: {error}: give the user an rtprio limit of {priority} '
+            '(/etc/security/limits.conf) or the process CAP_SYS_NICE, or set realtime_priority to 0'
         ) from None
 
 
 def realtime_granted() -> bool:
-    """Whether this user may take a real-time priority, tried by a thread that ends at once."""
+    """Whether the system grants this user a real-time priority; a temporary thread tries it."""
     with ThreadPoolExecutor(1) as pool:
-        return pool.submit(_try).result()
+        return pool.submit(_try_priority).result()
 
 
-def _try() -> bool:
+def _try_priority() -> bool:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
     except (OSError, AttributeError):

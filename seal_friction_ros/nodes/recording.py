@@ -1,29 +1,29 @@
-"""Recording as the node sees it: at most one bag at a time, started and stopped while estimates go on."""
+"""Recording of the node: at most one bag at a time, started and stopped while the node estimates."""
 
 from datetime import UTC, datetime
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from seal_friction_ros.nodes.parameters import RecordingOptions
+from seal_friction_ros.core.estimation.node_options import RecordingOptions
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.recorder import Recorder
 
 
 class Recording:
-    """The bag being recorded, if any, and what became of the last one."""
+    """The present bag, if any, and the bags that are being finished."""
 
     def __init__(self) -> None:
         self._recorder: Recorder | None = None
         self._finishing: list[Recorder] = []
         self.failure = ''
-        """Why the last bag could not be made or finished; empty if it could."""
+        """Why the last bag could not be created or finished; empty without an error."""
 
     def start(self, options: RecordingOptions) -> Path:
-        """Start a bag called ``record_name``, or after the time if that is empty; return its folder.
+        """Start a bag named ``record_name``, or after the present time if that is empty; return its folder.
 
         Raises:
-            BagError: It cannot be made, or another one is being recorded.
+            BagError: The bag cannot be created, or another bag is being recorded.
         """
         if self._recorder is not None and not self._recorder.error:
             raise BagError(f'recording to {self._recorder.path} already: stop that first')
@@ -46,16 +46,16 @@ class Recording:
         if self._recorder is not None:
             self._recorder.record(topic, type_name, log_time, data)
 
-    def now_is_a_good_time(self) -> None:
-        """To write: nobody waits for an answer right now."""
+    def flush_if_idle(self) -> None:
+        """Let the recorder write now, right after an answer."""
         if self._recorder is not None:
-            self._recorder.now_is_a_good_time()
+            self._recorder.flush_if_idle()
 
     def stop(self) -> str:
-        """Have the bag finished, without making the estimate wait for the disk.
+        """Finish the bag in the background, so that the disk does not delay the estimate.
 
         Returns:
-            What becomes of it in words; empty if none was being recorded.
+            Path and message counts, or the error; empty if no bag was being recorded.
         """
         recorder, self._recorder = self._recorder, None
         self.failure = ''
@@ -64,29 +64,29 @@ class Recording:
         recorder.stop()
         self._finishing.append(recorder)
         self.failure = recorder.error
-        words = f'{recorder.path}: {recorder.written} messages, {recorder.waiting} more to be written, '
-        return recorder.error or f'{words}{recorder.dropped} dropped'
+        counts = f'{recorder.written} messages, {recorder.waiting} more to be written, {recorder.dropped} dropped'
+        return recorder.error or f'{recorder.path}: {counts}'
 
     def close(self) -> str:
-        """Have the bag finished and wait for it; what became of it in words, empty if none was being recorded."""
+        """Finish the bag and wait for the disk; path and message counts or the error, empty if there was no bag."""
         recorder = self._recorder
         self.stop()
         for finishing in self._finishing:
             finishing.close()
-        self._look_after_finishing()
+        self._forget_finished()
         if recorder is None:
             return self.failure
         return recorder.error or f'{recorder.path}: {recorder.written} messages, {recorder.dropped} dropped'
 
-    def _look_after_finishing(self) -> None:
-        """Keep what went wrong with a bag after it was stopped."""
+    def _forget_finished(self) -> None:
+        """Drop the finished bags; keep the last error."""
         for recorder in self._finishing:
             self.failure = recorder.error or self.failure
         self._finishing = [recorder for recorder in self._finishing if not recorder.is_finished]
 
     def report(self) -> DiagnosticStatus:
-        """State of the recorder."""
-        self._look_after_finishing()
+        """Status of the recorder."""
+        self._forget_finished()
         status = DiagnosticStatus(level=DiagnosticStatus.OK, message='not recording')
         values = {}
         recorder = self._recorder or next(iter(self._finishing), None)

@@ -1,4 +1,4 @@
-"""The live node: what it publishes, refuses, reports and survives, on a real graph."""
+"""The live node on a real graph: answers, lifecycle, parameters, diagnostics, recording."""
 
 import json
 import math
@@ -6,40 +6,32 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-import rclpy
+import yaml
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from live_graph import graph
 from paths import ROOT
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParametersAtomically
-from rclpy.context import Context
-from rclpy.node import Node
-from rclpy.qos import ReliabilityPolicy, qos_profile_sensor_data
-from seal_friction_msgs.msg import FrictionEstimate, RodVelocity
-from std_msgs.msg import Float64
+from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
+from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, ROS_PARAMETERS
 from seal_friction_ros.core.friction.actuator import actuator_friction
-from seal_friction_ros.files import default_configuration
+from seal_friction_ros.files import default_configuration, load_parameter_file
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
-from seal_friction_ros.nodes.parameters import InputOptions, RecordingOptions, StartOptions
 from seal_friction_ros.offline.bags.bag import bag_topics
 from seal_friction_ros.offline.replay.replay import replay
 
 SECOND = 10**9  # [ns]
-BOOL, DOUBLE, STRING_ARRAY = 1, 3, 9  # rcl_interfaces/ParameterType
+DOUBLE, STRING_ARRAY = 3, 9  # rcl_interfaces/ParameterType
 
 
 def double(name: str, value: float) -> Parameter:
     return Parameter(name=name, value=ParameterValue(type=DOUBLE, double_value=value))
-
-
-def boolean(name: str, value: bool) -> Parameter:
-    return Parameter(name=name, value=ParameterValue(type=BOOL, bool_value=value))
 
 
 def transition(number: int) -> ChangeState.Request:
@@ -57,7 +49,7 @@ def test_each_velocity_sample_is_answered_by_an_estimate_with_its_header():
         assert (estimate.state, estimate.direction, estimate.status) == (FrictionEstimate.SLIDING, 1, 0)
 
 
-def test_it_says_stuck_and_breakaway_of_a_rod_at_rest():
+def test_a_rod_at_rest_is_stuck_or_breaks_away():
     with graph() as g:
         g.connect()
         stuck = g.estimate(SECOND, 0.0, force=-5.0)
@@ -156,7 +148,7 @@ def test_settings_change_while_running_and_the_new_configuration_is_published():
         ),
     ],
 )
-def test_changes_that_make_no_sense_are_refused_whole_with_the_reason(parameters: list[Parameter], words: list[str]):
+def test_invalid_changes_are_rejected_as_a_whole_with_the_reason(parameters: list[Parameter], words: list[str]):
     with graph() as g:
         request = SetParametersAtomically.Request(parameters=parameters)
         result = g.call(SetParametersAtomically, 'friction_estimator/set_parameters_atomically', request).result
@@ -181,16 +173,36 @@ def test_parameters_carry_unit_bounds_and_description():
         ({'pressure_timeout': 'soon'}, ['pressure_timeout', 'soon']),
     ],
 )
-def test_a_parameter_override_that_makes_no_sense_starts_nothing(parameters: dict[str, object], words: list[str]):
+def test_an_invalid_parameter_override_prevents_the_start(parameters: dict[str, object], words: list[str]):
     with pytest.raises(ValueError) as error, graph(parameters):
         pass
     assert [word for word in words if word not in str(error.value)] == []
     assert '\n' not in str(error.value)
 
 
-def test_a_misspelt_parameter_is_said(capfd):
-    with graph({'stick_velocty': 0.5}):
-        assert 'no such parameter: stick_velocty' in capfd.readouterr().err
+def test_an_unknown_parameter_is_logged_with_a_suggestion(capfd):
+    with graph({'stick_velocty': 0.5, 'wave': 'sine'}):
+        logged = capfd.readouterr().err
+        assert 'no parameter stick_velocty (did you mean stick_velocity?), wave (a parameter of servo_sim' in logged
+
+
+@pytest.mark.parametrize('nested', [False, True])
+def test_every_parameter_of_the_node_is_accepted_in_a_parameter_file(nested: bool, tmp_path: Path):
+    with graph() as g:
+        names = g.estimator.list_parameters([], 0).names
+        values = {name: g.estimator.get_parameter(name).value for name in names}
+    assert {'realtime_priority', 'refuse_second_publisher', 'use_sim_time', 'feedforward.lead_time'} <= values.keys()
+    assert any(name.startswith('qos_overrides./rod_velocity.') for name in values)
+    tree: dict[str, object] = {}
+    for name, value in values.items():
+        *branches, leaf = name.split('.') if nested else [name]
+        branch = tree
+        for key in branches:
+            branch = branch.setdefault(key, {})
+        branch[leaf] = value
+    path = tmp_path / 'parameters.yaml'
+    path.write_text(yaml.safe_dump({'/friction_estimator': {'ros__parameters': tree}}))
+    assert load_parameter_file(path) == (SealSelection(), EstimatorSettings(), FeedForwardSettings())
 
 
 def test_names_are_relative_so_namespaces_and_remapping_work():
@@ -209,58 +221,7 @@ def test_quality_of_service_can_be_overridden():
         assert g.estimator.get_parameter('qos_overrides./rod_velocity.subscription.depth').value == 7
 
 
-def test_a_best_effort_publisher_is_heard_too():
-    with graph(qos=qos_profile_sensor_data) as g:
-        assert g.spin_until(lambda: g.probe.velocity.get_subscription_count() == 1)
-        g.connect()
-        assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
-        (info,) = g.probe.get_subscriptions_info_by_topic('/rod_velocity')
-        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
-
-
-def test_a_second_publisher_is_named_and_harmless_unless_it_is_refused(tmp_path: Path):
-    with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
-        g.connect()
-        assert g.estimate(SECOND, 0.1).status == 0
-        intruder = Node('intruder', namespace='/other', context=g.context)
-        publisher = intruder.create_publisher(RodVelocity, '/rod_velocity', 10)
-        words = '/rod_velocity has several publishers: /other/intruder, /probe'
-        assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''))
-        assert g.probe.values('estimate')['level'] == '1'
-        assert g.estimate(SECOND + 10**6, 0.1).status == 0
-
-        answer = g.call(
-            SetParametersAtomically,
-            'friction_estimator/set_parameters_atomically',
-            SetParametersAtomically.Request(parameters=[boolean('refuse_second_publisher', True)]),
-        )
-        assert answer.result.successful
-        refused = g.estimate(SECOND + 2 * 10**6, 0.1)
-        assert (refused.status, refused.state) == (FrictionEstimate.INPUT_REFUSED, FrictionEstimate.UNKNOWN)
-        assert g.spin_until(lambda: g.probe.values('estimate').get('level') == '2')
-
-        intruder.destroy_publisher(publisher)
-        assert g.spin_until(lambda: 'several' not in g.probe.values('estimate').get('message', ''))
-        assert g.estimate(SECOND + 3 * 10**6, 0.1).status == 0
-        intruder.destroy_node()
-    assert replay(tmp_path / 'bag').identical  # the refusal is in the recording
-
-
-def test_an_input_that_cannot_be_heard_is_said_with_the_node_and_the_reason():
-    with graph() as g:
-        context = Context()  # within one, the middleware itself refuses a second type
-        rclpy.init(context=context, domain_id=g.context.get_domain_id())
-        other = Node('other_driver', context=context)
-        other.create_publisher(Float64, '/servo_reference', 10)
-        words = (
-            '/servo_reference: /other_driver publishes std_msgs/msg/Float64, not seal_friction_msgs/msg/ServoReference'
-        )
-        assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''))
-        other.destroy_node()
-        rclpy.try_shutdown(context=context)
-
-
-def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_path: Path):
+def test_a_recording_started_by_service_during_motion_replays_bit_for_bit(tmp_path: Path):
     with graph({'record_directory': str(tmp_path)}) as g:
         g.connect()
         for i in range(5):
@@ -276,7 +237,7 @@ def test_recording_by_service_starts_amid_motion_and_replays_to_the_byte(tmp_pat
     assert replay(Path(started.message)).identical
 
 
-def test_a_parameter_change_amid_a_recording_replays_to_the_byte(tmp_path: Path):
+def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Path):
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
         g.connect()
         g.estimate(SECOND, 0.003)
@@ -292,7 +253,7 @@ def test_a_parameter_change_amid_a_recording_replays_to_the_byte(tmp_path: Path)
     assert replay(tmp_path / 'bag').identical
 
 
-def test_a_bag_is_never_overwritten_and_the_estimate_goes_on(tmp_path: Path):
+def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path):
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'precious').write_text('data')
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
@@ -303,14 +264,14 @@ def test_a_bag_is_never_overwritten_and_the_estimate_goes_on(tmp_path: Path):
     assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['precious']
 
 
-def test_simulated_time_is_honoured_and_stops_nothing():
+def test_simulated_time_that_stands_still_does_not_stop_the_node():
     with graph({'use_sim_time': True}) as g:
         g.connect()
         assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
         assert g.spin_until(lambda: g.probe.values('estimate').get('estimates') == '1')
 
 
-def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_path: Path, capfd):
+def test_an_invalid_seal_file_prevents_the_start_and_the_log_names_the_field(tmp_path: Path, capfd):
     seal = tmp_path / 'seal.yaml'
     text = ROOT.joinpath('config/seals/ms28775_114.yaml').read_text()
     seal.write_text(text.replace('exponent: 0.562321', 'exponent: 1.7'))
@@ -324,11 +285,8 @@ def test_a_seal_file_that_makes_no_sense_starts_nothing_and_names_the_field(tmp_
         assert g.probe.count_publishers('friction_estimate') == 0
 
 
-def test_the_node_has_no_arithmetic_parameter_of_its_own():
+def test_the_node_declares_the_parameters_of_its_table_and_no_other():
     with graph() as g:
-        declared = {name for name in g.estimator._parameters if not name.startswith(('qos_overrides', 'use_sim_time'))}
-        known = {'seals', 'seal_chambers', *meanings(StartOptions)}
-        known |= {*meanings(InputOptions), *meanings(RecordingOptions)}
-        settings = {*meanings(EstimatorSettings), *(f'feedforward.{name}' for name in meanings(FeedForwardSettings))}
-        assert declared - known - {'start_type_description_service'} == settings
+        declared = {name for name in g.estimator._parameters if name.split('.')[0] not in ROS_PARAMETERS}
+        assert declared == {name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.names()}
         assert isinstance(g.estimator, FrictionEstimator)

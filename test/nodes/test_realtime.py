@@ -1,4 +1,4 @@
-"""Real-time priority is taken by every thread, or refused with what to do."""
+"""Every thread has the real-time priority, or the error names the remedy."""
 
 import os
 import subprocess
@@ -20,12 +20,12 @@ print({(os.sched_getscheduler(t), os.sched_getparam(t).sched_priority) for t in 
 
 
 @pytest.mark.skipif(not realtime_granted(), reason='the system grants this user no real-time priority')
-def test_every_thread_has_it_early_and_late_ones():
+def test_present_and_future_threads_have_the_priority():
     done = subprocess.run([sys.executable, '-c', RUN], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == f'{{({os.SCHED_FIFO}, 7)}}'
 
 
-def test_what_the_system_does_not_grant_is_refused_with_what_to_do(monkeypatch):
+def test_a_priority_that_the_system_does_not_grant_is_rejected_with_the_remedy(monkeypatch):
     def refuse(*_):
         raise PermissionError(1, 'Operation not permitted')
 

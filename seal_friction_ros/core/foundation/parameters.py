@@ -1,21 +1,22 @@
-"""Parameters that cannot exist wrong: frozen dataclasses whose fields carry unit, bounds and meaning.
+"""Parameters declared once: frozen dataclasses whose fields carry default, unit, bounds and meaning.
 
-From this one place follow the check at construction, the check of a YAML file, the ROS parameter declaration
-(``nodes/parameters.py``) and the tables in the docs.
+The check at construction, the check of a YAML file, the ROS parameter declaration (``nodes/parameters.py``) and the
+tables in the docs follow from these fields.
 """
 
 import dataclasses
+import difflib
 import math
 import re
-from collections.abc import Callable, Collection, Mapping
-from typing import Any, TypeVar
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 Record = TypeVar('Record')
 
 
 @dataclasses.dataclass(frozen=True)
 class Meaning:
-    """What a field is: unit, bounds (both included), meaning, and whether it may change while the node is active."""
+    """Unit, description and bounds (both included) of a field, and whether it may change while the node is active."""
 
     unit: str
     description: str
@@ -28,7 +29,7 @@ class Meaning:
     """first guess of a fit, from a `TypicalReading`; None: never fitted"""
 
     def bounds_text(self) -> str:
-        """Bounds for a reader, for example ``0.0 to 1.0``; empty if there are none."""
+        """Bounds as text, for example ``0.0 to 1.0``; empty without bounds."""
         return '' if self.lower is None and self.upper is None else f'{self.lower} to {self.upper}'
 
 
@@ -49,8 +50,27 @@ def parameter(
 
 
 def meanings(record: Any) -> dict[str, Meaning]:
-    """Meaning of each described field of a dataclass or of an instance of it, in order of declaration."""
+    """Meaning of each described field of a dataclass or an instance, in order of declaration."""
     return {f.name: f.metadata['meaning'] for f in dataclasses.fields(record) if 'meaning' in f.metadata}
+
+
+class ParameterGroup(NamedTuple):
+    """Parameters of a node that one dataclass declares."""
+
+    record_type: type
+    prefix: str = ''
+    """start of each parameter name, with its dot"""
+    live: bool = True
+    """False: no parameter of the group can change while the node is configured"""
+
+    def names(self) -> dict[str, str]:
+        """Name of each parameter -> field of the dataclass."""
+        return {self.prefix + name: name for name in meanings(self.record_type)}
+
+    def fixed(self) -> set[str]:
+        """Parameters that cannot change while the node is configured."""
+        described = meanings(self.record_type).items()
+        return {self.prefix + name for name, meaning in described if not (self.live and meaning.live)}
 
 
 def check(record: Any) -> None:
@@ -82,15 +102,15 @@ def _check_number(where: str, value: Any, meaning: Meaning) -> None:
 
 
 def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any) -> Record:
-    """Make a dataclass from a mapping that came from outside.
+    """Make a dataclass from untrusted input.
 
-    Integers are taken for floats, lists for tuples; nothing else is converted.
+    Integers convert to floats and lists to tuples. No other type is converted.
 
     Args:
         record_type: Dataclass whose fields are bool, int, float, str or tuples of str or float.
-        values: Field name to value; fields with a default may be left out.
-        where: What the mapping is, for the error message.
-        made: Fields that were made already, and that the mapping may not give.
+        values: Field name -> value; fields with a default are optional.
+        where: Name of the mapping in error messages.
+        made: Values of further fields; the mapping must not contain these fields.
 
     Raises:
         ValueError: A field is unknown, missing, of the wrong type or out of bounds.
@@ -110,25 +130,43 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
 
 
 def check_names(values: Mapping[Any, Any], known: Collection[str], where: str) -> None:
-    """Check that a mapping has no names but ``known`` ones; ``where`` says what it is.
+    """Check that a mapping has ``known`` names only; ``where`` names the mapping in the error message.
 
     Raises:
-        ValueError: It has.
+        ValueError: Another name is present; the message lists the known names and the most similar ones.
     """
-    unknown = sorted(plain(name) for name in values if name not in known)
+    unknown = sorted(printable(name) for name in values if name not in known)
     if unknown:
-        raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(known)}')
+        similar = ', '.join(dict.fromkeys(similar_names(unknown, known).values()))
+        hint = f'; did you mean {similar}?' if similar else ''
+        raise ValueError(f'{where} has no {", ".join(unknown)}: it has {", ".join(known)}{hint}')
+
+
+def similar_names(unknown: Sequence[str], known: Iterable[str]) -> dict[str, str]:
+    """The most similar known name for each of the first ten unknown names, where one is similar.
+
+    Known names are compared with and without their dotted prefix, so that a wrong or missing prefix does not matter.
+    """
+    full_names: dict[str, list[str]] = {}
+    for name in known:
+        for key in {name, name.rpartition('.')[2]}:
+            full_names.setdefault(key, []).append(name)
+    similar = {}
+    for name in unknown[:10]:  # comparing every name of a hostile file would take minutes
+        for match in difflib.get_close_matches(name.rpartition('.')[2], full_names, n=1):
+            similar[name] = difflib.get_close_matches(name, full_names[match], n=1, cutoff=0.0)[0]
+    return similar
 
 
 def name_and_source(document: Any, kind: str) -> tuple[str, str]:
-    """Name of what a document is of, and where it is from, '' if it does not say.
+    """``name`` and ``source`` of a document; the source is '' if the document has none.
 
     Args:
-        document: What came from outside.
-        kind: What it should be of, for example ``case``.
+        document: Untrusted input.
+        kind: Kind of file, for example ``case``.
 
     Raises:
-        ValueError: It is no mapping, has no name of one line, or its source is no text.
+        ValueError: The document is not a mapping, its name is not one line of text, or its source is not text.
     """
     if not isinstance(document, Mapping):
         raise ValueError(f'a {kind} file is a mapping of names to values, not {type(document).__name__}')
@@ -140,8 +178,8 @@ def name_and_source(document: Any, kind: str) -> tuple[str, str]:
     return name, source
 
 
-def plain(name: Any) -> str:
-    """A name that came from outside, fit for one line of an error message."""
+def printable(name: Any) -> str:
+    """An untrusted name as text without line breaks and control characters, for a one-line error message."""
     text = str(name)
     return text if text.isprintable() else repr(text)
 
@@ -150,11 +188,11 @@ def _fields(record_type: Any) -> tuple[dataclasses.Field[Any], ...]:
     return dataclasses.fields(record_type)
 
 
-_WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text'}
+_TYPE_NAMES = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text'}
 
 
 def _hint(value: Any, declared: Any) -> str:
-    """YAML 1.1 takes a number with an exponent but without point or sign, such as 15e-3 or 1.0e5, for a text."""
+    """Hint for a number that YAML 1.1 reads as text: an exponent without point or sign, such as 15e-3 or 1.0e5."""
     if declared is float and isinstance(value, str) and re.fullmatch(r'[-+]?[\d.]+[eE][-+]?\d+', value):
         return ': write it with a point and a signed exponent, as in 1.0e+5'
     return ''
@@ -166,9 +204,9 @@ def _as_declared(value: Any, declared: Any, where: str) -> Any:
             try:
                 return float(value)
             except OverflowError:
-                raise ValueError(f'{where} is a whole number too large to be a number in use') from None
+                raise ValueError(f'{where} is too large for a floating-point number') from None
         if type(value) is not declared:
-            raise ValueError(f'{where} = {value!r} is not {_WORDS[declared]}{_hint(value, declared)}')
+            raise ValueError(f'{where} = {value!r} is not {_TYPE_NAMES[declared]}{_hint(value, declared)}')
         return value
     if not isinstance(value, list | tuple):
         raise ValueError(f'{where} = {value!r} is not a list')

@@ -58,7 +58,7 @@ class Recorder:
         else:
             self._queue.append((topic, type_name, log_time, data))
 
-    def now_is_a_good_time(self) -> None:
+    def flush_if_idle(self) -> None:
         """Have the queue written now if it is long enough: the estimator says so when it has just answered.
 
         Python runs one thread at a time, so what is written while a sample comes in makes it wait.

@@ -25,6 +25,7 @@ from seal_friction_ros.core.estimation.messages import (
     decode,
     decode_text,
 )
+from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
 from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Position, ServoReference, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
@@ -33,7 +34,7 @@ from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.core.tuning.recorded_axis import Match, Recording, match
 from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Problem, Tuning, tune
-from seal_friction_ros.files import FEEDFORWARD_PREFIX, default_configuration
+from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
 from seal_friction_ros.offline.bags.topics import Topics, find_topics
 from seal_friction_ros.offline.replay.replay import Step, steps

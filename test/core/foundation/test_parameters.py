@@ -1,4 +1,4 @@
-"""Parameters that cannot exist wrong."""
+"""Parameters are checked at construction; errors name field, value and bound."""
 
 import math
 from dataclasses import asdict, dataclass, field
@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.foundation.parameters import Meaning, check, from_mapping, meanings, parameter
+from seal_friction_ros.core.foundation.parameters import (
+    Meaning,
+    ParameterGroup,
+    check,
+    from_mapping,
+    meanings,
+    parameter,
+    similar_names,
+)
 from seal_friction_ros.core.foundation.units import unit_size
 from seal_friction_ros.core.friction.actuator import Seal, Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
@@ -61,16 +69,16 @@ def test_a_number_is_accepted_exactly_inside_its_bounds(value):
         (-math.inf, 'Spring.stiffness = -inf N/m is not finite'),
     ],
 )
-def test_the_complaint_names_field_value_unit_and_bound(value, complaint):
+def test_the_error_names_field_value_unit_and_bound(value, complaint):
     with pytest.raises(ValueError, match='^' + complaint.replace('.', r'\.') + '$'):
         Spring(value)
 
 
-def test_fields_with_a_default_may_be_left_out():
+def test_fields_with_a_default_are_optional():
     assert make() == Spring(10.0)
 
 
-def test_integers_are_taken_for_floats_and_lists_for_tuples():
+def test_integers_convert_to_floats_and_lists_to_tuples():
     spring = make(stiffness=10, lengths=[1, 2.5], names=['a', 'b'])
     assert spring == Spring(10.0, lengths=(1.0, 2.5), names=('a', 'b'))
     assert type(spring.stiffness) is float
@@ -98,31 +106,67 @@ def test_integers_are_taken_for_floats_and_lists_for_tuples():
         ({'colour': 'red', 'age': 1}, 'spring has no age, colour: it has stiffness, coils'),
         ({'made': 1.0}, 'spring has no made: it has'),
         ({3: 4}, 'spring has no 3: it has'),
+        ({'stifness': 1.0}, 'spring has no stifness: it has .*, names; did you mean stiffness?'),
+        (
+            {'Coil': 1, 'matrial': 'x', 'zzz': 1},
+            r'spring has no Coil, matrial, zzz: .*; did you mean coils, material\?$',
+        ),
+        ({'zzz': 1}, 'spring has no zzz: it has [a-z, ]*$'),
+        ({'two\nlines': 1}, r"spring has no 'two\\nlines': it has"),
     ],
 )
-def test_a_mapping_that_makes_no_sense_is_refused_in_one_line_that_names_the_field(values, complaint):
+def test_an_invalid_mapping_is_rejected_in_one_line_that_names_the_field(values, complaint):
     with pytest.raises(ValueError, match=f'^{complaint}') as refusal:
         make(**{str(k): v for k, v in values.items()}) if 3 not in values else from_mapping(Spring, values, 'spring')
     assert '\n' not in str(refusal.value)
 
 
-def test_a_whole_number_beyond_any_float_is_beyond_its_bound_too():
+@pytest.mark.parametrize(
+    ('name', 'expected'),
+    [
+        ('coils', 'spring.coils'),
+        ('damper.coils', 'spring.coils'),
+        ('coil', 'spring.coils'),
+        ('spring_coils', 'spring.coils'),
+        ('damper.leng', 'damper.length'),
+        ('spring.leng', 'spring.length'),
+        ('mas', 'mass'),
+        ('x', None),
+    ],
+)
+def test_a_similar_name_has_few_other_letters_or_another_prefix(name, expected):
+    known = ['coil_spacing', 'spring.coils', 'spring.length', 'damper.length', 'mass']
+    assert similar_names([name], known).get(name) == expected
+
+
+def test_a_group_prefixes_its_names_and_knows_the_fixed_ones():
+    @dataclass(frozen=True)
+    class Clock:
+        period: float = parameter(1.0, unit='s', description='Period.')
+        name: str = parameter('', unit='', live=False, description='Name.')
+
+    assert ParameterGroup(Clock, 'clock.').names() == {'clock.period': 'period', 'clock.name': 'name'}
+    assert ParameterGroup(Clock, 'clock.').fixed() == {'clock.name'}
+    assert ParameterGroup(Clock, live=False).fixed() == {'period', 'name'}
+
+
+def test_an_integer_too_large_for_a_float_violates_its_bound():
     with pytest.raises(ValueError, match='above its upper bound 100'):
         make(coils=10**400)
 
 
-def test_what_is_missing_is_named():
+def test_a_missing_field_is_named():
     with pytest.raises(ValueError, match=r'^spring lacks stiffness$'):
         from_mapping(Spring, {}, 'spring')
 
 
 @pytest.mark.parametrize('values', [None, 5, 'stiffness', ['stiffness'], [('stiffness', 10.0)]])
-def test_what_is_no_mapping_is_refused(values):
+def test_a_value_that_is_not_a_mapping_is_rejected(values):
     with pytest.raises(ValueError, match=r'^spring is not a mapping of names to values but '):
         from_mapping(Spring, values, 'spring')
 
 
-def test_a_field_that_was_made_already_may_not_be_given():
+def test_a_field_that_the_caller_sets_is_rejected_in_the_mapping():
     assert from_mapping(Spring, {'coils': 7}, 'spring', stiffness=10.0) == Spring(10.0, 7)
     with pytest.raises(ValueError, match=r'^spring has no stiffness'):
         from_mapping(Spring, {'stiffness': 1.0}, 'spring', stiffness=10.0)
@@ -161,12 +205,12 @@ def test_meanings_come_in_order_of_declaration_of_class_and_instance_alike():
     ('lower', 'upper', 'text'),
     [(None, None, ''), (0.0, 1.0, '0.0 to 1.0')],
 )
-def test_bounds_are_told_to_a_reader(lower, upper, text):
+def test_bounds_have_a_text(lower, upper, text):
     assert Meaning('', '', lower, upper).bounds_text() == text
 
 
 @pytest.mark.parametrize('record', RECORDS, ids=lambda record: record.__name__)
-def test_every_parameter_has_a_sentence_of_meaning_and_bounds_in_order(record):
+def test_every_parameter_has_a_description_and_ordered_bounds(record):
     assert meanings(record)
     for name, meaning in meanings(record).items():
         assert meaning.description.endswith('.'), name
@@ -200,6 +244,6 @@ def test_units_have_their_size_in_si(unit, size):
     assert unit_size(unit) == pytest.approx(size, rel=1e-15)
 
 
-def test_an_unknown_unit_is_refused_with_what_there_is():
+def test_an_unknown_unit_is_rejected_with_the_known_ones():
     with pytest.raises(ValueError, match=r"^unknown unit 'furlong': use one of 1, s, ms"):
         unit_size('furlong')

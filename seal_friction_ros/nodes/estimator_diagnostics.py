@@ -1,0 +1,173 @@
+"""Counts, rates, ages and latencies of the running estimator, as a status of ``/diagnostics``."""
+
+import time
+from collections import Counter, deque
+from statistics import median
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
+from seal_friction_ros.core.estimation.messages import INPUTS
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.nodes.graph_watch import GraphFindings
+
+_SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one
+_LARGEST_DELAY = 1_000_000_000  # [ns] a stamp further back than this means that its clock was set
+
+
+class MissingSamples:
+    """Missing samples of one input, from the gaps between its stamps (our choice).
+
+    The middleware does not report samples that it discards when the node is too slow. The period is the median of the
+    last steps. Every step longer than 1.5 periods counts as a gap: also a jump of the clock, stamp jitter of a third of
+    the period and more, and the first eight steps at a lower rate. A stamp slightly back is a late sample, which
+    counted as missing before. A stamp far back means that the clock was set: the estimate of the period restarts.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._stamp = 0
+        self._period = 0.0
+        self._steps: deque[int] = deque(maxlen=15)
+
+    def on_stamp(self, stamp: int) -> None:
+        """Add the stamp [ns] of the next sample."""
+        step = stamp - self._stamp if self._stamp else 0
+        if -_LARGEST_DELAY <= step < 0:
+            self.count = max(self.count - 1, 0)
+            return
+        self._stamp = stamp
+        if step <= 0:
+            self._steps.clear()
+            return
+        if self._steps and not 0.7 * self._period < step < 1.5 * self._period:  # seldom: the median is slow
+            self._period = median(self._steps)
+            if step > 1.5 * self._period:
+                self.count += round(step / self._period) - 1
+        self._steps.append(step)
+
+
+class EstimatorDiagnostics:
+    """Counts since activation, and rates, ages and latencies of the present interval."""
+
+    def __init__(self) -> None:
+        self._received: Counter[str] = Counter()
+        self._malformed: Counter[str] = Counter()
+        self._missing = {name: MissingSamples() for name in INPUTS}
+        self._by_status: Counter[int] = Counter()
+        self._feedforwards_by_limit: Counter[int] = Counter()
+        self._feedforward_force = 0.0
+        self._input_age = -1.0
+        self._latencies: list[int] = []
+        self.start_interval()
+
+    def start_interval(self) -> None:
+        """Start a new interval."""
+        self._estimated_before = bool(self._latencies)
+        self._started = time.monotonic()
+        self._received_before = self._received.copy()
+        self._malformed_before = self._malformed.copy()
+        self._recent_status = self._recent_limit = 0
+        self._latencies = []
+
+    def on_input(self, name: str, stamp: int) -> None:
+        """Count one message of an input with its stamp [ns]."""
+        self._received[name] += 1
+        self._missing[name].on_stamp(stamp)
+
+    def on_malformed(self, name: str) -> None:
+        """Count one message of an input that cannot be decoded."""
+        self._malformed[name] += 1
+
+    def on_estimate(self, estimate: FrictionEstimate, latency: int) -> None:
+        """Count one estimate; ``latency`` [ns] is the time since its velocity sample was taken."""
+        self._by_status[estimate.status] += 1
+        self._recent_status |= estimate.status
+        self._latencies.append(latency)
+        self._input_age = estimate.input_age
+
+    def on_feedforward(self, feedforward: FeedForward) -> None:
+        """Count one feed-forward."""
+        self._feedforwards_by_limit[feedforward.limited] += 1
+        self._recent_limit |= feedforward.limited
+        self._feedforward_force = feedforward.force
+
+    @property
+    def silent_inputs(self) -> list[str]:
+        """Inputs without a message in this interval."""
+        return [name for name in INPUTS if self._received[name] == self._received_before[name]]
+
+    def report(self, active: bool, refused: bool, graph: GraphFindings) -> DiagnosticStatus:
+        """Status of the estimate in this interval.
+
+        Args:
+            active: Whether the node estimates.
+            refused: Whether the node rejects its inputs because of duplicate publishers.
+            graph: State of the graph.
+        """
+        seconds = max(time.monotonic() - self._started, 1e-3)
+        level, message = self._level(seconds) if active else (DiagnosticStatus.OK, 'inactive')
+        if refused:
+            level = DiagnosticStatus.ERROR
+        elif (graph.duplicates or graph.unheard) and level == DiagnosticStatus.OK:
+            level = DiagnosticStatus.WARN
+        values = self._input_values(seconds, graph) | self._output_values(seconds)
+        values |= {f'{name} best effort only, from': node for name, node in graph.best_effort.items()}
+        return DiagnosticStatus(
+            level=level,
+            message='; '.join([*graph.duplicates, *graph.unheard, message]),
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        )
+
+    def _level(self, seconds: float) -> tuple[bytes, str]:
+        """Level and message of an active estimator ``seconds`` [s] after the start of the interval."""
+        if not self._latencies and (seconds > _SHORTEST_SILENCE or not self._estimated_before):
+            return DiagnosticStatus.STALE, 'no rod_velocity received'
+        if self._recent_status:
+            return DiagnosticStatus.WARN, str(Status(self._recent_status).name)
+        if self._malformed != self._malformed_before:
+            names = ', '.join(sorted((self._malformed - self._malformed_before).keys()))
+            return DiagnosticStatus.WARN, f'malformed messages on {names}'
+        if self._recent_limit & Limited.FADE:
+            return DiagnosticStatus.WARN, 'the feed-forward fades: no usable reference'
+        return DiagnosticStatus.OK, 'estimating'
+
+    def _input_values(self, seconds: float, graph: GraphFindings) -> dict[str, str]:
+        values: dict[str, str] = {}
+        for name in INPUTS:
+            recent = self._received[name] - self._received_before[name]
+            values[f'{name} publishers'] = str(graph.publisher_counts[name])
+            values[f'{name} rate [Hz]'] = f'{recent / seconds:.1f}'
+            values[f'{name} received'] = str(self._received[name])
+            values[f'{name} malformed'] = str(self._malformed[name])
+            values[f'{name} missing'] = str(self._missing[name].count)
+        return values
+
+    def _output_values(self, seconds: float) -> dict[str, str]:
+        return {
+            'estimate rate [Hz]': f'{len(self._latencies) / seconds:.1f}',
+            'estimates': str(self._by_status.total()),
+            'estimates all good': str(self._by_status[0]),
+            **{f'estimates {bit.name}': str(_count(self._by_status, bit)) for bit in Status},
+            'feed-forwards': str(self._feedforwards_by_limit.total()),
+            **{f'feed-forwards {bit.name}': str(_count(self._feedforwards_by_limit, bit)) for bit in Limited},
+            'feed-forward [N]': f'{self._feedforward_force:.3f}',
+            'input age [s]': f'{self._input_age:.4f}',
+            **latency_values(self._latencies),
+        }
+
+
+def _count(by_bits: Counter[int], bit: int) -> int:
+    """Number of messages with a bit set."""
+    return sum(number for bits, number in by_bits.items() if bits & bit)
+
+
+def latency_values(latencies: list[int], what: str = 'latency') -> dict[str, str]:
+    """Median and 99th percentile [us] of latencies [ns], by their diagnostics keys."""
+    if not latencies:
+        return {f'{what} p50 [us]': 'none', f'{what} p99 [us]': 'none'}
+    ordered = sorted(latencies)
+    return {
+        f'{what} p{percent} [us]': f'{ordered[min(len(ordered) * percent // 100, len(ordered) - 1)] / 1e3:.1f}'
+        for percent in (50, 99)
+    }

@@ -1,0 +1,50 @@
+"""The table of node parameters is complete and documented; options of the node are checked."""
+
+import pytest
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.node_options import (
+    FEEDFORWARD_PREFIX,
+    FRICTION_ESTIMATOR_PARAMETERS,
+    RecordingOptions,
+    StartOptions,
+)
+from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
+
+TABLES = {'friction_estimator': FRICTION_ESTIMATOR_PARAMETERS, 'servo_simulator': SERVO_SIMULATOR_PARAMETERS}
+
+
+@pytest.mark.parametrize('node', TABLES)
+def test_every_parameter_belongs_to_one_group_and_every_group_is_documented(node: str):
+    names = [name for group in TABLES[node] for name in group.names()]
+    assert len(names) == len(set(names))
+    page = (ROOT / 'docs' / 'interfaces.md').read_text()
+    missing = [g.record_type.__name__ for g in TABLES[node] if f'<!-- table: {g.record_type.__name__} -->' not in page]
+    assert not missing
+
+
+def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
+    names = [name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.names()]
+    assert f'{FEEDFORWARD_PREFIX}coulomb_scale' in names
+    fixed = {name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.fixed()}
+    assert fixed == {'autostart', 'realtime_priority', 'seals', 'seal_chambers', 'record'}
+
+
+@pytest.mark.parametrize(
+    ('split', 'words'), [({'record_split_size': 1000}, '1000000'), ({'record_split_duration': 1.0}, '10')]
+)
+def test_a_split_into_thousands_of_files_is_rejected(split: dict[str, float], words: str):
+    with pytest.raises(ValueError, match=words):
+        RecordingOptions(**split)
+
+
+@pytest.mark.parametrize('name', ['../escaped', '/absolute', '..', '.', 'two\nlines'])
+def test_a_bag_name_outside_the_folder_is_rejected(name: str):
+    with pytest.raises(ValueError, match='record_name'):
+        RecordingOptions(record_name=name)
+
+
+@pytest.mark.parametrize('priority', [-1, 100])
+def test_a_priority_out_of_bounds_is_rejected(priority: int):
+    with pytest.raises(ValueError, match='realtime_priority'):
+        StartOptions(realtime_priority=priority)
