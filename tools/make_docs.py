@@ -4,6 +4,7 @@ Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
 """
 
 import dataclasses
+import inspect
 import re
 import sys
 from pathlib import Path
@@ -12,12 +13,9 @@ from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PA
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws import FRICTION_LAWS
 from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
-from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
-from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
-from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
@@ -38,6 +36,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / 'bench'))
 from fault_rows import SIGNAL_ROWS, Row
 from faults import REQUIRED, TRIALS
 
+from seal_friction_ros.core.friction.seal_file import keys_of_law
+
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
     *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
@@ -48,9 +48,6 @@ RECORDS = (
     NormalForceTable,
     PowerLaw,
     CoefficientTable,
-    PriorArtChart,
-    PressurePowerLaw,
-    ConstantCoulomb,
     VelocityTerms,
     Uncertainty,
     Groove,
@@ -58,7 +55,6 @@ RECORDS = (
     Numerics,
     OringCase,
     Measured,
-    FrictionMap,
     SealBody,
     Topography,
     Grease,
@@ -92,6 +88,19 @@ def _yaml(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return repr(value) if value == '' else str(value)
+
+
+def friction_laws() -> str:
+    """A section for each law of the registry: name in a seal file, equation, other keys it takes, parameters."""
+    sections = []
+    for law in FRICTION_LAWS:
+        about = inspect.cleandoc(law.__doc__ or '').split('\n\nRaises:')[0]
+        others = ', '.join(f'`{key}`' for key in sorted(keys_of_law(law) - {law.PART or law.NAME}))
+        text = f'### `coulomb_law: {law.NAME}`\n\nEquation: {law.FORMULA}. {about}'
+        text += f'\n\nIt takes {others} from the seal file.' if others else ''
+        text += f'\n\nParameters, under `{law.PART or law.NAME}`:\n\n{table(law)}' if meanings(law) else ''
+        sections.append(text)
+    return '\n\n'.join(sections)
 
 
 _FEEDFORWARD = {
@@ -128,6 +137,7 @@ def filled(text: str) -> str:
         'EhlGroove': table(ehl_groove.Groove),
         'EhlNumerics': table(ehl.Numerics),
     }  # the O-ring has these names, too
+    tables['friction_laws'] = friction_laws()
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(
         r'<!-- table: (\w+) -->\n.*?<!-- end -->',

@@ -1,6 +1,6 @@
-"""All that the estimator was told, as one text: published with the estimates and kept in every bag.
+"""Configuration and state of the estimator as one text, published with the estimates and recorded in every bag.
 
-So a bag carries what is needed to replay it, also when parameters changed on the way.
+A bag therefore carries everything needed to replay it, also when parameters changed during the recording.
 """
 
 import dataclasses
@@ -55,7 +55,7 @@ class SealSelection:
 
 @dataclass(frozen=True)
 class Configuration:
-    """What the estimator runs with, in the form it came in."""
+    """Seals and settings of the estimator, the seals as the documents of their files."""
 
     selection: SealSelection
     seal_documents: tuple[Mapping[str, Any], ...]
@@ -66,14 +66,14 @@ class Configuration:
         """Parameters of estimate and feed-forward.
 
         Raises:
-            ValueError: A seal document makes no sense.
+            ValueError: A seal document is not valid.
         """
         seals = mount_seals(self.seal_documents, self.selection.seal_chambers)
         return PipelineParameters(EstimatorParameters(self.settings, seals), self.feedforward)
 
 
 class Snapshot(NamedTuple):
-    """All that the next answer depends on besides the messages to come."""
+    """Everything that the next answer depends on besides the messages to come."""
 
     configuration: Configuration
     state: PipelineState
@@ -85,14 +85,14 @@ def first_snapshot(configuration: Configuration) -> Snapshot:
 
 
 def snapshot_text(snapshot: Snapshot) -> str:
-    """Snapshot as JSON; equal ones give equal text. Measured values are hexadecimal, so also NaN and infinity pass."""
+    """Snapshot as JSON; equal snapshots give equal text. Numbers of the state are hexadecimal, NaN included."""
     configuration, state = snapshot
     document = {
         'selection': dataclasses.asdict(configuration.selection),
         'seal_documents': configuration.seal_documents,
         'settings': dataclasses.asdict(configuration.settings),
         'feedforward': dataclasses.asdict(configuration.feedforward),
-        'state': _plain(state),
+        'state': _encoded_record(state),
     }
     return json.dumps(document, sort_keys=True, allow_nan=False)
 
@@ -101,7 +101,7 @@ def parse_snapshot(text: str) -> Snapshot:
     """Snapshot from its JSON text.
 
     Raises:
-        ValueError: The text is not the JSON of a snapshot, or a value in it makes no sense.
+        ValueError: The text is not the JSON of a snapshot, or a value in it is not valid.
     """
     try:
         document = json.loads(text)
@@ -118,10 +118,10 @@ def parse_snapshot(text: str) -> Snapshot:
 
 
 def _state(document: Any) -> PipelineState:
-    """State of the pipeline from what `_plain` made of it.
+    """State of the pipeline: inverse of `_encoded_record`.
 
     Raises:
-        ValueError: A number that was computed here, or a sample that was found usable, is not finite.
+        ValueError: A computed number or a usable sample is not finite.
     """
     seen: EstimatorState = _parsed(EstimatorState, document['estimator'])
     fed: FeedForwardState = _parsed(FeedForwardState, document['feedforward'])
@@ -140,15 +140,15 @@ def _state(document: Any) -> PipelineState:
     )
 
 
-def _plain(value: Any) -> Any:
+def _encoded_record(value: Any) -> Any:
     """Named tuples as mappings, whole numbers as they are, others as hexadecimal text."""
     if isinstance(value, tuple) and hasattr(value, '_asdict'):
-        return {name: _plain(field) for name, field in value._asdict().items()}
+        return {name: _encoded_record(field) for name, field in value._asdict().items()}
     return float(value).hex() if isinstance(value, float) else int(value)
 
 
 def _parsed(record_type: Any, document: Any) -> Any:
-    """Named tuple from what `_plain` made of it; each field of the type that it has to be of."""
+    """Named tuple: inverse of `_encoded_record`, with the declared type of each field."""
     hints = get_type_hints(record_type)
     return record_type(**{name: _field(hints[name], document[name]) for name in record_type._fields})
 

@@ -1,9 +1,8 @@
-"""The one estimator, online and offline.
+"""The estimator, the same online and offline.
 
 ``state = init(parameters)``, then ``state, estimate = step(parameters, state, sample)`` at every velocity sample.
 
-Nothing here knows of ROS, files or a clock: time is the stamp of the samples, so the same samples give the same
-estimates, live or replayed.
+Time is the stamp of the samples: the same samples give the same estimates, live or replayed.
 """
 
 import math
@@ -50,10 +49,10 @@ class EstimatorSettings:
         True, unit='', description='Breakaway force above Coulomb friction by the stiction of the seals.'
     )
     pressure_timeout: float = parameter(
-        0.1, unit='s', lower=1e-4, upper=60.0, description='Largest distance in time between velocity and pressure.'
+        0.1, unit='s', lower=1e-4, upper=60.0, description='Largest time between the stamps of velocity and pressure.'
     )
     force_timeout: float = parameter(
-        0.1, unit='s', lower=1e-4, upper=60.0, description='Largest distance in time between velocity and force sum.'
+        0.1, unit='s', lower=1e-4, upper=60.0, description='Largest time between the stamps of velocity and force sum.'
     )
     pressure_min: float = parameter(
         -1.2e5, unit='Pa', lower=-1.2e5, upper=0.0, description='A pressure below this is a sensor fault.'
@@ -69,13 +68,25 @@ class EstimatorSettings:
     )
 
     pressure_rate_max: float = parameter(
-        1e10, unit='Pa/s', lower=1.0, upper=1e15, description='A pressure that leaps faster than this is not believed.'
+        1e10,
+        unit='Pa/s',
+        lower=1.0,
+        upper=1e15,
+        description='A pressure that changes faster is rejected at first.',
     )
     force_rate_max: float = parameter(
-        1e8, unit='N/s', lower=1e-3, upper=1e15, description='A force sum that leaps faster than this is not believed.'
+        1e8,
+        unit='N/s',
+        lower=1e-3,
+        upper=1e15,
+        description='A force sum that changes faster is rejected at first.',
     )
     acceleration_max: float = parameter(
-        1e3, unit='m/s^2', lower=1e-3, upper=1e9, description='A velocity that leaps faster than this is not believed.'
+        1e3,
+        unit='m/s^2',
+        lower=1e-3,
+        upper=1e9,
+        description='A velocity that changes faster is rejected at first.',
     )
 
     def __post_init__(self) -> None:
@@ -89,7 +100,7 @@ class EstimatorSettings:
 
 @dataclass(frozen=True)
 class EstimatorParameters:
-    """All that the estimator knows beforehand: its settings and the seals of the actuator.
+    """Settings of the estimator and the seals of the actuator.
 
     Raises:
         ValueError: There is no seal.
@@ -136,13 +147,15 @@ class EstimatorState(NamedTuple):
     velocity: Speed
     """last usable velocity"""
     leapt_pressure: Pressure
-    """pressure that leapt away from the last usable one, if that was the newest"""
+    """newest pressure, if it jumped away from the last usable one"""
     leapt_force: Force
+    """likewise"""
     leapt_velocity: Speed
+    """likewise"""
 
 
 class Observation(NamedTuple):
-    """What one sample says, before any friction is computed."""
+    """One sample after the checks, before any friction is computed."""
 
     stamp: int
     """[ns]"""
@@ -155,7 +168,7 @@ class Observation(NamedTuple):
 
 
 def init(parameters: EstimatorParameters) -> EstimatorState:
-    """State before the first sample: nothing is known, the rod counts as moving."""
+    """State before the first sample: no inputs, the rod counts as moving."""
     del parameters
     return EstimatorState(NEVER, False, NO_PRESSURE, NO_FORCE, NO_SPEED, NO_PRESSURE, NO_FORCE, NO_SPEED)
 
@@ -184,7 +197,7 @@ _NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE
 _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
-SHORTEST_INTERVAL = 1e-3  # [s] our choice: below it noise leaps, and stamps of some drivers are no finer
+SHORTEST_INTERVAL = 1e-3  # [s] our choice: over less, noise exceeds any rate, and some drivers stamp no finer
 
 
 @compilable
@@ -193,14 +206,14 @@ def step(
 ) -> tuple[EstimatorState, FrictionEstimate]:
     """Estimate the friction of the seals at one rod-velocity sample.
 
-    A pressure or force sum that is not finite, out of range, or that leaps is never used: the last usable one is, for
-    as long as it is not stale, and the status says so. A velocity like that, inputs that are refused, or no usable
-    pressure ever, make the state UNKNOWN with a friction force of 0 N; so does, at rest, a force sum that is missing or
-    stale. A stale pressure leaves the state and the last known friction, flagged.
+    A pressure or force sum that is not finite, out of range, or jumps is never used: the last usable one stays in use
+    until it is stale, and the status says so. The state is UNKNOWN and the friction force 0 N with such a velocity,
+    with refused inputs, without any usable pressure so far, and at rest with a missing or stale force sum. A stale
+    pressure leaves state and friction as they are, with the status bit set.
 
-    A sample leaps if it is further from the last usable one than the largest rate allows for the time between them, at
-    least `SHORTEST_INTERVAL`. The next sample is believed if it agrees with either: so a spike costs one sample, and so
-    does a step that is real.
+    A sample jumps if it is further from the last usable one than the largest rate allows over the time between them,
+    at least `SHORTEST_INTERVAL`. The next sample is usable if it agrees with either of the two: a spike and a real step
+    each cost one sample.
 
     Args:
         parameters: Settings and seals.
@@ -225,7 +238,7 @@ def step(
 def assess_inputs(
     settings: EstimatorSettings, state: EstimatorState, sample: RodSample
 ) -> tuple[EstimatorState, Observation]:
-    """First half of a step: which inputs are in use, what is wrong with them, and whether the rod moves."""
+    """First half of a step: choose the inputs in use, flag their faults, decide whether the rod moves."""
     status = _INPUT_REFUSED if sample.refused else 0
     if state.stamp != NEVER and sample.stamp <= state.stamp:
         status |= _STAMP_NOT_INCREASING
@@ -262,7 +275,7 @@ def assess_inputs(
 def estimate_of(
     settings: EstimatorSettings, state: EstimatorState, seen: Observation, friction: ActuatorFriction
 ) -> FrictionEstimate:
-    """Second half of a step: what acts on the rod, given the friction of all seals at the pressure in use."""
+    """Second half of a step: friction that acts on the rod, from the friction of all seals at the pressure in use."""
     status = seen.status
     coulomb = friction.coulomb_friction
     breakaway = coulomb + friction.stiction if settings.use_stiction else coulomb
@@ -308,7 +321,7 @@ def _pressure_leaps(settings: EstimatorSettings, newer: Pressure, older: Pressur
 def _usable_pressure(
     settings: EstimatorSettings, newest: Pressure, used: Pressure, leapt: Pressure
 ) -> tuple[Pressure, Pressure, int]:
-    """Pressure to use, the one that leapt, and what is wrong."""
+    """Pressure to use, the pressure that jumped, and status bits."""
     missing = _PRESSURE_MISSING if used.stamp == NEVER else 0
     if newest.stamp == NEVER:
         return used, leapt, missing
@@ -327,7 +340,7 @@ def _usable_pressure(
 
 @compilable
 def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt: Force) -> tuple[Force, Force, int]:
-    """Force sum to use, the one that leapt, and what is wrong."""
+    """Force sum to use, the force sum that jumped, and status bits."""
     missing = _FORCE_MISSING if used.stamp == NEVER else 0
     if newest.stamp == NEVER:
         return used, leapt, missing
@@ -344,7 +357,7 @@ def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt
 
 @compilable
 def _usable_velocity(settings: EstimatorSettings, newest: Speed, used: Speed, leapt: Speed) -> tuple[Speed, Speed, int]:
-    """Velocity to use, the one that leapt, and what is wrong."""
+    """Velocity to use, the velocity that jumped, and status bits."""
     if not abs(newest.velocity) <= settings.velocity_max:
         return used, leapt, _VELOCITY_OUT_OF_RANGE if math.isfinite(newest.velocity) else _VELOCITY_NOT_FINITE
     fastest = settings.acceleration_max

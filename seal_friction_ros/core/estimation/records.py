@@ -1,8 +1,8 @@
-"""What goes into the estimator and what comes out of it.
+"""Inputs and outputs of the estimator.
 
-These are made for every sample, so they are named tuples: immutable, and three times cheaper than frozen dataclasses.
-What has not come yet is a record with the stamp `NEVER` and not None, so that each field has one type and the estimator
-can be compiled as it stands.
+They are named tuples, since each sample makes several: immutable, and three times cheaper than frozen dataclasses. A
+record with the stamp `NEVER` stands for a missing one, so that each field has one type and the estimator compiles as it
+stands.
 """
 
 from enum import IntFlag
@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 from seal_friction_ros.core.friction.states import UNKNOWN
 
-NEVER = -(2**63)  # [ns] stamp of a record that stands for none
+NEVER = -(2**63)  # [ns] stamp of a missing record
 
 
 class Status(IntFlag):
-    """What is wrong with an estimate; 0 means nothing. The meanings are written in FrictionEstimate.msg."""
+    """Faults of an estimate; 0: none. FrictionEstimate.msg has the meanings."""
 
     PRESSURE_MISSING = 1
     FORCE_MISSING = 2
@@ -94,7 +94,7 @@ class ServoReference(NamedTuple):
 
 
 class RodSample(NamedTuple):
-    """One rod-velocity sample with the newest pressure and force sum that came before it."""
+    """One rod-velocity sample with the newest pressure and force sum received before it."""
 
     stamp: int
     """[ns]"""
@@ -103,11 +103,11 @@ class RodSample(NamedTuple):
     pressure: Pressure
     force: Force
     refused: bool = False
-    """whether nobody knows who sent them, so that they must not act"""
+    """whether an input has several publishers, so that none may act"""
 
 
 class FrictionEstimate(NamedTuple):
-    """What the seals do at one rod-velocity sample. Every number is finite, whatever came in."""
+    """Friction of the seals at one rod-velocity sample. Every number is finite for any input."""
 
     stamp: int
     """[ns] of the velocity sample"""

@@ -27,6 +27,8 @@ class Meaning:
     """in an equation"""
     start: Callable[[Any], float] | None = None
     """first guess of a fit, from a `TypicalReading`; None: never fitted"""
+    fit_bounds: tuple[float, float] | None = None
+    """bounds of a fit, where they are narrower"""
 
     def bounds_text(self) -> str:
         """Bounds as text, for example ``0.0 to 1.0``; empty without bounds."""
@@ -43,9 +45,10 @@ def parameter(
     live: bool = True,
     symbol: str = '',
     start: Callable[[Any], float] | None = None,
+    fit_bounds: tuple[float, float] | None = None,
 ) -> Any:
     """Dataclass field with its `Meaning`; both bounds are included."""
-    meaning = Meaning(unit, description, lower, upper, live, symbol, start)
+    meaning = Meaning(unit, description, lower, upper, live, symbol, start, fit_bounds)
     return dataclasses.field(default=default, metadata={'meaning': meaning})
 
 

@@ -60,7 +60,7 @@ def parse_seal(document: Any) -> Seal:
     name, _ = name_and_source(document, 'seal')
     where = f'seal {name}'
     law_type = friction_laws()[_choice(document, 'coulomb_law', friction_laws(), where)]
-    check_names(document, sorted(_COMMON | _keys(law_type)), f'{where}: {law_type.NAME}')
+    check_names(document, sorted(_COMMON | keys_of_law(law_type)), f'{where}: {law_type.NAME}')
     law = _friction_law(law_type, document, where)
     terms = None
     if 'velocity_terms' in document:
@@ -124,8 +124,8 @@ def _fields(law_type: type[FrictionLaw]) -> list[dataclasses.Field[Any]]:
     return [field for field in dataclasses.fields(law_type) if field.init]
 
 
-def _keys(law_type: type[FrictionLaw]) -> set[str]:
-    """Keys of a seal file that a law takes."""
+def keys_of_law(law_type: type[FrictionLaw]) -> set[str]:
+    """Keys of a seal file that a law takes: its parts, and the one with its parameters."""
     keys = {_PARTS[field.type] for field in _fields(law_type) if field.type in _PARTS}
     return keys | ({law_type.PART or law_type.NAME} if meanings(law_type) else set())
 

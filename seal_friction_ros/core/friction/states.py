@@ -1,4 +1,4 @@
-"""Sliding, breakaway or stuck: what the Coulomb friction makes of velocity and force sum."""
+"""Sliding, breakaway or stuck: the friction that acts, from Coulomb friction, velocity and force sum."""
 
 from enum import IntEnum
 from typing import NamedTuple

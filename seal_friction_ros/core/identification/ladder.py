@@ -76,7 +76,9 @@ class FittedParameter(NamedTuple):
 def fitted_parameters(record_type: type) -> tuple[FittedParameter, ...]:
     """Parameters of a law, or of the velocity terms, that have a first guess."""
     return tuple(
-        FittedParameter(name, m.unit, float(m.lower or 0.0), float(m.upper or 0.0), m.start, m.symbol)
+        FittedParameter(
+            name, m.unit, *(m.fit_bounds or (float(m.lower or 0.0), float(m.upper or 0.0))), m.start, m.symbol
+        )
         for name, m in meanings(record_type).items()
         if m.start is not None
     )

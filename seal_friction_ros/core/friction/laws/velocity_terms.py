@@ -75,6 +75,7 @@ class VelocityTerms:
         description='v_S, speed at which Stribeck friction has fallen to 37 %.',
         symbol='v_S',
         start=lambda typical: min(0.1 * max(typical.speed, 1e-6), 1.0),
+        fit_bounds=(1e-4, 1.0),
     )
     asymmetry: float = parameter(
         0.0,
