@@ -18,6 +18,7 @@ from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import UNITS, unit_size
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.identification.readings import FEWEST_PRESSURES, Noted
+from seal_friction_ros.files import config_path, read_yaml
 
 TITLE = 'seal friction data sheet'
 PRESSURE_UNITS = ('psi', 'bar', 'MPa', 'kPa')
@@ -119,6 +120,20 @@ def make_plan(
         raise ValueError(f'seal name {seal_name!r} is not one line of text without a comma')
     pressures = tuple(round(float(p), 9) for p in np.linspace(lowest, highest, steps + 1))
     return Plan(seal_name, pressures, tests, seals, pressure_unit, force_unit, length_unit, geometry)
+
+
+def geometry_of_seal_file(seal: str) -> SealGeometry:
+    """Geometry of a seal file: a path, or the name of one in config/seals.
+
+    Raises:
+        ValueError: The file cannot be read or has no valid geometry; names it.
+    """
+    path = config_path('seals', seal)
+    document = read_yaml(path)
+    if not isinstance(document, Mapping):
+        raise ValueError(f'{path}: a seal file is a mapping of names to values')
+    geometry: SealGeometry = from_mapping(SealGeometry, document.get('geometry'), f'{path}: geometry')
+    return geometry
 
 
 # -- the empty sheet --------------------------------------------------------------------------------------------------

@@ -19,13 +19,9 @@ from seal_friction_ros.core.identification.fitting import BAND_95, Score, offset
 from seal_friction_ros.core.identification.ladder import normal_forces
 from seal_friction_ros.core.identification.readings import Readings
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.identification.identify import (
-    Identification,
-    Ring,
-    fitted_readings,
-    normal_force_law,
-    worst_left_out,
-)
+from seal_friction_ros.offline.identification.document import worst_left_out
+from seal_friction_ros.offline.identification.pipeline import fitted_readings, normal_force_law
+from seal_friction_ros.offline.identification.results import Identification, Ring
 from seal_friction_ros.offline.reports.bag_report import number, table, tiles, write_page
 from seal_friction_ros.offline.reports.figures import (
     BLACK,
@@ -187,10 +183,10 @@ def model_figure(shown: _Shown) -> Plot:
 def agreement_figure(shown: _Shown) -> Plot:
     """Measured against fitted, with the band."""
     unit, size = force_unit(float(shown.measured.max()))
-    coverage = 100.0 * shown.found.worth.coverage
+    coverage = 100.0 * shown.found.quality.coverage
     figure, ax = new_figure(f'Measured against law: {coverage:.0f} % of the readings left out are in the band', 4.6)
     line = np.linspace(0.0, max(float(shown.fitted.max()), float(shown.measured.max())), 101)
-    worth = shown.found.worth
+    worth = shown.found.quality
     half = BAND_95 * worth.spread.std(line)
     ax.fill_between(
         line / size, (line - half) / size, (line + half) / size, color=SKY, alpha=0.3, lw=0, label='95 % band'
@@ -212,13 +208,13 @@ def agreement_figure(shown: _Shown) -> Plot:
 def residual_figure(shown: _Shown) -> Plot:
     """What is left, out of sample, over pressure and in the order of the readings."""
     used = shown.found.data.used
-    left = shown.found.choice.validation.deviation
-    predicted = shown.found.choice.validation.predicted
+    left = shown.found.selection.validation.deviation
+    predicted = shown.found.selection.validation.predicted
     unit, size = force_unit(float(np.abs(left).max()))
-    half = BAND_95 * shown.found.worth.spread.std(predicted)
+    half = BAND_95 * shown.found.quality.spread.std(predicted)
     step = max(-(-used.count // DOTS), 1)
     figure, axes = new_figure(
-        f'Residuals out of sample: {shown.found.choice.validation.rms / size:.3g} {unit} RMS',
+        f'Residuals out of sample: {shown.found.selection.validation.rms / size:.3g} {unit} RMS',
         3.6,
         ncols=2,
         sharey=True,
@@ -247,19 +243,19 @@ def residual_figure(shown: _Shown) -> Plot:
 
 def ladder_figure(found: Identification) -> Plot:
     """Out-of-sample error of each law."""
-    scored = [score for score in found.choice.scores if score.validation is not None]
+    scored = [score for score in found.selection.scores if score.validation is not None]
     errors = [100.0 * score.validation.error for score in scored if score.validation is not None]
     names = [score.rung.words.replace(' + ', '\n+ ') for score in scored]
     figure, ax = new_figure('What each law is off by, on readings it has not seen', 1.5 + 0.33 * len(scored))
-    colours = [GREEN if score is found.choice.best else SKY for score in scored]
+    colours = [GREEN if score is found.selection.best else SKY for score in scored]
     bars = ax.barh(range(len(scored)), errors, color=colours, height=0.65)
     ax.bar_label(bars, labels=[f'{error:.1f} %' for error in errors], padding=4)
     ax.set_yticks(range(len(scored)), names)
     ax.invert_yaxis()
     ax.grid(visible=False, axis='y')
     ax.set_xlim(right=1.12 * max(errors))
-    if found.choice.reference is not None:
-        reference = 100.0 * found.choice.reference.error
+    if found.selection.reference is not None:
+        reference = 100.0 * found.selection.reference.error
         ax.axvline(reference, color=VERMILLION, ls='--', label=f'mean of the other tests, no law: {reference:.1f} %')
         _legend(ax)
     ax.set_xlabel('sum of the deviations over sum of the measured friction [%]')
@@ -301,7 +297,7 @@ def velocity_figure(shown: _Shown) -> Plot:
 
 def static_figure(shown: _Shown, breakaway: Readings) -> Plot:
     """Static and dynamic friction with curves of second order (Figure 16)."""
-    static = breakaway.at.direction * (breakaway.force - shown.found.choice.fit.offsets[breakaway.source])
+    static = breakaway.at.direction * (breakaway.force - shown.found.selection.fit.offsets[breakaway.source])
     unit, size = force_unit(float(static.max()))
     stiction = float(static.mean() - shown.measured.mean())
     figure, ax = new_figure(f'Breaking out takes {stiction:.3g} N more than running, on average', 4.2)
@@ -427,7 +423,7 @@ def _same_ring(law: PriorArtChart, ring: Ring) -> bool:
 
 
 def _sections(found: Identification, plots: Sequence[Plot], figure: Callable[[str], str]) -> Iterable[str]:
-    choice = found.choice
+    choice = found.selection
     yield f'<h1>Seal {escape(str(found.document["name"]))}, identified</h1>'
     yield f'<p class="lead">{escape(str(found.document["source"]))}</p>'
     yield _tiles(found)
@@ -463,9 +459,9 @@ def _sections(found: Identification, plots: Sequence[Plot], figure: Callable[[st
 
 
 def _tiles(found: Identification) -> str:
-    validation, worth = found.choice.validation, found.worth
+    validation, worth = found.selection.validation, found.quality
     values = [
-        ('law', found.choice.rung.name),
+        ('law', found.selection.rung.name),
         ('off on readings not seen', f'{100.0 * validation.error:.1f} %'),
         ('readings left out that are in the 95 % band', f'{100.0 * worth.coverage:.0f} %'),
     ]
@@ -510,8 +506,8 @@ def _or_none(value: float) -> float | None:
 
 def _ladder_table(found: Identification) -> str:
     heads = ('law', 'parameters', 'RMS [N]', 'mean deviation [N]', 'off [%]', 'condition', '')
-    rows = [_ladder_row(score, found) for score in found.choice.scores]
-    reference = found.choice.reference
+    rows = [_ladder_row(score, found) for score in found.selection.scores]
+    reference = found.selection.reference
     if reference is not None:
         rows.append(
             ('no law: mean of the other readings at the same pressure', number(None), number(reference.rms),
@@ -526,8 +522,8 @@ def _ladder_row(score: Score, found: Identification) -> tuple[str, ...]:
     if score.validation is None or score.fit is None:
         none = number(None)
         return name, parameters, none, none, none, none, score.why_not
-    marks = ['recommended'] if score is found.choice.best else []
-    marks += ['saved'] if score.fit is found.choice.fit else []
+    marks = ['recommended'] if score is found.selection.best else []
+    marks += ['saved'] if score.fit is found.selection.fit else []
     validation = score.validation
     return (
         name,
@@ -541,13 +537,13 @@ def _ladder_row(score: Score, found: Identification) -> tuple[str, ...]:
 
 
 def _parameter_table(found: Identification) -> str:
-    choice = found.choice
+    choice = found.selection
     rows = [
-        (p.name, p.symbol, f'{choice.fit.values[p.name]:.5g}', f'{found.worth.standard_errors[p.name]:.2g}', p.unit)
+        (p.name, p.symbol, f'{choice.fit.values[p.name]:.5g}', f'{found.quality.standard_errors[p.name]:.2g}', p.unit)
         for p in choice.rung.parameters
     ]
     rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in choice.rung.fixed.items()]
-    stiction = found.worth.stiction
+    stiction = found.quality.stiction
     if stiction is not None:
         value, unit = (stiction.ratio, '1') if stiction.law == 'load_dependent' else (stiction.stiction, 'N')
         rows.append(
@@ -557,15 +553,15 @@ def _parameter_table(found: Identification) -> str:
 
 
 def _correlation_table(found: Identification) -> str:
-    names = [p.name for p in found.choice.rung.parameters]
+    names = [p.name for p in found.selection.rung.parameters]
     if len(names) < 2:
         return ''
-    correlation = found.choice.fit.correlation
+    correlation = found.selection.fit.correlation
     rows = [
         (name, *(number(_or_none(float(x)), 3, signed=True) for x in row))
         for name, row in zip(names, correlation, strict=True)
     ]
-    condition = found.choice.fit.condition_number
+    condition = found.selection.fit.condition_number
     return table(('correlation', *names), rows) + f'<p>Condition number of the scaled fit: {condition:.1f}.</p>'
 
 

@@ -19,7 +19,8 @@ from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.findings import REFERENCE_HALF_WIDTH
 from seal_friction_ros.core.lubrication.spool import SpoolResult
 from seal_friction_ros.core.lubrication.transient import RunResult, last_cycle
-from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, Comparison, MapRuns, StudyRuns
+from seal_friction_ros.offline.contact.lubrication_comparison import Comparison
+from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, MapRuns, StudyRuns
 from seal_friction_ros.offline.reports.bag_report import number, table, tiles, write_page
 from seal_friction_ros.offline.reports.figures import (
     BLACK,
@@ -459,7 +460,7 @@ def _map_sections(computed: MapRuns, figure: Callable[[str], str]) -> Iterable[s
 def _comparison_sections(comparison: Comparison, figure: Callable[[str], str]) -> Iterable[str]:
     yield from _head(comparison.result.case)
     yield figure('simulation_against_measurement')
-    rows = [(name, f'{v:.3g}' if isinstance(v, float) else v) for name, v in comparison.figures().items()]
+    rows = [(name, f'{v:.3g}' if isinstance(v, float) else v) for name, v in comparison.numbers().items()]
     yield table(('number', 'value'), rows)
     yield figure('friction_over_position')
     yield figure('film')

@@ -8,7 +8,7 @@ from paths import ROOT
 
 from seal_friction_ros.offline.bags.import_log import Samples, write_samples
 from seal_friction_ros.offline.commands.main import main
-from seal_friction_ros.offline.identification.identify import Wishes, identify
+from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
 from seal_friction_ros.offline.reports.identification_report import write_identification_report
 
 THESIS = ROOT / 'data' / 'thesis' / 'friction_tests.csv'
@@ -43,7 +43,7 @@ def test_without_geometry_or_starts_the_page_says_which_figures_are_missing(tmp_
     dynamic_only = tmp_path / 'dynamic.csv'
     lines = THESIS.read_text().splitlines()
     dynamic_only.write_text('\n'.join([lines[0], *(line for line in lines if ',dynamic,' in line)]))
-    found = identify([dynamic_only], Wishes(), 'bare')
+    found = identify([dynamic_only], IdentifyOptions(), 'bare')
     write_identification_report(found, tmp_path / 'page.html')
     text = (tmp_path / 'page.html').read_text()
     assert 'Figures 18 and 19 need the geometry of the ring' in text
@@ -54,7 +54,7 @@ def test_without_geometry_or_starts_the_page_says_which_figures_are_missing(tmp_
 def test_the_same_sources_give_the_same_page(tmp_path):
     pages = []
     for name in ('one', 'two'):
-        found = identify([THESIS], Wishes(seal='ms28775_114'), 'same')
+        found = identify([THESIS], IdentifyOptions(seal='ms28775_114'), 'same')
         folder = tmp_path / name
         folder.mkdir()
         figures = write_identification_report(found, folder / 'page.html')
@@ -65,7 +65,7 @@ def test_the_same_sources_give_the_same_page(tmp_path):
 def test_what_a_file_name_says_is_escaped(tmp_path):
     evil = tmp_path / '<script>x.csv'
     evil.write_text(THESIS.read_text())
-    found = identify([evil], Wishes(), 'same')
+    found = identify([evil], IdentifyOptions(), 'same')
     write_identification_report(found, tmp_path / 'page.html')
     assert '<script>' not in (tmp_path / 'page.html').read_text()
 
@@ -82,7 +82,7 @@ def swept() -> Samples:
 
 def test_a_swept_log_shows_friction_over_velocity(tmp_path):
     write_samples(tmp_path / 'bag', swept(), 'rod')
-    found = identify([tmp_path / 'bag'], Wishes(), 'swept')
+    found = identify([tmp_path / 'bag'], IdentifyOptions(), 'swept')
     assert found.data.used.left_out_by == 'block'
     figures = write_identification_report(found, tmp_path / 'page.html')
     assert 'friction_over_velocity.svg' in {path.name for path in figures}

@@ -1,0 +1,33 @@
+"""``seal_friction report``: write a page about a bag."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.offline.commands.command_line import (
+    SUCCESS,
+    add_command,
+    add_namespace,
+    add_page,
+    print_result,
+)
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        commands, 'report', run, 'write a page with the figures and numbers of a bag',
+        'report bags/pull_test --out pull_test.html',
+    )  # fmt: skip
+    parser.add_argument('bag', type=Path)
+    add_namespace(parser)
+    add_page(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the page."""
+    from seal_friction_ros.offline.reports.bag_report import write_report
+
+    numbers = write_report(arguments.bag, arguments.out, arguments.namespace)
+    print_result(arguments, numbers, f'{arguments.out}: written')
+    return SUCCESS
