@@ -39,7 +39,8 @@ def warnings_of(
     """Limits of the law that its user has to know, one line each."""
     first = data.sources.files[0].name
     yield from (_change_text(first, change) for change in data.changes if abs(change.ratio - 1.0) > 0.0)
-    one_way = [name for name, index in zip(data.used.names, data.used.two_sided, strict=True) if not len(index)]
+    readings = data.prepared.readings
+    one_way = [name for name, index in zip(readings.names, readings.two_sided, strict=True) if not len(index)]
     if one_way:
         yield (
             f'{", ".join(one_way)}: readings in one direction only, so an offset of the force counts as friction: '
