@@ -16,9 +16,9 @@ from seal_friction_ros.core.identification.spool_evaluation import (
 from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.kinematics import MeasuredMotion
 from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
-from seal_friction_ros.core.lubrication.transient import RunResult, run
+from seal_friction_ros.core.lubrication.transient import RunResult
+from seal_friction_ros.offline.contact.lubrication_runs import run_with_progress
 from seal_friction_ros.offline.reports.bag_evaluation import read_run
-from seal_friction_ros.offline.work.progress import progress
 
 _FEWEST_SAMPLES = 10
 
@@ -147,8 +147,7 @@ def _run_through(case: Case, bag: Path, time: FloatArray, position: FloatArray) 
         raise ValueError(f'{bag}: {error}: choose another window') from None
     distance = max(float(np.ptp(position)), case.motion.distance)
     moved = replace(case, motion=replace(case.motion, distance=distance, cycles=1))
-    with progress(f'{case.name} on {bag.name}', round(motion.duration / case.numerics.time_step)) as advance:
-        return run(moved, motion, advance)
+    return run_with_progress(moved, motion)
 
 
 def _offset(position: FloatArray, force: FloatArray) -> float:

@@ -25,6 +25,7 @@ from seal_friction_ros.core.lubrication.friction_map import (
     memory_length,
     steady_friction,
 )
+from seal_friction_ros.core.lubrication.kinematics import Motion
 from seal_friction_ros.core.lubrication.spool import MemberMotion, SpoolResult, superposed
 from seal_friction_ros.core.lubrication.study import StudyTable, study_table
 from seal_friction_ros.core.lubrication.transient import Model, RunResult, advance, rest, run, with_solid_shear_stress
@@ -70,6 +71,12 @@ def compile_for(case: Case) -> None:
     time = case.numerics.time_step
     with suppress(NotConvergedError):
         advance(model, rest(model, case.motion.position(0.0)), time, case.motion.position(time))
+
+
+def run_with_progress(case: Case, motion: Motion) -> RunResult:
+    """Run a case through a motion, with a progress bar; errors as `run`."""
+    with progress(case.name, round(motion.duration / case.numerics.time_step)) as on_step:
+        return run(case, motion, on_step)
 
 
 # -- one run ----------------------------------------------------------------------------------------------------------
@@ -186,7 +193,7 @@ def run_spool(spool: Spool, case_file: str, workers: int) -> SpoolRun:
         local = beside / f'{member.case}.yaml'
         case = single_case(str(local) if local.is_file() else member.case, 'spool in it')
         moved = replace(case, motion=replace(spool.motion, centre=member.shift))
-        calls.append(partial(run, moved, MemberMotion(spool.motion, member)))
+        calls.append(partial(run_with_progress, moved, MemberMotion(spool.motion, member)))
     compile_for(calls[0].args[0])
     results = dict(zip(distinct, run_all(spool.name, calls, workers), strict=True))
     return SpoolRun(spool, superposed(spool.members, [results[member] for member in spool.members]))
@@ -242,7 +249,7 @@ def run_study(case: Case, workers: int, work: Path | None = None) -> StudyRuns:
 
 
 def _curves(case: Case) -> Mapping[str, Any]:
-    result = run(case)
+    result = run_with_progress(case, case.motion)
     return {name: getattr(result, name) for name in _CURVES}
 
 

@@ -84,7 +84,8 @@ def run_all(
             results[number] = cast(Result, result)
             on_result(number, results[number])
     if errors:
-        raise ValueError(errors[min(errors)])
+        error = errors[min(errors)]
+        raise ValueError(f'{label}: {error}' if error == _CRASHED else error)
     return [results[number] for number in range(len(calls))]
 
 

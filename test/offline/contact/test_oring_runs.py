@@ -221,7 +221,7 @@ def test_a_seal_file_that_is_there_is_not_overwritten_and_nothing_is_computed_fi
 
 @pytest.mark.parametrize(
     ('changes', 'message'),
-    [({'friction': None}, 'needs its section friction'), ({'pressures': [0.0]}, 'needs two pressures at least')],
+    [({'friction': None}, 'needs the section friction'), ({'pressures': [0.0]}, 'needs two pressures at least')],
 )
 def test_a_seal_file_needs_friction_and_two_pressures(
     changes: dict, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
