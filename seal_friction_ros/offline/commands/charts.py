@@ -3,17 +3,17 @@
 import argparse
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import SUCCESS, add_command, add_page, print_result
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(
+    parser = cli.add_command(
         commands, 'charts', run, 'write a page with the curves of a seal file',
         'charts ms28775_114 --out ms28775_114.html',
     )  # fmt: skip
     parser.add_argument('seal', help='seal file: a path, or the name of one in config/seals')
-    add_page(parser)
+    cli.add_page(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -22,5 +22,4 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.reports.seal_charts import write_seal_charts
 
     numbers = write_seal_charts(config_path('seals', arguments.seal), arguments.out)
-    print_result(arguments, numbers, f'{arguments.out}: written')
-    return SUCCESS
+    return cli.print_result(arguments, numbers, f'{arguments.out}: written')

@@ -95,13 +95,19 @@ def at_least_one(text: str) -> int:
 # -- output -----------------------------------------------------------------------------------------------------------
 
 
-def print_result(arguments: argparse.Namespace, numbers: Any, summary: str) -> None:
-    """Print a result: the summary on stdout, or with ``--json`` the numbers on stdout and the summary on stderr."""
+def print_result(arguments: argparse.Namespace, numbers: Any, summary: str, code: int = SUCCESS) -> int:
+    """Print the summary, or with ``--json`` the numbers and, on stderr, the summary; return the exit code."""
     if arguments.json:
         print(json.dumps(json_value(numbers), allow_nan=False))
         print(summary, file=sys.stderr)
     else:
         print(summary)
+    return code
+
+
+def options_from(arguments: argparse.Namespace, record: type[Any]) -> dict[str, Any]:
+    """The arguments that are named after fields of a record."""
+    return {f.name: getattr(arguments, f.name) for f in dataclasses.fields(record) if hasattr(arguments, f.name)}
 
 
 def print_error(text: str) -> None:

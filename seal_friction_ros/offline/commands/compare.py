@@ -1,30 +1,23 @@
 """``seal_friction compare``: compare a topic of two bags."""
 
 import argparse
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import (
-    DIFFERENT,
-    SUCCESS,
-    add_command,
-    non_negative,
-    print_result,
-)
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(
+    parser = cli.add_command(
         commands, 'compare', run, 'compare a topic of two bags: first, largest and RMS difference',
         'compare recorded replayed --rtol 0.05',
     )  # fmt: skip
     parser.add_argument('a', type=Path, metavar='A', help='first bag, the reference')
     parser.add_argument('b', type=Path, metavar='B', help='second bag')
     parser.add_argument('--topic', default='', help='default: the friction estimates of each bag')
-    parser.add_argument('--atol', type=non_negative, default=0.0, help='absolute tolerance, default 0')
-    parser.add_argument('--rtol', type=non_negative, default=0.0, help='relative tolerance, default 0')
+    parser.add_argument('--atol', type=cli.non_negative, default=0.0, help='absolute tolerance, default 0')
+    parser.add_argument('--rtol', type=cli.non_negative, default=0.0, help='relative tolerance, default 0')
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -32,5 +25,4 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.replay.compare import compare
 
     found = compare(arguments.a, arguments.b, arguments.topic, arguments.atol, arguments.rtol)
-    print_result(arguments, {**asdict(found), 'agree': found.agree}, found.summary())
-    return SUCCESS if found.agree else DIFFERENT
+    return cli.print_result(arguments, found.numbers(), found.summary(), cli.SUCCESS if found.agree else cli.DIFFERENT)

@@ -5,15 +5,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import (
-    SUCCESS,
-    add_command,
-    add_page,
-    add_workers,
-    at_least_one,
-    number_of_workers,
-    print_result,
-)
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
@@ -21,27 +13,29 @@ def add_parser(commands: Any) -> None:
     description = 'compute the lubricated contact of a seal'
     parser = commands.add_parser('ehl', help=description, description=description)
     steps = parser.add_subparsers(title='commands', required=True, metavar='COMMAND')
-    run = add_command(
+    run = cli.add_command(
         steps, 'run', run_case, 'compute friction, film and contact over a motion',
         'ehl run inner_seal --out inner_seal.html',
     )  # fmt: skip
     help_text = 'run through the recorded position of this bag and compare with its force'
     run.add_argument('--bag', type=Path, help=help_text)
     run.add_argument('--window', type=float, nargs=2, metavar=('FROM', 'TO'), help='with --bag: part to take [s]')
-    run.add_argument('--average', type=at_least_one, metavar='SAMPLES', help='with --bag: moving average, default 50')
-    study = add_command(
+    run.add_argument(
+        '--average', type=cli.at_least_one, metavar='SAMPLES', help='with --bag: moving average, default 50'
+    )
+    study = cli.add_command(
         steps, 'study', run_study, 'compute friction with other solid shear stresses',
         'ehl study inner_seal --work build/study --out study.html',
     )  # fmt: skip
-    chart = add_command(
+    chart = cli.add_command(
         steps, 'map', run_map, 'compute a friction map: steady friction over speed and pressure',
         'ehl map inner_seal --seal-file mapped.yaml',
     )  # fmt: skip
     chart.add_argument('--seal-file', type=Path, metavar='FILE.yaml', help='seal file to write; must not exist')
     for step in (run, study, chart):
         step.add_argument('case', help='case file: a path, or the name of one in config/ehl')
-        add_workers(step, 'runs')
-        add_page(step, required=False)
+        cli.add_workers(step, 'runs')
+        cli.add_page(step, required=False)
     for step in (study, chart):
         help_text = 'keep finished parts in this folder, and resume from them'
         step.add_argument('--work', type=Path, metavar='FOLDER', help=help_text)
@@ -61,7 +55,7 @@ def run_case(arguments: argparse.Namespace) -> int:
     if isinstance(case, Spool):
         if arguments.bag is not None:
             raise ValueError(f'{arguments.case}: a spool cannot be compared with a bag: take the case of one seal')
-        spool = runs.run_spool(case, arguments.case, number_of_workers(arguments))
+        spool = runs.run_spool(case, arguments.case, cli.number_of_workers(arguments))
         return _finish(
             arguments, spool, lambda page: report.write_spool_page(case.name, spool.result, spool.labels, page)
         )
@@ -88,7 +82,7 @@ def run_study(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.reports.lubrication_report import write_study_page
 
     case = runs.single_case(arguments.case, 'study')
-    study = runs.run_study(case, number_of_workers(arguments), arguments.work)
+    study = runs.run_study(case, cli.number_of_workers(arguments), arguments.work)
     return _finish(arguments, study, lambda page: write_study_page(case, study, page))
 
 
@@ -101,18 +95,16 @@ def run_map(arguments: argparse.Namespace) -> int:
     case = runs.single_case(arguments.case, 'friction map')
     if arguments.seal_file is not None:
         check_new(arguments.seal_file)
-    computed = runs.run_map(case, number_of_workers(arguments), arguments.work)
+    computed = runs.run_map(case, cli.number_of_workers(arguments), arguments.work)
     numbers, summary = _with_page(arguments, computed, lambda page: write_map_page(computed, page))
     if arguments.seal_file is not None:
         write_seal(runs.seal_document(computed, arguments.seal_file.stem), arguments.seal_file)
-    print_result(arguments, numbers, summary)
-    return SUCCESS
+    return cli.print_result(arguments, numbers, summary)
 
 
 def _finish(arguments: argparse.Namespace, result: Any, write_page: Callable[[Path], Iterable[Path]]) -> int:
     """Write the page, if one is asked for, and print the result."""
-    print_result(arguments, *_with_page(arguments, result, write_page))
-    return SUCCESS
+    return cli.print_result(arguments, *_with_page(arguments, result, write_page))
 
 
 def _with_page(

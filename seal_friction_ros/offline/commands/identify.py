@@ -4,44 +4,40 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import (
-    SUCCESS,
-    add_command,
-    add_namespace,
-    add_page,
-    non_negative,
-    print_result,
-)
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(
+    parser = cli.add_command(
         commands, 'identify', run, 'identify a seal file from bags, logs, tables or filled data sheets',
         'identify bags/pull_test --out my_seal.yaml --report my_seal.html',
         'identify O-ring257_*bar.csv --rig delft --out o_ring.yaml',
     )  # fmt: skip
     parser.add_argument('sources', type=Path, nargs='+', metavar='SOURCE', help='bag, log, table or data sheet')
     parser.add_argument('--out', type=Path, required=True, metavar='SEAL.yaml', help='seal file to write')
-    add_page(parser, '--report', required=False)
+    cli.add_page(parser, '--report', required=False)
     parser.add_argument('--rig', help='rig file of the logs: a path, or the name of one in config/rigs')
     parser.add_argument('--seal', help='seal file with the geometry of the ring: a path, or one in config/seals')
     parser.add_argument(
         '--squeeze-force', action='store_true', help='normal force from the geometry, even if --seal has one'
     )
     parser.add_argument(
-        '--seal-chambers', type=_chambers, metavar='a,b', help='chamber that each seal sees, one letter for each seal'
+        '--seal-chambers', dest='chambers', type=_chambers, metavar='a,b', help='chamber of each seal, one letter each'
     )
     parser.add_argument('--law', help='law to save instead of the recommended one')
     parser.add_argument(
-        '--run-to-run', type=non_negative, metavar='SHARE', help='relative standard deviation between runs, if known'
+        '--run-to-run',
+        type=cli.non_negative,
+        metavar='SHARE',
+        help='relative standard deviation between runs, if known',
     )
     parser.add_argument('--name', default='', help='name of the seal; default: that of the file')
-    parser.add_argument('--slowest', type=non_negative, metavar='M/S', help='a slower rod counts as at rest')
+    parser.add_argument('--slowest', type=cli.non_negative, metavar='M/S', help='a slower rod counts as at rest')
     parser.add_argument(
-        '--largest-acceleration', type=non_negative, metavar='M/S2', help='samples beyond it are not used'
+        '--largest-acceleration', type=cli.non_negative, metavar='M/S2', help='samples beyond it are not used'
     )
-    add_namespace(parser)
+    cli.add_namespace(parser)
 
 
 def _chambers(text: str) -> tuple[str, ...]:
@@ -59,21 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.identification.wording import summary
     from seal_friction_ros.offline.work.seal_writer import write_seal
 
-    source_options = SourceOptions(
-        rig=arguments.rig,
-        chambers=arguments.seal_chambers,
-        namespace=arguments.namespace,
-        slowest=arguments.slowest,
-        largest_acceleration=arguments.largest_acceleration,
-    )
-    options = IdentifyOptions(
-        sources=source_options,
-        seal=arguments.seal,
-        squeeze_force=arguments.squeeze_force,
-        law=arguments.law,
-        run_to_run=arguments.run_to_run,
-        name=arguments.name,
-    )
+    source_options = SourceOptions(**cli.options_from(arguments, SourceOptions))
+    options = IdentifyOptions(**{**cli.options_from(arguments, IdentifyOptions), 'sources': source_options})
     found = identify(arguments.sources, options, arguments.out.stem)
     written: dict[str, Any] = {'seal_file': arguments.out}
     if arguments.report:
@@ -82,5 +65,6 @@ def run(arguments: argparse.Namespace) -> int:
         figures = write_identification_report(found, arguments.report)
         written |= {'report': arguments.report, 'figures': figures}
     write_seal(found.document, arguments.out)
-    print_result(arguments, identification_numbers(found) | written, f'{summary(found)}\n{arguments.out}: written')
-    return SUCCESS
+    return cli.print_result(
+        arguments, identification_numbers(found) | written, f'{summary(found)}\n{arguments.out}: written'
+    )

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import SUCCESS, add_command, print_result
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
@@ -12,13 +12,13 @@ def add_parser(commands: Any) -> None:
     description = 'make a bag from measurements'
     parser = commands.add_parser('import', help=description, description=description)
     sources = parser.add_subparsers(title='sources', required=True, metavar='SOURCE')
-    log = add_command(
+    log = cli.add_command(
         sources, 'log', run_log, 'make a bag from a measured log, CSV or white space',
         'import log ram.csv --rig my_rig.yaml --out ram',
     )  # fmt: skip
     log.add_argument('log', type=Path, help='log file')
     log.add_argument('--rig', required=True, help='rig file: a path, or the name of one in config/rigs')
-    thesis = add_command(
+    thesis = cli.add_command(
         sources, 'thesis', run_thesis, 'make a bag from the pull test of the thesis, Tables A-1 to A-3',
         'import thesis --out pull_test',
     )  # fmt: skip
@@ -32,8 +32,7 @@ def run_log(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.bags.import_log import import_log
 
     summary = import_log(arguments.log, config_path('rigs', arguments.rig), arguments.out)
-    print_result(arguments, summary, f'{arguments.out}: {summary.rows} rows written')
-    return SUCCESS
+    return cli.print_result(arguments, summary, f'{arguments.out}: {summary.rows} rows written')
 
 
 def run_thesis(arguments: argparse.Namespace) -> int:
@@ -41,5 +40,4 @@ def run_thesis(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.bags.import_thesis import import_thesis
 
     summary = import_thesis(arguments.out)
-    print_result(arguments, summary, f'{arguments.out}: {summary.rows} rows written')
-    return SUCCESS
+    return cli.print_result(arguments, summary, f'{arguments.out}: {summary.rows} rows written')

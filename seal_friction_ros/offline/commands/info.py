@@ -4,14 +4,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import SUCCESS, add_command, print_result
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    add_command(commands, 'info', run, 'show the contents of a bag', 'info bags/pull_test').add_argument(
-        'bag', type=Path
-    )
+    parser = cli.add_command(commands, 'info', run, 'show the contents of a bag', 'info bags/pull_test')
+    parser.add_argument('bag', type=Path)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -19,5 +18,4 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.bags.info import bag_info
 
     info = bag_info(arguments.bag)
-    print_result(arguments, info, info.summary())
-    return SUCCESS
+    return cli.print_result(arguments, info, info.summary())

@@ -26,7 +26,7 @@ from seal_friction_ros.offline.commands import (
     spool,
     tune,
 )
-from seal_friction_ros.offline.commands.command_line import INTERRUPTED, UNUSABLE, print_error
+from seal_friction_ros.offline.commands import command_line as cli
 
 GROUPS = {
     'replay': (info, replay, compare, recover, report, import_data),
@@ -81,10 +81,10 @@ def main(arguments: list[str] | None = None) -> int:
     except (ValueError, OSError) as error:
         from seal_friction_ros.offline.work.executor import error_text
 
-        print_error(error_text(error))
-        return UNUSABLE
+        cli.print_error(error_text(error))
+        return cli.UNUSABLE
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return cli.INTERRUPTED
 
 
 def run_and_exit() -> None:

@@ -4,12 +4,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import SUCCESS, add_command, add_page, print_result
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(
+    parser = cli.add_command(
         commands, 'oring', run, 'compute contact stress and normal force of an O-ring by finite elements',
         'oring ms28775_114 --out my_seal.yaml --report oring.html',
     )  # fmt: skip
@@ -17,7 +17,7 @@ def add_parser(commands: Any) -> None:
     help_text = 'gauge pressures, instead of those in the file'
     parser.add_argument('--pressures', type=float, nargs='+', default=(), metavar='PA', help=help_text)
     parser.add_argument('--out', type=Path, metavar='SEAL.yaml', help='seal file to write; must not exist')
-    add_page(parser, '--report', required=False)
+    cli.add_page(parser, '--report', required=False)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,5 +35,4 @@ def run(arguments: argparse.Namespace) -> int:
         write_oring_report(computed, arguments.report)
     if arguments.out:
         write_seal(seal_document(computed), arguments.out, seal_comment(computed))
-    print_result(arguments, computed.summary, numbers_text(computed))
-    return SUCCESS
+    return cli.print_result(arguments, computed.summary, numbers_text(computed))

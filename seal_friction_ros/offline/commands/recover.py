@@ -4,13 +4,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import SUCCESS, add_command, print_result
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
     description = 'make a valid bag from the readable part of a damaged or unfinished bag'
-    parser = add_command(commands, 'recover', run, description, 'recover build/bags/friction_20260302_101500')
+    parser = cli.add_command(commands, 'recover', run, description, 'recover build/bags/friction_20260302_101500')
     parser.add_argument('bag', type=Path)
     parser.add_argument('--out', type=Path, metavar='BAG', help='bag to make; default: BAG_recovered')
 
@@ -20,5 +20,4 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.bags.recover import recover
 
     found = recover(arguments.bag, arguments.out)
-    print_result(arguments, found, found.summary())
-    return SUCCESS
+    return cli.print_result(arguments, found, found.summary())

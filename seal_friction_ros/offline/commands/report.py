@@ -4,24 +4,18 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import (
-    SUCCESS,
-    add_command,
-    add_namespace,
-    add_page,
-    print_result,
-)
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(
+    parser = cli.add_command(
         commands, 'report', run, 'write a page with the figures and numbers of a bag',
         'report bags/pull_test --out pull_test.html',
     )  # fmt: skip
     parser.add_argument('bag', type=Path)
-    add_namespace(parser)
-    add_page(parser)
+    cli.add_namespace(parser)
+    cli.add_page(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -29,5 +23,4 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.reports.bag_report import write_report
 
     numbers = write_report(arguments.bag, arguments.out, arguments.namespace)
-    print_result(arguments, numbers, f'{arguments.out}: written')
-    return SUCCESS
+    return cli.print_result(arguments, numbers, f'{arguments.out}: written')

@@ -4,12 +4,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.offline.commands.command_line import SUCCESS, add_command, print_result
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(
+    parser = cli.add_command(
         commands, 'sheet', run, 'make an empty data sheet of the friction test plan: CSV, and a page to print',
         'sheet rod_seal --seal ms28775_114 --out sheet.csv',
     )  # fmt: skip
@@ -49,5 +49,4 @@ def run(arguments: argparse.Namespace) -> int:
         geometry=geometry_of_seal_file(arguments.seal) if arguments.seal else None,
     )
     sheet, page = write_sheet(plan, arguments.out)
-    print_result(arguments, {'sheet': sheet, 'page': page}, f'{sheet}, {page}: written')
-    return SUCCESS
+    return cli.print_result(arguments, {'sheet': sheet, 'page': page}, f'{sheet}, {page}: written')

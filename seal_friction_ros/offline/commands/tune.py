@@ -6,19 +6,12 @@ from typing import Any
 
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
-from seal_friction_ros.offline.commands.command_line import (
-    DIFFERENT,
-    SUCCESS,
-    add_command,
-    add_configuration,
-    add_namespace,
-    print_result,
-)
+from seal_friction_ros.offline.commands import command_line as cli
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = add_command(
+    parser = cli.add_command(
         commands, 'tune', run, 'tune the friction feed-forward on a simulated servo or on a recorded axis',
         'tune --out feedforward.yaml',
         'tune --bag BAG --out feedforward.yaml',
@@ -26,8 +19,8 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
     help_text = 'parameter file to write; a report goes beside it'
     parser.add_argument('--out', type=Path, required=True, metavar='FILE', help=help_text)
-    add_configuration(parser)
-    add_namespace(parser, 'with --bag: ')
+    cli.add_configuration(parser)
+    cli.add_namespace(parser, 'with --bag: ')
     for name, meaning in _settings().items():
         condition = '' if name in meanings(TuningSettings) else 'with --bag: '
         unit = f' [{meaning.unit}]' if meaning.unit else ''
@@ -54,8 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         result = tune_simulator(arguments.out, TuningSettings(**given), configuration)
     numbers = {**result.numbers, 'file': result.file, 'page': result.page, 'figures': result.figures}
-    print_result(arguments, numbers, f'{result.verdict}\n{result.file} and {result.page}: written')
-    return SUCCESS if result.better_in_every_case else DIFFERENT
+    code = cli.SUCCESS if result.better_in_every_case else cli.DIFFERENT
+    return cli.print_result(arguments, numbers, f'{result.verdict}\n{result.file} and {result.page}: written', code)
 
 
 def _given(arguments: argparse.Namespace) -> dict[str, Any]:

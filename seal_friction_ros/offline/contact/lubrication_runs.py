@@ -81,22 +81,12 @@ def run_with_progress(case: Case, motion: Motion) -> RunResult:
 
 # -- one run ----------------------------------------------------------------------------------------------------------
 
-_UNITS = {
-    **dict.fromkeys(('assisted_length', 'elastic_length', 'second_lobe'), 'm'),
-    **dict.fromkeys(
-        (
-            'friction',
-            'solid_slow',
-            'solid_fast',
-            'fluid_slow',
-            'fluid_fast',
-            'edge_assist',
-            'friction_on_leaving',
-            'after_edge',
-        ),
-        'N',
-    ),
-}
+_LENGTHS = {'assisted_length', 'elastic_length', 'second_lobe'}
+_FORCES = {
+    'friction', 'solid_slow', 'solid_fast', 'fluid_slow', 'fluid_fast', 'edge_assist', 'friction_on_leaving',
+    'after_edge',
+}  # fmt: skip
+_UNITS = dict.fromkeys(_LENGTHS, 'm') | dict.fromkeys(_FORCES, 'N')
 
 
 def _with_units(found: dict[str, Any]) -> dict[str, Any]:

@@ -102,31 +102,13 @@ def identification_section(
 
 # -- JSON -------------------------------------------------------------------------------------------------------------
 
-_OF_THE_SECTION = (
-    'law',
-    'parameters',
-    'standard_errors',
-    'pressure_Pa',
-    'measured_N',
-    'fitted_N',
-    'cross_validation_error',
-    'warnings',
-    'residual_N',
-    'is_outlier',
-    'left_out_by',
-    'cross_validation_rms_N',
-    'recommended_law',
-    'band_coverage',
-    'repeatability',
-    'seal_chambers',
-)
-
 
 def identification_numbers(found: Identification) -> dict[str, Any]:
     """Numbers for JSON."""
     data, selection, quality, levels = found.data, found.selection, found.quality, found.levels
     reference, line = selection.reference, quality.offset_line
-    return {name: found.document['identification'][name] for name in _OF_THE_SECTION} | {
+    return {
+        **found.document['identification'],
         'std_N': [rounded_value(level.std) for level in levels],
         'left_out_N': [rounded_value(level.left_out) for level in levels],
         'worst_left_out_error': rounded_value(worst_left_out(levels)),

@@ -2,8 +2,9 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import islice
+from typing import Any
 
 from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE
 
@@ -26,6 +27,10 @@ class ReplayResult:
     def identical(self) -> bool:
         """Whether the bag holds estimates, and the replay reproduced every recorded answer to the byte."""
         return self.recorded_estimates > 0 and not self.differing
+
+    def numbers(self) -> dict[str, Any]:
+        """Numbers for JSON."""
+        return {**asdict(self), 'identical': self.identical}
 
     def summary(self, *, verified: bool) -> str:
         """One line for a person; ``verified``: about the comparison with the recorded answers."""

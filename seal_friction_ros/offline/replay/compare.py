@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,10 @@ class BagComparison:
     def agree(self) -> bool:
         """Whether both bags have the same number of messages and every field is within tolerance."""
         return not self.first_difference
+
+    def numbers(self) -> dict[str, Any]:
+        """Numbers for JSON."""
+        return {**asdict(self), 'agree': self.agree}
 
     def summary(self) -> str:
         """One line for the topic and one for each field that differs, for a person."""

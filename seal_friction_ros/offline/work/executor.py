@@ -8,7 +8,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, NamedTuple, TypeVar, cast
@@ -130,6 +130,7 @@ class _Worker:
 def _work(call: Callable[[], Any], connection: Connection, inherited: Sequence[Connection]) -> None:
     """Body of a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # ends silently: the parent writes the message
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     for other in inherited:
         other.close()
     report_shares_to(connection.send)
@@ -146,6 +147,17 @@ def _outcome(call: Callable[[], Any]) -> Outcome[Any]:
         return Outcome(None, error_text(error))
 
 
+@contextmanager
+def _sigint_delayed() -> Iterator[None]:
+    """Deliver an interrupt after the block."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    try:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _completed(
     label: str, calls: Sequence[Callable[[], Any]], workers: int, *, stop_at_error: bool
 ) -> Iterator[tuple[int, Outcome[Any]]]:
@@ -157,8 +169,9 @@ def _completed(
             while waiting or running:
                 while waiting and len(running) < max(workers, 1):
                     number = waiting.pop()
-                    worker = _Worker(number, calls[number], list(running))
-                    running[worker.connection] = worker
+                    with _sigint_delayed():  # else a worker could begin and not be known
+                        worker = _Worker(number, calls[number], list(running))
+                        running[worker.connection] = worker
                 ready = wait(list(running))
                 for worker in [worker for connection, worker in running.items() if connection in ready]:
                     share, outcome = worker.receive()
