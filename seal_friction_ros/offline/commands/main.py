@@ -176,7 +176,8 @@ def _jobs(arguments: argparse.Namespace) -> int:
 
 def _tune(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.replay.replay import chosen_configuration
-    from seal_friction_ros.offline.tuning.tune import tune_bag, tune_simulator
+    from seal_friction_ros.offline.reports.tune_report import write_tuning_page
+    from seal_friction_ros.offline.tuning.tune import check_target, page_of, tune_bag, tune_simulator, write_parameters
 
     kind, other = (MatchSettings, TuningSettings) if arguments.bag else (TuningSettings, MatchSettings)
     given = {name: value for name in _tuning_options() if (value := getattr(arguments, name)) is not None}
@@ -185,14 +186,16 @@ def _tune(arguments: argparse.Namespace) -> int:
         name = (foreign or ['namespace'])[0].replace('_', '-')
         raise ValueError(f'--{name} is {"not for" if arguments.bag else "only for"} a --bag')
     configuration = chosen_configuration(arguments.params, arguments.seal)
+    check_target(arguments.out)
     if arguments.bag:
-        known = MatchSettings(**given)
-        summary = tune_bag(arguments.bag, arguments.out, known, configuration, arguments.namespace)
+        tuning: Any = tune_bag(arguments.bag, MatchSettings(**given), configuration, arguments.namespace)
     else:
-        summary = tune_simulator(arguments.out, TuningSettings(**given), configuration)
-    figures = {**summary.numbers, 'file': summary.file, 'page': summary.page, 'figures': summary.figures}
-    _tell(arguments, figures, f'{summary.verdict}\n{summary.file} and {summary.page}: written')
-    return 0 if summary.better_in_every_case else DIFFERENT
+        tuning = tune_simulator(TuningSettings(**given), configuration)
+    page = page_of(arguments.out)
+    figures = {**tuning.numbers, 'file': arguments.out, 'page': page, 'figures': write_tuning_page(tuning, page)}
+    write_parameters(arguments.out, tuning)
+    _tell(arguments, figures, f'{tuning.verdict}\n{arguments.out} and {page}: written')
+    return 0 if tuning.found.better_in_every_case else DIFFERENT
 
 
 def _tuning_options() -> dict[str, Meaning]:

@@ -42,7 +42,7 @@ from seal_friction_ros.core.lubrication.spool import MemberMotion, SpoolResult, 
 from seal_friction_ros.core.lubrication.study import StudyTable, study_table
 from seal_friction_ros.core.lubrication.transient import RunResult, run, with_solid_shear_stress
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.reports.bag_evaluation import read_run
+from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
