@@ -2,10 +2,9 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.foundation.parameters import meanings
@@ -16,21 +15,11 @@ from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, Pres
 from seal_friction_ros.offline.reports.bag_figures import bag_verdict, run_figures
 from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, number
-from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, write_page
+from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, ReportSummary, Table, write_page
 from seal_friction_ros.offline.reports.tracking_evaluation import TrackingStretch
 from seal_friction_ros.offline.reports.tracking_figures import stretch_name, tracking_plots, tracking_verdict
 
 _SHOWN_CONFIGURATIONS = 2  # so many of the first and of the last, in a bag with more
-
-
-@dataclass(frozen=True)
-class ReportSummary:
-    """Files of a report, and its numbers."""
-
-    page: Path
-    figures: tuple[Path, ...]
-    numbers: dict[str, Any]
-    """`bag_evaluation.evaluation_numbers`, and ``tracking``, a list of `TrackingStretch`; None for a missing number"""
 
 
 @house_style()
@@ -41,6 +30,9 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         bag: The bag.
         out: HTML file.
         namespace: Only topics below it count; for bags of several actuators.
+
+    Returns:
+        Files, and as numbers `evaluation_numbers` and ``tracking``, a list of `TrackingStretch`.
 
     Raises:
         BagError: The bag cannot be read, or holds no estimates.

@@ -134,6 +134,20 @@ def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:
             handle.set_alpha(1.0)
 
 
+def finish_figure_18(ax: Axes, unit: str) -> None:
+    """Axes and legend of the coefficient of friction over normal force, as Figure 18 of the thesis."""
+    ax.set(xlim=(0.0, None), xlabel=f'normal force of one seal [{unit}]')
+    ax.set(ylim=(0.0, None), ylabel='coefficient of dynamic friction [-]')
+    legend_above(ax)
+
+
+def finish_figure_19(ax: Axes, unit: str) -> None:
+    """Axes and legend of normal over axial force, as Figure 19 of the thesis."""
+    ax.set(xlabel=f'axial force of one seal, pressure times projected area [{unit}]')
+    ax.set(ylim=(0.0, None), ylabel=f'normal force of one seal [{unit}]')
+    legend_above(ax)
+
+
 def zero_lines(ax: Axes, *, vertical: bool = False) -> None:
     """Thin line at zero of the y axis, and with ``vertical`` at zero of the x axis too."""
     ax.axhline(0.0, color=GREY, lw=0.6, zorder=1.0)

@@ -358,13 +358,7 @@ def fitted_coefficient_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     coulomb = np.array([shown.seal.coulomb_law.coulomb_friction(float(p)) for p in pressure])
     ax.plot(of_one / size, coulomb / of_one, color=style.BLACK, lw=1.8, label='law')
     _draw_readings(ax, shown, total / seals / size, shown.measured / total)
-    ax.set(
-        xlim=(0.0, None),
-        ylim=(0.0, None),
-        xlabel=f'normal force of one seal [{unit}]',
-        ylabel='coefficient of dynamic friction [-]',
-    )
-    style.legend_above(ax)
+    style.finish_figure_18(ax, unit)
     return Plot('fig18_coefficient_of_friction', figure)
 
 
@@ -385,13 +379,7 @@ def computed_normal_force_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     levels = np.array([level.pressure * area for level in shown.found.levels])
     at_levels = np.interp(levels, x, y)
     ax.plot(levels / size, at_levels / size, 'o', color=style.BLACK, ms=5.0, label='pressures measured')
-    ax.set(
-        xlim=(0.0, None),
-        ylim=(0.0, None),
-        xlabel=f'axial force of one seal, pressure times projected area [{unit}]',
-        ylabel=f'normal force of one seal [{unit}]',
-    )
-    style.legend_above(ax)
+    style.finish_figure_19(ax, unit)
     return Plot('fig19_normal_force', figure)
 
 

@@ -3,7 +3,6 @@
 Cases of the seal of the thesis are compared with its Appendix B.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +23,6 @@ from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number, pressure_text
 from seal_friction_ros.offline.reports.page import Table, write_page
 from seal_friction_ros.offline.reports.thesis_data import THESIS_SEAL, ThesisContact, appendix_b
-
-
-@dataclass(frozen=True)
-class OringReport:
-    """Files of a report."""
-
-    page: Path
-    figures: tuple[Path, ...]
 
 
 def thesis_case(computed: Computed, result: ContactResult) -> ThesisContact | None:
@@ -67,14 +58,17 @@ def numbers_text(computed: Computed) -> str:
 
 
 @house_style()
-def write_oring_report(computed: Computed, out: Path) -> OringReport:
+def write_oring_report(computed: Computed, out: Path) -> tuple[Path, ...]:
     """Write the report of a computed case; see `write_page`.
+
+    Returns:
+        Paths of the figures.
 
     Raises:
         ValueError: The page or a figure cannot be written.
     """
     case = computed.file.case
-    figures = write_page(
+    return write_page(
         out,
         'oring',
         oring_figures(computed),
@@ -88,7 +82,6 @@ def write_oring_report(computed: Computed, out: Path) -> OringReport:
         thesis_table=_thesis_table(computed),
         friction_table=_friction_table(computed),
     )
-    return OringReport(out, figures)
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ so the same input gives the same bytes.
 
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +32,16 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[Any]]
     text_columns: Sequence[int] = ()
     """columns that hold text, which is aligned left; the others hold numbers"""
+
+
+@dataclass(frozen=True)
+class ReportSummary:
+    """Files of a report, and its numbers."""
+
+    page: Path
+    figures: tuple[Path, ...]
+    numbers: dict[str, Any]
+    """plain types for JSON; None for a missing number"""
 
 
 def parameter_rows(record: Any, prefix: str = '') -> list[tuple[Any, ...]]:

@@ -219,13 +219,7 @@ def seal_coefficient_figure(shown: ChartedSeal, law: PhysicsBased) -> Plot:
         # 250 and 750 psi were not tested: interpolated between the neighbours.
         means = np.interp(pressures, *mean_dynamic_friction()) / 2.0
         ax.plot(normal / size, means / normal, **_SINGLE, label='tests over finite elements (Figure 18)')
-    ax.set(
-        xlim=(0.0, None),
-        ylim=(0.0, None),
-        xlabel=f'normal force of one seal [{unit}]',
-        ylabel='coefficient of dynamic friction [-]',
-    )
-    style.legend_above(ax)
+    style.finish_figure_18(ax, unit)
     return Plot('fig18_coefficient_of_friction', figure)
 
 
@@ -240,12 +234,7 @@ def seal_normal_force_figure(shown: ChartedSeal, law: PhysicsBased) -> Plot:
     if shown.is_thesis_seal:
         x, y = thesis_columns('normal_force', axial_force_lbf=LBF, normal_force_lbf=LBF)
         ax.plot(x / size, y / size, **_SINGLE, label='finite elements (thesis, Table 4)')
-    ax.set(
-        ylim=(0.0, None),
-        xlabel=f'axial force of one seal, pressure times projected area [{unit}]',
-        ylabel=f'normal force of one seal [{unit}]',
-    )
-    style.legend_above(ax)
+    style.finish_figure_19(ax, unit)
     return Plot('fig19_normal_force', figure)
 
 

@@ -1,6 +1,5 @@
 """Report of a measurement of several cycles, evaluated as in the spool-valve paper."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,26 +10,17 @@ from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluati
 from seal_friction_ros.offline.identification.sources import column_in_si, table_rows
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
-from seal_friction_ros.offline.reports.page import write_page
+from seal_friction_ros.offline.reports.page import ReportSummary, write_page
 
 TIME_UNITS = {'s': 's', 'ms': 'ms'}
 LENGTH_UNITS = {'m': 'm', 'mm': 'mm', 'um': 'um'}
 FORCE_UNITS = {'n': 'N', 'kn': 'kN', 'lbf': 'lbf'}
 
 
-@dataclass(frozen=True)
-class SpoolSummary:
-    """Files of a report, and its numbers."""
-
-    page: Path
-    figures: tuple[Path, ...]
-    numbers: dict[str, Any]
-
-
 @house_style()
 def write_spool_report(
     table: Path, out: Path, settings: SpoolEvaluation, reference: float | None = None
-) -> SpoolSummary:
+) -> ReportSummary:
     """Evaluate a table of several cycles and write the report; see `write_page`.
 
     Args:
@@ -68,7 +58,7 @@ def write_spool_report(
         numbers=numbers,
         settings=settings,
     )
-    return SpoolSummary(out, figures, numbers)
+    return ReportSummary(out, figures, numbers)
 
 
 def spool_numbers(found: SpoolFriction) -> dict[str, Any]:
