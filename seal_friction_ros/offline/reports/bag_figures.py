@@ -55,7 +55,7 @@ def bag_verdict(levels: Sequence[PressureLevel]) -> str:
     if len(levels) == 1:
         side = 'above' if level.deviation > 0.0 else 'below'
         return f'Estimated sliding friction is {size} {side} the measured friction {where}'
-    return f'Estimated sliding friction deviates at most {size} from the measured friction ({where})'
+    return f'Estimated sliding friction is within {size} of the measurement (worst {where})'
 
 
 # -- over time --------------------------------------------------------------------------------------------------------
