@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from report_page import checked_page
-from seal_friction_ros.core.friction.friction_map import FrictionMap
 
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.case import parse_case
 from seal_friction_ros.core.lubrication.findings import Findings
 from seal_friction_ros.core.lubrication.friction_map import SteadyFriction
