@@ -37,18 +37,21 @@ def _settings() -> dict[str, Meaning]:
 def run(arguments: argparse.Namespace) -> int:
     """Tune on the simulated servo or on a bag."""
     from seal_friction_ros.offline.replay.replay import chosen_configuration
-    from seal_friction_ros.offline.tuning.tune import tune_bag, tune_simulator
+    from seal_friction_ros.offline.reports.tune_report import write_tuning_page
+    from seal_friction_ros.offline.tuning.tune import check_target, page_of, tune_bag, tune_simulator, write_parameters
 
     given = _given(arguments)
     configuration = chosen_configuration(arguments.params, arguments.seal)
+    check_target(arguments.out)
     if arguments.bag:
-        known = MatchSettings(**given)
-        result = tune_bag(arguments.bag, arguments.out, known, configuration, arguments.namespace)
+        tuning: Any = tune_bag(arguments.bag, MatchSettings(**given), configuration, arguments.namespace)
     else:
-        result = tune_simulator(arguments.out, TuningSettings(**given), configuration)
-    numbers = {**result.numbers, 'file': result.file, 'page': result.page, 'figures': result.figures}
-    code = cli.SUCCESS if result.better_in_every_case else cli.DIFFERENT
-    return cli.print_result(arguments, numbers, f'{result.verdict}\n{result.file} and {result.page}: written', code)
+        tuning = tune_simulator(TuningSettings(**given), configuration)
+    page = page_of(arguments.out)
+    numbers = {**tuning.numbers, 'file': arguments.out, 'page': page, 'figures': write_tuning_page(tuning, page)}
+    write_parameters(arguments.out, tuning)
+    code = cli.SUCCESS if tuning.found.better_in_every_case else cli.DIFFERENT
+    return cli.print_result(arguments, numbers, f'{tuning.verdict}\n{arguments.out} and {page}: written', code)
 
 
 def _given(arguments: argparse.Namespace) -> dict[str, Any]:

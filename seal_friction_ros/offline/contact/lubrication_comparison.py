@@ -17,8 +17,8 @@ from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.kinematics import MeasuredMotion
 from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
 from seal_friction_ros.core.lubrication.transient import RunResult
+from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.contact.lubrication_runs import run_with_progress
-from seal_friction_ros.offline.reports.bag_evaluation import read_run
 
 _FEWEST_SAMPLES = 10
 

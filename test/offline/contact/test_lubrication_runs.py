@@ -23,10 +23,10 @@ from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, t
 from seal_friction_ros.core.lubrication.transient import run
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.contact import lubrication_runs as ehl
 from seal_friction_ros.offline.contact.lubrication_runs import load_case
-from seal_friction_ros.offline.reports.bag_evaluation import read_run
 
 SMALL = """name: small
 motion: {cycles: 1}
