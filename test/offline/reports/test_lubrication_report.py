@@ -14,7 +14,8 @@ from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain
 from seal_friction_ros.core.lubrication.spool import SpoolResult
 from seal_friction_ros.core.lubrication.study import StudyTable
 from seal_friction_ros.core.lubrication.transient import RunResult
-from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, Comparison, MapRuns, StudyRuns
+from seal_friction_ros.offline.contact.lubrication_comparison import Comparison
+from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, MapRuns, StudyRuns
 from seal_friction_ros.offline.reports import lubrication_report as report
 
 EVIL = '<b>case</b> & "1"'
