@@ -101,10 +101,12 @@ def _verify() -> Callable[[Path], object]:
 
 
 def _identify() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.identification.identify import Wishes, identify
-    from seal_friction_ros.offline.identification.sources import Choices
+    from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
+    from seal_friction_ros.offline.identification.sources import SourceOptions
 
-    return lambda folder: identify([folder / 'bag'], Wishes(sources=Choices(chambers=('a', 'b'))), 'bench')
+    return lambda folder: identify(
+        [folder / 'bag'], IdentifyOptions(sources=SourceOptions(chambers=('a', 'b'))), 'bench'
+    )
 
 
 def _report() -> Callable[[Path], object]:

@@ -34,7 +34,8 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.results import contact_results, evaluate
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.oring_runs import compute_case
-from seal_friction_ros.offline.reports.oring_report import appendix_b, friction_deviation, thesis_case
+from seal_friction_ros.offline.reports.oring_report import friction_deviation, thesis_case
+from seal_friction_ros.offline.reports.thesis_data import appendix_b
 
 Rows = list[dict[str, float | str]]
 SQUEEZES = (0.02, 0.04, 0.06, 0.08)

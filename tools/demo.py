@@ -27,7 +27,8 @@ from seal_friction_ros.nodes.realtime import realtime_granted
 from seal_friction_ros.offline.bags.import_log import import_log
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
 from seal_friction_ros.offline.replay.replay import replay
-from seal_friction_ros.offline.reports.bag_report import ReportSummary, write_report
+from seal_friction_ros.offline.reports.bag_report import write_report
+from seal_friction_ros.offline.reports.page import ReportSummary
 from seal_friction_ros.offline.reports.servo_charts import write_servo_charts
 
 ROOT = Path(__file__).parents[1]

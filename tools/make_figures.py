@@ -7,7 +7,7 @@ from pathlib import Path
 
 from seal_friction_ros.files import config_path
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
-from seal_friction_ros.offline.contact.lubrication_commands import map_command, run_command, study_command
+from seal_friction_ros.offline.commands.main import main as seal_friction
 from seal_friction_ros.offline.contact.oring_runs import compute_case
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_report import write_report
@@ -28,10 +28,14 @@ def main() -> int:
         write_seal_charts(config_path('seals', 'ms28775_114'), folder / 'seal.html')
         write_oring_report(compute_case(config_path('oring', 'ms28775_114')), folder / 'oring.html')
         write_servo_charts(folder / 'servo.html')
-        run_command('inner_seal', 1, folder / 'inner.html', None, None, None)
-        run_command('inner_seal_groove', 1, folder / 'groove.html', None, None, None)
-        study_command('inner_seal', 1, folder / 'study.html', None)
-        map_command('inner_seal', 1, folder / 'map.html', None, None)
+        for command, case, page in (
+            ('run', 'inner_seal', 'inner'),
+            ('run', 'inner_seal_groove', 'groove'),
+            ('study', 'inner_seal', 'study'),
+            ('map', 'inner_seal', 'map'),
+        ):
+            if seal_friction(['ehl', command, case, '--out', str(folder / f'{page}.html')]):
+                raise SystemExit(f'seal_friction ehl {command} {case} failed')
         FIGURES.mkdir(parents=True, exist_ok=True)
         for source, target in {
             'report_figures/live_estimate.png': 'live_estimate.png',

@@ -27,8 +27,9 @@ from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.processes import free_domain
 from seal_friction_ros.nodes.servo_simulator import ServoSimulator
+from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.replay.replay import replay
-from seal_friction_ros.offline.reports.bag_evaluation import evaluate, read_run
+from seal_friction_ros.offline.reports.bag_evaluation import evaluate_run
 
 TOPICS = {
     'cylinder_pressure': CylinderPressure,
@@ -140,7 +141,7 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
     assert verdict.recorded_feedforwards >= verdict.recorded_estimates > 500
     run = read_run(tmp_path / 'bag')
     late = ('PRESSURE_MISSING', 'FORCE_MISSING', 'PRESSURE_STALE', 'FORCE_STALE')  # connected last, or a busy machine
-    counts = evaluate(run).status_counts
+    counts = evaluate_run(run).status_counts
     assert sum(count for bit, count in counts.items() if bit not in late) == 0
     assert sum(counts.values()) < 0.1 * verdict.recorded_estimates
     assert float(abs(run.feedforward_force[200:]).max()) == pytest.approx(0.9 * run.coulomb_friction.max(), rel=0.1)

@@ -16,11 +16,11 @@ from scipy.optimize import least_squares, nnls
 from scipy.stats import t as student_t
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.identification.ladder import Conditions, Rung, Values, values_of
 from seal_friction_ros.core.identification.readings import Readings, level_friction
 from seal_friction_ros.core.identification.signal_preparation import half_range
 
-BAND_95 = 1.96  # standard deviations on each side that hold 95 % of a normal distribution
 COLLINEAR = 0.9  # correlation of two regressors from which on they are called collinear (our choice)
 TRADED_OFF = 0.95  # correlation of two fitted parameters from which on neither is known alone (our choice)
 ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_

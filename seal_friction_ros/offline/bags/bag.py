@@ -1,8 +1,8 @@
 """rosbag2 bags: a folder with ``metadata.yaml`` and MCAP files (profile ``ros2``), written and read.
 
-What is written opens in ``ros2 bag``, Foxglove, PlotJuggler, ``rosbags`` and the ``mcap`` reader, message definitions
-inside. What is read may be any rosbag2 bag (MCAP or SQLite), a bare MCAP or SQLite file, or what a stranger made to
-look like one: memory is bounded, and nothing outside of the bag is opened.
+A written bag contains its message definitions and opens in ``ros2 bag``, Foxglove, PlotJuggler, ``rosbags`` and the
+``mcap`` reader. Any rosbag2 bag (MCAP or SQLite) or bare MCAP or SQLite file can be read, from an untrusted source too:
+memory is bounded, and no file outside the bag is opened.
 """
 
 import errno
@@ -45,7 +45,7 @@ class BagError(ValueError):
 
 
 class BagMessage(NamedTuple):
-    """One message of a bag, still serialised."""
+    """One serialised message of a bag."""
 
     topic: str
     type_name: str
@@ -78,7 +78,7 @@ def _message_share() -> Path:
 
 @cache
 def describe(type_name: str) -> Description:
-    """Description of topics of a type that is installed."""
+    """Description of a topic whose type is installed."""
     definition, type_hash = message_definition(type_name)
     metadata = {'offered_qos_profiles': _yaml_text([_qos(type_name)]), 'topic_type_hash': type_hash}
     return Description(type_name, 'ros2msg', definition.encode(), metadata)
@@ -87,16 +87,15 @@ def describe(type_name: str) -> Description:
 class BagWriter:
     """Writes one bag, message by message, in the order given.
 
-    Log times are made strictly increasing, so that every reader, which sorts by them, gives the messages back in the
-    order in which they were written. ``metadata.yaml`` is there from the start; it is true at the end and, in between,
-    as of the last finished file and the newest topic.
+    Log times are made strictly increasing, since readers sort by them: they return the messages in the order written.
+    ``metadata.yaml`` exists from the start. It is updated after each finished file, for each new topic, and at the end.
 
-    As a context manager it removes what it wrote if the block fails, so that a failed command leaves nothing behind.
+    As a context manager it removes the bag if the block fails, so that a failed command leaves no files.
 
     Args:
         path: Folder of the bag; must not exist.
-        split_size: A new file begins where one would grow beyond this [bytes]; 0: never.
-        split_duration: A new file begins where one would become longer than this [s]; 0: never.
+        split_size: Largest size of a file, after which the next one begins [bytes]; 0: no limit.
+        split_duration: Longest duration of a file, after which the next one begins [s]; 0: no limit.
 
     Raises:
         BagError: There is something at ``path`` already, or it cannot be made.
@@ -105,7 +104,7 @@ class BagWriter:
     def __init__(self, path: Path, *, split_size: int = 0, split_duration: float = 0.0) -> None:
         self.path = path
         for type_name in DECODERS:
-            describe(type_name)  # now, where it can be said, and not when the first message comes
+            describe(type_name)  # raises here and not at the first message
         self._split_size, self._split_time = split_size, round(split_duration * 1e9)
         self._descriptions: dict[tuple[str, str], Description] = {}
         self._listed = 0
@@ -127,7 +126,7 @@ class BagWriter:
                 self._output.close()
                 raise
         except OSError as error:
-            shutil.rmtree(path, ignore_errors=True)  # made just now, by us
+            shutil.rmtree(path, ignore_errors=True)  # made above
             raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
 
     def write(
@@ -140,13 +139,13 @@ class BagWriter:
             type_name: Its type.
             log_time: [ns]
             data: CDR.
-            description: Of the topic; may be left out if the type is installed.
+            description: Of the topic; optional if the type is installed.
 
         Returns:
-            The log time [ns] it got: the one given, or 1 ns after the last.
+            The recorded log time [ns]: the one given, or 1 ns after the last one if that is later.
 
         Raises:
-            OSError: The disk does not take it.
+            OSError: Writing failed.
         """
         known = self._descriptions.get((topic, type_name))
         if known is None:
@@ -159,10 +158,10 @@ class BagWriter:
         return log_time
 
     def flush(self) -> None:
-        """Hand what was written to the operating system, so that it outlives this process.
+        """Pass all messages to the operating system, so that they outlive this process.
 
         Raises:
-            OSError: The disk does not take it.
+            OSError: Writing failed.
         """
         self._output.flush()
         if len(self._descriptions) > self._listed:
@@ -170,14 +169,14 @@ class BagWriter:
 
     @property
     def message_count(self) -> int:
-        """Messages written so far."""
+        """Number of messages written so far."""
         return sum(span.messages for _, span in self._finished) + self._output.span.messages
 
     def close(self, custom_data: dict[str, str] | None = None) -> None:
-        """Write what is pending, the index and the final ``metadata.yaml``; ``custom_data`` goes into the latter.
+        """Write pending messages, the index and the final ``metadata.yaml``, which holds ``custom_data``.
 
         Raises:
-            OSError: The disk does not take it.
+            OSError: Writing failed.
         """
         self._custom_data = custom_data or {}
         self._output.finish(_yaml_text(self._information()))
@@ -185,14 +184,14 @@ class BagWriter:
         self._output.close()
 
     def rescue(self, failure: str, offered: int) -> None:
-        """After a failure: leave a valid bag of all whole chunks; on a full disk without the last, to make room.
+        """After a failure, leave a valid bag of all complete chunks; on a full disk, drop chunks to make room.
 
         Args:
-            failure: What went wrong; kept in ``metadata.yaml``.
-            offered: Messages that were to be recorded; those that are not in the bag are counted there, too.
+            failure: Reason of the failure; recorded in ``metadata.yaml``.
+            offered: Number of messages that were to be recorded; ``metadata.yaml`` counts those not in the bag.
 
         Raises:
-            OSError: Not even that could be done; what is there is for ``seal_friction recover``.
+            OSError: The bag could not be completed: use ``seal_friction recover``.
         """
         try:
             while True:
@@ -207,8 +206,8 @@ class BagWriter:
                     if not self._output.give_back():
                         break
             if self._finished:
-                self._output.path.unlink(missing_ok=True)  # a new file without a chunk
-            (self.path / 'metadata.yaml').unlink(missing_ok=True)  # the last room there is
+                self._output.path.unlink(missing_ok=True)  # new, without a chunk
+            (self.path / 'metadata.yaml').unlink(missing_ok=True)  # frees the last space
             self._write_metadata()
         finally:
             self._output.close()
@@ -315,7 +314,7 @@ def _parsed(text: str) -> Any:
 
 
 class _PlainDumper(yaml.SafeDumper):
-    """Writes no aliases: not every reader of bags knows them."""
+    """Writes no aliases, since some bag readers do not support them."""
 
     def ignore_aliases(self, data: Any) -> bool:
         del data
@@ -348,7 +347,7 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
         path: Bag folder, or a bare MCAP or SQLite file.
 
     Raises:
-        BagError: There is no bag, or it is damaged (found out when the damage is reached).
+        BagError: There is no bag, or it is damaged; raised when the damage is reached.
     """
     with _as_bag_errors(path):
         found = _storage(path)
@@ -362,7 +361,7 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
 
 
 class Storage(NamedTuple):
-    """The files of a bag, and how messages are kept in them."""
+    """Files of a bag, and their format."""
 
     files: tuple[Path, ...]
     is_sqlite: bool
@@ -389,14 +388,14 @@ def _read_file(path: Path, is_sqlite: bool) -> Iterator[BagMessage]:
 
 
 class TopicInfo(NamedTuple):
-    """What a bag says of one of its topics."""
+    """Type and number of messages of a topic."""
 
     type_name: str
     message_count: int
 
 
 def bag_topics(path: Path) -> dict[str, TopicInfo]:
-    """Topics of a bag with their type and number of messages, from its index where it has one.
+    """Topics of a bag with their type and number of messages, from its index if it has one.
 
     Raises:
         BagError: There is no bag, or it is damaged.
@@ -429,7 +428,7 @@ def _count_file(path: Path, is_sqlite: bool) -> Iterator[tuple[str, str, int]]:
 
 @contextmanager
 def _as_bag_errors(path: Path) -> Iterator[None]:
-    """Turn whatever a reader says of a damaged bag into one line."""
+    """Convert the errors of all readers to a `BagError` of one line."""
     try:
         yield
     except BagError:
@@ -443,19 +442,19 @@ def _storage(path: Path) -> Storage:
     """Find the files of a bag.
 
     Raises:
-        ValueError: There are none, or they are not in the folder.
+        ValueError: There are none, or they are outside the folder.
     """
     if not path.is_dir():
         if not path.is_file():
-            raise ValueError('there is no such file' if not path.exists() else 'neither a file nor a folder')
+            raise ValueError('no such file' if not path.exists() else 'neither a file nor a folder')
         return Storage((path,), path.suffix == '.db3')
     metadata = path / 'metadata.yaml'
     if not metadata.is_file():
-        raise BagError(f'{path}: no metadata.yaml in it, so not a rosbag2 bag')
+        raise BagError(f'{path}: not a rosbag2 bag: no metadata.yaml in it')
     document = read_yaml(_inside(path, 'metadata.yaml'), _LARGEST_METADATA)
     information = document.get('rosbag2_bagfile_information') if isinstance(document, Mapping) else None
     if not isinstance(information, Mapping):
-        raise ValueError('metadata.yaml is not that of a rosbag2 bag')
+        raise ValueError('metadata.yaml is not in the format of rosbag2')
     names, kind = information.get('relative_file_paths'), information.get('storage_identifier')
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ValueError('metadata.yaml: relative_file_paths is not a list of names')
@@ -468,15 +467,15 @@ def _storage(path: Path) -> Storage:
 
 
 def _inside(folder: Path, name: str) -> Path:
-    """File of a bag; early versions of rosbag2 put the name of the folder before that of the file.
+    """File of a bag; early versions of rosbag2 name the folder before the file.
 
     Raises:
-        ValueError: The name, or a link, leads out of the folder, or there is no such file.
+        ValueError: The name or a link leads out of the folder, or there is no such file.
     """
     parts = PurePosixPath(name).parts
     file = folder / parts[-1] if parts else folder
     if len(parts) > 2 or not {'/', '..'}.isdisjoint(parts) or file.resolve().parent != folder.resolve():
         raise ValueError(f'{name!r} leads out of the folder of the bag')
     if not file.is_file():
-        raise ValueError(f'{name!r}, which metadata.yaml names, is not there')
+        raise ValueError(f'{name!r}, which metadata.yaml names, does not exist')
     return file

@@ -1,7 +1,7 @@
-"""A bag read in bulk: blocks of messages as they lie in the file, and where each one is.
+"""Bulk reading of a bag: blocks of messages in file order, with the position of each message.
 
-The checks are those of `mcap_file`, and so is the order. Anything out of the ordinary (damage, a topic described twice,
-chunks that overlap by much) is refused with `UnsuitedError`: the general reader then says what it is, or reads it.
+The checks and the order of messages are those of `mcap_reader`. Unusual bags (damage, a topic described twice, chunks
+that overlap by much) are refused with `UnsuitedError`; the general reader reads them or reports the fault.
 """
 
 import heapq
@@ -28,11 +28,11 @@ from seal_friction_ros.offline.bags.bag import BagMessage, read_messages, storag
 from seal_friction_ros.offline.bags.mcap_reader import Block, Layout
 
 KindOf = Callable[[str, str], Kind]
-"""Topic and message type -> what its messages are."""
+"""Topic and message type -> kind of its messages."""
 
-_AT_ONCE = 1 << 21  # [bytes] read before they are handed on: some 20 000 messages
-_UNKNOWN = 255  # instead of a `Kind`: the channel has not been described
-_SMALLEST = 31  # [bytes] of the record of a message without content
+_AT_ONCE = 1 << 21  # [bytes] read at a time: about 20 000 messages
+_UNKNOWN = 255  # instead of a `Kind`: channel without description
+_SMALLEST = 31  # [bytes] of the record of an empty message
 _MESSAGE, _SCHEMA, _CHANNEL = int(Opcode.MESSAGE), int(Opcode.SCHEMA), int(Opcode.CHANNEL)
 _LAST_TIME = mcap_reader.LAST_TIME
 
@@ -41,7 +41,7 @@ def read_in_bulk(path: Path, kind_of: KindOf) -> Iterator[Messages]:
     """Messages of a bag in the order of `bag.read_messages`, at most `MOST_MESSAGES` at a time.
 
     Raises:
-        UnsuitedError: It is not for this way.
+        UnsuitedError: The bag is unusual.
         BagError: It cannot be read.
     """
     files = storage(path)
@@ -57,7 +57,7 @@ def read_in_bulk(path: Path, kind_of: KindOf) -> Iterator[Messages]:
 
 
 def compile_now() -> None:
-    """Compile what is compiled here, for processes to come."""
+    """Compile in this process, so that worker processes inherit the compiled code."""
     messages, times = _pool_of(bytes(1), 0)
     _walk(*messages, times, 0, 0, 0, 0, 0, np.zeros(1, np.uint8))
 
@@ -73,14 +73,14 @@ def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messa
 
 
 class _Pool(NamedTuple):
-    """Messages that were read, with their log times [ns]."""
+    """Messages with their log times [ns]."""
 
     messages: Messages
     times: Integers
 
 
 def _pool_of(data: bytes, count: int) -> _Pool:
-    """Room for so many messages."""
+    """Pool with space for ``count`` messages."""
     columns: Integers = np.empty((3, count), np.int64)
     return _Pool(Messages(np.frombuffer(data, np.uint8), np.empty(count, np.uint8), *columns[:2]), columns[2])
 
@@ -110,10 +110,10 @@ def _of_file(file: BinaryIO, layout: Layout, kind_of: KindOf) -> Iterator[Messag
 
 
 def _check_overlap(blocks: Sequence[Block], earliest: Sequence[int]) -> None:
-    """Refuse chunks that overlap in time by so much that `mcap_file` might.
+    """Refuse chunks that overlap in time by so much that `mcap_reader` may refuse them.
 
     Raises:
-        UnsuitedError: They do.
+        UnsuitedError: They overlap by too much.
     """
     open_blocks: list[tuple[int, int]] = []  # end in time [ns] and size
     at_once = 0
@@ -135,7 +135,7 @@ def _sorted(pool: _Pool) -> _Pool:
 
 
 def _copied(pool: _Pool, first: int) -> _Pool:
-    """What has to wait, since a chunk that follows reaches back before it."""
+    """Messages from number ``first`` on: they wait, since a following chunk begins before them."""
     if first == len(pool.times):
         return _EMPTY
     (_, kinds, _, sizes), times = pool
@@ -145,7 +145,7 @@ def _copied(pool: _Pool, first: int) -> _Pool:
 
 
 class _Channels:
-    """What is known of channels, as a table for compiled code."""
+    """Kinds of messages by channel, as a table for compiled code."""
 
     def __init__(self, layout: Layout, kind_of: KindOf) -> None:
         self._names = mcap_reader.Names(layout.channels)
@@ -156,7 +156,7 @@ class _Channels:
             self.kinds[number] = kind_of(channel.topic, channel.type_name)
 
     def learn(self, opcode: int, data: bytes) -> None:
-        """Take the record of a schema or a channel."""
+        """Add the record of a schema or a channel."""
         self._names.learn(opcode, data)
         for number, channel in self._names.channels.items():
             if self._known.setdefault(number, channel) != channel:
@@ -165,7 +165,7 @@ class _Channels:
 
 
 def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: _Pool) -> _Pool:
-    """Messages that were kept and those of the blocks, in this order.
+    """The kept messages, then those of the blocks.
 
     Raises:
         UnsuitedError: A block cannot be read.
@@ -196,7 +196,7 @@ def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: _P
 
 
 def _index(pool: _Pool, count: int, start: int, end: int, block: Block, channels: _Channels) -> int:
-    """Find the messages of a block; the number of all messages with them."""
+    """Index the messages of a block; return the number of all messages so far."""
     data = pool.messages.data
     first, last = min(block.first, _LAST_TIME + 1), min(block.last, _LAST_TIME)
     while start < end:
@@ -233,11 +233,11 @@ def _walk(
     last: int,
     kind_of_channel: npt.NDArray[np.uint8],
 ) -> tuple[int, int, int]:
-    """Walk over records of a block up to its end, or up to the description of a schema or channel.
+    """Index records of a block up to its end, or up to the next schema or channel.
 
     Returns:
-        Where the walk ended, the number of all messages, and the opcode of the record there; 0 at the end of the block,
-        -1 if the record makes no sense.
+        Offset reached, number of all messages, and opcode of the record there: 0 at the end of the block, -1 for an
+        invalid record.
     """
     while start < end:
         if end - start < 9:

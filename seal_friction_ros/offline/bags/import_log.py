@@ -1,23 +1,22 @@
-"""A measured log and a rig file -> a bag with the pressure, force sum and rod velocity of each row.
+"""Import of a measured log: log and rig file -> bag with the pressure, force sum and rod velocity of each row.
 
-The rig file says what the log is: which columns, in which units, with which signs and areas. It looks like this; the
-files in ``config/rigs`` are examples::
+The rig file describes the columns of the log, their units, signs and areas. The files in ``config/rigs`` are examples::
 
     name: my_rig
-    source: what the log is, and why the signs are as they are
+    source: origin of the log, and reason for the signs
     frame_id: rod               # frame of the messages
     header: comment             # none; row: the first line; comment: the last '#' line before the first row
-    skip_rows: 15               # rows at the beginning that are passed over
+    skip_rows: 15               # rows ignored at the beginning
     start: 1.0                  # [s] added to the time of each row
-    time: {column: 0, unit: ms} # columns count from 0 ...
-    chamber_a: {terms: [{column_name: P(psig), unit: psi}]} # ... or go by their name in the header
+    time: {column: 0, unit: ms} # columns are numbered from 0 ...
+    chamber_a: {terms: [{column_name: P(psig), unit: psi}]} # ... or named as in the header
     chamber_b: {constant: 0.0}  # [Pa]
     force_sum:                  # sum of gain * column, plus a constant [N]
       terms: [{column: 6, unit: N}, {column: 5, unit: bar, gain: -518.7, gain_unit: mm2}]
     velocity:
       terms: [{column: 4, unit: mm, gain: -1.0}]
-      savitzky_golay: {window: 0.2, order: 2, largest_gap: 0.05} # absent: the terms are a velocity already
-    sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # what identification takes; absent: these values
+      savitzky_golay: {window: 0.2, order: 2, largest_gap: 0.05} # absent: the terms are a velocity
+    sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # for identification; absent: these values
 """
 
 from array import array
@@ -39,9 +38,9 @@ from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagWriter
 from seal_friction_ros.offline.work.progress import progress
 
-_LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one that the int32 seconds of a ROS stamp do not hold
+_LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one beyond the int32 seconds of a ROS stamp
 _LONGEST_LINE = 1 << 18  # characters
-_SHOWN = 40  # characters of a wrong cell that an error repeats
+_SHOWN = 40  # characters of an invalid cell in an error message
 _PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
 _HEADERS = ('none', 'row', 'comment')
 _QUANTITIES = {
@@ -58,7 +57,7 @@ _QUANTITY_OF = {unit: quantity for quantity, units in _QUANTITIES.items() for un
 
 @dataclass(frozen=True, kw_only=True)
 class Term:
-    """One column of the log with its unit, times a gain that may have a unit of its own (an area, a sensor's scale).
+    """One column of the log with its unit, times a gain with a unit (for example an area, or a sensor scale).
 
     Raises:
         ValueError: The column is named twice or not at all, or there is no such unit.
@@ -67,7 +66,7 @@ class Term:
     column: int = parameter(-1, unit='', lower=-1, upper=9999, description='Number of the column, counted from 0.')
     column_name: str = parameter('', unit='', description='Name of the column in the header, instead of its number.')
     unit: str = parameter(unit='', description='Unit of the column.')
-    gain: float = parameter(1.0, unit='', description='Factor; -1 turns the sign.')
+    gain: float = parameter(1.0, unit='', description='Factor; -1 inverts the sign.')
     gain_unit: str = parameter('1', unit='', description='Unit of the gain.')
 
     def __post_init__(self) -> None:
@@ -83,7 +82,7 @@ class Term:
 
     @property
     def size(self) -> float:
-        """What a 1 in the column adds, in SI."""
+        """SI value of a 1 in the column."""
         return self.gain * unit_size(self.gain_unit) * unit_size(self.unit)
 
     def is_a(self, quantity: str) -> bool:
@@ -101,7 +100,7 @@ class Combination:
     """
 
     terms: tuple[Term, ...] = ()
-    constant: float = parameter(0.0, unit='SI', description='Part that no column gives.')
+    constant: float = parameter(0.0, unit='SI', description='Constant part.')
 
     def __post_init__(self) -> None:
         check(self)
@@ -109,17 +108,17 @@ class Combination:
 
 @dataclass(frozen=True, kw_only=True)
 class Rig:
-    """What a log of one rig is.
+    """Format of the logs of one rig.
 
     Raises:
-        ValueError: A value is out of bounds, or a column has a unit that does not fit what is made from it.
+        ValueError: A value is out of bounds, or the unit of a column does not fit its quantity.
     """
 
     name: str
     source: str = ''
     frame_id: str = 'rod'
     header: str = 'none'
-    skip_rows: int = parameter(0, unit='rows', lower=0, upper=10**9, description='Rows passed over at the beginning.')
+    skip_rows: int = parameter(0, unit='rows', lower=0, upper=10**9, description='Rows ignored at the beginning.')
     start: float = parameter(0.0, unit='s', lower=0.0, upper=2.0e9, description='Added to the time of each row.')
     time: Term
     chamber_a: Combination
@@ -141,11 +140,11 @@ class Rig:
             quantity = wanted[where.split('.')[0]]
             if not term.is_a(quantity):
                 raise ValueError(
-                    f'{where}.unit = {term.unit!r} with gain_unit = {term.gain_unit!r} is no {quantity}: '
+                    f'{where}.unit = {term.unit!r} with gain_unit = {term.gain_unit!r} is not a {quantity}: '
                     f'use one of {", ".join(_QUANTITIES[quantity])}'
                 )
             if self.header == 'none' and term.column_name:
-                raise ValueError(f'{where}.column_name = {term.column_name!r} but header = none: no names to go by')
+                raise ValueError(f'{where}.column_name = {term.column_name!r} but header = none: the log has no names')
 
     def terms(self) -> Iterator[tuple[str, Term]]:
         """Every term with its place in the rig file."""
@@ -156,12 +155,12 @@ class Rig:
 
 
 class ImportSummary(NamedTuple):
-    """What an import wrote."""
+    """Contents of an imported bag."""
 
     rows: int
     """one pressure, one force sum and one velocity message each"""
     not_finite: int
-    """rows of which a pressure, the force sum or the velocity is NaN or infinite; the estimator flags them"""
+    """rows with a NaN or infinite pressure, force sum or velocity; the estimator flags them"""
     first_stamp: int
     """[ns]"""
     last_stamp: int
@@ -169,7 +168,7 @@ class ImportSummary(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """What goes into a bag, row by row; arrays of shape (n,)."""
+    """Samples for a bag; arrays of shape (n,)."""
 
     stamp: NDArray[np.int64]
     """[ns]"""
@@ -184,38 +183,35 @@ class Samples(NamedTuple):
 
 
 def import_log(log: Path, rig_file: Path, out: Path) -> ImportSummary:
-    """Turn a measured log into a bag.
+    """Convert a measured log to a bag.
 
     Args:
-        log: Text of one row per line, cells parted by commas, semicolons or white space; '#' starts a comment line.
-        rig_file: What the columns are.
+        log: Text with one row per line, cells separated by commas, semicolons or white space; '#' begins a comment.
+        rig_file: Description of the columns.
         out: Bag to write; must not exist.
 
-    Returns:
-        What was written.
-
     Raises:
-        ValueError: Rig file or log cannot be read or make no sense; one line that names file and field or line. Nothing
-            is written then.
-        BagError: There is something at ``out`` already, or it cannot be made.
+        ValueError: Rig file or log cannot be read or are invalid; one line that names file and field or line. Nothing
+            is written.
+        BagError: ``out`` exists already or cannot be made.
     """
     rig = read_rig(rig_file)
     return write_samples(out, read_samples(log, rig).samples, rig.frame_id)
 
 
 class ReadLog(NamedTuple):
-    """A log in SI, and the columns it came from."""
+    """A log in SI units, and its columns."""
 
     samples: 'Samples'
     columns: dict[Term, FloatArray]
-    """as they stand in the log, in the units of the terms"""
+    """values in the log, in the units of the terms"""
 
 
 def read_samples(log: Path, rig: Rig) -> ReadLog:
     """Read a log.
 
     Raises:
-        ValueError: The log cannot be read or makes no sense; one line that names file and field or line.
+        ValueError: The log cannot be read or is invalid; one line that names file and field or line.
     """
     cells = _read_cells(log, rig)
     return ReadLog(_samples(log, rig, cells), cells.columns)
@@ -225,7 +221,7 @@ def read_rig(path: Path) -> Rig:
     """Rig from its file.
 
     Raises:
-        ValueError: The file cannot be read, or a value in it makes no sense; names file, field, value and bound.
+        ValueError: The file cannot be read, or a value in it is invalid; names file, field, value and bound.
     """
     document = read_yaml(path)
     if not isinstance(document, Mapping):
@@ -250,7 +246,7 @@ def read_rig(path: Path) -> Rig:
 
 
 def _taken_out(values: Any, key: str) -> tuple[Any, Any]:
-    """A mapping without ``key``, and what stood there; anything else as it is, for `from_mapping` to refuse."""
+    """A mapping without ``key``, and the value there; anything else unchanged, for `from_mapping` to refuse."""
     if not isinstance(values, Mapping):
         return values, None
     return {k: v for k, v in values.items() if k != key}, values.get(key)
@@ -267,7 +263,7 @@ def _combination(document: Any, where: str) -> Combination:
 
 
 class _Cells(NamedTuple):
-    """The cells of a log that the rig file asks for."""
+    """Columns of a log that the rig file names."""
 
     line_numbers: Sequence[int]
     columns: dict[Term, FloatArray]
@@ -295,7 +291,7 @@ def _read_cells(log: Path, rig: Rig) -> _Cells:
     except UnicodeDecodeError:
         raise ValueError(f'{log}: not a text file') from None
     if not line_numbers:
-        raise ValueError(f'{log}: no row of numbers in it after the {rig.skip_rows} that the rig file passes over')
+        raise ValueError(f'{log}: no row of numbers in it after the {rig.skip_rows} rows that the rig file skips')
     columns = np.frombuffer(numbers, dtype=np.float64).reshape(len(line_numbers), len(terms)).T
     return _Cells(line_numbers, dict(zip(terms, columns, strict=True)))
 
@@ -303,14 +299,14 @@ def _read_cells(log: Path, rig: Rig) -> _Cells:
 def _lines(file: TextIO, log: Path) -> Iterator[str]:
     while line := file.readline(_LONGEST_LINE):
         if len(line) == _LONGEST_LINE:
-            raise ValueError(f'{log}: a line of more than {_LONGEST_LINE} characters, so not a log')
+            raise ValueError(f'{log}: not a log: a line of more than {_LONGEST_LINE} characters')
         yield line
 
 
 def _parted(
     numbered_lines: Iterator[tuple[int, str]], header_kind: str
 ) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
-    """Names in the header (none if it has none), and the rows after it: line number and cells."""
+    """Names in the header (empty without header), and the rows after it: line number and cells."""
     header: list[str] = []
     for number, line in numbered_lines:
         text = line.strip()
@@ -336,33 +332,33 @@ def _rows(numbered_lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, list
 
 
 def _split(text: str) -> list[str]:
-    """Cells of a line: parted by commas, else by semicolons, else by white space; quotes around a cell are dropped."""
+    """Cells of a line, separated by commas, else by semicolons, else by white space; without quotes."""
     separator = next((mark for mark in ',;' if mark in text), None)
     return [cell.strip().strip('"\'') for cell in text.split(separator)]
 
 
 def _position(term: Term, where: str, header: list[str], width: int, log: Path) -> int:
-    """Number of the column that a term names.
+    """Number of the column of a term.
 
     Raises:
-        ValueError: There is none, or several.
+        ValueError: There is no such column, or several.
     """
     if not term.column_name:
         if term.column >= width:
-            raise ValueError(f'{log}: rig file asks for {where}.column = {term.column}, but there are 0 to {width - 1}')
+            raise ValueError(f'{log}: rig file names {where}.column = {term.column}, but the log has 0 to {width - 1}')
         return term.column
     found = [i for i, name in enumerate(header) if name == term.column_name]
     if len(found) != 1:
         raise ValueError(
-            f'{log}: rig file asks for {where}.column_name = {term.column_name!r}, '
-            f'there {len(found)} times in the header: {", ".join(header)[:1000]}'
+            f'{log}: rig file names {where}.column_name = {term.column_name!r}, '
+            f'found {len(found)} times in the header: {", ".join(header)[:1000]}'
         )
     return found[0]
 
 
 def _numbers(cells: list[str], positions: list[int], width: int, where: str) -> list[float]:
     if len(cells) != width:
-        raise ValueError(f'{where}: {len(cells)} columns where there should be {width}')
+        raise ValueError(f'{where}: {len(cells)} columns instead of {width}')
     numbers = []
     for position in positions:
         try:
@@ -374,7 +370,7 @@ def _numbers(cells: list[str], positions: list[int], width: int, where: str) -> 
 
 def _samples(log: Path, rig: Rig, cells: _Cells) -> Samples:
     stamps = _stamps(log, rig, cells)
-    with np.errstate(invalid='ignore', over='ignore'):  # NaN and infinite cells are passed on as they are
+    with np.errstate(invalid='ignore', over='ignore'):  # NaN and infinite cells stay
         signals = {part: _combined(getattr(rig, part), cells.columns, len(stamps)) for part in _PARTS[1:]}
     if rig.savitzky_golay is not None:
         seconds = (stamps - stamps[0]) * 1e-9
@@ -396,7 +392,7 @@ def _stamps(log: Path, rig: Rig, cells: _Cells) -> NDArray[np.int64]:
     """Stamps [ns]: start + time column.
 
     Raises:
-        ValueError: A time is not finite, or beyond what a stamp holds, or not after the one before it.
+        ValueError: A time is not finite, outside the range of a stamp, or not after the previous one.
     """
     with np.errstate(invalid='ignore', over='ignore'):
         nanoseconds = np.rint((rig.start + rig.time.size * cells.columns[rig.time]) * 1e9)
@@ -409,7 +405,7 @@ def _stamps(log: Path, rig: Rig, cells: _Cells) -> NDArray[np.int64]:
         row = int(backwards[0]) + 1
         raise ValueError(
             f'{log}: line {cells.line_numbers[row]}: time {stamps[row] * 1e-9:.9g} s is not after '
-            f'{stamps[row - 1] * 1e-9:.9g} s in the row before'
+            f'{stamps[row - 1] * 1e-9:.9g} s in the previous row'
         )
     return stamps
 
@@ -417,10 +413,10 @@ def _stamps(log: Path, rig: Rig, cells: _Cells) -> NDArray[np.int64]:
 def write_samples(out: Path, samples: Samples, frame_id: str) -> ImportSummary:
     """Write samples as a bag: pressure, force sum, then velocity, all three with the stamp of their row.
 
-    The velocity comes last, since it is what triggers an estimate from the other two.
+    The velocity comes last, since it triggers the estimate.
 
     Raises:
-        BagError: There is something at ``out`` already, or it cannot be made.
+        BagError: ``out`` exists already or cannot be made.
     """
     frame = frame_id.encode()
     with BagWriter(out) as writer, progress(f'import {out.name}', len(samples.stamp)) as advance:

@@ -1,4 +1,4 @@
-"""The pull test of the thesis as a bag: what its tables hold, played as signals."""
+"""Import of the pull test of the thesis: its tables as signals in a bag."""
 
 import csv
 from pathlib import Path
@@ -11,7 +11,7 @@ from seal_friction_ros.files import share_directory
 from seal_friction_ros.offline.bags.import_log import ImportSummary, Samples, write_samples
 
 RATE = 100  # [Hz]
-RUNNING_VELOCITY = 0.01  # [m/s] a slow pull by hand; the thesis gives no speed
+RUNNING_VELOCITY = 0.01  # [m/s] slow pull by hand (our choice); the thesis gives no speed
 START = 1.0  # [s] stamp of the first sample
 DWELL_SAMPLES = 30
 RAMP_SAMPLES = 40
@@ -22,7 +22,7 @@ DIRECTIONS = {'extend': 1, 'retract': -1}
 
 
 class Pull(NamedTuple):
-    """One pull of the test: the two readings at one pressure in one direction, sums over both seals."""
+    """One pull of the test: both readings at one pressure in one direction, sums over both seals."""
 
     test: int
     pressure: float
@@ -30,9 +30,9 @@ class Pull(NamedTuple):
     direction: int
     """1 extend, -1 retract"""
     static_friction: float
-    """[N] magnitude at which the rod breaks out"""
+    """[N] magnitude at breakaway"""
     dynamic_friction: float
-    """[N] magnitude while it runs"""
+    """[N] magnitude while the rod slides"""
 
 
 def read_pulls() -> list[Pull]:
@@ -52,22 +52,22 @@ def read_pulls() -> list[Pull]:
 def import_thesis(out: Path) -> ImportSummary:
     """Write the pull test of the thesis as a bag: 3 tests, 11 pressures, retract and extend, 132 readings.
 
-    Each pull is 1.5 s at 100 Hz: at rest without force (0.3 s), at rest under a force that rises evenly to the static
-    reading (0.4 s, its last sample is the reading), running at 10 mm/s under the dynamic reading (0.6 s), at rest
-    without force (0.2 s). Both chambers have the pressure of the test. A force sum that equals the friction while the
-    rod runs evenly is the rig's case: a spring scale pulls, and nothing accelerates.
+    Each pull is 1.5 s at 100 Hz: at rest without force (0.3 s), at rest under a force that rises linearly to the static
+    reading (0.4 s, the last sample is the reading), sliding at 10 mm/s under the dynamic reading (0.6 s), at rest
+    without force (0.2 s). Both chambers have the pressure of the test. While the rod slides evenly, the force sum is
+    the friction: a spring scale pulls, and nothing accelerates.
 
     Args:
         out: Bag to write; must not exist.
 
     Returns:
-        What was written: 9900 rows, 99 s.
+        Summary of 9900 rows, 99 s.
 
     Raises:
-        BagError: There is something at ``out`` already, or it cannot be made.
+        BagError: ``out`` exists already or cannot be made.
 
-    Source: thesis, section 5.2 and Tables A-1 to A-3 (readings only). How long each part lasts and the speed are our
-    choice: the real test dwells 30 s before each reading, which here would be 35 minutes of nothing.
+    Source: thesis, section 5.2 and Tables A-1 to A-3 (readings only). Speed and duration of each part are our choice:
+    the test itself rests 30 s before each reading, 35 minutes in total.
     """
     pulls = read_pulls()
     count = len(pulls) * CYCLE_SAMPLES

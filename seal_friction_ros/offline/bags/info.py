@@ -1,4 +1,4 @@
-"""What is in a bag: topics, counts, rates, states, status bits, configuration."""
+"""Contents of a bag: topics, counts, rates, friction states, status bits, seals."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -25,13 +25,23 @@ class BagInfo:
     states: dict[str, int]
     """estimates in each friction state"""
     status: dict[str, int]
-    """estimates with each status bit set; ``all good`` for none"""
+    """estimates with each status bit set; ``all good``: those without any"""
     seals: list[str]
-    """seal of each mount with its chamber, from the newest configuration in the bag"""
+    """each seal with its chamber, from the newest configuration in the bag"""
+
+    def summary(self) -> str:
+        """The same for a person."""
+        lines = [f'{self.bag}: {self.messages} messages in {self.duration_s:.3f} s']
+        lines += [f'  {topic}: {t["count"]} x {t["type"]}, {t["rate_Hz"]} Hz' for topic, t in self.topics.items()]
+        counts = {'states': self.states, 'status': self.status}
+        texts = {'seals': self.seals} | {
+            title: [f'{name} {count}' for name, count in of_kind.items()] for title, of_kind in counts.items()
+        }
+        return '\n'.join([*lines, *(f'  {title}: {", ".join(values)}' for title, values in texts.items() if values)])
 
 
 def bag_info(bag: Path) -> BagInfo:
-    """Read a bag through and sum it up.
+    """Read a bag and summarise it.
 
     Raises:
         BagError: It cannot be read, or holds no message.

@@ -1,7 +1,7 @@
-"""One MCAP file, read as a stranger's: memory is bounded whatever the file claims, and damage is found and placed.
+"""Reader of one untrusted MCAP file: memory is bounded whatever sizes the file claims, and damage is located.
 
-The libraries take a file at its word (a chunk of 1 TB, a kilobyte that unfolds to gigabytes), so the walk over records
-is our own; what stands in the record of a schema, a channel or a statistic is left to the library.
+The libraries trust the sizes in a file (a chunk of 1 TB, a kilobyte that unpacks to gigabytes), so this module walks
+over the records itself. The library only parses the records of schemas, channels and statistics.
 
 Layout: https://mcap.dev/spec.
 """
@@ -23,10 +23,10 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 MAGIC = b'\x89MCAP0\r\n'
-LARGEST_CHUNK = 1 << 25  # [bytes] packed or not, and of any other record that is read; rosbag2 makes chunks of 0.8 MB
+LARGEST_CHUNK = 1 << 25  # [bytes] packed or unpacked, and of any other record; rosbag2 writes chunks of 0.8 MB
 MOST_AT_ONCE = 2 * LARGEST_CHUNK  # [bytes] of chunks that overlap in time
-_MOST_BLOCKS = 500_000  # 30 GB of our own chunks
-_BLOCK_SIZE = 1 << 20  # [bytes] messages outside of chunks are read in such portions
+_MOST_BLOCKS = 500_000  # 30 GB in chunks of `mcap_writer`
+_BLOCK_SIZE = 1 << 20  # [bytes] read at a time of messages outside of chunks
 _LONGEST_NAME = 1024  # characters of a topic or a type; ROS has 255
 LAST_TIME = 1 << 62  # [ns] in the year 2116
 NO_TIME = (1 << 64) - 1  # [ns] first log time of a block without messages
@@ -35,12 +35,12 @@ RECORD = struct.Struct('<BQ')  # opcode, length
 _CHUNK = struct.Struct('<QQQII')  # first and last log time, unpacked size, checksum, length of the compression's name
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log time, publish time
 _SIZE = struct.Struct('<Q')
-_SHORT = 'a record is shorter than what it claims to hold'  # the library says nothing
+_SHORT = 'a record is shorter than what it claims to hold'  # the library gives no reason
 ERRORS = (ValueError, McapError, struct.error, EOFError, RuntimeError, zstandard.ZstdError)  # RuntimeError: of lz4
 
 
 class Channel(NamedTuple):
-    """A topic as the file describes it."""
+    """Description of a topic in the file."""
 
     topic: str
     type_name: str
@@ -52,7 +52,7 @@ class Channel(NamedTuple):
 
 
 class Message(NamedTuple):
-    """One message, still serialised."""
+    """One serialised message."""
 
     channel: Channel
     log_time: int
@@ -61,10 +61,10 @@ class Message(NamedTuple):
 
 
 class Block(NamedTuple):
-    """A stretch of the file with records of messages: what is in a chunk, or neighbours outside of chunks."""
+    """Part of the file with records of messages: a chunk, or consecutive records outside of chunks."""
 
     offset: int
-    """[bytes] where it begins in the file"""
+    """[bytes] of its beginning in the file"""
     size: int
     """[bytes] as stored"""
     first: int
@@ -74,28 +74,28 @@ class Block(NamedTuple):
     unpacked_size: int
     """[bytes]"""
     checksum: int = 0
-    """CRC-32 of what is unpacked; 0 if not known"""
+    """CRC-32 of the unpacked data; 0 if unknown"""
     compression: str = ''
     fault: str = ''
-    """why it cannot be read; empty if nothing is known against it"""
+    """reason why it cannot be read; empty if none is known"""
 
 
 class Layout(NamedTuple):
-    """Where things are in a file."""
+    """Structure of a file."""
 
     blocks: tuple[Block, ...]
     channels: dict[int, Channel]
     """those repeated at the end of the file"""
     counts: dict[int, int]
-    """messages of each channel, as the end of the file claims; empty if it does not"""
+    """messages of each channel, by the statistics of the file; empty if it has none"""
     damage: str
-    """what is wrong with the file from `sound_size` on; empty if it is finished"""
+    """fault of the file from `sound_size` on; empty if it is finished"""
     sound_size: int
-    """[bytes] of whole records"""
+    """[bytes] of complete records"""
 
 
 def scan(file: BinaryIO) -> Layout:
-    """Walk over the records of a file, passing over what is in them; of a damaged file, as far as it goes."""
+    """Walk over the records of a file without reading their contents; in a damaged file, up to the damage."""
     walk = _Walk(file)
     damage = ''
     try:
@@ -107,19 +107,19 @@ def scan(file: BinaryIO) -> Layout:
 
 
 def scan_finished(file: BinaryIO) -> Layout:
-    """Walk over the records of a file that has to be whole.
+    """Walk over the records of a finished file.
 
     Raises:
-        ValueError: It is not; says what to do.
+        ValueError: It is damaged or unfinished; says what to do.
     """
     layout = scan(file)
     if layout.damage:
-        raise ValueError(f'{layout.damage}: seal_friction recover makes a bag of what is sound')
+        raise ValueError(f'{layout.damage}: use seal_friction recover')
     return layout
 
 
 class _Walk:
-    """State of a `scan`."""
+    """State of `scan`."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -135,24 +135,24 @@ class _Walk:
         """Walk until the end of a finished file.
 
         Raises:
-            ValueError: It is not finished, or no MCAP file; `position` is where that was found.
+            ValueError: It is unfinished or not an MCAP file; `position` is that of the fault.
         """
         if self._read(0, len(MAGIC)) != MAGIC:
-            raise ValueError('it does not begin as an MCAP file does')
+            raise ValueError('it does not begin like an MCAP file')
         self.position, opcode = len(MAGIC), 0
         while opcode != Opcode.FOOTER:
             head = self._read(self.position, RECORD.size)
             opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, self._size)
             end = self.position + RECORD.size + length
             if end > self._size:
-                raise ValueError(f'it was not finished, or truncated: no whole record at byte {self.position}')
+                raise ValueError(f'it was not finished, or truncated: no complete record at byte {self.position}')
             self._take(opcode, length)
             self.position = end
         if self._read(self.position, len(MAGIC) + 1) != MAGIC:
-            raise ValueError(f'what stands at byte {self.position} is no end of an MCAP file')
+            raise ValueError(f'no end of an MCAP file at byte {self.position}')
 
     def finish_bare(self) -> None:
-        """Close the block of neighbours outside of chunks."""
+        """Complete the block of records outside of chunks."""
         if self._bare is not None:
             size = self._bare.unpacked_size
             fault = _too_large(size) if size > LARGEST_CHUNK else ''
@@ -226,7 +226,7 @@ OF_MESSAGES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 
 def _too_large(size: int) -> str:
-    return f'{size} bytes, and at most {LARGEST_CHUNK >> 20} MiB are taken: write it anew with smaller chunks'
+    return f'{size} bytes, at most {LARGEST_CHUNK >> 20} MiB are allowed: write the file again with smaller chunks'
 
 
 def _stream(data: bytes) -> ReadDataStream:
@@ -234,7 +234,7 @@ def _stream(data: bytes) -> ReadDataStream:
 
 
 class Names:
-    """What is known of schemas and channels."""
+    """Schemas and channels by number."""
 
     def __init__(self, channels: dict[int, Channel] | None = None) -> None:
         self._schemas: dict[int, records.Schema] = {0: records.Schema(id=0, data=b'', encoding='', name='')}
@@ -243,10 +243,10 @@ class Names:
         self.channels = dict(channels or {})
 
     def learn(self, opcode: int, data: bytes) -> None:
-        """Take the record of a schema or a channel.
+        """Add the record of a schema or a channel.
 
         Raises:
-            ValueError: It makes no sense, or a name in it is not one line of sensible length.
+            ValueError: It is invalid, or a name in it is too long or not printable.
         """
         if opcode == Opcode.SCHEMA:
             schema = records.Schema.read(_stream(data))
@@ -259,7 +259,7 @@ class Names:
         self._count(opcode, channel.id, len(data))
         schema = self._schemas.get(channel.schema_id)
         if schema is None:
-            raise ValueError(f'{channel.topic} is of a type that the file does not describe')
+            raise ValueError(f'{channel.topic} has a type without description in the file')
         self.channels[channel.id] = Channel(
             channel.topic, schema.name, channel.message_encoding, schema.encoding, schema.data, channel.metadata
         )
@@ -273,7 +273,7 @@ class Names:
 
 def _check_name(kind: str, name: str) -> None:
     if not name.isprintable() or len(name) > _LONGEST_NAME:
-        raise ValueError(f'{name[:40]!r} is no name of a {kind}')
+        raise ValueError(f'{name[:40]!r} is not a valid name of a {kind}')
 
 
 def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], None] | None = None) -> Iterator[Message]:
@@ -282,14 +282,14 @@ def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], No
     Args:
         file: The file.
         layout: From `scan`.
-        on_fault: Called with each block that cannot be read, and the reason; if None, that is an error.
+        on_fault: Called with each unreadable block and the reason; if None, such a block is an error.
 
     Raises:
         ValueError: A block cannot be read, or too many overlap in time.
     """
     names = Names(layout.channels)
     blocks: Sequence[Block] = layout.blocks
-    if names.channels:  # else each channel has to be met before its messages
+    if names.channels:  # else blocks stay in file order: channels are described before their messages
         blocks = sorted(blocks, key=lambda block: block.first)
     earliest = earliest_times(blocks)
     heap: list[tuple[int, int, int, _Contents, Iterator[int]]] = []
@@ -317,7 +317,7 @@ def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], No
 
 
 def earliest_times(blocks: Sequence[Block]) -> 'array[int]':
-    """Smallest log time [ns] in each block and all that follow it."""
+    """Smallest log time [ns] in each block and all following ones."""
     earliest = array('Q', [block.first for block in blocks])
     for place in reversed(range(len(earliest) - 1)):
         earliest[place] = min(earliest[place], earliest[place + 1])
@@ -325,7 +325,7 @@ def earliest_times(blocks: Sequence[Block]) -> 'array[int]':
 
 
 class _Contents(NamedTuple):
-    """What is in a block, and where its messages are."""
+    """Data of a block, and positions of its messages."""
 
     data: bytes
     times: 'array[int]'
@@ -361,17 +361,17 @@ def _contents(file: BinaryIO, block: Block, names: Names, on_fault: Callable[[Bl
 
 
 def unpacked(file: BinaryIO, block: Block) -> bytes:
-    """Records of a block, as large as it claims and with the right checksum.
+    """Records of a block, of the claimed size and checksum.
 
     Raises:
-        ValueError: It cannot be read (or another of `ERRORS`).
+        ValueError: It cannot be read (or another error in `ERRORS`).
     """
     if block.fault:
         raise ValueError(block.fault)
     file.seek(block.offset)
     data = _UNPACKERS[block.compression](file.read(block.size), block.unpacked_size)
     if len(data) != block.unpacked_size:
-        raise ValueError(f'it does not unfold to the {block.unpacked_size} bytes that it claims')
+        raise ValueError(f'it does not unpack to the claimed {block.unpacked_size} bytes')
     if block.checksum and zlib.crc32(data) != block.checksum:
         raise ValueError('its checksum is wrong')
     return data
@@ -388,9 +388,9 @@ def _indexed(data: bytes, block: Block, names: Names) -> _Contents:
         if opcode == Opcode.MESSAGE:
             _, length, channel, _, log_time, _ = _MESSAGE.unpack_from(data, offset)
             if length < _MESSAGE.size - RECORD.size or channel not in names.channels:
-                raise ValueError(f'a message of {length} bytes on channel {channel} makes no sense')
+                raise ValueError(f'a message of {length} bytes on channel {channel} is invalid')
             if not block.first <= log_time <= block.last or log_time > LAST_TIME:
-                raise ValueError(f'a message at {log_time} ns is not within the times that it claims')
+                raise ValueError(f'a message at {log_time} ns is outside its claimed range of times')
             times.append(log_time)
             offsets.append(offset)
         elif opcode in OF_MESSAGES:
@@ -403,7 +403,7 @@ def unpack_zstd(data: bytes, size: int) -> bytes:
     """Unpack at most ``size + 1`` bytes.
 
     Raises:
-        zstandard.ZstdError: The data are no zstd frame, or one of a window above `LARGEST_CHUNK`.
+        zstandard.ZstdError: The data are no zstd frame, or its window is above `LARGEST_CHUNK`.
     """
     parts, wanted = [], size + 1
     with zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(data) as reader:

@@ -1,7 +1,7 @@
-"""One MCAP file (profile ``ros2``) that is whole up to its newest chunk at any moment, whatever stops the writing.
+"""Writer of one MCAP file (profile ``ros2``) that is valid up to its newest chunk at any time, however writing ends.
 
-The records are those of the ``mcap`` library and the file is, byte for byte, what its writer makes; but messages and
-their index are packed here, in less than half the time, since the estimator waits while Python packs.
+The file is byte for byte that of the writer of the ``mcap`` library. Messages and their index are packed here, in less
+than half the time, because the estimator waits while Python packs.
 """
 
 import errno
@@ -30,30 +30,30 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-CHUNK_SIZE = 64 * 1024  # [bytes] small chunks keep the writing thread short; the file is no larger for it
+CHUNK_SIZE = 64 * 1024  # [bytes] small, so that the writing thread blocks briefly; the file does not get larger
 _MESSAGE_OVERHEAD = 47  # [bytes] head of a message and its entry in the index
-_MARKS = 4  # chunks that can be given back to make room for the end of the file
-# Heads of records (https://mcap.dev/spec), each from the opcode and the length of what follows that.
+_MARKS = 4  # chunks that can be dropped to make room for the end of the file
+# Heads of records (https://mcap.dev/spec), each beginning with the opcode and the length of the rest.
 _MESSAGE = struct.Struct('<BQHIQQ')  # channel, sequence number, log time, publish time
 _CHUNK = struct.Struct('<BQQQQIIQ')  # first and last time, size and checksum of its data, no compression, size
 _MESSAGE_INDEX = struct.Struct('<BQHI')  # channel, size of what follows: log time and offset of each message
-_FOOTER = struct.Struct('<BQQQ')  # where the summary and its offsets begin; the checksum covers it up to there
+_FOOTER = struct.Struct('<BQQQ')  # beginning of summary and of its offsets; the checksum covers it up to there
 _OPCODE_AND_LENGTH = 9  # [bytes]
 _MESSAGE_OPCODE = int(Opcode.MESSAGE)  # a number is packed faster than a member of an enumeration
 
 
 class Description(NamedTuple):
-    """What a bag says of a topic besides its name."""
+    """Description of a topic in a bag, without its name."""
 
     type_name: str
     definition_encoding: str
     definition: bytes
     metadata: dict[str, str]
-    """of the channel: hash of the type and QoS, as rosbag2 has them"""
+    """of the channel: type hash and QoS in the format of rosbag2"""
 
 
 class Span(NamedTuple):
-    """What is in a file."""
+    """Range of the messages of a file."""
 
     first_time: int = 0
     """log time of its first message [ns]"""
@@ -63,7 +63,7 @@ class Span(NamedTuple):
 
 
 class _Mark(NamedTuple):
-    """The end of a whole chunk."""
+    """End of a complete chunk."""
 
     size: int
     """[bytes] of the file"""
@@ -72,7 +72,7 @@ class _Mark(NamedTuple):
 
 
 class _Chunk:
-    """Messages that go into the file together."""
+    """Messages that are written together."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -92,7 +92,7 @@ class _Chunk:
         self.last_time = log_time
 
     def records(self, start: int) -> tuple[bytes, ChunkIndex]:
-        """Return what is written, and its entry in the summary if it is written at ``start``."""
+        """Bytes of the chunk written at offset ``start``, and its entry in the summary."""
         size, first, last = len(self.data), self.first_time, self.last_time
         length = _CHUNK.size - _OPCODE_AND_LENGTH + size
         chunk = _CHUNK.pack(Opcode.CHUNK, length, first, last, size, zlib.crc32(self.data), 0, size) + self.data
@@ -108,10 +108,10 @@ class McapOutput:
     """A file being written.
 
     Args:
-        path: Where; must not exist.
+        path: Its path; must not exist.
 
     Raises:
-        OSError: It cannot be made (so each method, if the disk does not take what is written).
+        OSError: It cannot be made. Every method raises it if writing fails.
     """
 
     def __init__(self, path: Path) -> None:
@@ -135,11 +135,11 @@ class McapOutput:
 
     @property
     def size(self) -> int:
-        """Of the file, once what is pending is written [bytes]."""
+        """Of the file with pending messages [bytes]."""
         return self._stream.tell() + self._pending
 
     def write(self, topic: str, description: Description, log_time: int, data: bytes) -> None:
-        """Append one message, ``log_time`` in ns, no earlier than the one before."""
+        """Append one message; its ``log_time`` [ns] is not before that of the last one."""
         key = (topic, description.type_name)
         if key not in self._channels:
             self._add_channel(key, description)
@@ -161,7 +161,7 @@ class McapOutput:
         self.counts[key] = 0
 
     def flush(self) -> None:
-        """Hand what is pending to the operating system: from then on it outlives this process."""
+        """Pass pending messages to the operating system, so that they outlive this process."""
         if self._pending:
             records, entry = self._chunk.records(self._stream.tell())
             self._stream.write(records)
@@ -172,7 +172,7 @@ class McapOutput:
             self._marks.append(_Mark(self._stream.tell(), self.span, dict(self.counts)))
 
     def finish(self, metadata: str) -> None:
-        """Write what is pending, ``metadata`` for rosbag2, the index and the end."""
+        """Write pending messages, ``metadata`` for rosbag2, the index and the end of the file."""
         self.flush()
         record = _packed(Metadata('rosbag2', {'serialized_metadata': metadata}))
         entry = MetadataIndex(self._stream.tell(), len(record), 'rosbag2')
@@ -180,7 +180,7 @@ class McapOutput:
         self._stream.write(self._summary(self._stream.tell(), entry))
 
     def _summary(self, start: int, metadata: MetadataIndex) -> bytes:
-        """Return all that is written from ``start`` to the end of the file."""
+        """Bytes from ``start`` to the end of the file."""
         channels = self._channels.values()
         counts = {self._channels[key].id: count for key, count in self.counts.items()}
         schemas, chunks, (first, last, messages) = len(self._schemas), len(self._chunks), self.span
@@ -204,9 +204,9 @@ class McapOutput:
         return summary + _packed(Footer(start, offsets_start, checksum)) + MCAP0_MAGIC
 
     def finish_early(self) -> None:
-        """After a failure: cut off what is not whole and write an end without index, for which there is always room.
+        """After a failure, cut off incomplete records and write an end of the file without index.
 
-        May be called again, if there was none after all, after `give_back`.
+        If there is no room for it, call `give_back` and this method again.
         """
         size, self.span, counts = self._marks[-1]
         self.counts = dict(counts)
@@ -215,14 +215,14 @@ class McapOutput:
         self._stream.write(_packed(DataEnd(0), Footer(0, 0, 0)) + MCAP0_MAGIC)
 
     def give_back(self) -> bool:
-        """Give up the newest chunk, to make room; False if there is none to give."""
+        """Drop the newest chunk to make room; False if there is none."""
         if len(self._marks) < 2:
             return False
         self._marks.pop()
         return True
 
     def close(self) -> None:
-        """Let go of the file as it is."""
+        """Close the file as it is."""
         self._stream.close()
 
 
@@ -234,7 +234,7 @@ def _packed(*records: McapRecord) -> bytes:
 
 
 class _Stream:
-    """A file without a buffer of its own, to which never less than all is written without raising."""
+    """Unbuffered file; each write is complete or raises."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -242,7 +242,7 @@ class _Stream:
         self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
 
     def write(self, data: bytes) -> None:
-        """Write all of it."""
+        """Write all data."""
         view = memoryview(data)
         while view:
             try:
@@ -256,7 +256,7 @@ class _Stream:
         return self._size
 
     def check(self) -> None:
-        if not os.fstat(self._handle).st_nlink:  # what is written to a removed file is lost without a word
+        if not os.fstat(self._handle).st_nlink:  # writes to a removed file are lost without an error
             raise FileNotFoundError(errno.ENOENT, 'removed while it was written', str(self._path))
 
     def cut(self, size: int) -> None:

@@ -1,9 +1,8 @@
-"""Records what the estimator consumed and published without ever making it wait.
+"""Recorder of the inputs and outputs of the estimator; it never blocks the estimator.
 
-Messages go into a bounded queue; a thread of the recorder's own takes them out and writes the bag. What was taken out
-is handed to the operating system within `FLUSH_PERIOD`, so that it outlives the process. When the disk cannot keep up,
-messages are dropped and counted; when it fails, recording stops, says why and leaves a valid bag of what was written.
-The estimate goes on either way.
+Messages enter a bounded queue; a separate thread writes them to the bag and passes them to the operating system within
+`FLUSH_PERIOD`, so that they outlive the process. If the disk is too slow, messages are dropped and counted. If it
+fails, recording stops with an error and leaves a valid bag of the messages written. The estimator continues in both.
 """
 
 import threading
@@ -15,12 +14,10 @@ from seal_friction_ros.offline.bags.bag import BagWriter
 
 QUEUE_LENGTH = 100_000  # [messages] fourteen seconds of seven topics at 1 kHz
 FLUSH_PERIOD = 0.3  # [s]
-_PERIOD = (
-    0.05  # [s] between two looks at the queue if nobody says when: waking for each message would slow the estimator
-)
-_HASTE = 0.002  # [s] the same while a backlog is written, if the estimator does not answer
-_ENOUGH = 20  # messages to be woken up for
-_AT_A_TIME = 50  # messages written before the estimator has the processor again, so a backlog does not delay it
+_IDLE_PERIOD = 0.05  # [s] between checks of the queue without `flush_if_idle`; more wake-ups slow the estimator
+_BACKLOG_PERIOD = 0.002  # [s] the same while there is a backlog
+_WAKE_LENGTH = 20  # [messages] shortest queue for which `flush_if_idle` wakes the thread
+_BATCH = 50  # messages written before the thread yields the processor, so that a backlog does not delay the estimator
 
 
 class Recorder:
@@ -28,7 +25,7 @@ class Recorder:
 
     Args:
         path: Folder of the bag; must not exist.
-        queue_length: Messages that may wait for the disk.
+        queue_length: Largest number of queued messages.
         split_size: As of `BagWriter` [bytes].
         split_duration: As of `BagWriter` [s].
 
@@ -43,7 +40,7 @@ class Recorder:
         self.error = ''
         self._offered = self._refused = 0
         self._queue_length = queue_length
-        self._queue: deque[tuple[str, str, int, bytes]] = deque()  # plain tuples: the garbage collector lets go of them
+        self._queue: deque[tuple[str, str, int, bytes]] = deque()  # plain tuples: the garbage collector untracks them
         self._writer = BagWriter(path, split_size=split_size, split_duration=split_duration)
         self._stop = threading.Event()
         self._wake = threading.Event()
@@ -59,40 +56,40 @@ class Recorder:
             self._queue.append((topic, type_name, log_time, data))
 
     def flush_if_idle(self) -> None:
-        """Have the queue written now if it is long enough: the estimator says so when it has just answered.
+        """Write the queue now if it is long enough; the estimator calls this right after an answer.
 
-        Python runs one thread at a time, so what is written while a sample comes in makes it wait.
+        Python runs one thread at a time, so writing while a sample arrives would delay its estimate.
         """
-        if len(self._queue) >= _ENOUGH:
+        if len(self._queue) >= _WAKE_LENGTH:
             self._wake.set()
 
     @property
     def written(self) -> int:
-        """Messages written so far."""
+        """Number of messages written so far."""
         return self._writer.message_count
 
     @property
     def dropped(self) -> int:
-        """Messages that are not and will not be in the bag: the queue was full, or the recording failed."""
+        """Number of messages that are not in the bag because the queue was full or the recording failed."""
         return self._offered - self.written if self.error else self._refused
 
     @property
     def waiting(self) -> int:
-        """Messages in the queue."""
+        """Number of messages in the queue."""
         return len(self._queue)
 
     @property
     def is_finished(self) -> bool:
-        """Whether nothing more will be written: after `stop`, in time, or after an error."""
+        """Whether the thread has ended: some time after `stop`, or after an error."""
         return not self._thread.is_alive()
 
     def stop(self) -> None:
-        """Have what is queued written and the bag finished, without waiting for that."""
+        """Write the queue and finish the bag, without waiting for it."""
         self._stop.set()
         self._wake.set()
 
     def close(self) -> None:
-        """Write what is queued and finish the bag; how many messages were dropped is kept in its metadata."""
+        """Write the queue and finish the bag; its metadata hold the number of dropped messages."""
         self.stop()
         self._thread.join()
 
@@ -100,26 +97,26 @@ class Recorder:
         try:
             self._write_until_stopped()
             self._writer.close({'dropped_messages': str(self.dropped)})
-        except Exception as error:  # noqa: BLE001  whatever it is, the thread must not end without a word
+        except Exception as error:  # noqa: BLE001  the thread must not end silently
             self._rescue(error)
 
     def _write_until_stopped(self) -> None:
         flushed = time.monotonic()
         while self._queue or not self._stop.is_set():
-            for _ in range(min(len(self._queue), _AT_A_TIME)):
+            for _ in range(min(len(self._queue), _BATCH)):
                 self._writer.write(*self._queue.popleft())
             if time.monotonic() - flushed >= FLUSH_PERIOD:
                 self._writer.flush()
                 flushed = time.monotonic()
-            if self._wake.wait(_HASTE if self._queue else _PERIOD):
+            if self._wake.wait(_BACKLOG_PERIOD if self._queue else _IDLE_PERIOD):
                 self._wake.clear()
 
     def _rescue(self, failure: Exception) -> None:
-        """Leave a valid bag of what was written, and say what happened."""
-        words = f'{self.path}: recording stopped: {failure}'
+        """Leave a valid bag of the messages written, and record the error."""
+        text = f'{self.path}: recording stopped: {failure}'
         try:
             self._writer.rescue(str(failure), self._offered)
         except Exception as error:  # noqa: BLE001  as above
-            words += f'; and the bag could not be finished ({error}): seal_friction recover makes one of it'
-        self.error = words
+            text += f'; and the bag could not be finished ({error}): use seal_friction recover'
+        self.error = text
         self._queue.clear()

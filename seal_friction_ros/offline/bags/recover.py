@@ -1,4 +1,4 @@
-"""A valid bag of whatever can be read of one that was not finished, or is damaged."""
+"""Recovery of the readable part of a damaged or unfinished bag into a valid bag."""
 
 import re
 from collections import Counter
@@ -19,12 +19,12 @@ _QOS, _HASH = 'offered_qos_profiles', 'topic_type_hash'
 
 @dataclass(frozen=True)
 class Recovery:
-    """What was saved and what is gone."""
+    """Result of a recovery."""
 
     bag: str
     out: str
     messages: int
-    """saved"""
+    """number saved"""
     topics: dict[str, int]
     """topic -> messages saved"""
     first_ns: int
@@ -32,31 +32,31 @@ class Recovery:
     last_ns: int
     """log time of the last message [ns]"""
     lost_bytes: int
-    """at the ends of files, behind the last whole record"""
+    """at the ends of files, after the last complete record"""
     lost_chunks: int
-    """whole, but their contents make no sense"""
+    """complete chunks with invalid contents"""
     damage: list[str]
-    """what is wrong, file by file; empty for a bag that was finished and is sound"""
+    """one line for each fault; empty for a finished and undamaged bag"""
 
-    def in_words(self) -> str:
+    def summary(self) -> str:
         """The same for a person."""
         until = datetime.fromtimestamp(self.last_ns * 1e-9, UTC)
         saved = f'{self.out}: {self.messages} messages saved, up to log time {self.last_ns} ns ({until:%F %T} UTC)'
         if not self.damage:
-            return f'{saved}; nothing was damaged'
-        gone = f'gone: {self.lost_bytes} bytes at the ends of files, {self.lost_chunks} chunks'
-        return '\n'.join([f'{saved}; {gone}, and what the recorder had not written yet', *self.damage])
+            return f'{saved}; the bag is not damaged'
+        lost = f'lost: {self.lost_bytes} bytes at the ends of files, {self.lost_chunks} chunks'
+        return '\n'.join([f'{saved}; {lost}, and messages that the recorder had not written', *self.damage])
 
 
 def recover(bag: Path, out: Path | None = None) -> Recovery:
-    """Copy every message that can be read, in order, to a new bag.
+    """Copy every readable message, in order, to a new bag.
 
     Args:
-        bag: Folder of a bag, whatever its ``metadata.yaml`` says, or an MCAP file.
-        out: Bag to make; must not exist. By default beside ``bag``, with ``_recovered`` after its name.
+        bag: Folder of a bag, with any or no ``metadata.yaml``, or an MCAP file.
+        out: Bag to make; must not exist. Default: beside ``bag``, with ``_recovered`` after its name.
 
     Raises:
-        BagError: Nothing can be read, or ``out`` exists already. Nothing is left at ``out`` then.
+        BagError: Nothing can be read, or ``out`` exists already; then nothing is left at ``out``.
     """
     files = _files(bag)
     out = out or bag.resolve().with_name(f'{bag.resolve().stem if bag.is_file() else bag.resolve().name}_recovered')
@@ -82,25 +82,25 @@ def recover(bag: Path, out: Path | None = None) -> Recovery:
 
 
 def _files(bag: Path) -> list[Path]:
-    """MCAP files of a bag in the order in which they were begun; links are passed over."""
+    """MCAP files of a bag in the order of recording, without links."""
     if bag.is_file():
         return [bag]
     if not bag.is_dir():
-        raise BagError(f'{bag}: there is no such bag')
+        raise BagError(f'{bag}: no such file or folder')
     files = [path for path in bag.glob('*.mcap') if path.is_file() and not path.is_symlink()]
     if not files:
-        raise BagError(f'{bag}: no MCAP file in it, so nothing to recover')
+        raise BagError(f'{bag}: no MCAP file in it, nothing to recover')
     return sorted(files, key=lambda path: _parts(path.name))
 
 
 def _parts(name: str) -> list[str | int]:
-    """Texts and numbers in turn, text first: ``bag_10.mcap`` comes after ``bag_9.mcap``."""
+    """Texts and numbers in turn, text first, to sort ``bag_10.mcap`` after ``bag_9.mcap``."""
     parts = re.split(r'([0-9]+)', name)
     return [int(part) if place % 2 else part for place, part in enumerate(parts)]
 
 
 class _Copy:
-    """State of a `recover`."""
+    """State of `recover`."""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
@@ -110,7 +110,7 @@ class _Copy:
         self._descriptions: dict[tuple[str, str], Description] = {}
 
     def take(self, path: Path, writer: BagWriter) -> None:
-        """Copy what can be read of one file."""
+        """Copy the readable messages of one file."""
 
         def on_fault(block: Block, reason: str) -> None:
             self.lost_chunks += 1
@@ -137,13 +137,13 @@ class _Copy:
         key = (channel.topic, channel.type_name)
         if key not in self._descriptions:
             if channel.encoding != 'cdr':
-                raise BagError(f'{path}: {channel.topic} is encoded as {channel.encoding[:40]!r}, not as ROS 2 does')
+                raise BagError(f'{path}: {channel.topic} is encoded as {channel.encoding[:40]!r}, not as CDR')
             self._descriptions[key] = _described(channel)
         return self._descriptions[key]
 
 
 def _described(channel: Channel) -> Description:
-    """As the damaged bag says it; a QoS that is not written as rosbag2 does is left out."""
+    """Description in the damaged bag, without a QoS that is not in the format of rosbag2."""
     text = channel.metadata.get(_QOS, '')
     try:
         profiles = parse_yaml(text.encode(), channel.topic)

@@ -1,4 +1,4 @@
-"""One SQLite file of a rosbag2 bag, read as a stranger's: plain tables only, no views, nothing written beside it."""
+"""Reader of one untrusted SQLite file of a rosbag2 bag: plain tables only, no views, no journal files."""
 
 import sqlite3
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ def topics(path: Path) -> list[tuple[str, str, int]]:
     """Name, message type and number of messages of each topic.
 
     Raises:
-        ValueError: The file is no such database.
+        ValueError: The file is not such a database.
         sqlite3.Error: It is damaged.
     """
     with _opened(path) as database:
@@ -29,14 +29,14 @@ def messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
     """Topic, message type, log time [ns] and bytes of each message, in order of log time.
 
     Raises:
-        ValueError: The file is no such database.
+        ValueError: The file is not such a database.
         sqlite3.Error: It is damaged.
     """
     with _opened(path) as database:
         names = {number: (name, type_name) for number, name, type_name in _names(database)}
         for number, log_time, data in database.execute(_MESSAGES):
             if number not in names or not isinstance(log_time, int) or not isinstance(data, bytes):
-                raise ValueError(f'a message of topic {number!r} at {log_time!r} makes no sense')
+                raise ValueError(f'a message of topic {number!r} at {log_time!r} is invalid')
             yield *names[number], log_time, data
 
 
@@ -49,12 +49,12 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
             for table in ('topics', 'messages'):
                 _check_plain(database, table)
             yield database
-        except MemoryError:  # so SQLite answers to some damaged sizes, which it has not tried to get
-            raise ValueError('a size in it makes no sense') from None
+        except MemoryError:  # SQLite raises it for damaged sizes, without allocating
+            raise ValueError('a size in it is invalid') from None
 
 
 def _check_plain(database: sqlite3.Connection, table: str) -> None:
-    """Refuse a view and a virtual table, and columns that are computed: reading them need not end."""
+    """Refuse views, virtual tables and computed columns, since reading them may not end."""
     stored = "SELECT count(*) FROM sqlite_schema WHERE name = ? AND type = 'table' AND rootpage > 0"
     computed = 'SELECT count(*) FROM pragma_table_xinfo(?) WHERE hidden'
     if database.execute(stored, (table,)).fetchone() != (1,) or any(*database.execute(computed, (table,))):
@@ -64,5 +64,5 @@ def _check_plain(database: sqlite3.Connection, table: str) -> None:
 def _names(database: sqlite3.Connection) -> Iterator[tuple[int, str, str]]:
     for number, *names in database.execute(_TOPICS):
         if not all(isinstance(name, str) and name.isprintable() and len(name) <= _LONGEST_NAME for name in names):
-            raise ValueError(f'topic {number!r} has no sensible name or type')
+            raise ValueError(f'topic {number!r} has no valid name or type')
         yield number, names[0], names[1]

@@ -1,4 +1,4 @@
-"""Which topic of a bag is what to the estimator."""
+"""Topics of the estimator in a bag, found by message type."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,11 +17,11 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.offline.bags.bag import ESTIMATE_TOPIC, FEEDFORWARD_TOPIC, BagError, TopicInfo, bag_topics
 
 ANSWER_TOPICS = {ESTIMATE_TYPE: ESTIMATE_TOPIC, FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
-"""Message type of an answer -> topic, where the bag has no name for it."""
+"""Message type of an answer -> topic, if the bag has no topic of that type."""
 
 
 class Topics(NamedTuple):
-    """Names of the estimator's topics in a bag; an empty name where there is no such topic."""
+    """Names of the estimator's topics in a bag; empty if there is no such topic."""
 
     pressure: str
     velocity: str
@@ -50,11 +50,11 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
 
     Args:
         bag: The bag.
-        namespace: Only topics below it are looked at; for bags of several actuators.
-        known: From `bag_topics`, if it was asked already.
+        namespace: Use only topics below it; for bags of several actuators.
+        known: Result of `bag_topics`, if already known.
 
     Raises:
-        BagError: There is no velocity, or a type has several topics.
+        BagError: There is no velocity topic, or a type has several topics.
     """
     names = []
     below = f'/{namespace.strip("/")}/'.replace('//', '/')

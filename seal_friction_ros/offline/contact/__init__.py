@@ -1,1 +1,1 @@
-"""Runs of the contact computations: lubricated contact and finite-element O-ring."""
+"""Contact of a seal, computed from case files: O-ring by finite elements, and lubricated contact."""

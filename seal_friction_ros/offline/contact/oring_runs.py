@@ -1,4 +1,4 @@
-"""The finite-element O-ring from files to files: a case file in; numbers, a seal file and a report out."""
+"""Finite-element O-ring: case file -> numbers and seal file."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -13,35 +13,35 @@ from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
 
-DIGITS = 8  # that a computed number in a seal file has
+DIGITS = 8  # of a computed number in a seal file
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Contact stress along a wall, at the nodes in contact."""
+    """Contact stress along a wall, at the nodes in contact, shape (n,)."""
 
     position_m: tuple[float, ...]
-    """along rod and gland, positive downstream from the middle of the free ring; for the wall the radius"""
+    """along rod and gland from the middle of the free ring, positive downstream; for the wall the radius"""
     stress_Pa: tuple[float, ...]  # noqa: N815  (unit symbols keep their case)
 
 
 @dataclass(frozen=True)
 class OringSummary:
-    """Numbers of a case, one of each for every pressure."""
+    """Numbers of a case, one per pressure."""
 
     case: str
     sliding_wall: str
     pressure_Pa: tuple[float, ...]  # noqa: N815
     normal_force_N: tuple[float, ...]  # noqa: N815
-    """contact stress on the wall the ring slides on, over its area"""
+    """integral of the contact stress over the sliding wall"""
     axial_force_N: tuple[float, ...]  # noqa: N815
-    """of the gland on the ring, along the axis"""
+    """axial force of the gland on the ring"""
     peak_contact_stress_Pa: tuple[float, ...]  # noqa: N815
     contact_width_m: tuple[float, ...]
     area_deformation_gain: float | None
-    """slope of normal over axial force, least squares; None with one pressure"""
+    """slope of normal over axial force by least squares; None with one pressure"""
     radial_force_N: float | None  # noqa: N815
-    """what that line has at no axial force; None with one pressure"""
+    """value of that line at zero axial force; None with one pressure"""
     friction_N: tuple[float, ...] | None  # noqa: N815
     """sliding friction of one seal, if the case has a friction coefficient"""
     rod_profile: tuple[Profile, ...]
@@ -51,7 +51,7 @@ class OringSummary:
 
 
 class Computed(NamedTuple):
-    """A case and what came of it."""
+    """A case and its results."""
 
     file: CaseFile
     results: tuple[ContactResult, ...]
@@ -59,7 +59,7 @@ class Computed(NamedTuple):
 
 
 def sliding_contact(file: CaseFile, result: ContactResult) -> Contact:
-    """Contact on the wall the ring slides on."""
+    """Contact on the sliding wall."""
     return result.rod if file.case.geometry.sliding_wall == 'rod' else result.gland
 
 
@@ -68,12 +68,12 @@ def compute_case(path: Path, pressures: Sequence[float] = (), *, for_seal_file: 
 
     Args:
         path: The case file.
-        pressures: Instead of those in the file [Pa, gauge], increasing.
-        for_seal_file: Refuse, before computing, what `seal_document` could not make a seal of.
+        pressures: Increasing pressures instead of those in the file [Pa, gauge].
+        for_seal_file: Refuse a case without what `seal_document` needs, before computing.
 
     Raises:
-        ValueError: The file makes no sense or is not enough for a seal file, or the ring does not fit, does not seal or
-            finds no equilibrium.
+        ValueError: The file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has
+            no equilibrium.
     """
     document = read_yaml(path)
     try:
@@ -121,7 +121,7 @@ def _profile(contact: Contact) -> Profile:
 
 def _friction_of_seal(file: CaseFile, pressures: Sequence[float]) -> Friction:
     if file.friction is None:
-        raise ValueError(f'case {file.case.name}: a seal file needs its section friction, with a friction_coefficient')
+        raise ValueError(f'case {file.case.name}: a seal file needs the section friction with a friction_coefficient')
     if len(pressures) < 2:
         raise ValueError(f'case {file.case.name}: a seal file needs two pressures at least')
     return file.friction
@@ -155,10 +155,10 @@ def seal_document(computed: Computed) -> dict[str, Any]:
 
 
 def seal_comment(computed: Computed) -> str:
-    """What stands above that seal file."""
+    """Comment at the beginning of that seal file."""
     summary = computed.summary
     return (
-        'Made by `seal_friction oring`, which computes the normal force from geometry and rubber; see docs/oring.md.\n'
+        'Made by `seal_friction oring`, which computes the normal force from geometry and rubber, see docs/oring.md.\n'
         f'As a line over axial force: area_deformation_gain: {summary.area_deformation_gain:.6g} [1], '
         f'radial_force: {summary.radial_force_N:.6g} [N].'
     )

@@ -1,1 +1,1 @@
-"""From bags, logs and data sheets to a seal file."""
+"""Identification of a friction law from measurements: sources -> readings -> fitted law -> seal file."""

@@ -1,7 +1,7 @@
-"""The friction test plan of the thesis, Appendix A, as a data sheet: printed, filled in by hand, checked, read.
+"""Data sheet of the friction test plan of the thesis, Appendix A: make, check and read it.
 
-A sheet is a CSV file of two tables: the dimensions, and the readings, one row for each pressure, one column for each
-test, kind of friction and direction. A dash in a cell is a reading that was not to be had.
+A sheet is a CSV file of two tables: the dimensions, and the readings with one row per pressure and one column per test,
+kind of friction and direction. A dash in a cell is a reading that could not be taken.
 """
 
 import csv
@@ -18,6 +18,7 @@ from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import UNITS, unit_size
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.identification.readings import FEWEST_PRESSURES, Noted
+from seal_friction_ros.files import config_path, read_yaml
 
 TITLE = 'seal friction data sheet'
 PRESSURE_UNITS = ('psi', 'bar', 'MPa', 'kPa')
@@ -26,37 +27,37 @@ LENGTH_UNITS = ('in', 'mm')
 KINDS = ('static', 'dynamic')
 DIRECTIONS = {'retract': -1, 'extend': 1}
 DIMENSIONS = ('gland_diameter', 'rod_diameter', 'ring_inner_diameter', 'section_diameter')
-NOT_TO_BE_HAD = '-'
-WILD = 2.0  # a reading that is this many times the others at its pressure, or their part, is implausible (our choice)
+NOT_TAKEN = '-'
+IMPLAUSIBLE_FACTOR = 2.0  # a reading beyond this factor above or below the others at its pressure (our choice)
 MOST_SEALS = 20
-_SHOWN = 4  # cells that an error names
+_SHOWN = 4  # cells listed in an error
 
 PROCEDURE = (
-    'Measure rod, groove and ring, and note the dimensions above.',
+    'Measure rod, groove and ring, and write down the dimensions above.',
     'Ground one end; fasten the load cell, spring scale or weighted pulley to the other. Both ports share one line.',
-    'Bring the pressure up once, so that the seals seat; bleed the air; bring the pressure back to the first row.',
+    'Raise the pressure once, so that the seals seat; bleed the air; set the pressure of the first row.',
     'Wait 30 s.',
-    'Retract slowly. Note the force at which it begins to move (static), and the force while it runs (dynamic).',
-    'Wait 30 s. Extend slowly, and note both forces.',
+    'Retract slowly. Write down the force when it begins to move (static) and the force while it slides (dynamic).',
+    'Wait 30 s. Extend slowly, and write down both forces.',
     'Raise the pressure to the next row and repeat, up to the last row.',
-    'Do all of it again for each further test: they tell how well a reading repeats.',
+    'Repeat everything for each further test: this shows how well a reading repeats.',
 )
 
 
 class Plan(NamedTuple):
-    """What is to be measured."""
+    """Readings to be taken."""
 
     seal_name: str
     pressures: tuple[float, ...]
     """in ``pressure_unit``, increasing"""
     tests: int
     seals: int
-    """that share the pressure, and whose friction is measured together"""
+    """number of seals that share the pressure and whose friction is measured together"""
     pressure_unit: str = 'psi'
     force_unit: str = 'lbf'
     length_unit: str = 'in'
     geometry: SealGeometry | None = None
-    """filled in beforehand, where it is known"""
+    """filled in, if known"""
 
 
 class Sheet(NamedTuple):
@@ -65,7 +66,7 @@ class Sheet(NamedTuple):
     dynamic: Noted
     static: Noted
     chambers: tuple[str, ...]
-    """one for each seal; they alternate, since both see the same pressure"""
+    """one for each seal; they alternate, since both chambers have the same pressure"""
     seal_document: Mapping[str, Any]
     """name and geometry"""
     remarks: tuple[str, ...]
@@ -80,7 +81,7 @@ class Column(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Its head in the sheet."""
+        """Its heading in the sheet."""
         return f'test {self.test} {self.kind} {self.direction}'
 
 
@@ -105,10 +106,10 @@ def make_plan(
     """Make a plan of evenly spaced pressures.
 
     Raises:
-        ValueError: A value makes no sense.
+        ValueError: A value is invalid.
     """
     if not (math.isfinite(lowest) and math.isfinite(highest) and 0.0 <= lowest < highest):
-        raise ValueError(f'pressures from {lowest:g} to {highest:g}: give a lowest (0 or more) and a higher one')
+        raise ValueError(f'pressures from {lowest:g} to {highest:g}: give a lowest one of at least 0 and a higher one')
     if not FEWEST_PRESSURES - 1 <= steps <= 100:
         raise ValueError(f'{steps} pressure steps: take {FEWEST_PRESSURES - 1} to 100')
     if not 1 <= tests <= 20:
@@ -121,12 +122,26 @@ def make_plan(
     return Plan(seal_name, pressures, tests, seals, pressure_unit, force_unit, length_unit, geometry)
 
 
+def geometry_of_seal_file(seal: str) -> SealGeometry:
+    """Geometry of a seal file: a path, or the name of one in config/seals.
+
+    Raises:
+        ValueError: The file cannot be read or has no valid geometry; names it.
+    """
+    path = config_path('seals', seal)
+    document = read_yaml(path)
+    if not isinstance(document, Mapping):
+        raise ValueError(f'{path}: a seal file is a mapping of names to values')
+    geometry: SealGeometry = from_mapping(SealGeometry, document.get('geometry'), f'{path}: geometry')
+    return geometry
+
+
 # -- the empty sheet --------------------------------------------------------------------------------------------------
 
 
 def sheet_text(plan: Plan) -> str:
     """CSV of an empty sheet."""
-    lines = [f'# {TITLE}', '# Fill in every empty cell; a dash (-) is a reading that was not to be had.']
+    lines = [f'# {TITLE}', '# Fill in every empty cell; write a dash (-) for a reading that could not be taken.']
     lines += [f'# {number}. {step}' for number, step in enumerate(PROCEDURE, start=1)]
     lines += ['quantity,value,unit', f'seal,{plan.seal_name},', f'seals,{plan.seals},']
     lines += [f'{name},{_dimension(plan, name)},{plan.length_unit}' for name in DIMENSIONS]
@@ -200,7 +215,7 @@ def write_sheet(plan: Plan, out: Path) -> tuple[Path, Path]:
     """Write an empty sheet as CSV and, beside it, as a page to print; returns both paths.
 
     Raises:
-        ValueError: There is a sheet at ``out`` already, which may be filled in, or it cannot be written.
+        ValueError: ``out`` exists already and may be filled in, or it cannot be written.
     """
     page = out.with_suffix('.html')
     if out.suffix != '.csv':
@@ -225,10 +240,10 @@ def is_data_sheet(head: Sequence[str]) -> bool:
 
 
 class _Row(NamedTuple):
-    """One row of readings as it stands."""
+    """One row of readings as written."""
 
     number: int
-    """of the line"""
+    """line number"""
     pressure: float
     """[Pa]"""
     cells: tuple[str, ...]
@@ -238,8 +253,8 @@ def read_data_sheet(path: Path) -> Sheet:
     """Read and check a filled sheet.
 
     Raises:
-        ValueError: A dimension or reading is missing, out of order or implausible; one line that says which, and what
-            to do.
+        ValueError: A dimension or reading is missing, out of order or implausible; one line that names it and says
+            what to do.
     """
     try:
         text = path.read_text(encoding='utf-8-sig')
@@ -248,7 +263,7 @@ def read_data_sheet(path: Path) -> Sheet:
     lines = list(_lines(text))
     start = next((i for i, (_, cells) in enumerate(lines) if cells[0].startswith('pressure')), None)
     if start is None:
-        raise ValueError(f'{path}: no row that begins with pressure [unit]: not a data sheet')
+        raise ValueError(f'{path}: not a data sheet: no row begins with pressure [unit]')
     quantities = {cells[0]: [*cells[1:], '', ''][:2] for _, cells in lines[:start]}
     chambers, document = _seal(path, quantities)
     order, pressure_unit, force_unit = _heads(path, lines[start][1])
@@ -256,8 +271,8 @@ def read_data_sheet(path: Path) -> Sheet:
     _check_pressures(path, rows, pressure_unit)
     readings = _readings(path, rows, order, force_unit, pressure_unit)
     _check_plausible(path, readings, force_unit, pressure_unit)
-    skipped = sum(cell == NOT_TO_BE_HAD for row in rows for cell in row.cells)
-    remarks = (f'{skipped} readings are marked as not to be had',) if skipped else ()
+    skipped = sum(cell == NOT_TAKEN for row in rows for cell in row.cells)
+    remarks = (f'{skipped} readings are marked as not taken',) if skipped else ()
     dynamic, static = (_noted(path, readings, kind) for kind in ('dynamic', 'static'))
     return Sheet(dynamic, static, chambers, document, remarks)
 
@@ -300,8 +315,8 @@ def _heads(path: Path, heads: Sequence[str]) -> tuple[list[Column], str, str]:
     units = [head.partition('[')[2].rstrip('] ') for head in heads]
     if units[0] not in PRESSURE_UNITS or any(unit not in FORCE_UNITS for unit in units[1:]) or len(set(units[1:])) != 1:
         raise ValueError(
-            f'{path}: heads {", ".join(heads)[:200]}: the first needs one of [{"] [".join(PRESSURE_UNITS)}], the '
-            f'others all the same of [{"] [".join(FORCE_UNITS)}]'
+            f'{path}: headings {", ".join(heads)[:200]}: the first needs one of [{"] [".join(PRESSURE_UNITS)}], the '
+            f'others the same one of [{"] [".join(FORCE_UNITS)}]'
         )
     order = []
     for head in heads[1:]:
@@ -311,13 +326,13 @@ def _heads(path: Path, heads: Sequence[str]) -> tuple[list[Column], str, str]:
             raise ValueError(f'{path}: column {head[:60]!r} is not test NUMBER static|dynamic retract|extend [unit]')
         order.append(Column(int(words[1]), words[2], words[3]))
     if len(set(order)) != len(order):
-        raise ValueError(f'{path}: a column is there twice')
+        raise ValueError(f'{path}: two columns have the same heading')
     return order, units[0], units[1]
 
 
 def _row(path: Path, number: int, cells: Sequence[str], width: int, pressure_unit: str) -> _Row:
     if len(cells) > width + 1 and any(cells[width + 1 :]):
-        raise ValueError(f'{path}: line {number}: {len(cells)} cells where there are {width + 1} columns')
+        raise ValueError(f'{path}: line {number}: {len(cells)} cells in {width + 1} columns')
     try:
         pressure = float(cells[0]) * unit_size(pressure_unit)
     except ValueError:
@@ -330,8 +345,8 @@ def _check_pressures(path: Path, rows: Sequence[_Row], unit: str) -> None:
         if not row.pressure > before.pressure:
             raise ValueError(
                 f'{path}: line {row.number}: pressure {row.pressure / unit_size(unit):g} {unit} is not above '
-                f'{before.pressure / unit_size(unit):g} {unit} in the row before: the plan raises the pressure from '
-                'row to row; put the rows in order, or look for a slip of the pen'
+                f'{before.pressure / unit_size(unit):g} {unit} in the previous row: the plan raises the pressure from '
+                'row to row; sort the rows, or look for a typing error'
             )
 
 
@@ -351,7 +366,7 @@ def _readings(
         for column, cell in zip(order, row.cells, strict=True):
             if not cell:
                 missing.append(f'{column.title} at {at}')
-            elif cell != NOT_TO_BE_HAD:
+            elif cell != NOT_TAKEN:
                 try:
                     force = float(cell)
                 except ValueError:
@@ -362,14 +377,14 @@ def _readings(
     if missing:
         more = f' and {len(missing) - _SHOWN} more' if len(missing) > _SHOWN else ''
         raise ValueError(
-            f'{path}: {len(missing)} readings are missing: {"; ".join(missing[:_SHOWN])}{more}: measure them, or put a '
-            'dash (-) for what was not to be had'
+            f'{path}: {len(missing)} readings are missing: {"; ".join(missing[:_SHOWN])}{more}: measure them, or write '
+            'a dash (-) for a reading that could not be taken'
         )
     return found
 
 
 def _check_plausible(path: Path, readings: Sequence[_Reading], force_unit: str, pressure_unit: str) -> None:
-    """Refuse a reading that is far from the others at its pressure, or a breakout force below the running one."""
+    """Refuse a reading far from the others at its pressure, or a static force below the dynamic one."""
     by_place = {(r.row.number, r.column): r for r in readings}
     for reading in readings:
         row, column, force = reading
@@ -377,17 +392,18 @@ def _check_plausible(path: Path, readings: Sequence[_Reading], force_unit: str, 
         middle = float(np.median(others)) if others else force
         static = by_place.get((row.number, column._replace(kind='static')))
         doubt = ''
-        if len(others) >= 2 and middle > 0.0 and not middle / WILD <= force <= WILD * middle:
+        factor = IMPLAUSIBLE_FACTOR
+        if len(others) >= 2 and middle > 0.0 and not middle / factor <= force <= factor * middle:
             doubt = (
                 f'the other {column.kind} readings there are about {middle / unit_size(force_unit):.3g} {force_unit}'
             )
         elif column.kind == 'dynamic' and static is not None and static.force < force:
-            doubt = f'it broke out at less, {static.force / unit_size(force_unit):g} {force_unit}'
+            doubt = f'the static one is less, {static.force / unit_size(force_unit):g} {force_unit}'
         if doubt:
             raise ValueError(
                 f'{path}: line {row.number}: {column.title} at {row.pressure / unit_size(pressure_unit):g} '
                 f'{pressure_unit} is {force / unit_size(force_unit):g} {force_unit}, but {doubt}: measure it again, or '
-                'put a dash (-)'
+                'write a dash (-)'
             )
 
 

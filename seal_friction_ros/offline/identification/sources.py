@@ -1,6 +1,6 @@
-"""Where friction readings come from: bags, logs of a rig, tables of noted readings, filled data sheets.
+"""Sources of friction readings: bags, logs of a rig, tables of noted readings, filled data sheets.
 
-What a source is shows in the file itself, so commands take any of them in any number.
+The kind of a source is found from the file itself, so a command takes any of them in any number.
 """
 
 import csv
@@ -42,15 +42,15 @@ VELOCITY_UNITS = {'m_per_s': 'm/s', 'mm_per_s': 'mm/s', 'in_per_s': 'in/s'}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choices:
-    """What a person says of the sources; None where the sources may say it themselves."""
+class SourceOptions:
+    """Options on the sources; None leaves a value to the sources themselves."""
 
     rig: str | None = None
     """rig file of the logs: a path, or the name of one in config/rigs"""
     chambers: tuple[str, ...] | None = None
     """chamber that each seal sees"""
     namespace: str = ''
-    """only topics below it count, in bags"""
+    """of a bag: use only topics below it"""
     slowest: float | None = None
     """[m/s] see `Sliding`"""
     largest_acceleration: float | None = None
@@ -58,7 +58,7 @@ class Choices:
 
 
 class DataFile(NamedTuple):
-    """A source as a seal file names it."""
+    """Name and digest of a source, for the seal file."""
 
     name: str
     sha256: str
@@ -66,7 +66,7 @@ class DataFile(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """Everything that was read."""
+    """Contents of all sources."""
 
     files: tuple[DataFile, ...]
     chambers: tuple[str, ...]
@@ -77,13 +77,13 @@ class Sources:
     seal_document: Mapping[str, Any] | None = None
     """seal file that a bag or a data sheet carries"""
     remarks: tuple[str, ...] = ()
-    """what was concluded and not said"""
+    """assumptions that no source or option states"""
 
     def prepare(self, index: Sequence[int] | None = None) -> Prepared:
-        """Readings of the sources, or of those that ``index`` names.
+        """Readings of all sources, or of those numbered in ``index``.
 
         Raises:
-            ValueError: They are not fit to identify from.
+            ValueError: They are unfit for identification.
         """
         chosen = range(len(self.files)) if index is None else index
         if self.measurements:
@@ -94,7 +94,7 @@ class Sources:
 
 @dataclass(frozen=True, eq=False)
 class _Source:
-    """One source as it was read."""
+    """Contents of one source."""
 
     file: DataFile
     chambers: tuple[str, ...] | None
@@ -105,26 +105,26 @@ class _Source:
     remarks: tuple[str, ...] = field(default=())
 
 
-def read_sources(paths: Sequence[Path], choices: Choices) -> Sources:
+def read_sources(paths: Sequence[Path], options: SourceOptions) -> Sources:
     """Read every source.
 
     Args:
         paths: Bags, logs, tables or data sheets; logs and bags may be mixed, and tables and sheets.
-        choices: What the person says of them.
+        options: Options on them.
 
     Raises:
-        ValueError: A source cannot be read, is none of these, or does not fit the others; one line that names it.
+        ValueError: A source cannot be read, is of no known kind, or does not fit the others; one line that names it.
     """
     if not paths:
-        raise ValueError('no source: name a bag, a log or a table')
+        raise ValueError('no source: give a bag, a log or a table')
     twice = sorted({str(path) for path in paths if list(paths).count(path) > 1})
     if twice:
         raise ValueError(f'{twice[0]} is named twice')
-    read = [_read(path, choices) for path in paths]
+    read = [_read(path, options) for path in paths]
     signals = [source.measurement for source in read if source.measurement is not None]
     if signals and len(signals) < len(read):
-        raise ValueError('noted readings and recorded signals cannot be fitted together: identify each for itself')
-    chambers, remark = _chambers(read, choices)
+        raise ValueError('noted readings and recorded signals cannot be fitted together: identify each separately')
+    chambers, remark = _chambers(read, options)
     documents = [source.seal_document for source in read if source.seal_document is not None]
     return Sources(
         tuple(source.file for source in read),
@@ -137,29 +137,29 @@ def read_sources(paths: Sequence[Path], choices: Choices) -> Sources:
     )
 
 
-def _chambers(read: Sequence[_Source], choices: Choices) -> tuple[tuple[str, ...], list[str]]:
-    """Chamber of each seal: as chosen, else as the sources say, else one seal for each chamber under pressure."""
-    if choices.chambers is not None:
-        return choices.chambers, []
-    said = {source.chambers for source in read if source.chambers is not None}
-    if len(said) > 1:
-        texts = ' and '.join(sorted(','.join(chambers) for chambers in said))
-        raise ValueError(f'the sources have seals on different chambers ({texts}): choose with --seal-chambers')
-    if said:
-        return said.pop(), []
+def _chambers(read: Sequence[_Source], options: SourceOptions) -> tuple[tuple[str, ...], list[str]]:
+    """Chamber of each seal: from the options, else from the sources, else one seal for each chamber under pressure."""
+    if options.chambers is not None:
+        return options.chambers, []
+    stated = {source.chambers for source in read if source.chambers is not None}
+    if len(stated) > 1:
+        texts = ' and '.join(sorted(','.join(chambers) for chambers in stated))
+        raise ValueError(f'the sources have seals on different chambers ({texts}): give them with --seal-chambers')
+    if stated:
+        return stated.pop(), []
     parts = [source.measurement.signals for source in read if source.measurement is not None]
     found = tuple(
         name
         for name, column in (('a', 'pressure_a'), ('b', 'pressure_b'))
         if any(np.nanmax(np.abs(getattr(signals, column)), initial=0.0) > 0.0 for signals in parts)
     ) or ('a',)
-    words = 'one seal is taken for each chamber under pressure' if parts else 'all friction is given to one seal'
-    return found, [f'{words}: {",".join(found)}; if there are others say so with --seal-chambers']
+    assumed = 'one seal for each chamber under pressure' if parts else 'one seal with all friction'
+    return found, [f'{assumed} is assumed: {",".join(found)}; give others with --seal-chambers']
 
 
-def _read(path: Path, choices: Choices) -> _Source:
+def _read(path: Path, options: SourceOptions) -> _Source:
     if path.is_dir() or path.suffix == '.mcap':
-        return _read_bag(path, choices)
+        return _read_bag(path, options)
     try:
         with path.open(encoding='utf-8-sig') as file:
             head = [line for line in (file.readline() for _ in range(50)) if line.strip()]
@@ -179,11 +179,11 @@ def _read(path: Path, choices: Choices) -> _Source:
     if _is_table(head):
         dynamic, static = read_table(path)
         return _Source(_data_file(path), None, dynamic=dynamic, static=static)
-    return _read_log(path, choices)
+    return _read_log(path, options)
 
 
 def _data_file(path: Path) -> DataFile:
-    """Name and hash of a file, or of the data files of a bag, one after the other in order of name."""
+    """Name and digest of a file, or of the data files of a bag in order of name."""
     digest = hashlib.sha256()
     parts = sorted(p for p in path.iterdir() if p.suffix in ('.mcap', '.db3')) if path.is_dir() else [path]
     for part in parts:
@@ -193,8 +193,8 @@ def _data_file(path: Path) -> DataFile:
     return DataFile(path.resolve().name, digest.hexdigest())
 
 
-def _sliding(base: Sliding, choices: Choices) -> Sliding:
-    chosen = {'slowest': choices.slowest, 'largest_acceleration': choices.largest_acceleration}
+def _sliding(base: Sliding, options: SourceOptions) -> Sliding:
+    chosen = {'slowest': options.slowest, 'largest_acceleration': options.largest_acceleration}
     values = {'slowest': base.slowest, 'largest_acceleration': base.largest_acceleration}
     values |= {name: value for name, value in chosen.items() if value is not None}
     return from_mapping(Sliding, values, 'sliding')
@@ -203,10 +203,10 @@ def _sliding(base: Sliding, choices: Choices) -> Sliding:
 # -- logs -------------------------------------------------------------------------------------------------------------
 
 
-def _read_log(path: Path, choices: Choices) -> _Source:
-    rig, remarks = _recognised(path) if choices.rig is None else (read_rig(config_path('rigs', choices.rig)), ())
+def _read_log(path: Path, options: SourceOptions) -> _Source:
+    rig, remarks = _recognised(path) if options.rig is None else (read_rig(config_path('rigs', options.rig)), ())
     log = read_samples(path, rig)
-    samples, sliding = log.samples, _sliding(rig.sliding, choices)
+    samples, sliding = log.samples, _sliding(rig.sliding, options)
     moving = np.abs(samples.velocity) > sliding.slowest
     for term, column in log.columns.items():
         if term is not rig.time:
@@ -217,12 +217,12 @@ def _read_log(path: Path, choices: Choices) -> _Source:
 
 
 def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
-    """The one rig of config/rigs that can read a log, and the remark that it was concluded.
+    """The one rig of config/rigs that can read a log, and a remark on that assumption.
 
-    A rig whose columns go by name and are all there is surer than one that goes by their number.
+    A rig whose columns are found by name is preferred to one whose columns are found by number.
 
     Raises:
-        ValueError: None can, or several can.
+        ValueError: No rig can read it, or several can.
     """
     folder = share_directory('seal_friction_ros', __file__) / 'config' / 'rigs'
     found, reasons = [], []
@@ -237,23 +237,25 @@ def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
     found = [(rig, name) for rig, name in found if rig.header != 'none'] or found
     if len(found) == 1:
         rig, name = found[0]
-        return rig, (f'{path.name} was read as a log of rig {name}; if it is another say so with --rig',)
+        return rig, (f'{path.name} was read as a log of rig {name}; if it is of another, name that with --rig',)
     if found:
-        raise ValueError(f'{path}: rigs {" and ".join(name for _, name in found)} can both read it: choose with --rig')
+        raise ValueError(
+            f'{path}: rigs {" and ".join(name for _, name in found)} can both read it: name one with --rig'
+        )
     raise ValueError(
         f'{path}: not a table with a pressure and a friction column, and no log of a known rig ({"; ".join(reasons)}): '
-        'write a rig file (docs/rig_files.md) and name it with --rig'
+        'write a rig file (docs/rig_files.md) and give it with --rig'
     )
 
 
 # -- bags -------------------------------------------------------------------------------------------------------------
 
 
-def _read_bag(path: Path, choices: Choices) -> _Source:
-    topics = find_topics(path, choices.namespace)
+def _read_bag(path: Path, options: SourceOptions) -> _Source:
+    topics = find_topics(path, options.namespace)
     missing = [name for name in ('pressure', 'force') if not getattr(topics, name)]
     if missing:
-        raise ValueError(f'{path}: no {" and no ".join(missing)} messages in it: friction cannot be told without')
+        raise ValueError(f'{path}: no {" and no ".join(missing)} messages in it: friction cannot be identified without')
     total = sum(info.message_count for info in bag_topics(path).values())
     reader = _BagReader(topics)
     with progress(f'read {path.name}', total) as advance:
@@ -262,12 +264,12 @@ def _read_bag(path: Path, choices: Choices) -> _Source:
             if count % 1000 == 0:
                 advance(1000)
     name = path.resolve().name
-    measurement = Measurement(name, reader.signals(), _sliding(Sliding(), choices))
+    measurement = Measurement(name, reader.signals(), _sliding(Sliding(), options))
     return _Source(_data_file(path), reader.chambers, measurement, seal_document=reader.seal_document)
 
 
 class _BagReader:
-    """Follows the messages of a bag: one row for each velocity, with the pressure and force that are held then."""
+    """Collects the messages of a bag: one row for each velocity, with the newest pressure and force before it."""
 
     def __init__(self, topics: Topics) -> None:
         self.chambers: tuple[str, ...] | None = None
@@ -278,7 +280,11 @@ class _BagReader:
         self._rows: list[tuple[int, float, float, float, float]] = []
 
     def take(self, path: Path, message: BagMessage) -> None:
-        """Take one message in; a damaged one is an error that names it."""
+        """Add one message.
+
+        Raises:
+            ValueError: It is damaged; names it.
+        """
         try:
             self._take(message)
         except ValueError as error:
@@ -300,12 +306,14 @@ class _BagReader:
             self.seal_document = configuration.seal_documents[0]
 
     def signals(self) -> Signals:
-        """The rows whose stamps increase."""
+        """Signals of the rows with increasing stamps."""
         stamps = np.array([row[0] for row in self._rows], dtype=np.int64)
         newest = np.maximum.accumulate(stamps)
         kept = np.concatenate(([True], stamps[1:] > newest[:-1])) if len(stamps) else np.array([], dtype=bool)
         columns = np.array([row[1:] for row in self._rows], dtype=np.float64).reshape(len(stamps), 4).T
-        columns = np.where(np.abs(columns) < 1e15, columns, np.nan)  # [SI] no measurement is as large; drops NaN too
+        columns = np.where(
+            np.abs(columns) < 1e15, columns, np.nan
+        )  # [SI] no measurement is as large; the comparison drops NaN too
         return Signals((stamps - stamps[:1].sum()) * 1e-9, *columns).taken(kept)
 
 
@@ -326,11 +334,11 @@ def read_table(path: Path) -> tuple[Noted, Noted]:
     """Running and breakout friction from a table of one reading per row.
 
     Columns, by the names in its first row: ``pressure_<unit>`` (psig, psi, bar, kPa, MPa, Pa) and ``friction_<unit>``
-    (lbf, N, kN), of all seals; and where they are there ``direction`` (extend or retract), ``kind`` (dynamic or
-    static), ``test`` and ``velocity_<unit>`` (m_per_s, mm_per_s, in_per_s).
+    (lbf, N, kN), of all seals; optional ``direction`` (extend or retract), ``kind`` (dynamic or static), ``test``
+    and ``velocity_<unit>`` (m_per_s, mm_per_s, in_per_s).
 
     Raises:
-        ValueError: The table cannot be read or makes no sense; one line that names file, row and column.
+        ValueError: The table cannot be read or a cell is invalid; one line that names file, row and column.
     """
     rows = table_rows(path)
     names = list(rows[0]) if rows else []
@@ -357,10 +365,10 @@ def read_table(path: Path) -> tuple[Noted, Noted]:
 
 
 def table_rows(path: Path) -> list[dict[str, str]]:
-    """Rows of a table of comma-separated values, by the names in its first row, in lower case.
+    """Rows of a table of comma-separated values as mappings from the names in its first row, in lower case.
 
     Raises:
-        ValueError: It cannot be read, or a row has not as many cells as the first one.
+        ValueError: It cannot be read, or a row and the first row differ in their number of cells.
     """
     try:
         with path.open(encoding='utf-8-sig', newline='') as file:
@@ -371,7 +379,7 @@ def table_rows(path: Path) -> list[dict[str, str]]:
     rows = []
     for number, row in enumerate(reader, start=2):
         if None in row or None in row.values():
-            raise ValueError(f'{path}: row {number}: not as many cells as the first row')
+            raise ValueError(f'{path}: row {number}: number of cells differs from the first row')
         rows.append({str(name).strip().lower(): str(cell).strip() for name, cell in row.items()})
     return rows
 
@@ -379,23 +387,23 @@ def table_rows(path: Path) -> list[dict[str, str]]:
 def column_in_si(
     path: Path, rows: Sequence[Mapping[str, str]], names: Iterable[str], quantity: str, units: Mapping[str, str]
 ) -> FloatArray:
-    """A column in SI, found by the beginning of its name; the rest of the name is the unit.
+    """A column in SI units; its name is that of the quantity, followed by the unit.
 
     Args:
         path: Of the table, for the error message.
         rows: Of the table.
         names: Of its columns.
-        quantity: What the name begins with.
-        units: Unit as the name has it -> unit as `UNITS` has it.
+        quantity: Beginning of the name.
+        units: Unit in the name -> unit in `UNITS`.
 
     Raises:
-        ValueError: There is no such column, or several, or a cell is no number.
+        ValueError: There is no such column, or several, or a cell is not a number.
     """
     found = [name for name in names if name.startswith(quantity)]
     unit = found[0].removeprefix(quantity).strip('_ ()[]') if found else ''
     if len(found) != 1 or unit not in units:
         raise ValueError(
-            f'{path}: {len(found)} columns called {quantity}_<unit> ({", ".join(found)}): name one '
+            f'{path}: {len(found)} columns called {quantity}_<unit> ({", ".join(found)}): call one '
             f'{" or ".join(f"{quantity}_{name}" for name in units)}'
         )
     size = UNITS[units[unit]]

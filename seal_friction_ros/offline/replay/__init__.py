@@ -1,1 +1,1 @@
-"""A bag through the estimator, and two bags compared."""
+"""Replay of bags through the estimator, and comparison of bags."""

@@ -1,8 +1,8 @@
-"""Two bags, one topic: the first difference, the largest, the root mean square."""
+"""Comparison of one topic of two bags: first, largest and root mean square difference."""
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -13,47 +13,62 @@ from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics,
 
 @dataclass(frozen=True)
 class FieldDifference:
-    """How one field differs over all messages, second bag minus first."""
+    """Difference of one field over all messages, second bag minus first."""
 
     largest: float
-    """largest magnitude, in the unit of the field; infinite if a number faces none"""
+    """largest magnitude, in the unit of the field; infinite if only one of the two is a number"""
     rms: float
     outside: int
-    """messages in which it is outside the tolerance"""
+    """number of messages with a difference outside the tolerance"""
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """What a comparison of two bags found."""
+class BagComparison:
+    """Result of the comparison of two bags."""
 
     topic: str
     messages_a: int
     messages_b: int
     identical_bytes: bool
     first_difference: str
-    """in words; empty if there is none outside the tolerance"""
+    """for a person; empty if no difference is outside the tolerance"""
     fields: dict[str, FieldDifference]
 
     @property
     def agree(self) -> bool:
-        """Whether both have the same number of messages, every field within tolerance."""
+        """Whether both bags have the same number of messages and every field is within tolerance."""
         return not self.first_difference
 
+    def numbers(self) -> dict[str, Any]:
+        """Numbers for JSON."""
+        return {**asdict(self), 'agree': self.agree}
 
-def compare(bag_a: Path, bag_b: Path, topic: str = '', atol: float = 0.0, rtol: float = 0.0) -> Comparison:
+    def summary(self) -> str:
+        """One line for the topic and one for each field that differs, for a person."""
+        result = 'agree' if self.agree else f'differ: {self.first_difference}'
+        differing = {name: field for name, field in self.fields.items() if field.largest > 0.0}
+        return '\n'.join(
+            [
+                f'{self.messages_a} and {self.messages_b} messages on {self.topic}: {result}',
+                *(f'{name}: largest {f.largest:.6g}, RMS {f.rms:.6g}' for name, f in differing.items()),
+            ]
+        )
+
+
+def compare(bag_a: Path, bag_b: Path, topic: str = '', atol: float = 0.0, rtol: float = 0.0) -> BagComparison:
     """Compare a topic of two bags, message by message in order.
 
-    Two numbers agree if ``|b - a| <= atol + rtol |a|`` or both are NaN; other values if they are equal.
+    Two numbers agree if ``|b - a| <= atol + rtol |a|`` or if both are NaN, other values if they are equal.
 
     Args:
         bag_a: First bag, the reference.
         bag_b: Second bag.
-        topic: Topic; by default the one of the friction estimates, whatever its name in each bag.
+        topic: Topic; by default that of the friction estimates, which may have another name in each bag.
         atol: Absolute tolerance, in the unit of each field.
         rtol: Relative tolerance [-].
 
     Raises:
-        BagError: A bag cannot be read or has no such topic, or its messages are not of this project.
+        BagError: A bag cannot be read or has no such topic, or a message on it is of an unknown type.
     """
     topic_a, topic_b = (topic or _estimate_topic(bag) for bag in (bag_a, bag_b))
     tally = _Tally(atol, rtol)
@@ -79,7 +94,7 @@ def _decoded(bag: Path, topic: str) -> Iterator[tuple[bytes, dict[str, Any]]]:
 
 def _fields(bag: Path, message: BagMessage) -> dict[str, Any]:
     if message.type_name not in DECODERS:
-        raise BagError(f'{bag}: {message.topic} is {message.type_name}, not a message of this project')
+        raise BagError(f'{bag}: {message.topic} is {message.type_name}, not a message type of this project')
     try:
         record = DECODERS[message.type_name](message.data)
     except ValueError as error:
@@ -100,7 +115,7 @@ class _Tally:
         self._outside: dict[str, int] = {}
 
     def add(self, a: tuple[bytes, dict[str, Any]] | None, b: tuple[bytes, dict[str, Any]] | None) -> None:
-        """Count one pair of messages; None where one bag has ended."""
+        """Add one pair of messages; None where one bag has ended."""
         self.messages_a += a is not None
         self.messages_b += b is not None
         if a is None or b is None:
@@ -119,18 +134,18 @@ class _Tally:
         if not within and not self._first:
             self._first = f'message {self.messages_a} at {stamp} ns: {name} {a!r} -> {b!r}'
 
-    def comparison(self, topic: str) -> Comparison:
-        """Sum it up."""
+    def comparison(self, topic: str) -> BagComparison:
+        """Result over all pairs."""
         pairs = max(min(self.messages_a, self.messages_b), 1)
         fields = {
             name: FieldDifference(self._largest[name], math.sqrt(self._squares[name] / pairs), self._outside[name])
             for name in self._largest
         }
-        return Comparison(topic, self.messages_a, self.messages_b, self._identical, self._first, fields)
+        return BagComparison(topic, self.messages_a, self.messages_b, self._identical, self._first, fields)
 
 
 def _difference(a: Any, b: Any, atol: float, rtol: float) -> tuple[float, bool]:
-    """Magnitude of b - a (1 for unequal things that are no numbers), and whether it is within tolerance."""
+    """Magnitude of b - a (1 for unequal values that are not numbers), and whether it is within tolerance."""
     if not isinstance(a, int | float) or not isinstance(b, int | float):
         return (0.0, True) if a == b else (1.0, False)
     if a == b or (math.isnan(a) and math.isnan(b)):
@@ -139,8 +154,3 @@ def _difference(a: Any, b: Any, atol: float, rtol: float) -> tuple[float, bool]:
     if not math.isfinite(difference):
         return math.inf, False
     return float(difference), difference <= atol + rtol * abs(a)
-
-
-def differing_fields(comparison: Comparison) -> Iterable[tuple[str, FieldDifference]]:
-    """Fields that differ at all, in the order of the message."""
-    return ((name, field) for name, field in comparison.fields.items() if field.largest > 0.0)

@@ -1,6 +1,6 @@
-"""A bag through the estimator block by block, compiled: the verdict of `replay`, a hundred times faster.
+"""Compiled replay of a bag, block by block: the result of `replay`, a hundred times faster.
 
-It takes seconds to compile, so it is for long bags. What is out of the ordinary it leaves to `replay`.
+Compiling takes seconds, so it pays for long bags. Unusual bags are left to `replay`.
 """
 
 from collections.abc import Callable, Iterator
@@ -36,24 +36,24 @@ from seal_friction_ros.offline.bags import block_reader
 from seal_friction_ros.offline.bags.block_reader import KindOf, read_in_bulk
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.bags.topics import Topics
-from seal_friction_ros.offline.replay.verdict import Stream, Verdict, verdict_of
+from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 
 _RECORDED = {ESTIMATE_TYPE: Kind.ESTIMATE, FEEDFORWARD_TYPE: Kind.FEEDFORWARD}
 
 
 def replay_in_bulk(
     bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]
-) -> Verdict | None:
-    """Replay a bag and compare with the answers it holds, as `replay` does.
+) -> ReplayResult | None:
+    """Replay a bag and compare with the recorded answers, as `replay` does.
 
     Args:
         bag: The bag.
         topics: The estimator's topics in it.
-        override: Configuration instead of what the bag says.
-        advance: Called with numbers of messages done.
+        override: Configuration instead of the recorded one.
+        advance: Called with the number of messages done since the last call.
 
     Returns:
-        The verdict; None if the bag is not for this way: malformed, unreadable, or out of the ordinary.
+        The result; None if the bag is malformed, unreadable or unusual, so that only `replay` can handle it.
     """
     done = 0
 
@@ -69,24 +69,24 @@ def replay_in_bulk(
         return None
 
 
-def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]) -> Verdict:
+def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]) -> ReplayResult:
     velocities, is_cut = 0, False
     compared = {ESTIMATE_TYPE: topics.estimate, FEEDFORWARD_TYPE: topics.feedforward}
-    streams = {type_name: _BulkStream(type_name) for type_name, topic in compared.items() if topic}
+    streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in compared.items() if topic}
     for messages, answers in _answered(read_in_bulk(bag, _kind_of(topics)), override):
         kinds = messages.kinds
         velocities += int(np.count_nonzero(kinds == Kind.VELOCITY))
         for type_name, stream in streams.items():
-            stream.take_all(messages, answers, _RECORDED[type_name])
+            stream.compare_block(messages, answers, _RECORDED[type_name])
         if len(kinds):
             answered = answers.estimate_sizes[-1] or answers.feedforward_sizes[-1]
             is_cut = bool(answered) or int(kinds[-1]) in (Kind.ESTIMATE, Kind.OTHER_ESTIMATE)
         advance(len(kinds))
-    return verdict_of(velocities, streams, is_cut=is_cut)
+    return replay_result(velocities, streams, is_cut=is_cut)
 
 
 def compile_now() -> None:
-    """Compile all that is compiled, for processes to come."""
+    """Compile in this process, so that worker processes inherit the compiled code."""
     parameters = default_configuration().parameters()
     none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((2, 0), np.int64))
     _, answers = receive_all(parameters, init(parameters), none)
@@ -95,10 +95,9 @@ def compile_now() -> None:
 
 
 def _kind_of(topics: Topics) -> KindOf:
-    """What a topic is to the estimator.
+    """Function that gives the kind of message on a topic.
 
-    Raises:
-        UnsuitedError: (when asked) the messages of a topic are not of its type.
+    It raises `UnsuitedError` for a topic with messages of two types.
     """
     known = {
         topics.pressure: (PRESSURE_TYPE, Kind.PRESSURE),
@@ -112,7 +111,7 @@ def _kind_of(topics: Topics) -> KindOf:
     known.pop('', None)
 
     def kind_of(topic: str, type_name: str) -> Kind:
-        """What the messages of a topic are to the estimator."""
+        """Kind of the messages on a topic."""
         other = Kind.OTHER_ESTIMATE if type_name == ESTIMATE_TYPE else Kind.OTHER
         wanted, kind = known.get(topic, (type_name, other))
         if type_name != wanted:
@@ -123,7 +122,7 @@ def _kind_of(topics: Topics) -> KindOf:
 
 
 def _answered(blocks: Iterator[Messages], override: Configuration | None) -> Iterator[tuple[Messages, Answers]]:
-    """Blocks of messages and the answers to them; a new block begins at each configuration."""
+    """Blocks of messages and the answers to them; a block ends before each configuration."""
     parameters = (override or default_configuration()).parameters()
     state = init(parameters)
     for block in blocks:
@@ -137,15 +136,15 @@ def _answered(blocks: Iterator[Messages], override: Configuration | None) -> Ite
             yield messages, answers
 
 
-class _BulkStream(Stream):
-    """A `Stream` that takes blocks: what is as expected is compared by compiled code, the rest one by one."""
+class _BulkAnswerStream(AnswerStream):
+    """An `AnswerStream` for blocks: compiled code compares the expected order, `AnswerStream` the rest one by one."""
 
-    def take_all(self, messages: Messages, answers: Answers, kind: Kind) -> None:
+    def compare_block(self, messages: Messages, answers: Answers, kind: Kind) -> None:
         """Compare the recorded messages of a block with the answers before them.
 
         Args:
             messages: The block.
-            answers: To each of its messages.
+            answers: Answers to its messages.
             kind: `Kind.ESTIMATE` or `Kind.FEEDFORWARD`.
         """
         places = answers[1:3] if kind == Kind.ESTIMATE else answers[3:5]
@@ -163,18 +162,18 @@ class _BulkStream(Stream):
                 self.recorded += taken - before
                 self.differing += differing
             if taken < len(recorded):
-                self._wait_all(answers.data, offsets[used : available[taken]], sizes[used:])
+                self._add_all(answers.data, offsets[used : available[taken]], sizes[used:])
                 used = int(available[taken])
-                self.take(messages.message(recorded[taken]))
+                self.compare_recorded(messages.message(recorded[taken]))
                 taken += 1
                 if len(self.pending) <= used:  # they are all of this block
                     used -= len(self.pending)
                     self.pending.clear()
-        self._wait_all(answers.data, offsets[used:], sizes[used:])
+        self._add_all(answers.data, offsets[used:], sizes[used:])
 
-    def _wait_all(self, data: Bytes, offsets: Integers, sizes: Integers) -> None:
+    def _add_all(self, data: Bytes, offsets: Integers, sizes: Integers) -> None:
         for offset, size in zip(offsets.tolist(), sizes.tolist(), strict=False):
-            self.wait(data[offset : offset + size].tobytes())
+            self.add_replayed(data[offset : offset + size].tobytes())
 
 
 @compiled
@@ -186,12 +185,14 @@ def _compare(
     theirs: tuple[Bytes, Integers, Integers],
     available: Integers,
 ) -> tuple[int, int, int]:
-    """Compare recorded messages, from number ``taken`` on, with answers from number ``used`` on, while it is simple.
+    """Compare recorded messages from number ``taken`` on with answers from number ``used`` on, in the simple case.
 
-    It is as long as they agree, and, once the first difference has a name, where only one answer waits.
+    The case is simple while they agree and, once the first difference has a text (``is_named``), while exactly one
+    answer waits.
 
     Returns:
-        The first recorded message that is not simple, the first answer that waits for it, and how many differed.
+        Number of the first recorded message that is not simple, of the first answer that waits for it, and the number
+        of differences.
     """
     data, offsets, sizes = ours
     recorded, recorded_offsets, recorded_sizes = theirs

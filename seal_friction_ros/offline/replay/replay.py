@@ -1,7 +1,6 @@
-"""A bag through the estimator, with no ROS graph and no clock: the same messages give the same bytes as live."""
+"""Replay of a bag through the estimator, without ROS graph or clock: byte for byte the answers of the live node."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,7 +34,7 @@ from seal_friction_ros.offline.bags.bag import (
     read_messages,
 )
 from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS, Topics, find_topics
-from seal_friction_ros.offline.replay.verdict import Stream, Verdict, verdict_of
+from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 from seal_friction_ros.offline.work.progress import progress
 
 
@@ -43,7 +42,7 @@ def chosen_configuration(params: Path | None, seal: Path | None) -> Configuratio
     """Configuration from a ROS parameter file and a seal file for all seals; None if neither is given.
 
     Raises:
-        ValueError: A file cannot be read or makes no sense.
+        ValueError: A file cannot be read, or a value is invalid.
     """
     if params is None and seal is None:
         return None
@@ -55,27 +54,23 @@ def chosen_configuration(params: Path | None, seal: Path | None) -> Configuratio
     return load_configuration(selection, settings, feedforward)
 
 
-Show = Callable[[str, int], AbstractContextManager[Callable[[float], None]]]
-"""Shows progress: from what is done and how many messages it has, a context in which to say how many more are done."""
-
-
 class Step(NamedTuple):
-    """One message and what the estimator answers."""
+    """One message, and the answers of the estimator to it."""
 
     message: BagMessage
     answers: tuple[tuple[str, bytes], ...]
-    """message type and bytes of each"""
+    """message type and bytes of each answer"""
 
 
 def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuration | None) -> Iterator[Step]:
-    """Each message in order, with the serialised answers to it.
+    """Each message in order, with the serialised answers of the estimator to it.
 
-    The configuration is the newest one in the bag, or ``override``, or the default where there is neither. What was
-    used comes out: configuration messages hold ``override`` where it is given, and there is one at the start if the
-    bag has none.
+    The estimator uses ``override``, or else the newest configuration in the bag, or else the default configuration. The
+    configuration messages that are returned hold the configuration used: ``override`` replaces recorded ones, and if
+    the bag has none, one is inserted at the start.
 
     Raises:
-        BagError: A message is not what its type says.
+        BagError: A message does not match its type.
     """
     configuration = override or default_configuration()
     parameters = configuration.parameters()
@@ -102,7 +97,7 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
 
 
 BULK_FROM = 500_000
-"""Messages from which on a bag is replayed compiled: to compile takes as long as this many messages one by one."""
+"""Bags of at least so many messages are replayed compiled: compiling takes as long as replaying them one by one."""
 
 
 def replay(
@@ -112,38 +107,36 @@ def replay(
     namespace: str = '',
     *,
     bulk_from: int = BULK_FROM,
-    show: Show = progress,
-) -> Verdict:
-    """Replay a bag; compare with the estimates it holds; with ``out``, write inputs and new estimates as a new bag.
+) -> ReplayResult:
+    """Replay a bag and compare the answers with the recorded ones; with ``out``, write inputs and answers as a new bag.
 
     Args:
         bag: The bag.
-        override: Configuration instead of what the bag says.
+        override: Configuration instead of the recorded one.
         out: Bag to write.
-        namespace: Only topics below it are looked at.
-        bulk_from: Without ``out``, a bag of so many messages is replayed compiled, to the same verdict.
-        show: What shows the progress: as `progress`.
+        namespace: Use only topics below it.
+        bulk_from: Without ``out``, a bag of at least so many messages is replayed compiled; the result is the same.
 
     Raises:
-        BagError: The bag cannot be read, or ``out`` exists already. Nothing is left at ``out`` then.
+        BagError: The bag cannot be read, or ``out`` exists already; then nothing is left at ``out``.
     """
     known = bag_topics(bag)
     topics = find_topics(bag, namespace, known)
     total = count_messages(known)
-    with show(f'replay {bag.name}', total) as advance:
-        verdict = None
+    with progress(f'replay {bag.name}', total) as advance:
+        result = None
         if out is None and total >= bulk_from:
             from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
 
-            verdict = replay_in_bulk(bag, topics, override, advance)
-        if verdict is None:
-            verdict = _replay_one_by_one(bag, topics, override, out, advance)
-    return verdict
+            result = replay_in_bulk(bag, topics, override, advance)
+        if result is None:
+            result = _replay_one_by_one(bag, topics, override, out, advance)
+    return result
 
 
 def _replay_one_by_one(
     bag: Path, topics: Topics, override: Configuration | None, out: Path | None, advance: Callable[[int], None]
-) -> Verdict:
+) -> ReplayResult:
     replayed = _counted(steps(read_messages(bag), topics, override), advance)
     if out is None:
         return _compare(replayed, topics)
@@ -168,30 +161,30 @@ def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter) -> Ite
     answered = {ESTIMATE_TYPE: names['estimate'], FEEDFORWARD_TYPE: names['feedforward']}
     for step in replayed:
         message = step.message
-        used = message.topic in topics or message.type_name == CONFIGURATION_TYPE
-        if used and message.type_name not in answered:
+        is_used = message.topic in topics or message.type_name == CONFIGURATION_TYPE
+        if is_used and message.type_name not in answered:
             log_time = writer.write(*message)
             for type_name, data in step.answers:
                 writer.write(answered[type_name] or ANSWER_TOPICS[type_name], type_name, log_time, data)
         yield step
 
 
-def _compare(replayed: Iterable[Step], topics: Topics) -> Verdict:
-    """Recorded answers against new ones, in order.
+def _compare(replayed: Iterable[Step], topics: Topics) -> ReplayResult:
+    """Compare recorded and replayed answers in order.
 
-    A recorded estimate answers the velocity sample before it, and an estimate without one differs. A recording may stop
-    between a message and its answer, as one that was cut off does, so an answer to its last message may be missing.
+    A recorded estimate answers the velocity sample before it; an estimate without one is a difference. A recording may
+    stop between a message and its answer, so the answer to its last message may be missing.
     """
     velocities = 0
-    cut = False
+    is_cut = False
     compared = {ESTIMATE_TYPE: topics.estimate, FEEDFORWARD_TYPE: topics.feedforward}
-    streams = {type_name: Stream(type_name) for type_name, topic in compared.items() if topic}
+    streams = {type_name: AnswerStream(type_name) for type_name, topic in compared.items() if topic}
     for message, answers in replayed:
         velocities += message.topic == topics.velocity
         for type_name, data in answers:
             if type_name in streams:
-                streams[type_name].wait(data)
+                streams[type_name].add_replayed(data)
         if message.topic and message.topic == compared.get(message.type_name):
-            streams[message.type_name].take(message.data)
-        cut = bool(answers) or message.type_name == ESTIMATE_TYPE
-    return verdict_of(velocities, streams, is_cut=cut)
+            streams[message.type_name].compare_recorded(message.data)
+        is_cut = bool(answers) or message.type_name == ESTIMATE_TYPE
+    return replay_result(velocities, streams, is_cut=is_cut)

@@ -1,45 +1,31 @@
-"""A simulated position servo with and without seal friction as one page: the flat peaks of the thesis's Figure 25."""
+"""Charts of a simulated position servo with and without seal friction: the flat peaks of Figure 25 of the thesis."""
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from html import escape
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import meanings
-from seal_friction_ros.core.foundation.units import BAR, MM
+from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.position_servo import ServoParameters, Trajectory, init, simulate
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, tracking_peak, tracking_rms
 from seal_friction_ros.files import load_seals
-from seal_friction_ros.offline.reports.bag_report import number, table, tiles, write_page
-from seal_friction_ros.offline.reports.figures import (
-    BLACK,
-    BLUE,
-    GREY,
-    ORANGE,
-    VERMILLION,
-    Plot,
-    force_unit,
-    house_style,
-    legend_above,
-    line,
-    new_figure,
-)
-from seal_friction_ros.offline.reports.tracking_figures import length, shade
+from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit, number
+from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, parameter_rows, write_page
 
-SETTLING_PERIODS = 2  # of the reference, until the start is forgotten; 0.4 s at 5 Hz
-PERIODS = 6  # of the reference that count
-SHOWN_PERIODS = 2  # of them in the figures
+SETTLING_PERIODS = 2  # of the reference, left out; 0.4 s at 5 Hz
+EVALUATED_PERIODS = 6  # of the reference, after those
+SHOWN_PERIODS = 2  # of the evaluated ones, in the figures
 
 
 @dataclass(frozen=True, kw_only=True)
 class ServoTracking:
-    """How one servo follows the wave."""
+    """Tracking of one servo."""
 
     rms: float
     """[m] root mean square of the tracking error"""
@@ -48,14 +34,14 @@ class ServoTracking:
     reached: float
     """[m] amplitude of the rod"""
     dwell: float
-    """[s] mean rest per reversal; the simulated rod rests exactly, so any speed but 0 m/s is motion"""
+    """[s] mean rest per reversal; the simulated rod rests at exactly 0 m/s"""
     dwell_share: float
     """[-] of a period"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ServoChartsSummary:
-    """What was written, and the numbers in it."""
+    """Files of the charts, and their numbers."""
 
     page: Path
     figures: tuple[Path, ...]
@@ -68,11 +54,11 @@ class ServoChartsSummary:
     without_friction: ServoTracking
 
 
-class Simulated(NamedTuple):
-    """A servo that follows a wave, once settled; all arrays of shape (n,)."""
+class FollowedWave(NamedTuple):
+    """A settled servo that follows a wave; all arrays of shape (n,)."""
 
     time: FloatArray
-    """[s] since the first sample shown"""
+    """[s] since the first sample"""
     reference: FloatArray
     """[m]"""
     trajectory: Trajectory
@@ -80,7 +66,7 @@ class Simulated(NamedTuple):
 
 
 def default_servo() -> ServoParameters:
-    """The servo of the simulator with the seals that it has by default."""
+    """The servo of the simulator with its default seals."""
     return ServoParameters(seals=load_seals(SealSelection()))
 
 
@@ -89,14 +75,14 @@ def without_seals(parameters: ServoParameters) -> ServoParameters:
     return replace(parameters, seals=())
 
 
-def follow(parameters: ServoParameters, wave: Sine) -> Simulated:
-    """Let a servo follow a wave from rest, and evaluate it once it has settled."""
+def follow_wave(parameters: ServoParameters, wave: Sine) -> FollowedWave:
+    """Simulate a servo that follows a wave from rest, and evaluate it after `SETTLING_PERIODS`."""
     period = 1.0 / wave.frequency
     step = parameters.control_period
-    settling, count = round(SETTLING_PERIODS * period / step), round(PERIODS * period / step)
+    settling, count = round(SETTLING_PERIODS * period / step), round(EVALUATED_PERIODS * period / step)
     wanted = [wave.at(i * step) for i in range(settling + count)]
     _, everything = simulate(parameters, init(parameters, wave.offset), wanted)
-    # A row of the trajectory is the end of its step, so it belongs to the reference of the next.
+    # A row of the trajectory holds the end of its step, so it belongs to the next reference.
     trajectory = Trajectory(*(column[settling - 1 : -1] for column in everything))
     reference = np.array([r.position for r in wanted[settling:]])
     position = trajectory.position
@@ -108,11 +94,11 @@ def follow(parameters: ServoParameters, wave: Sine) -> Simulated:
         dwell=dwell,
         dwell_share=dwell / period,
     )
-    return Simulated(np.linspace(0.0, (count - 1) * step, count), reference, trajectory, tracking)
+    return FollowedWave(np.linspace(0.0, (count - 1) * step, count), reference, trajectory, tracking)
 
 
 def friction_force(trajectory: Trajectory) -> FloatArray:
-    """Friction force of the seals [N]: Coulomb friction in motion, at rest what holds the rod.
+    """Friction force of the seals [N]: Coulomb friction in motion, the force sum up to the breakaway force at rest.
 
     Source: `seal_friction_ros.core.friction.states.state_friction`, for arrays.
     """
@@ -122,15 +108,16 @@ def friction_force(trajectory: Trajectory) -> FloatArray:
     return np.where(trajectory.velocity == 0.0, held, sliding)
 
 
+@house_style()
 def write_servo_charts(
     out: Path, parameters: ServoParameters | None = None, wave: Sine | None = None
 ) -> ServoChartsSummary:
-    """Write the charts of a servo: a page, and each figure as PNG and SVG in ``<stem>_figures`` beside it.
+    """Write the charts of a servo; see `write_page`.
 
     Args:
-        out: HTML file; replaced if it is there.
+        out: HTML file.
         parameters: The servo with its seals; default: that of the simulator.
-        wave: What it shall follow; default: that of the simulator.
+        wave: The reference; default: that of the simulator.
 
     Raises:
         ValueError: The servo has no seals, or the page cannot be written.
@@ -138,18 +125,23 @@ def write_servo_charts(
     servo, wave = parameters or default_servo(), wave or Sine()
     if not servo.seals:
         raise ValueError('the servo has no seals: there is no friction to compare with none')
-    rubbing, free = follow(servo, wave), follow(without_seals(servo), wave)
-    with house_style():
-        plots = [figure_25(wave, rubbing, free), forces_figure(wave, rubbing)]
-        written = write_page(
-            out,
-            'Position servo with and without seal friction',
-            lambda figure: _sections(servo, wave, rubbing, free, figure),
-            plots,
-        )
+    rubbing, free = follow_wave(servo, wave), follow_wave(without_seals(servo), wave)
+    figures = write_page(
+        out,
+        'servo',
+        [figure_25(rubbing, free, wave), forces_figure(rubbing, wave)],
+        wave=wave,
+        seals=len(servo.seals),
+        rubbing=rubbing.tracking,
+        free=free.tracking,
+        tracking_table=_tracking_table(rubbing.tracking, free.tracking),
+        parameter_table=_parameter_table(servo, wave),
+        SETTLING_PERIODS=SETTLING_PERIODS,
+        EVALUATED_PERIODS=EVALUATED_PERIODS,
+    )
     return ServoChartsSummary(
         page=out,
-        figures=written,
+        figures=figures,
         amplitude=wave.amplitude,
         frequency=wave.frequency,
         seals=len(servo.seals),
@@ -158,148 +150,83 @@ def write_servo_charts(
     )
 
 
+def _tracking_table(rubbing: ServoTracking, free: ServoTracking) -> Table:
+    heads = (
+        '', 'RMS error [µm]', 'peak error [µm]', 'amplitude reached [µm]', 'rest per reversal [ms]', '[% of a period]',
+    )  # fmt: skip
+    rows = []
+    for name, t in (('with friction', rubbing), ('without friction', free)):
+        values = (t.rms / UM, t.peak / UM, t.reached / UM, t.dwell / MS, 100.0 * t.dwell_share)
+        rows.append((name, *(number(value, 1) for value in values)))
+    return Table(heads, rows, (0,))
+
+
+def _parameter_table(parameters: ServoParameters, wave: Sine) -> Table:
+    rows = parameter_rows(wave, 'reference.')
+    for name in ('valve', 'cylinder', 'load', 'controller'):
+        rows += parameter_rows(getattr(parameters, name), f'{name}.')
+    return Table(PARAMETER_HEADS, rows + parameter_rows(parameters), (0, 2, 3))
+
+
 # -- figures ----------------------------------------------------------------------------------------------------------
 
 
-def _shown(run: Simulated, wave: Sine) -> slice:
+def _shown_periods(run: FollowedWave, wave: Sine) -> slice:
     step = run.time[1] - run.time[0]
     return slice(0, round(SHOWN_PERIODS / (wave.frequency * step)) + 1)
 
 
-def _figure_25_title(tracking: ServoTracking) -> str:
-    if tracking.dwell == 0.0:
-        return 'The rod turns round without a rest'
-    share = f'{100.0 * tracking.dwell_share:.0f} % of a period'
-    return f'Friction flattens the peaks: a rest of {1e3 * tracking.dwell:.1f} ms at each reversal, {share}'
-
-
-def figure_25(wave: Sine, rubbing: Simulated, free: Simulated) -> Plot:
+def figure_25(rubbing: FollowedWave, free: FollowedWave, wave: Sine) -> Plot:
     """Position with and without friction against the reference (Figure 25), and the tracking errors."""
-    part = _shown(rubbing, wave)
-    time = rubbing.time[part]
-    title = _figure_25_title(rubbing.tracking)
-    figure, axes = new_figure(title, 5.6, nrows=2, sharex=True, gridspec_kw={'height_ratios': [3.0, 1.6]})
-    for ax in axes:
-        shade(ax, time, rubbing.trajectory.velocity[part] == 0.0, 'at rest, with friction')
-    unit, size = ('mm', MM) if max(rubbing.tracking.peak, free.tracking.peak) >= MM else ('µm', 1e-6)
-    runs = ((free, ORANGE, 'without friction'), (rubbing, BLUE, 'with friction'))
-    for run, colour, name in runs:
-        position = run.trajectory.position[part]
-        line(axes[0], time, position / MM, color=colour, lw=1.7, label=name)
-        label = f'{name}: {length(run.tracking.rms)} RMS'
-        line(axes[1], time, (run.reference[part] - position) / size, color=colour, label=label)
-    line(axes[0], time, rubbing.reference[part] / MM, color=BLACK, lw=1.1, ls=':', label='reference')
+    part = _shown_periods(rubbing, wave)
+    time, dwell = rubbing.time[part], rubbing.tracking.dwell
+    title = 'The rod reverses without a rest'
+    if dwell:
+        share = 100.0 * rubbing.tracking.dwell_share
+        title = (
+            f'Friction flattens the peaks: a rest of {dwell / MS:.1f} ms at each reversal, {share:.0f} % of a period'
+        )
+    figure, axes = style.new_figure(title, 5.6, nrows=2, sharex=True, gridspec_kw={'height_ratios': [3.0, 1.6]})
+    at_rest = rubbing.trajectory.velocity[part] == 0.0
+    for ax, label in zip(axes, ('at rest, with friction', None), strict=True):
+        style.shade(ax, time, at_rest, label)
+    unit, size = length_unit(max(rubbing.tracking.peak, free.tracking.peak))
+    for run, colour, name in ((free, style.ORANGE, 'without friction'), (rubbing, style.BLUE, 'with friction')):
+        position, reference = run.trajectory.position[part], run.reference[part]
+        style.thin_line(axes[0], time, position / MM, color=colour, lw=1.7, label=name)
+        label = f'{name}: {length_text(run.tracking.rms)} RMS'
+        style.thin_line(axes[1], time, (reference - position) / size, color=colour, label=label)
+    look = {'color': style.BLACK, 'lw': 1.1, 'ls': ':', 'label': 'reference'}
+    style.thin_line(axes[0], time, rubbing.reference[part] / MM, **look)
     axes[0].set_ylabel('position [mm]')
-    axes[1].set_ylabel(f'reference less\nposition [{unit}]')
-    axes[1].set_xlabel('time [s]')
-    axes[1].set_xlim(time[0], time[-1])
-    legend_above(axes[0])
-    handles, labels = axes[1].get_legend_handles_labels()
-    legend_above(axes[1], handles=handles[-2:], labels=labels[-2:])
-    return Plot(
-        'fig25_servo_with_and_without_friction',
-        figure,
-        f'Position servo on a sine of ± {length(wave.amplitude)} and {wave.frequency:.3g} Hz with and without the '
-        'friction of the seals (thesis, Figure 25). Near the reversal of the direction the seals hold more than the '
-        'forces on the rod: it stands still until they have grown to the breakaway force.',
-    )
+    axes[1].set(ylabel=f'reference less\nposition [{unit}]', xlabel='time [s]', xlim=(time[0], time[-1]))
+    for ax in axes:
+        style.legend_above(ax)
+    return Plot('fig25_servo_with_and_without_friction', figure)
 
 
-def forces_figure(wave: Sine, rubbing: Simulated) -> Plot:
-    """Why it rests: force sum and friction force against what the seals hold, and the chamber pressures."""
-    part = _shown(rubbing, wave)
+def forces_figure(rubbing: FollowedWave, wave: Sine) -> Plot:
+    """Force sum and friction force against the breakaway force, and the chamber pressures."""
+    part = _shown_periods(rubbing, wave)
     time, trajectory = rubbing.time[part], Trajectory(*(column[part] for column in rubbing.trajectory))
-    friction = friction_force(trajectory)
     breakaway = trajectory.breakaway_force
     unit, size = force_unit(float(np.abs(trajectory.force_sum).max()))
-    figure, axes = new_figure(
-        f'The seals hold the rod until {breakaway.max() / size:.3g} {unit} act on it', 5.2, nrows=2, sharex=True
-    )
-    for ax in axes:
-        shade(ax, time, trajectory.velocity == 0.0, 'at rest')
-    for side, label in ((1.0, 'breakaway force'), (-1.0, None)):
-        line(axes[0], time, side * breakaway / size, color=VERMILLION, lw=1.1, ls=':', label=label)
-    line(axes[0], time, trajectory.force_sum / size, color=BLACK, lw=1.2, label='force sum')
-    line(axes[0], time, friction / size, color=BLUE, lw=1.6, label='friction force')
-    axes[0].axhline(0.0, color=GREY, lw=0.6, zorder=1.0)
+    title = f'The seals hold the rod up to a force sum of {breakaway.max() / size:.3g} {unit}'
+    figure, axes = style.new_figure(title, 5.2, nrows=2, sharex=True)
+    for ax, label in zip(axes, ('at rest', None), strict=True):
+        style.shade(ax, time, trajectory.velocity == 0.0, label)
+    for values, look in (
+        (breakaway, {'color': style.VERMILLION, 'lw': 1.1, 'ls': ':', 'label': 'breakaway force'}),
+        (-breakaway, {'color': style.VERMILLION, 'lw': 1.1, 'ls': ':'}),
+        (trajectory.force_sum, {'color': style.BLACK, 'lw': 1.2, 'label': 'force sum'}),
+        (friction_force(trajectory), {'color': style.BLUE, 'lw': 1.6, 'label': 'friction force'}),
+    ):
+        style.thin_line(axes[0], time, values / size, **look)
+    style.zero_lines(axes[0])
     axes[0].set_ylabel(f'force [{unit}]')
-    legend_above(axes[0])
-    line(axes[1], time, trajectory.pressure_a / BAR, color=BLUE, label='chamber a')
-    line(axes[1], time, trajectory.pressure_b / BAR, color=ORANGE, label='chamber b')
-    axes[1].set_ylabel('pressure [bar, gauge]')
-    axes[1].set_xlabel('time [s]')
-    axes[1].set_xlim(time[0], time[-1])
-    handles, labels = axes[1].get_legend_handles_labels()
-    legend_above(axes[1], handles=handles[-2:], labels=labels[-2:])
-    return Plot(
-        'forces_and_pressures',
-        figure,
-        'The servo with friction over the same periods. In motion the friction force is the Coulomb friction; at rest '
-        'it is the force sum, up to the breakaway force.',
-    )
-
-
-# -- the page ---------------------------------------------------------------------------------------------------------
-
-
-def _sections(
-    parameters: ServoParameters, wave: Sine, rubbing: Simulated, free: Simulated, figure: Callable[[str], str]
-) -> Iterable[str]:
-    yield '<h1>Position servo with and without seal friction</h1>'
-    seals = len(parameters.seals)
-    lead = (
-        f'A simulated servo follows a sine of ± {length(wave.amplitude)} and {wave.frequency:.3g} Hz: with '
-        f'{seals} seal{"s" if seals != 1 else ""} on its rod, and with none'
-    )
-    yield f'<p class="lead">{escape(lead)}.</p>'
-    yield tiles(
-        [
-            ('rest per reversal with friction', f'{1e3 * rubbing.tracking.dwell:.1f} ms'),
-            ('of a period', f'{100.0 * rubbing.tracking.dwell_share:.0f} %'),
-            ('rest per reversal without friction', f'{1e3 * free.tracking.dwell:.1f} ms'),
-            ('tracking error with friction, RMS', length(rubbing.tracking.rms)),
-            ('without friction', length(free.tracking.rms)),
-        ]
-    )
-    yield figure('fig25_servo_with_and_without_friction')
-    yield figure('forces_and_pressures')
-    yield '<h2>Numbers</h2>'
-    heads = (
-        '',
-        'RMS error [µm]',
-        'peak error [µm]',
-        'amplitude reached [µm]',
-        'rest per reversal [ms]',
-        '[% of a period]',
-    )
-    named = (('with friction', rubbing.tracking), ('without friction', free.tracking))
-    yield table(heads, [_row(name, tracking) for name, tracking in named])
-    yield (
-        f'<p>The first {SETTLING_PERIODS} periods, in which the start is forgotten, are left out; the next {PERIODS} '
-        'count. No noise, no delay; no friction but that of the seals.</p>'
-    )
-    yield '<h2>Parameters</h2>'
-    for name, record in _records(parameters, wave):
-        yield f'<h3>{escape(name)}</h3>'
-        yield _parameter_table(record)
-
-
-def _row(name: str, tracking: ServoTracking) -> tuple[str, ...]:
-    lengths = (tracking.rms, tracking.peak, tracking.reached)
-    shares = (1e3 * tracking.dwell, 100.0 * tracking.dwell_share)
-    return (name, *(number(value * 1e6, 1) for value in lengths), *(number(value, 1) for value in shares))
-
-
-def _records(parameters: ServoParameters, wave: Sine) -> Iterable[tuple[str, Any]]:
-    yield 'Reference', wave
-    for name in ('valve', 'cylinder', 'load', 'controller'):
-        yield name.capitalize(), getattr(parameters, name)
-    yield 'Time', parameters
-
-
-def _parameter_table(record: Any) -> str:
-    rows = [
-        (name, f'{getattr(record, name):.6g}', meaning.unit, meaning.description)
-        for name, meaning in meanings(record).items()
-    ]
-    return table(('parameter', 'value', 'unit', 'meaning'), rows, (0, 2, 3))
+    style.thin_line(axes[1], time, trajectory.pressure_a / BAR, color=style.BLUE, label='chamber a')
+    style.thin_line(axes[1], time, trajectory.pressure_b / BAR, color=style.ORANGE, label='chamber b')
+    axes[1].set(ylabel='pressure [bar, gauge]', xlabel='time [s]', xlim=(time[0], time[-1]))
+    for ax in axes:
+        style.legend_above(ax)
+    return Plot('forces_and_pressures', figure)

@@ -1,8 +1,8 @@
-"""How well a servo tracked: numbers from a bag that holds the reference and the position of the rod.
+"""Tracking of a servo, from a bag with reference and position of the rod.
 
-The bag is cut where the configuration changed, so that a feed-forward that was switched on live can be compared with
-the same servo without it. What counts as settled, as periodic and as the same reference is our choice and stands with
-the constants below.
+The bag is cut where the configuration changed, so that a feed-forward switched on live can be compared with the same
+servo without it. The definitions of settled, of periodic and of the same reference are our choice; see the constants
+below.
 """
 
 import math
@@ -19,71 +19,70 @@ from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, reversals, tracking_peak, tracking_rms
-from seal_friction_ros.offline.reports.bag_evaluation import MAX_GAP, RecordedRun
+from seal_friction_ros.offline.bags.recorded_run import MAX_GAP, RecordedRun
 
-SETTLING_TIME = 0.5  # [s] left out after a change, on top of fade_time: the feed-forward fades in, then the servo
-#                      forgets; the simulated one takes 0.1 s
-MIN_SAMPLES = 50  # a shorter stretch tells nothing
-MIN_PERIODS = 2  # of a reference that is called periodic
-HYSTERESIS = 0.1  # of the amplitude: a reference must pass the middle by as much to have crossed it
-SAME = 0.05  # periods, amplitudes and shapes that differ by less are the same
+SETTLING_TIME = 0.5  # [s] left out after a change, in addition to fade_time: the simulated servo settles in 0.1 s
+MIN_SAMPLES = 50  # a shorter stretch is not evaluated
+MIN_PERIODS = 2  # of a periodic reference
+HYSTERESIS = 0.1  # of the amplitude: a reference must pass the middle by this much to cross it
+SAME = 0.05  # periods, amplitudes and shapes that differ by a smaller share are the same
 
 
 class Periodicity(NamedTuple):
-    """A reference that repeats itself."""
+    """Period of a periodic reference."""
 
     period: float
     """[s]"""
     crossings: FloatArray
-    """[s] when it goes up through a little above its middle; since the first sample"""
+    """[s] since the first sample: upward crossings of a level slightly above the middle"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingStretch:
-    """Tracking while the configuration stayed the same, without the time it took to settle."""
+    """Tracking while the configuration stayed the same, without the time of settling."""
 
     first: int
-    """index of the first estimate that counts"""
+    """index of the first evaluated estimate"""
     last: int
-    """index of the last one"""
+    """index of the last evaluated estimate"""
     start: float
-    """[s] of the first, since the first estimate of the bag"""
+    """[s] time of the first, since the first estimate of the bag"""
     end: float
-    """[s] of the last"""
+    """[s] time of the last"""
     settling: float
     """[s] left out before"""
     settings: FeedForwardSettings | None
-    """None if the bag does not say"""
+    """None if they are not in the bag"""
     standstill: float
-    """[m/s] speed at and below which the rod counts as resting: the estimator's ``stick_velocity``"""
+    """[m/s] speed at and below which the rod rests: ``stick_velocity`` of the estimator"""
     samples: int
-    """estimates that count: those with reference and position"""
+    """evaluated estimates: those with reference and position"""
     amplitude: float
-    """[m] of the reference, half the way from its lowest to its highest"""
+    """[m] of the reference, half peak to peak"""
     period: float | None
-    """[s] of the reference; None if it does not repeat itself"""
+    """[s] of the reference; None if it is not periodic"""
     rms: float
     """[m] root mean square of the tracking error"""
     peak: float
     """[m] largest tracking error"""
     reversals: int
-    """how often the rod changed its direction"""
+    """changes of direction of the rod"""
     dwell: float | None
     """[s] mean rest per reversal of the rod; None if it does not reverse"""
     reference_dwell: float | None
-    """[s] likewise of the reference, which passes through standstill as well"""
+    """[s] the same of the reference, which also passes through standstill"""
     not_sliding: float | None
-    """[-] share of the estimates of a known state that do not slide"""
+    """[-] share of the estimates of known state that do not slide"""
     feedforward_peak: float
     """[N] largest feed-forward; 0.0 without"""
     rms_change: float | None = None
-    """[%] of the RMS against the first stretch without feed-forward, if that had the same reference"""
+    """[%] against the first stretch without feed-forward; None if the reference differs"""
     dwell_change: float | None = None
-    """[%] likewise of the dwell"""
+    """[%] the same of the dwell"""
 
     @property
     def has_feedforward(self) -> bool:
-        """Whether there was any force of the feed-forward."""
+        """Whether the feed-forward was ever above 0 N."""
         return self.feedforward_peak > 0.0
 
 
@@ -93,16 +92,16 @@ class TrackingEvaluation:
 
     stretches: tuple[TrackingStretch, ...]
     notes: tuple[str, ...]
-    """what has to be said about it"""
+    """notes for the reader"""
 
     @property
     def without(self) -> TrackingStretch | None:
-        """First stretch without feed-forward, with which the others are compared."""
+        """First stretch without feed-forward: the base of the comparison."""
         return next((stretch for stretch in self.stretches if not stretch.has_feedforward), None)
 
     @property
     def compensated(self) -> TrackingStretch | None:
-        """Last stretch with feed-forward; with the reference of the one without, if there is one like that."""
+        """Last stretch with feed-forward, preferably with the reference of the one without."""
         active = [stretch for stretch in self.stretches if stretch.has_feedforward]
         comparable = [stretch for stretch in active if stretch.rms_change is not None]
         return next(reversed(comparable or active), None)
@@ -111,8 +110,8 @@ class TrackingEvaluation:
 def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
     """Tracking in each stretch between two changes of configuration; None without reference or position.
 
-    Of a stretch in which either is missing for more than `MAX_GAP`, the longest part without such a gap counts. The
-    first ``fade_time`` + `SETTLING_TIME` of it are left out, and of a periodic reference whole periods count.
+    The longest part of a stretch without a gap in either above `MAX_GAP` is evaluated. Its first ``fade_time`` +
+    `SETTLING_TIME` are left out; of a periodic reference, whole periods are evaluated.
     """
     if not np.isfinite(run.reference - run.position).any():
         return None
@@ -129,9 +128,9 @@ def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
 
 
 def configuration_stretches(run: RecordedRun) -> Iterator[tuple[int, int, Configuration | None]]:
-    """First index, index behind the last, and configuration of each stretch in which that did not change.
+    """First index, index behind the last, and configuration of each stretch of unchanged configuration.
 
-    The configuration is None before the first one in the bag, and where it is not understood.
+    The configuration is None before the first one in the bag, and where it cannot be parsed.
     """
     known = [(0, None), *zip(run.configuration_rows, map(_parsed, run.configurations), strict=True)]
     changes = [known[0]]
@@ -147,7 +146,7 @@ def _parsed(change: tuple[float, str]) -> Configuration | None:
     try:
         return parse_snapshot(change[1]).configuration
     except (ValueError, LookupError, TypeError):
-        return None  # the report shows it as it is
+        return None  # the report shows the text
 
 
 def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configuration | None) -> TrackingStretch | None:
@@ -191,7 +190,7 @@ def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configurati
 
 
 def _longest_part(run: RecordedRun, first: int, end: int) -> IntArray:
-    """Indices of the longest part, in time, in which reference and position are never missing for long."""
+    """Indices of the longest part, in time, without a gap in reference and position above `MAX_GAP`."""
     known = first + np.flatnonzero(np.isfinite(run.reference[first:end] - run.position[first:end]))
     if not len(known):
         return known
@@ -201,13 +200,13 @@ def _longest_part(run: RecordedRun, first: int, end: int) -> IntArray:
 
 
 def _whole_periods(time: FloatArray, period: float) -> float:
-    """Time of the whole periods in some times [s], one sample more or less."""
+    """Duration of the whole periods within ``time`` [s], to half a sample."""
     step = float(np.median(np.diff(time)))
     return math.floor(float(time[-1] - time[0] + step) / period + 1e-6) * period - step / 2.0
 
 
 def _even(time: FloatArray, values: FloatArray) -> tuple[float, FloatArray]:
-    """Time between samples [s], and the values at evenly spaced times: what is missing in between is interpolated."""
+    """Sample time [s], and the values at evenly spaced times; missing values are interpolated."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
     if len(time) < 2:
@@ -218,17 +217,17 @@ def _even(time: FloatArray, values: FloatArray) -> tuple[float, FloatArray]:
 
 
 def _dwell(time: FloatArray, velocity: FloatArray, standstill: float) -> tuple[int, float | None]:
-    """How often the direction changes, and the mean rest [s] at each; None if it never does."""
+    """Number of changes of direction, and the mean rest [s] at each; None without a change."""
     step, even = _even(time, velocity)
     turns = reversals(even, standstill)
     return turns, dwell_per_reversal(even, step, standstill) if turns else None
 
 
 def periodicity(time: FloatArray, reference: FloatArray) -> Periodicity | None:
-    """Period of a reference [m] over increasing times [s]; None if it does not repeat itself `MIN_PERIODS` times.
+    """Period of a reference [m] over increasing times [s]; None if it does not repeat `MIN_PERIODS` times.
 
-    A period is the time between two crossings of the middle, upwards. It must not vary by more than `SAME`, and 95 %
-    of the samples must come back a period later to within `SAME` of the amplitude.
+    A period is the time between two upward crossings of the middle. The periods must agree within `SAME`, and 95 % of
+    the samples must repeat one period later within `SAME` of the amplitude.
     """
     step, even = _even(time, reference)
     middle, amplitude = (even.max() + even.min()) / 2.0, float(np.ptp(even)) / 2.0
@@ -270,23 +269,23 @@ def _compared(stretch: TrackingStretch, base: TrackingStretch) -> TrackingStretc
 
 
 def _change(value: float | None, base: float | None) -> float | None:
-    """Change in percent; None where there is nothing to compare with."""
+    """Change in percent; None without a base."""
     return None if value is None or not base else 100.0 * (value / base - 1.0)
 
 
 def _notes(stretches: Sequence[TrackingStretch], base: TrackingStretch | None, short: int) -> Iterator[str]:
     if short:
         yield (
-            f'{short} stretches of unchanged configuration are too short to say how the servo tracked: less than '
-            f'{MIN_SAMPLES} samples with reference and position are left once it has settled.'
+            f'{short} stretches of unchanged configuration are too short to evaluate the tracking: fewer than '
+            f'{MIN_SAMPLES} samples with reference and position remain after settling.'
         )
     if stretches and base is None:
-        yield 'There is no stretch without feed-forward, so nothing to compare the feed-forward with.'
+        yield 'There is no stretch without feed-forward to compare with.'
     for stretch in stretches:
         if base is not None and not _same_reference(stretch, base):
             yield (
-                f'The reference from {stretch.start:.1f} s on is another one than that from {base.start:.1f} s on, '
-                'without feed-forward: the two are not compared.'
+                f'The reference from {stretch.start:.1f} s on differs from the reference without feed-forward, from '
+                f'{base.start:.1f} s on: the two stretches are not compared.'
             )
 
 

@@ -1,1 +1,1 @@
-"""What long work shares: progress, files that are whole, seal files."""
+"""Shared by all long-running work: worker processes, finished parts, progress, atomic files, seal files."""

@@ -1,10 +1,14 @@
-"""Files that are there whole or not at all."""
+"""Files written atomically: complete or absent."""
 
 from pathlib import Path
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all; one that is there is replaced."""
+    """Write a file in one step, so that a reader never sees half of it; replace an existing file.
+
+    Raises:
+        OSError: The file cannot be written. The previous file is left unchanged.
+    """
     partial = path.with_name(f'.{path.name}.partial')
     try:
         partial.write_bytes(content)

@@ -1,22 +1,65 @@
-"""Progress of long work, on stderr, and only where a person looks at it."""
+"""Progress of long-running work: a bar on stderr, or a report to the parent process."""
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+_SMALLEST_SHARE = 0.01  # of a call: a worker process reports no smaller progress (our choice)
+_REFRESH_PERIOD = 0.1  # [s]
+
+_report_share: Callable[[float], None] | None = None  # set in a worker process
+
+
+def report_shares_to(report: Callable[[float], None]) -> None:
+    """Make `progress` in this process call ``report`` with the share done since the last call, instead of a bar."""
+    global _report_share  # noqa: PLW0603  one per process, like stderr
+    _report_share = report
+
 
 @contextmanager
 def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]:
-    """Show a bar while the block runs; call what it gives with the number of steps done since the last call.
+    """Show a bar on stderr while the block runs, if stderr is a terminal.
+
+    No thread draws the bar, so that a process may fork inside the block.
 
     Args:
-        label: What is being done.
-        total: Number of steps; None if not known.
+        label: Text beside the bar.
+        total: Number of steps; None if unknown.
+
+    Yields:
+        Function to call with the number of steps done since the last call.
     """
+    if _report_share is not None:
+        yield _shares(total, _report_share)
+        return
     console = Console(stderr=True)
     columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    shown = console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=not shown, auto_refresh=False) as bar:
         task = bar.add_task(label, total=total)
-        yield lambda steps: bar.advance(task, steps)
+        refreshed = time.monotonic()
+
+        def advance(steps: float) -> None:
+            nonlocal refreshed
+            bar.advance(task, steps)
+            if shown and time.monotonic() > refreshed + _REFRESH_PERIOD:
+                bar.refresh()
+                refreshed = time.monotonic()
+
+        yield advance
+
+
+def _shares(total: int | None, report: Callable[[float], None]) -> Callable[[float], None]:
+    pending = 0.0
+
+    def advance(steps: float) -> None:
+        nonlocal pending
+        pending += steps / total if total else 0.0
+        if abs(pending) >= _SMALLEST_SHARE:
+            report(pending)
+            pending = 0.0
+
+    return advance

@@ -1,4 +1,4 @@
-"""The one way in which seal files are written: checked as the node will read them, whole or not at all."""
+"""Writer of seal files: each is checked as the node checks it and written atomically."""
 
 import os
 from collections.abc import Mapping
@@ -13,10 +13,10 @@ from seal_friction_ros.offline.work.atomic_file import write_whole
 
 
 def check_new(out: Path) -> None:
-    """Check that a file can be made, before the work for it begins.
+    """Check before the work that a file can be made.
 
     Raises:
-        ValueError: It is there already, or nothing can be written where it should be.
+        ValueError: It exists already, or its folder cannot be written to.
     """
     if out.exists():
         raise ValueError(f'{out} exists already: not overwriting it')
@@ -26,7 +26,7 @@ def check_new(out: Path) -> None:
 
 
 def rounded(value: float, digits: int) -> float:
-    """A number with so many significant digits, for a file that people read."""
+    """A number rounded to so many significant digits."""
     return float(f'{value:.{digits}g}')
 
 
@@ -37,15 +37,15 @@ def seal_text(document: Mapping[str, Any]) -> str:
 
 
 def write_seal(document: Mapping[str, Any], out: Path, comment: str = '') -> None:
-    """Write a seal file, with its folder if there is none; one that is there is replaced.
+    """Write a seal file, and its folder if necessary; replace an existing file.
 
     Args:
         document: The seal.
         out: The file.
-        comment: Lines to stand above it.
+        comment: Comment lines at its beginning.
 
     Raises:
-        ValueError: The document makes no seal, or the file cannot be written.
+        ValueError: The document is not a valid seal, or the file cannot be written.
     """
     content = (''.join(f'# {line}\n' for line in comment.splitlines()) + seal_text(document)).encode()
     parse_seal(parse_yaml(content, str(out)))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.identification.fitting import (
-    BAND_95,
     band_coverage,
     changed_levels,
     climb,

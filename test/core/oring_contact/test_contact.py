@@ -28,7 +28,7 @@ from seal_friction_ros.core.oring_contact.hertz import LineContact, cylinder_bet
 from seal_friction_ros.core.oring_contact.loading import model_of, squeeze
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.results import ContactResult, contact_results, evaluate
-from seal_friction_ros.offline.reports.oring_report import appendix_b
+from seal_friction_ros.offline.reports.thesis_data import appendix_b
 
 PRESSURES = tuple(psi * PSI for psi in (0.0, 250.0, 500.0, 750.0, 1000.0))
 COARSE = Numerics(lines=13)

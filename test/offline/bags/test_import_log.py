@@ -258,11 +258,11 @@ def test_velocity_from_position_in_a_log(tmp_path):
         (b'\x89PNG\r\n\x1a\n\x00\x00', 'log.csv: not a text file'),
         (
             b'\x00\x01\x02\x00' * 5000,
-            r'log.csv: rig file asks for chamber_a.terms\[0\].column = 1, but there are 0 to 0',
+            r'log.csv: rig file names chamber_a.terms\[0\].column = 1, but the log has 0 to 0',
         ),
-        ('1,2,3\n', r'log.csv: rig file asks for velocity.terms\[0\].column = 3, but there are 0 to 2'),
-        (ROWS + '1100,2,10\n', 'line 4: 3 columns where there should be 4'),
-        (ROWS + '1100,2,10,1,7\n', 'line 4: 5 columns where there should be 4'),
+        ('1,2,3\n', r'log.csv: rig file names velocity.terms\[0\].column = 3, but the log has 0 to 2'),
+        (ROWS + '1100,2,10\n', 'line 4: 3 columns instead of 4'),
+        (ROWS + '1100,2,10,1,7\n', 'line 4: 5 columns instead of 4'),
         (ROWS + '# note\n1100,2,ten,1\n', "line 5: column 2 is 'ten', not a number"),
         (ROWS + '1100,2,,1\n', "line 4: column 2 is '', not a number"),
         (ROWS + '1100,2,' + 'x' * 5000 + ',1\n', 'line 4: column 2 is .{42}, not a number'),
@@ -290,7 +290,7 @@ def test_garbage_in_the_log_gives_one_line(tmp_path, log, pattern):
             changed(time={'column': 0, 'unit': 'fortnight'}),
             "rig.yaml: time: Term.unit = 'fortnight' is not one of",
         ),
-        (changed(time={'column': 0, 'unit': 'bar'}), "rig.yaml: time.unit = 'bar' .* is no time: use one of s, ms"),
+        (changed(time={'column': 0, 'unit': 'bar'}), "rig.yaml: time.unit = 'bar' .* is not a time: use one of s, ms"),
         (changed(time={'column': 0}), 'rig.yaml: time lacks unit'),
         (changed(time={'unit': 's'}), 'rig.yaml: time: Term.column = -1'),
         (changed(time={'column': 0, 'column_name': 't', 'unit': 's'}), 'give one of them'),
@@ -300,7 +300,10 @@ def test_garbage_in_the_log_gives_one_line(tmp_path, log, pattern):
         (changed(chamber_a={}), 'rig.yaml: chamber_a has neither terms nor a constant'),
         (changed(chamber_a=7), 'rig.yaml: chamber_a is not a mapping'),
         (changed(chamber_a={'terms': 7}), r'rig.yaml: chamber_a.terms = 7 is not a list'),
-        (changed(chamber_a={'terms': [{'column': 1, 'unit': 'N'}]}), r'chamber_a.terms\[0\].unit = .N. .* no pressure'),
+        (
+            changed(chamber_a={'terms': [{'column': 1, 'unit': 'N'}]}),
+            r'chamber_a.terms\[0\].unit = .N. .* not a pressure',
+        ),
         (changed(chamber_a={'constant': math.nan}), 'rig.yaml: chamber_a: Combination.constant = nan SI is not finite'),
         (
             changed(force_sum={'terms': [{'column': 1, 'unit': 'bar', 'gain': math.inf, 'gain_unit': 'mm2'}]}),
@@ -308,9 +311,12 @@ def test_garbage_in_the_log_gives_one_line(tmp_path, log, pattern):
         ),
         (
             changed(force_sum={'terms': [{'column': 1, 'unit': 'bar'}]}),
-            r'force_sum.terms\[0\].unit = .bar. .*no force',
+            r'force_sum.terms\[0\].unit = .bar. .*not a force',
         ),
-        (changed(velocity={'terms': [{'column': 3, 'unit': 'mm'}]}), r'velocity.terms\[0\].unit = .mm. .* no velocity'),
+        (
+            changed(velocity={'terms': [{'column': 3, 'unit': 'mm'}]}),
+            r'velocity.terms\[0\].unit = .mm. .* not a velocity',
+        ),
         (changed(velocity={**RIG['velocity'], 'savitzky_golay': {'window': 1.0}}), 'lacks largest_gap'),
         (
             changed(velocity={**RIG['velocity'], 'savitzky_golay': {'window': -1.0, 'largest_gap': 1.0}}),
@@ -328,7 +334,7 @@ def test_a_rig_file_that_makes_no_sense_gives_one_line(tmp_path, rig, pattern):
 
 @pytest.mark.parametrize(
     ('header', 'times'),
-    [('#t,p,F,v\n', 'there 0 times'), ('#p A,p A,t,v\n', 'there 2 times'), ('', 'there 0 times')],
+    [('#t,p,F,v\n', 'found 0 times'), ('#p A,p A,t,v\n', 'found 2 times'), ('', 'found 0 times')],
 )
 def test_a_name_that_is_not_once_in_the_header(tmp_path, header, times):
     rig = changed(header='comment', chamber_a=NAMED['chamber_a'])

@@ -51,7 +51,7 @@ def test_a_sound_bag_is_copied_message_by_message(recorded: Path):
     assert found.out == str(recorded.with_name('bag_recovered'))
     assert messages(Path(found.out)) == messages(recorded)
     assert (found.lost_bytes, found.lost_chunks, found.damage) == (0, 0, [])
-    assert 'nothing was damaged' in found.in_words()
+    assert 'the bag is not damaged' in found.summary()
 
 
 def test_an_unfinished_bag_is_refused_with_what_to_do_and_recovered_to_its_last_whole_chunk(recorded: Path):
@@ -64,7 +64,7 @@ def test_an_unfinished_bag_is_refused_with_what_to_do_and_recovered_to_its_last_
     assert len(saved) == found.messages > 0.8 * len(messages(recorded))
     assert replay(Path(found.out)).identical
     assert found.last_ns == saved[-1].log_time
-    assert 'killed_0.mcap: it was not finished' in found.in_words()
+    assert 'killed_0.mcap: it was not finished' in found.summary()
 
 
 def test_what_stands_before_the_cut_of_a_truncated_file_is_saved(recorded: Path, tmp_path: Path):
@@ -96,7 +96,7 @@ def test_one_damaged_chunk_costs_that_chunk_alone(recorded: Path):
     found = recover(recorded)
     assert (found.lost_chunks, found.lost_bytes) == (1, 0)
     assert 0 < expected - found.messages < 1500
-    assert 'bag_1.mcap: chunk at byte' in found.in_words()
+    assert 'bag_1.mcap: chunk at byte' in found.summary()
 
 
 def test_metadata_that_is_gone_or_nonsense_does_not_matter(recorded: Path, tmp_path: Path):

@@ -12,15 +12,13 @@ import yaml
 from paths import ROOT
 from rich.progress import Progress
 
-from seal_friction_ros.core.foundation.units import PSI
 from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.oring_contact.case_file import parse_case
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.contact.oring_runs import compute_case
-from seal_friction_ros.offline.reports.oring_report import appendix_b
-from seal_friction_ros.offline.reports.seal_charts import dynamic_readings
+from seal_friction_ros.offline.reports.thesis_data import appendix_b, dynamic_readings
 
 CASES = ROOT / 'config' / 'oring'
 KEYS = {'pressure_Pa', 'normal_force_N', 'axial_force_N', 'peak_contact_stress_Pa', 'contact_width_m'}
@@ -49,8 +47,6 @@ def computed(tmp_path_factory):
         str(case),
         '--out',
         str(folder / 'seal.yaml'),
-        '--report',
-        str(folder / 'page.html'),
         '--json',
     ]
     assert main(arguments) == 0
@@ -85,18 +81,6 @@ def test_the_seal_file_made_is_a_seal_with_the_computed_normal_force(computed: P
     assert seal.pressure_max == 1.7e6
 
 
-def test_the_page_stands_alone_and_shows_what_was_asked_for(computed: Path):
-    page = (computed / 'page.html').read_text()
-    assert not re.findall(r'(?:src|href)="(?!data:)', page)
-    names = {path.stem for path in (computed / 'page_figures').iterdir()}
-    assert names == {
-        'deformed_shape', 'contact_stress_profiles', 'contact_stress_walls', 'normal_over_axial_force', 'friction',
-    }  # fmt: skip
-    assert all(f'id="{name}"' in page for name in names)
-    assert 'Against Appendix B of the thesis' in page
-    assert 'ms28775_114_fem' in page
-
-
 def test_the_seal_that_comes_with_the_package_was_made_by_the_command_from_its_case():
     seal, case = read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114_fem.yaml'), read_yaml(CASES / 'ms28775_114.yaml')
     assert seal['name'] == case['name']
@@ -129,13 +113,6 @@ def test_every_case_that_comes_with_the_package_is_one_and_says_where_it_is_from
     assert len(file.source) > 80
     assert file.friction is not None
     assert file.measured is not None
-
-
-def test_appendix_b_is_read_in_si():
-    case = appendix_b()[1000.0]
-    assert case.peak_stress == pytest.approx(1187.3 * PSI)
-    assert case.normal_force == pytest.approx(91.1 * 4.448, rel=1e-3)
-    assert len(appendix_b()) == 5
 
 
 def test_progress_is_one_step_a_pressure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -221,7 +198,7 @@ def test_a_seal_file_that_is_there_is_not_overwritten_and_nothing_is_computed_fi
 
 @pytest.mark.parametrize(
     ('changes', 'message'),
-    [({'friction': None}, 'needs its section friction'), ({'pressures': [0.0]}, 'needs two pressures at least')],
+    [({'friction': None}, 'needs the section friction'), ({'pressures': [0.0]}, 'needs two pressures at least')],
 )
 def test_a_seal_file_needs_friction_and_two_pressures(
     changes: dict, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -230,9 +207,3 @@ def test_a_seal_file_needs_friction_and_two_pressures(
     assert main(['oring', str(path), '--out', str(tmp_path / 'seal.yaml')]) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / 'seal.yaml').exists()
-
-
-def test_a_case_of_one_pressure_without_friction_still_makes_a_page(tmp_path: Path):
-    path = written(tmp_path, document(friction=None, measured=None, pressures=[0.0]))
-    assert main(['oring', str(path), '--report', str(tmp_path / 'page.html')]) == 0
-    assert len(list((tmp_path / 'page_figures').glob('*.png'))) == 3

@@ -37,8 +37,8 @@ from seal_friction_ros.offline.bags.block_reader import read_in_bulk
 from seal_friction_ros.offline.bags.mcap_reader import MAGIC
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay import compiled_replay
+from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.replay import BULK_FROM, replay
-from seal_friction_ros.offline.replay.verdict import Verdict
 
 CORPUS = ROOT / 'test' / 'corpus'
 
@@ -47,11 +47,11 @@ def chances(seed: int) -> random.Random:
     return random.Random(seed)  # noqa: S311  no secret depends on it
 
 
-def in_bulk(bag: Path, override: Configuration | None = None) -> Verdict | None:
+def in_bulk(bag: Path, override: Configuration | None = None) -> ReplayResult | None:
     return compiled_replay.replay_in_bulk(bag, find_topics(bag), override, lambda _: None)
 
 
-def assert_same_verdict(bag: Path, override: Configuration | None = None) -> Verdict:
+def assert_same_verdict(bag: Path, override: Configuration | None = None) -> ReplayResult:
     expected = replay(bag, override, bulk_from=BULK_FROM)
     assert in_bulk(bag, override) == expected
     return expected
@@ -176,7 +176,7 @@ def test_a_recording_that_was_cut_off_between_a_sample_and_its_answer_is_no_diff
 
 
 def test_estimates_that_are_not_recorded_any_more_wait_in_bounded_memory(recorded: Path, tmp_path: Path, monkeypatch):
-    monkeypatch.setattr('seal_friction_ros.offline.replay.verdict.MOST_WAITING', 20)
+    monkeypatch.setattr('seal_friction_ros.offline.replay.answer_comparison.LONGEST_QUEUE', 20)
     numbers = [n for n, message in enumerate(read_messages(recorded)) if message.topic == ESTIMATE_TOPIC]
     lost = set(numbers[100:200])
     with_gap = rewrite(recorded, tmp_path / 'gap', lambda n, m: None if n in lost else m)

@@ -1,4 +1,4 @@
-"""Several bags in one command: the same figures whatever the number of processes, and one bad bag spoils no other."""
+"""Replay of several bags: the result does not depend on the number of processes, and one bad bag spoils no other."""
 
 import json
 import os
@@ -18,23 +18,22 @@ GOOD = [ROOT / 'bags' / 'pull_test', ROOT / 'bags' / 'faults']
 
 @pytest.fixture(scope='module')
 def bags(tmp_path_factory) -> list[Path]:
-    """Bags of different length, one that is none among them."""
+    """Bags of different length; one folder is no bag."""
     folder = tmp_path_factory.mktemp('many')
     inputs = [write_inputs(folder / f'inputs_{samples}', samples) for samples in (400, 3, 50)]
     (folder / 'nothing').mkdir()
     return [*GOOD, folder / 'nothing', *inputs]
 
 
-def test_every_bag_has_the_verdict_that_it_has_alone_in_the_order_given(bags: list[Path]):
+def test_results_are_those_of_each_bag_alone_in_the_order_given(bags: list[Path]):
     alone = [None if bag.name == 'nothing' else replay(bag) for bag in bags]
     for workers in (1, 2, 5):
         outcomes = replay_many(bags, workers=workers)
-        assert [outcome.bag for outcome in outcomes] == bags
-        assert [outcome.verdict for outcome in outcomes] == alone
-        assert [bool(outcome.error) for outcome in outcomes] == [verdict is None for verdict in alone]
+        assert [outcome.result for outcome in outcomes] == alone
+        assert [bool(outcome.error) for outcome in outcomes] == [result is None for result in alone]
 
 
-def test_compiled_before_the_processes_begin_the_verdicts_are_the_same(bags: list[Path], monkeypatch):
+def test_results_are_the_same_with_the_compiled_estimator(bags: list[Path], monkeypatch):
     expected = replay_many(bags, workers=2)
     monkeypatch.setattr(module, 'BULK_FROM', 0)
     assert replay_many(bags, workers=2) == expected
@@ -84,7 +83,8 @@ def test_a_process_that_dies_costs_its_own_bag_only(bags: list[Path], monkeypatc
 
     monkeypatch.setattr(module, 'replay', replay_or_die)
     first, second = replay_many(GOOD, workers=2)
-    assert first.verdict is not None
-    assert first.verdict.identical
-    assert second.verdict is None
+    assert first.result is not None
+    assert first.result.identical
+    assert second.result is None
+    assert str(GOOD[1]) in second.error
     assert 'ended before it was done' in second.error

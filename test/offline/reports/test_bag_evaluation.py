@@ -22,14 +22,14 @@ from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags import bag as bags
-from seal_friction_ros.offline.bags.bag import BagError, BagWriter
+from seal_friction_ros.offline.bags.bag import BagWriter
+from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_evaluation import (
-    as_figures,
-    evaluate,
+    evaluate_run,
+    evaluation_numbers,
     friction_by_pressure,
     pressure_labels,
-    read_run,
 )
 
 START = 1_700_000_000_123_456_789  # [ns]
@@ -56,7 +56,7 @@ def strokes(directions=(1, -1), speed=0.02, rest=0.5, slide=1.0, error=1.0):
     return rows
 
 
-def make_bag(folder: Path, rows, estimates=True) -> Path:
+def make_bag(folder: Path, rows) -> Path:
     inputs = folder / 'inputs'
     with BagWriter(inputs) as writer:
         text = encode_text(snapshot_text(first_snapshot(CONFIGURATION)))
@@ -68,9 +68,8 @@ def make_bag(folder: Path, rows, estimates=True) -> Path:
             writer.write(bags.FORCE_TOPIC, FORCE_TYPE, stamp, encode(Force(stamp, force)))
             data = encode(Velocity(stamp, velocity, b'rod'))
             writer.write(bags.VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
-    if estimates:
-        replay(inputs, out=folder / 'estimates')
-    return folder / 'estimates' if estimates else inputs
+    replay(inputs, out=folder / 'estimates')
+    return folder / 'estimates'
 
 
 def evaluated(folder: Path, rows):
@@ -153,14 +152,14 @@ def test_inputs_that_are_no_numbers_are_left_out_and_counted(tmp_path):
         assert level.measured == pytest.approx(friction, rel=1e-6)
         assert len(level.events) == 2  # a lost velocity does not cut a stroke in two
     assert any('unusable inputs' in note for note in result.notes)
-    counts = evaluate(run).status_counts
+    counts = evaluate_run(run).status_counts
     for bit in ('VELOCITY_NOT_FINITE', 'PRESSURE_NOT_FINITE', 'FORCE_NOT_FINITE'):
         assert counts[bit] > 0
 
 
 def test_rates_shares_ages_and_span_are_those_of_the_bag(tmp_path):
     run = read_run(make_bag(tmp_path, strokes()))
-    result = evaluate(run)
+    result = evaluate_run(run)
     assert result.start == START
     assert result.duration == pytest.approx(len(run.time) / RATE, rel=0.01)
     assert result.rates[bags.PRESSURE_TOPIC] == pytest.approx(RATE, rel=0.01)
@@ -168,26 +167,14 @@ def test_rates_shares_ages_and_span_are_those_of_the_bag(tmp_path):
     assert result.state_shares['SLIDING'] == pytest.approx(2 / 3, abs=0.01)
     assert result.input_age == {'p50': 0.0, 'p99': 0.0, 'max': 0.0}
     assert result.flagged == 0
-    figures = json.loads(json.dumps(as_figures(result), allow_nan=False))
+    figures = json.loads(json.dumps(evaluation_numbers(result), allow_nan=False))
     assert figures['friction']['sliding'][0]['events'] == 2
-
-
-def test_inputs_are_those_that_the_estimate_was_made_from(tmp_path):
-    run = read_run(make_bag(tmp_path, strokes()))
-    stuck = (run.state == 3) & (np.abs(run.force_sum) < run.breakaway_force)
-    assert np.array_equal(run.friction_force[stuck], run.force_sum[stuck])
 
 
 def test_other_bits_of_a_newer_version_are_counted_not_lost(tmp_path):
     run = read_run(make_bag(tmp_path, strokes()))
     run = dataclasses.replace(run, status=np.full_like(run.status, 1 << 20))
-    assert evaluate(run).status_counts['UNKNOWN_BITS'] == len(run.time)
-
-
-def test_a_bag_without_estimates_says_to_replay_first(tmp_path):
-    with pytest.raises(BagError, match=r'no estimates in it.*replay') as error:
-        read_run(make_bag(tmp_path, strokes(), estimates=False))
-    assert '\n' not in str(error.value)
+    assert evaluate_run(run).status_counts['UNKNOWN_BITS'] == len(run.time)
 
 
 def test_levels_are_separated_at_gaps_and_ramps_are_cut():

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from report_page import checked_page
 
 from seal_friction_ros.offline.commands.main import main
 
@@ -40,7 +41,9 @@ def test_reference_force_and_resonance_come_out(tmp_path, capsys):
     assert numbers['resonance_Hz'] == pytest.approx(157.0, rel=0.03)
     assert numbers['stroke_m'] == pytest.approx(1.8e-3, rel=0.01)
     assert numbers['highest_normalised'] == pytest.approx(1.0, abs=0.3)
-    assert (tmp_path / 'page_figures' / 'friction_over_displacement.svg').exists()
+    page = checked_page(tmp_path / 'page.html')
+    assert page.figures == ['friction_over_displacement']
+    assert page.tiles['stroke'] == '1.8 mm'
 
 
 def test_another_reference_scales_the_result(tmp_path, capsys):

@@ -12,8 +12,8 @@ from seal_friction_ros.core.estimation.configuration import first_snapshot, snap
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.motions import Chirp, Sine
-from seal_friction_ros.offline.reports.bag_evaluation import RecordedRun, read_run
-from seal_friction_ros.offline.reports.figures import house_style
+from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
+from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.tracking_evaluation import (
     MIN_SAMPLES,
     SETTLING_TIME,
@@ -134,7 +134,7 @@ def test_another_reference_is_not_compared_and_said():
     reference = np.concatenate((run.reference[:2000], 2.0 * run.reference[2000:]))
     found = evaluate_tracking(dataclasses.replace(run, reference=reference, position=reference - 1e-5))
     assert [s.rms_change for s in found.stretches] == [None, None]
-    assert 'another one' in found.notes[0]
+    assert 'differs from the reference' in found.notes[0]
 
 
 def test_an_equal_configuration_published_again_makes_no_stretch():

@@ -1,7 +1,9 @@
-"""The command line: exit codes, figures alone on stdout, one line for what went wrong, nothing left behind."""
+"""The command line: help, exit codes, JSON alone on stdout, one line for each error, no files after a failure."""
 
+import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +14,7 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.messages import encode_text
 from seal_friction_ros.offline.bags.bag import BagWriter
-from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.commands.main import main, make_parser
 
 PULL_TEST = str(ROOT / 'bags' / 'pull_test')
 
@@ -59,18 +61,6 @@ def test_with_json_stdout_is_one_object_and_nothing_else(arguments: list[str], t
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert result.returncode == 0
     assert isinstance(json.loads(result.stdout), dict)
-
-
-def test_compare_says_first_largest_and_rms_difference(other: str, capsys):
-    capsys.readouterr()
-    main(['compare', PULL_TEST, other, '--json'])
-    found = json.loads(capsys.readouterr().out)
-    coulomb = found['fields']['coulomb_friction']
-    assert not found['agree']
-    assert found['first_difference'].startswith('message 1 at')
-    assert 0.0 < coulomb['rms'] <= coulomb['largest'] < 1.0
-    assert coulomb['outside'] == found['messages_a'] == 900
-    assert found['fields']['stamp']['largest'] == 0.0
 
 
 @pytest.mark.parametrize('command', ['info', 'replay', 'report'])
@@ -139,12 +129,38 @@ def test_a_reader_that_closes_the_pipe_early_is_no_error():
     assert (result.returncode, result.stderr) == (0, '')
 
 
-@pytest.mark.parametrize('command', [[], ['import'], ['import', 'log'], ['replay'], ['compare'], ['info'], ['report']])
-def test_every_command_has_help(command: list[str], capsys):
+def parsers(parser: argparse.ArgumentParser, *above: str) -> dict[tuple[str, ...], argparse.ArgumentParser]:
+    """Every command and its parser."""
+    found = {above: parser}
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, command in action.choices.items():
+                found |= parsers(command, *above, name)
+    return found
+
+
+@pytest.mark.parametrize('command', parsers(make_parser()), ids=' '.join)
+def test_every_command_has_help_and_its_examples_are_command_lines(command: tuple[str, ...], capsys):
     with pytest.raises(SystemExit) as stopped:
         main([*command, '--help'])
     assert stopped.value.code == 0
-    assert 'usage: seal_friction' in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert text.startswith(' '.join(['usage: seal_friction', *command]))
+    examples = re.findall(r'^  seal_friction (.*)$', text, re.MULTILINE)
+    assert all(tuple(example.split()[: len(command)]) == command for example in examples)
+    for example in examples:
+        make_parser().parse_args(example.split())
+
+
+def test_help_lists_every_command_in_its_group(capsys):
+    with pytest.raises(SystemExit):
+        main(['--help'])
+    groups = re.findall(r'^(\w+):\n((?:  .*\n)+)', capsys.readouterr().out, re.MULTILINE)
+    listed = {title: re.findall(r'^  (\w+)', text, re.MULTILINE) for title, text in groups}
+    del listed['options']
+    assert list(listed) == ['replay', 'identify', 'tune', 'compute']
+    names = [name for of_group in listed.values() for name in of_group]
+    assert sorted(names) == sorted(command[0] for command in parsers(make_parser()) if len(command) == 1)
 
 
 def test_help_loads_no_numerics_no_compiler_and_no_ros():

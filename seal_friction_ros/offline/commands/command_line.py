@@ -1,0 +1,130 @@
+"""Shared by all commands: parsers, options, exit codes, output. Loads nothing heavy, so that ``--help`` is fast."""
+
+import argparse
+import dataclasses
+import json
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+SUCCESS, DIFFERENT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+"""Exit codes: no difference; a difference or a failed check; unusable input; interrupted by SIGINT."""
+
+
+# -- parsers and options ----------------------------------------------------------------------------------------------
+
+
+def add_command(
+    commands: Any,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    description: str,
+    *examples: str,
+) -> argparse.ArgumentParser:
+    """Add a command with the option ``--json``.
+
+    Args:
+        commands: Subparsers that it belongs to.
+        name: Name of the command.
+        run: Runs it and returns the exit code.
+        description: One line for ``--help``.
+        examples: Command lines for ``--help``, without ``seal_friction``.
+    """
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=description,
+        description=description,
+        epilog='\n'.join(['examples:' if examples[1:] else 'example:', *(f'  seal_friction {e}' for e in examples)])
+        if examples
+        else None,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument('--json', action='store_true', help='print the numbers as one JSON object on stdout')
+    parser.set_defaults(run=run)
+    return parser
+
+
+def add_page(parser: argparse.ArgumentParser, option: str = '--out', *, required: bool = True) -> None:
+    """Add the option for an HTML page."""
+    text = 'page with figures to write, PNG and SVG beside it'
+    parser.add_argument(option, type=Path, required=required, metavar='FILE.html', help=text)
+
+
+def add_namespace(parser: argparse.ArgumentParser, condition: str = '') -> None:
+    """Add the option that restricts a bag to one namespace."""
+    parser.add_argument('--namespace', default='', help=f'{condition}use only topics below it')
+
+
+def add_configuration(parser: argparse.ArgumentParser) -> None:
+    """Add the options that replace the configuration of a bag or the default one."""
+    parser.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file of the estimator')
+    parser.add_argument('--seal', type=Path, metavar='FILE', help='seal file for every seal')
+
+
+def add_workers(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the option for the number of worker processes; ``what`` each of them works on."""
+    text = f'{what} at a time, one process each; default: number of cores'
+    parser.add_argument('--workers', '--jobs', type=at_least_one, metavar='N', help=text)
+
+
+def number_of_workers(arguments: argparse.Namespace) -> int:
+    """Number of worker processes: as given, else the number of cores."""
+    from seal_friction_ros.offline.work.executor import available_cores
+
+    return arguments.workers or available_cores()
+
+
+def non_negative(text: str) -> float:
+    """Type of an option: a finite number of at least 0."""
+    value = float(text)
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f'{text} is not a finite number of at least 0')
+    return value
+
+
+def at_least_one(text: str) -> int:
+    """Type of an option: a whole number of at least 1."""
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f'{text} is below 1')
+    return value
+
+
+# -- output -----------------------------------------------------------------------------------------------------------
+
+
+def print_result(arguments: argparse.Namespace, numbers: Any, summary: str, code: int = SUCCESS) -> int:
+    """Print the summary, or with ``--json`` the numbers and, on stderr, the summary; return the exit code."""
+    if arguments.json:
+        print(json.dumps(json_value(numbers), allow_nan=False))
+        print(summary, file=sys.stderr)
+    else:
+        print(summary)
+    return code
+
+
+def options_from(arguments: argparse.Namespace, record: type[Any]) -> dict[str, Any]:
+    """The arguments that are named after fields of a record."""
+    return {f.name: getattr(arguments, f.name) for f in dataclasses.fields(record) if hasattr(arguments, f.name)}
+
+
+def print_error(text: str) -> None:
+    """Print one line on stderr."""
+    print(f'seal_friction: {text}', file=sys.stderr)
+
+
+def json_value(value: Any) -> Any:
+    """A value as JSON can hold it: records as mappings, paths as text, numbers that are not finite as null."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return json_value(dataclasses.asdict(value))
+    if hasattr(value, '_asdict'):
+        return json_value(value._asdict())
+    if isinstance(value, dict):
+        return {str(key): json_value(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_value(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)

@@ -1,0 +1,118 @@
+"""``seal_friction ehl``: compute the lubricated contact of a seal."""
+
+import argparse
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    description = 'compute the lubricated contact of a seal'
+    parser = commands.add_parser('ehl', help=description, description=description)
+    steps = parser.add_subparsers(title='commands', required=True, metavar='COMMAND')
+    run = cli.add_command(
+        steps, 'run', run_case, 'compute friction, film and contact over a motion',
+        'ehl run inner_seal --out inner_seal.html',
+    )  # fmt: skip
+    help_text = 'run through the recorded position of this bag and compare with its force'
+    run.add_argument('--bag', type=Path, help=help_text)
+    run.add_argument('--window', type=float, nargs=2, metavar=('FROM', 'TO'), help='with --bag: part to take [s]')
+    run.add_argument(
+        '--average', type=cli.at_least_one, metavar='SAMPLES', help='with --bag: moving average, default 50'
+    )
+    study = cli.add_command(
+        steps, 'study', run_study, 'compute friction with other solid shear stresses',
+        'ehl study inner_seal --work build/study --out study.html',
+    )  # fmt: skip
+    chart = cli.add_command(
+        steps, 'map', run_map, 'compute a friction map: steady friction over speed and pressure',
+        'ehl map inner_seal --seal-file mapped.yaml',
+    )  # fmt: skip
+    chart.add_argument('--seal-file', type=Path, metavar='FILE.yaml', help='seal file to write; must not exist')
+    for step in (run, study, chart):
+        step.add_argument('case', help='case file: a path, or the name of one in config/ehl')
+        cli.add_workers(step, 'runs')
+        cli.add_page(step, required=False)
+    for step in (study, chart):
+        help_text = 'keep finished parts in this folder, and resume from them'
+        step.add_argument('--work', type=Path, metavar='FOLDER', help=help_text)
+
+
+def run_case(arguments: argparse.Namespace) -> int:
+    """Run a case or a spool, or a case on the motion of a bag."""
+    from seal_friction_ros.core.lubrication.case import Spool
+    from seal_friction_ros.offline.contact import lubrication_runs as runs
+    from seal_friction_ros.offline.reports import lubrication_report as report
+
+    if arguments.bag is None:
+        for option in ('window', 'average'):
+            if getattr(arguments, option) is not None:
+                raise ValueError(f'--{option} is only for a --bag')
+    case = runs.load_case(arguments.case)
+    if isinstance(case, Spool):
+        if arguments.bag is not None:
+            raise ValueError(f'{arguments.case}: a spool cannot be compared with a bag: take the case of one seal')
+        spool = runs.run_spool(case, arguments.case, cli.number_of_workers(arguments))
+        return _finish(
+            arguments, spool, lambda page: report.write_spool_page(case.name, spool.result, spool.labels, page)
+        )
+    if arguments.bag is not None:
+        return _compare_with_bag(arguments, case)
+    run = runs.run_case(case)
+    return _finish(arguments, run, lambda page: report.write_run_page(run, page))
+
+
+def _compare_with_bag(arguments: argparse.Namespace, case: Any) -> int:
+    from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
+    from seal_friction_ros.offline.contact.lubrication_comparison import compare_with_bag
+    from seal_friction_ros.offline.reports.lubrication_report import write_comparison_page
+
+    window = None if arguments.window is None else (arguments.window[0], arguments.window[1])
+    law = SpoolEvaluation() if arguments.average is None else SpoolEvaluation(moving_average=arguments.average)
+    comparison = compare_with_bag(case, arguments.bag, window, law)
+    return _finish(arguments, comparison, lambda page: write_comparison_page(comparison, page))
+
+
+def run_study(arguments: argparse.Namespace) -> int:
+    """Run a case with each solid shear stress of its study."""
+    from seal_friction_ros.offline.contact import lubrication_runs as runs
+    from seal_friction_ros.offline.reports.lubrication_report import write_study_page
+
+    case = runs.single_case(arguments.case, 'study')
+    study = runs.run_study(case, cli.number_of_workers(arguments), arguments.work)
+    return _finish(arguments, study, lambda page: write_study_page(case, study, page))
+
+
+def run_map(arguments: argparse.Namespace) -> int:
+    """Compute the friction map of a case."""
+    from seal_friction_ros.offline.contact import lubrication_runs as runs
+    from seal_friction_ros.offline.reports.lubrication_report import write_map_page
+    from seal_friction_ros.offline.work.seal_writer import check_new, write_seal
+
+    case = runs.single_case(arguments.case, 'friction map')
+    if arguments.seal_file is not None:
+        check_new(arguments.seal_file)
+    computed = runs.run_map(case, cli.number_of_workers(arguments), arguments.work)
+    numbers, summary = _with_page(arguments, computed, lambda page: write_map_page(computed, page))
+    if arguments.seal_file is not None:
+        write_seal(runs.seal_document(computed, arguments.seal_file.stem), arguments.seal_file)
+    return cli.print_result(arguments, numbers, summary)
+
+
+def _finish(arguments: argparse.Namespace, result: Any, write_page: Callable[[Path], Iterable[Path]]) -> int:
+    """Write the page, if one is asked for, and print the result."""
+    return cli.print_result(arguments, *_with_page(arguments, result, write_page))
+
+
+def _with_page(
+    arguments: argparse.Namespace, result: Any, write_page: Callable[[Path], Iterable[Path]]
+) -> tuple[dict[str, Any], str]:
+    """Numbers and summary of a result, with the page, if one is asked for."""
+    numbers, summary = result.numbers(), result.summary()
+    if arguments.out is None:
+        return numbers, summary
+    figures = tuple(write_page(arguments.out))
+    return {**numbers, 'page': arguments.out, 'figures': figures}, f'{summary}\n{arguments.out}: written'

@@ -1,0 +1,70 @@
+"""``seal_friction identify``: identify a seal file from measurements."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = cli.add_command(
+        commands, 'identify', run, 'identify a seal file from bags, logs, tables or filled data sheets',
+        'identify bags/pull_test --out my_seal.yaml --report my_seal.html',
+        'identify O-ring257_*bar.csv --rig delft --out o_ring.yaml',
+    )  # fmt: skip
+    parser.add_argument('sources', type=Path, nargs='+', metavar='SOURCE', help='bag, log, table or data sheet')
+    parser.add_argument('--out', type=Path, required=True, metavar='SEAL.yaml', help='seal file to write')
+    cli.add_page(parser, '--report', required=False)
+    parser.add_argument('--rig', help='rig file of the logs: a path, or the name of one in config/rigs')
+    parser.add_argument('--seal', help='seal file with the geometry of the ring: a path, or one in config/seals')
+    parser.add_argument(
+        '--squeeze-force', action='store_true', help='normal force from the geometry, even if --seal has one'
+    )
+    parser.add_argument(
+        '--seal-chambers', dest='chambers', type=_chambers, metavar='a,b', help='chamber of each seal, one letter each'
+    )
+    parser.add_argument('--law', help='law to save instead of the recommended one')
+    parser.add_argument(
+        '--run-to-run',
+        type=cli.non_negative,
+        metavar='SHARE',
+        help='relative standard deviation between runs, if known',
+    )
+    parser.add_argument('--name', default='', help='name of the seal; default: that of the file')
+    parser.add_argument('--slowest', type=cli.non_negative, metavar='M/S', help='a slower rod counts as at rest')
+    parser.add_argument(
+        '--largest-acceleration', type=cli.non_negative, metavar='M/S2', help='samples beyond it are not used'
+    )
+    cli.add_namespace(parser)
+
+
+def _chambers(text: str) -> tuple[str, ...]:
+    chambers = tuple(text.split(','))
+    if not set(chambers) <= {'a', 'b'}:
+        raise argparse.ArgumentTypeError(f'{text} is not a list like a,b')
+    return chambers
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Identify, and write seal file and page."""
+    from seal_friction_ros.offline.identification.document import identification_numbers
+    from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
+    from seal_friction_ros.offline.identification.sources import SourceOptions
+    from seal_friction_ros.offline.identification.wording import summary
+    from seal_friction_ros.offline.work.seal_writer import write_seal
+
+    source_options = SourceOptions(**cli.options_from(arguments, SourceOptions))
+    options = IdentifyOptions(**{**cli.options_from(arguments, IdentifyOptions), 'sources': source_options})
+    found = identify(arguments.sources, options, arguments.out.stem)
+    written: dict[str, Any] = {'seal_file': arguments.out}
+    if arguments.report:
+        from seal_friction_ros.offline.reports.identification_report import write_identification_report
+
+        figures = write_identification_report(found, arguments.report)
+        written |= {'report': arguments.report, 'figures': figures}
+    write_seal(found.document, arguments.out)
+    return cli.print_result(
+        arguments, identification_numbers(found) | written, f'{summary(found)}\n{arguments.out}: written'
+    )

@@ -1,0 +1,38 @@
+"""``seal_friction oring``: compute contact stress and normal force of an O-ring by finite elements."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = cli.add_command(
+        commands, 'oring', run, 'compute contact stress and normal force of an O-ring by finite elements',
+        'oring ms28775_114 --out my_seal.yaml --report oring.html',
+    )  # fmt: skip
+    parser.add_argument('case', metavar='CASE', help='case file: a path, or the name of one in config/oring')
+    help_text = 'gauge pressures, instead of those in the file'
+    parser.add_argument('--pressures', type=float, nargs='+', default=(), metavar='PA', help=help_text)
+    parser.add_argument('--out', type=Path, metavar='SEAL.yaml', help='seal file to write; must not exist')
+    cli.add_page(parser, '--report', required=False)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compute, and write seal file and page."""
+    from seal_friction_ros.files import config_path
+    from seal_friction_ros.offline.contact.oring_runs import compute_case, seal_comment, seal_document
+    from seal_friction_ros.offline.reports.oring_report import numbers_text, write_oring_report
+    from seal_friction_ros.offline.work.seal_writer import check_new, write_seal
+
+    if arguments.out:
+        check_new(arguments.out)
+    path = config_path('oring', arguments.case)
+    computed = compute_case(path, arguments.pressures, for_seal_file=arguments.out is not None)
+    if arguments.report:
+        write_oring_report(computed, arguments.report)
+    if arguments.out:
+        write_seal(seal_document(computed), arguments.out, seal_comment(computed))
+    return cli.print_result(arguments, computed.summary, numbers_text(computed))

@@ -1,0 +1,53 @@
+"""``seal_friction replay``: replay bags through the estimator."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = cli.add_command(
+        commands, 'replay', run, 'replay bags through the estimator, faster than real time',
+        'replay bags/pull_test --verify',
+        'replay bags/pull_test --seal my_seal.yaml --out with_my_seal',
+    )  # fmt: skip
+    parser.add_argument('bags', type=Path, nargs='+', metavar='BAG')
+    cli.add_workers(parser, 'bags')
+    cli.add_configuration(parser)
+    parser.add_argument('--out', type=Path, metavar='BAG', help='write inputs and new estimates to this bag')
+    cli.add_namespace(parser)
+    parser.add_argument('--verify', action='store_true', help='compare with the recorded estimates byte for byte')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Replay one bag, or several in parallel."""
+    from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
+
+    override = chosen_configuration(arguments.params, arguments.seal)
+    if len(arguments.bags) > 1:
+        return _run_many(arguments, override)
+    result = replay(arguments.bags[0], override, arguments.out, arguments.namespace)
+    code = cli.DIFFERENT if arguments.verify and not result.identical else cli.SUCCESS
+    return cli.print_result(arguments, result.numbers(), result.summary(verified=arguments.verify), code)
+
+
+def _run_many(arguments: argparse.Namespace, override: Any) -> int:
+    """Several bags: one line for each, and the exit code of the worst."""
+    from seal_friction_ros.offline.replay.parallel_replay import replay_many
+
+    if arguments.out:
+        raise ValueError('--out is for one bag: replay several bags one by one')
+    outcomes = replay_many(arguments.bags, override, arguments.namespace, cli.number_of_workers(arguments))
+    bags, lines = [], []
+    for bag, (result, error) in zip(arguments.bags, outcomes, strict=True):
+        bags.append({'bag': bag, **(result.numbers() if result else {'error': error})})
+        lines += [f'{bag}: {result.summary(verified=arguments.verify)}'] if result else []
+    errors = [outcome.error for outcome in outcomes if outcome.error]
+    identical = all(outcome.result is not None and outcome.result.identical for outcome in outcomes)
+    cli.print_result(arguments, {'bags': bags, 'identical': identical}, '\n'.join(lines))
+    for error in errors:
+        cli.print_error(error)
+    return cli.UNUSABLE if errors else cli.DIFFERENT if arguments.verify and not identical else cli.SUCCESS

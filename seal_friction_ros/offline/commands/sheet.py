@@ -1,0 +1,52 @@
+"""``seal_friction sheet``: make an empty data sheet of the friction test plan."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = cli.add_command(
+        commands, 'sheet', run, 'make an empty data sheet of the friction test plan: CSV, and a page to print',
+        'sheet rod_seal --seal ms28775_114 --out sheet.csv',
+    )  # fmt: skip
+    parser.add_argument('name', help='name of the seal')
+    parser.add_argument('--out', type=Path, required=True, metavar='SHEET.csv', help='must not exist')
+    parser.add_argument(
+        '--pressures', type=_pressures, default=(0.0, 1000.0, 10), metavar='LOW:HIGH:STEPS', help='default 0:1000:10'
+    )
+    parser.add_argument('--tests', type=int, default=3, help='default 3')
+    parser.add_argument('--seals', type=int, default=2, help='seals that share the pressure, default 2')
+    parser.add_argument('--seal', help='seal file whose geometry is filled in: a path, or the name of one')
+    parser.add_argument('--pressure-unit', choices=('psi', 'bar', 'MPa', 'kPa'), default='psi')
+    parser.add_argument('--force-unit', choices=('lbf', 'N', 'kN'), default='lbf')
+    parser.add_argument('--length-unit', choices=('in', 'mm'), default='in')
+
+
+def _pressures(text: str) -> tuple[float, float, int]:
+    low, high, steps = text.split(':')
+    return float(low), float(high), int(steps)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the sheet."""
+    from seal_friction_ros.offline.identification.data_sheet import geometry_of_seal_file, make_plan, write_sheet
+
+    low, high, steps = arguments.pressures
+    plan = make_plan(
+        arguments.name,
+        low,
+        high,
+        steps,
+        tests=arguments.tests,
+        seals=arguments.seals,
+        pressure_unit=arguments.pressure_unit,
+        force_unit=arguments.force_unit,
+        length_unit=arguments.length_unit,
+        geometry=geometry_of_seal_file(arguments.seal) if arguments.seal else None,
+    )
+    sheet, page = write_sheet(plan, arguments.out)
+    return cli.print_result(arguments, {'sheet': sheet, 'page': page}, f'{sheet}, {page}: written')

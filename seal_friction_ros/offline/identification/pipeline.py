@@ -1,0 +1,389 @@
+"""Identification pipeline: sources -> readings -> fitted laws -> selected law -> seal file.
+
+A fit that fails or predicts nothing is an error and never a file. Nothing is random, and every number is rounded to six
+digits before another number is computed from it, so the same sources give the same bytes.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.parameters import from_mapping
+from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
+from seal_friction_ros.core.friction.seal_file import parse_normal_force, parse_seal
+from seal_friction_ros.core.identification.fitting import (
+    CHANGED,
+    Change,
+    Fit,
+    Outlier,
+    Score,
+    Stiction,
+    band_coverage,
+    between_runs,
+    changed_levels,
+    climb,
+    compare_with_law,
+    fit,
+    identify_stiction,
+    offsets_of,
+    outlying_level,
+    plain_mean,
+    recommended,
+    repeatability,
+    run_drift,
+    spread_of,
+    standard_errors,
+)
+from seal_friction_ros.core.identification.ladder import Rung, ladder, normal_forces
+from seal_friction_ros.core.identification.readings import Prepared, Readings, level_friction
+from seal_friction_ros.core.identification.signal_preparation import OffsetLine, offset_line
+from seal_friction_ros.files import config_path, read_yaml
+from seal_friction_ros.offline.identification.document import identification_section, rounded_value, seal_document
+from seal_friction_ros.offline.identification.results import (
+    FEWEST_PRESSURES_FOR_EXPONENT,
+    Identification,
+    IdentificationData,
+    LawQuality,
+    LawSelection,
+    Level,
+    Ring,
+)
+from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
+from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
+from seal_friction_ros.offline.work.progress import progress
+
+SPEEDS_DIFFER = 1.5  # fastest over slowest reading from which on velocity terms are tried (our choice)
+LARGEST_ERROR = 0.5  # out-of-sample error beyond which a law is not saved (our choice)
+REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is used where no other is known
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifyOptions:
+    """Options of an identification."""
+
+    sources: SourceOptions = dataclasses.field(default_factory=SourceOptions)
+    seal: str | None = None
+    """seal file with the geometry of the ring and its normal force: a path, or the name of one in config/seals"""
+    squeeze_force: bool = False
+    """compute the normal force from the geometry, even if the seal file has one"""
+    law: str | None = None
+    """law to save instead of the recommended one"""
+    run_to_run: float | None = None
+    """[-] relative standard deviation between runs, if known from elsewhere"""
+    name: str = ''
+    """of the seal; empty: the name of the seal file"""
+
+
+def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Identification:
+    """Read sources, fit every law, select one and assess it.
+
+    Args:
+        paths: Bags, logs, tables or data sheets.
+        options: Options.
+        name: Of the seal, unless the options name it.
+
+    Raises:
+        ValueError: The data are unfit for identification, or no law predicts them; one line that says what is wrong and
+            what to measure instead.
+    """
+    data = gather(paths, options)
+    selection = select_law(data, options.law)
+    quality = assess(data, selection, options.run_to_run)
+    document = seal_document(data, selection, quality, options.name or name)
+    levels = _levels(data, selection, quality, document)
+    warnings = tuple(warnings_of(data, selection, quality, levels))
+    remarks = (*data.sources.remarks, *remarks_on(data, selection))
+    document['identification'] = identification_section(data, selection, quality, levels, warnings)
+    return Identification(data, selection, quality, levels, document, warnings, remarks)
+
+
+# -- data -------------------------------------------------------------------------------------------------------------
+
+
+def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationData:
+    """Read the sources and exclude readings that do not belong to one state of one seal.
+
+    Raises:
+        ValueError: The data are unfit for identification.
+    """
+    sources = read_sources(paths, options.sources)
+    ring = _ring(sources, options)
+    prepared, changes, kept = _one_state(sources)
+    prepared = prepared._replace(readings=_with_normal_force(prepared.readings, ring))
+    readings = prepared.readings
+    outlier = _outlier(readings)
+    used = readings if outlier is None else _renumbered(readings.taken(readings.level != outlier.level))
+    return IdentificationData(sources, prepared, used, ring, outlier, changes, kept)
+
+
+def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
+    """Geometry and normal force of the ring: from the seal of the options, else from a bag or sheet that has one."""
+    document, where = sources.seal_document, 'seal of the source'
+    if options.seal is not None:
+        path = config_path('seals', options.seal)
+        document, where = read_yaml(path), str(path)
+        if not isinstance(document, Mapping) or 'geometry' not in document:
+            raise ValueError(f'{where}: it has no geometry: measure ring and groove and add them there')
+    if document is None or 'geometry' not in document:
+        return None
+    geometry = from_mapping(SealGeometry, document['geometry'], f'{where}: geometry')
+    given = document.get('normal_force')
+    if isinstance(given, Mapping) and not options.squeeze_force:
+        return Ring(geometry, dict(given))
+    reference = read_yaml(config_path('seals', REFERENCE_SEAL))['normal_force']['area_deformation_gain']
+    force = rounded_value(squeeze_force(geometry))
+    law = {'law': 'area_deformation_gain', 'area_deformation_gain': reference, 'radial_force': force}
+    return Ring(geometry, law)
+
+
+def normal_force_law(document: Mapping[str, Any]) -> NormalForceLaw:
+    """Law of the section ``normal_force`` of a seal file.
+
+    Raises:
+        ValueError: A name or value is invalid.
+    """
+    return parse_normal_force({'normal_force': document}, 'seal')
+
+
+def _with_normal_force(readings: Readings, ring: Ring | None) -> Readings:
+    if ring is None:
+        return readings
+    forces = normal_forces(readings.at.pressure, ring.geometry, normal_force_law(ring.normal_force))
+    return dataclasses.replace(readings, at=readings.at._replace(normal_force=forces))
+
+
+def _one_state(sources: Sources) -> tuple[Prepared, tuple[Change, ...], tuple[int, ...]]:
+    """Readings of the sources that agree, comparison of each further swept log with the first, and the sources kept.
+
+    Sources with readings at held pressures form one law together, so a disagreement between them is an error. A swept
+    log determines a law by itself: the first one is fitted, each other one is compared with its law and is excluded if
+    its friction has changed.
+    """
+    numbers = tuple(range(len(sources.files)))
+    first = _if_swept(sources) if len(numbers) > 1 else None
+    if first is None:
+        together = sources.prepare()
+        _check_unchanged(together.readings)
+        return together, (), numbers
+    rungs = {rung.name: rung for rung in _rungs(first.readings)}
+    law = fit(rungs.get('pressure_power_law_viscous', rungs['pressure_power_law']), first.readings)
+    changes = tuple(compare_with_law(law, first.readings, sources.prepare([i]).readings) for i in numbers[1:])
+    kept = (0, *(i for i, change in zip(numbers[1:], changes, strict=True) if not change.is_change))
+    return (sources.prepare(kept) if len(kept) > 1 else first), changes, kept
+
+
+def _if_swept(sources: Sources) -> Prepared | None:
+    """The first source if it is a swept log; None if it has readings at held pressures, possibly too few by itself."""
+    try:
+        first = sources.prepare([0])
+    except ValueError:
+        return None
+    return first if first.readings.are_samples else None
+
+
+def _check_unchanged(readings: Readings) -> None:
+    changes = changed_levels(readings)
+    if changes:
+        worst = max(changes, key=lambda c: abs(c.other_friction / c.friction - 1.0))
+        raise ValueError(
+            f'the friction has changed: {worst.friction:.4g} N in {worst.name} and {worst.other_friction:.4g} N in '
+            f'{worst.other_name}, {100.0 * (worst.other_friction / worst.friction - 1.0):+.0f} %, both at '
+            f'{worst.pressure / BAR:.3g} bar; runs of one seal repeat within {100.0 * CHANGED:.0f} %, so these are two '
+            'seals or two states of one seal: identify each separately'
+        )
+
+
+def _rungs(readings: Readings, ring: Ring | None = None) -> tuple[Rung, ...]:
+    speed = np.abs(readings.at.velocity)
+    with_speeds = bool(np.isfinite(speed).all()) and float(speed.max()) > SPEEDS_DIFFER * float(speed.min())
+    with_exponent = readings.are_samples or len(np.unique(readings.level)) >= FEWEST_PRESSURES_FOR_EXPONENT
+    return ladder(
+        geometry=ring.geometry if ring else None,
+        normal_force_law=normal_force_law(ring.normal_force) if ring else None,
+        with_speeds=with_speeds,
+        with_exponent=with_exponent,
+    )
+
+
+def _outlier(readings: Readings) -> Outlier | None:
+    """Pressure that disagrees with the law of all others; None if there are too few pressures to tell."""
+    if readings.are_samples or len(np.unique(readings.level)) < 4:
+        return None
+    rung = next(rung for rung in _rungs(readings) if rung.name == 'pressure_power_law')
+    found = fit(rung, readings)
+    floor = repeatability(readings, found.offsets)
+    return outlying_level(rung, readings, found.values, floor if math.isfinite(floor) else 0.0)
+
+
+def _renumbered(readings: Readings) -> Readings:
+    """Readings with levels, and groups that are levels, numbered from 0 without gaps."""
+    level = np.unique(readings.level, return_inverse=True)[1]
+    group = level if readings.left_out_by == 'pressure' else readings.group
+    return dataclasses.replace(readings, level=level, group=group)
+
+
+# -- law --------------------------------------------------------------------------------------------------------------
+
+
+def select_law(data: IdentificationData, law: str | None) -> LawSelection:
+    """Fit and score every law of the ladder; select the recommended one, or the one called ``law``.
+
+    Raises:
+        ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
+    """
+    rungs = _rungs(data.used, data.ring)
+    with progress('fit and leave out', len(rungs) * (len(np.unique(data.used.group)) + 1)) as advance:
+        scores = climb(rungs, data.used, advance)
+    best = recommended(scores)
+    selected = best if law is None else _score_of(scores, law)
+    assert selected.fit is not None  # noqa: S101
+    assert selected.validation is not None  # noqa: S101
+    if not selected.validation.error <= LARGEST_ERROR:
+        raise ValueError(
+            f'{", ".join(data.used.names)}: no law predicts these readings: {selected.rung.name} is off by '
+            f'{100.0 * selected.validation.error:.0f} % on left-out readings: measure more strokes at each pressure, '
+            'in both directions, with a settled seal'
+        )
+    return LawSelection(scores, best, selected.fit, selected.validation, plain_mean(data.used))
+
+
+def _score_of(scores: tuple[Score, ...], law: str) -> Score:
+    found = next((score for score in scores if score.rung.name == law), None)
+    if found is None:
+        raise ValueError(f'law {law!r} is not one of {", ".join(score.rung.name for score in scores)}')
+    if not found.is_scored:
+        raise ValueError(f'law {law} was not fitted: {found.why_not}')
+    return found
+
+
+# -- quality ----------------------------------------------------------------------------------------------------------
+
+
+def assess(data: IdentificationData, selection: LawSelection, run_to_run: float | None) -> LawQuality:
+    """Uncertainty of the selected law for new readings."""
+    used, found, validation = data.used, selection.fit, selection.validation
+    groups = len(np.unique(used.group))
+    everything = data.prepared.readings
+    offsets = offsets_of(everything, found.friction(everything.at))
+    drift = {} if used.are_samples else run_drift(everything, offsets)
+    between, is_drift = _run_to_run(data, drift) if run_to_run is None else (run_to_run, False)
+    with progress('test the band', groups * (groups - 1)) as advance:
+        coverage = band_coverage(selection.rung, used, found.values, between, advance)
+    names = [parameter.name for parameter in selection.rung.parameters]
+    return LawQuality(
+        spread=spread_of(validation.predicted, validation.deviation, groups, between),
+        run_to_run=between,
+        is_drift=is_drift,
+        coverage=coverage,
+        repeatability=repeatability(used, found.offsets),
+        drift=drift,
+        stiction=_stiction(data, found),
+        offset_line=_offset_line(everything),
+        standard_errors=dict(zip(names, (float(e) for e in standard_errors(validation)), strict=True)),
+    )
+
+
+def _run_to_run(data: IdentificationData, drift: Mapping[int, float]) -> tuple[float, bool]:
+    """Relative standard deviation between runs, if each pressure has runs of its own; and whether it is the drift.
+
+    It is measured if pressures were repeated. Otherwise the root mean square drift within the runs is used in its place
+    (our choice): a seal that changes during a measurement differs in the next one. Runs of the Delft O-ring drift by 11
+    to 18 % and repeat within 10 to 15 %.
+    """
+    if data.used.left_out_by != 'pressure' or data.used.are_samples or not data.used.samples:
+        return 0.0, False
+    measured = between_runs(data.used)
+    if math.isfinite(measured):
+        return measured, False
+    kept = [change for level, change in drift.items() if not data.is_outlier(level)]
+    return (math.sqrt(sum(change**2 for change in kept) / len(kept)), True) if kept else (0.0, False)
+
+
+def _stiction(data: IdentificationData, found: Fit) -> Stiction | None:
+    breakaway = data.prepared.breakaway
+    if breakaway is None:
+        return None
+    breakaway = _with_normal_force(breakaway, data.ring)
+    if data.outlier is not None:
+        breakaway = breakaway.taken(breakaway.level != data.outlier.level)
+    if len(np.unique(breakaway.group)) < 2:
+        return None
+    return identify_stiction(breakaway, found.rung.coulomb_friction(breakaway.at, found.values), found.offsets)
+
+
+def _offset_line(readings: Readings) -> OffsetLine | None:
+    if readings.are_samples or not readings.samples:
+        return None
+    levels = np.unique(readings.level)
+    pressures = np.array([readings.seal_pressure[readings.level == level].mean() for level in levels])
+    offsets = np.array([level_friction(readings, readings.level == level).offset for level in levels])
+    return offset_line(pressures, offsets)
+
+
+# -- levels -----------------------------------------------------------------------------------------------------------
+
+
+def _levels(
+    data: IdentificationData, selection: LawSelection, quality: LawQuality, document: Mapping[str, Any]
+) -> tuple[Level, ...]:
+    """Measured and fitted friction at each pressure level, by the law as the seal file has it."""
+    readings = data.prepared.readings
+    seal = parse_seal(document)
+    mounted = tuple(MountedSeal(seal, chamber) for chamber in data.sources.chambers)
+    fitted, std = fitted_readings(mounted, data.prepared.chamber_pressures, readings.at.velocity)
+    offsets = offsets_of(readings, fitted)
+    measured = readings.at.direction * (readings.force - offsets[readings.source])
+    found: list[Level] = []
+    for level in np.unique(readings.level):
+        inside = readings.level == level
+        half_range = level_friction(readings, inside)
+        is_used = not data.is_outlier(int(level))
+        number = sum(other.is_used for other in found)  # of the level among those in use
+        left_out = selection.validation.predicted[data.used.level == number].mean() if is_used else _expected(data)
+        found.append(
+            Level(
+                pressure=float(readings.seal_pressure[inside].mean()),
+                speed=float(np.abs(readings.at.velocity[inside]).mean()),
+                measured=float(measured[inside].mean() if readings.are_samples else half_range.friction),
+                fitted=float(fitted[inside].mean()),
+                std=float(std[inside].mean()),
+                left_out=float(left_out),
+                offset=math.nan if readings.are_samples else half_range.offset,
+                readings=int(inside.sum()),
+                drift=quality.drift.get(int(level), math.nan),
+                is_used=is_used,
+            )
+        )
+    return tuple(found)
+
+
+def _expected(data: IdentificationData) -> float:
+    """Friction at the outlier by the law of the other pressures [N]."""
+    return math.nan if data.outlier is None else data.outlier.expected
+
+
+def fitted_readings(
+    mounted: tuple[MountedSeal, ...], chambers: FloatArray, velocity: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Friction and its standard deviation [N] of mounted seals, as the node computes them, shape (n,) each.
+
+    Args:
+        mounted: The seals of the rig.
+        chambers: Pressure of chambers a and b [Pa], shape (n, 2).
+        velocity: [m/s] shape (n,); NaN counts as 0, where velocity terms vanish.
+    """
+    found = [
+        actuator_friction(mounted, float(a), float(b), float(v))
+        for (a, b), v in zip(chambers, np.nan_to_num(velocity), strict=True)
+    ]
+    friction = np.array([f.coulomb_friction + f.velocity_friction for f in found])
+    return friction, np.array([f.coulomb_friction_std for f in found])

@@ -1,0 +1,223 @@
+"""Text of an identification for people: warnings, remarks and the summary on the terminal."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.identification.fitting import (
+    ILL_CONDITIONED,
+    SETTLED,
+    Change,
+    CrossValidation,
+    Outlier,
+    Score,
+    collinear_regressors,
+    is_beaten,
+    traded_off,
+)
+from seal_friction_ros.offline.identification.results import (
+    FEWEST_PRESSURES_FOR_EXPONENT,
+    Identification,
+    IdentificationData,
+    LawQuality,
+    LawSelection,
+    Level,
+)
+
+Named = tuple[str, CrossValidation]
+"""Name of a law and its cross-validation."""
+
+
+# -- warnings ---------------------------------------------------------------------------------------------------------
+
+
+def warnings_of(
+    data: IdentificationData, selection: LawSelection, quality: LawQuality, levels: Sequence[Level]
+) -> Iterator[str]:
+    """Limits of the law that its user has to know, one line each."""
+    first = data.sources.files[0].name
+    yield from (_change_text(first, change) for change in data.changes if abs(change.ratio - 1.0) > 0.0)
+    readings = data.prepared.readings
+    one_way = [name for name, index in zip(readings.names, readings.two_sided, strict=True) if not len(index)]
+    if one_way:
+        yield (
+            f'{", ".join(one_way)}: readings in one direction only, so an offset of the force counts as friction: '
+            'measure the other direction too'
+        )
+    if data.outlier is not None:
+        yield _outlier_text(data.outlier, levels)
+    yield from _collinearity_texts(data, selection)
+    yield from _no_pressure_gain_text(selection)
+    yield from _parameter_texts(selection)
+    yield from _scatter_texts(selection, quality, levels)
+    if quality.stiction is None:
+        yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
+
+
+def _change_text(first: str, change: Change) -> str:
+    percent = f'{100.0 * (change.ratio - 1.0):+.0f} % (standard error {100.0 * change.standard_error:.0f} %)'
+    left = f'the law of {first} leaves an RMS of {change.rms:.3g} N there, one fitted there {change.own_rms:.3g} N'
+    if change.is_change:
+        return (
+            f'the friction has changed: in {change.name} it is {percent} against the law of {first}; {left}; it is '
+            'another state of the machine and was not averaged in: identify it separately'
+        )
+    return f'{change.name} agrees with {first}: friction {percent}; {left}; both are fitted together'
+
+
+def _outlier_text(outlier: Outlier, levels: Sequence[Level]) -> str:
+    level = next(level for level in levels if not level.is_used)
+    others = [abs(other.drift) for other in levels if other.is_used and math.isfinite(other.drift)]
+    largest = max(others, default=0.0)
+    percent = 100.0 * (outlier.measured / outlier.expected - 1.0)
+    text = (
+        f'outlier: at {level.pressure / BAR:.3g} bar the friction is {outlier.measured:.3g} N where the law of the '
+        f'other pressures expects {outlier.expected:.3g} N ({percent:+.0f} %, {outlier.standard_deviations:.1f} '
+        'standard deviations); the law was not fitted to it'
+    )
+    if math.isfinite(level.drift) and abs(level.drift) > SETTLED and abs(level.drift) > 2.0 * largest:
+        return (
+            f'{text}. A reason to look: its friction changed by {100.0 * level.drift:+.0f} % during the run, that of '
+            f'the other runs by {100.0 * largest:.0f} % at most: the seal had not settled (lubricant pushed out, twist '
+            'or extrusion into the gap): inspect the ring and repeat that run until its friction stays constant'
+        )
+    return (
+        f'{text}. A reason to look: repeat that run; if it gives the same friction, the law changes there: measure more'
+    )
+
+
+def _collinearity_texts(data: IdentificationData, selection: LawSelection) -> Iterator[str]:
+    for pair in collinear_regressors(data.prepared.readings, data.prepared.chamber_pressures):
+        yield (
+            f'{pair.one} and {pair.other} are collinear: they changed together (correlation {pair.correlation:+.2f}), '
+            'so their effects can hardly be separated: drive several speeds at each pressure'
+        )
+    for pair in traded_off(selection.fit):
+        yield (
+            f'{pair.one} and {pair.other} trade off (correlation {pair.correlation:+.3f}): the data determine the '
+            'friction that they give together, but neither of them alone'
+        )
+    if not selection.fit.condition_number <= ILL_CONDITIONED:
+        yield f'the fit is ill-conditioned: condition number {selection.fit.condition_number:.0f} (good below 30)'
+
+
+def _no_pressure_gain_text(selection: LawSelection) -> Iterator[str]:
+    with_it, without = pressure_gain(selection.scores)
+    if with_it is not None and without is not None and not is_beaten(without[1].losses, with_it[1].losses):
+        yield f'no gain is claimed for pressure: {_gain_text(with_it, without)}: the difference is within the noise'
+
+
+def _gain_text(with_it: Named, without: Named) -> str:
+    return (
+        f'out of sample {with_it[1].rms:.3g} N RMS remain with pressure ({with_it[0]}) and {without[1].rms:.3g} N '
+        f'without ({without[0]})'
+    )
+
+
+def pressure_gain(scores: Sequence[Score]) -> tuple[Named | None, Named | None]:
+    """The best law with and the best law without a pressure-dependent Coulomb friction; None if there is none."""
+    found: dict[bool, Named] = {}
+    for score in scores:
+        if score.validation is not None:
+            side = score.rung.depends_on_pressure
+            if side not in found or score.validation.losses.mean() < found[side][1].losses.mean():
+                found[side] = score.rung.name, score.validation
+    return found.get(True), found.get(False)
+
+
+def _parameter_texts(selection: LawSelection) -> Iterator[str]:
+    for parameter in selection.rung.parameters:
+        value = selection.fit.values[parameter.name]
+        span = parameter.upper - parameter.lower
+        if parameter.upper < 1e3 and value > parameter.upper - 1e-6 * span:
+            yield f'{parameter.name} is at its bound of {parameter.upper:g}: an effect is missing in the law'
+        elif value == 0.0 and parameter.lower == 0.0:
+            yield f'{parameter.name} is 0: these data show no such effect'
+    for name in selection.rung.fixed:
+        yield (
+            f'{name} is not fitted but set to that of an elastic contact, 2/3: measure at '
+            f'{FEWEST_PRESSURES_FOR_EXPONENT} pressures at least to determine it'
+        )
+
+
+def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[Level]) -> Iterator[str]:
+    if quality.is_drift:
+        yield (
+            'every pressure was measured in one run, so the data do not show run-to-run variation: the drift within '
+            f'the runs ({100.0 * quality.run_to_run:.0f} %) is used in its place in the standard deviation; repeat '
+            'runs, or give a known value with --run-to-run'
+        )
+    drifted = [level for level in levels if level.is_used and abs(level.drift) > SETTLED]
+    if drifted:
+        at = ', '.join(f'{100.0 * level.drift:+.0f} % at {level.pressure / BAR:.3g} bar' for level in drifted)
+        yield f'the friction drifted during the runs ({at}): let the seal settle until its friction stays constant'
+    floor = quality.repeatability
+    error = selection.validation.rms / float(np.abs(selection.validation.predicted).mean())
+    if math.isfinite(floor) and error > 2.0 * floor:
+        yield (
+            f'the law is off by {100.0 * error:.0f} % (RMS) on left-out readings, while readings repeat within '
+            f'{100.0 * floor:.0f} %: the friction depends on something that is not in the law'
+        )
+
+
+# -- remarks ----------------------------------------------------------------------------------------------------------
+
+
+def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[str]:
+    """Assumptions and how to change them, one line each."""
+    prepared = data.prepared
+    total, used = sum(prepared.total.values()), sum(prepared.used.values())
+    if prepared.left_out:
+        why = ', '.join(f'{name} {100.0 * count / total:.0f} %' for name, count in prepared.left_out.items())
+        yield f'{used} of {total} samples used ({100.0 * used / total:.0f} %); not used: {why}'
+    with_it, without = pressure_gain(selection.scores)
+    if with_it is not None and without is not None and is_beaten(without[1].losses, with_it[1].losses):
+        yield f'pressure pays: {_gain_text(with_it, without)}'
+    if data.ring is None:
+        yield 'the geometry of the ring is unknown, so the physics-based law was not tried: name a seal with --seal'
+    if selection.rung.name != selection.best.rung.name:
+        yield f'{selection.rung.name} is saved as asked for with --law; recommended is {selection.best.rung.name}'
+    chambers = data.sources.chambers
+    mounting = f'seals: [{", ".join(["FILE"] * len(chambers))}], seal_chambers: [{", ".join(chambers)}]'
+    yield f'the law is that of one seal of {len(chambers)}; for the node: {mounting}'
+    if prepared.breakaway is None and prepared.readings.are_samples:
+        yield 'breakaway is not identified from logs without held pressures'
+
+
+# -- summary ----------------------------------------------------------------------------------------------------------
+
+
+def summary(found: Identification) -> str:
+    """The result for a person: law, numbers at each pressure, ladder, remarks and warnings."""
+    selection, quality = found.selection, found.quality
+    lines = [f'law: {selection.rung.name} ({selection.rung.words})']
+    for parameter in selection.rung.parameters:
+        error = quality.standard_errors[parameter.name]
+        value = selection.fit.values[parameter.name]
+        lines.append(f'  {parameter.name} = {value:.4g} {parameter.unit}, standard error {error:.2g}')
+    lines += ['  pressure [bar]  measured [N]  fitted [N]  std [N]']
+    for level in found.levels:
+        row = (level.pressure / BAR, level.measured, level.fitted, level.std)
+        numbers = '  '.join(f'{value:{width}.4g}' for value, width in zip(row, (14, 12, 10, 7), strict=True))
+        lines.append(f'  {numbers}{"" if level.is_used else "  outlier, not used"}')
+    lines += [f'laws on left-out readings (left out by {found.data.used.left_out_by}):']
+    lines += [f'  {line}' for line in _ladder_lines(selection)]
+    lines += [f'95 % band: holds {100.0 * quality.coverage:.0f} % of the left-out readings']
+    lines += [f'note: {remark}' for remark in found.remarks]
+    lines += [f'warning: {warning}' for warning in found.warnings]
+    return '\n'.join(lines)
+
+
+def _ladder_lines(selection: LawSelection) -> Iterator[str]:
+    for score in selection.scores:
+        if score.validation is None:
+            yield f'{score.rung.name:32} not fitted: {score.why_not}'
+        else:
+            mark = ' <- recommended' if score is selection.best else ''
+            validation = score.validation
+            yield f'{score.rung.name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}'
+    if selection.reference is not None:
+        reference = selection.reference
+        yield f'{"mean of the other readings":32} {reference.rms:9.4g} N RMS  {100.0 * reference.error:5.1f} %'

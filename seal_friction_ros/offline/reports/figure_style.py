@@ -1,0 +1,202 @@
+"""The common look of all figures, and the parts that several figures share.
+
+Figures are made without pyplot, so no state is kept between calls, and the same numbers give the same bytes. The
+colours are those of Okabe and Ito, which are distinct for all colour vision. A long recording is drawn through the
+lowest and the highest value in each column of pixels, so the size of a figure does not grow with the recording.
+"""
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import matplotlib.style
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+
+BLACK, GREY, LIGHT_GREY = '#1a1a1a', '#7f7f7f', '#d9d9d9'
+BLUE, SKY, ORANGE, VERMILLION, GREEN, PURPLE = '#0072b2', '#56b4e9', '#e69f00', '#d55e00', '#009e73', '#cc79a7'
+WIDTH = 8.6  # [inch]
+COLUMNS = 1200  # of pixels across a figure
+_STYLE = {
+    'axes.axisbelow': True,
+    'axes.grid': True,
+    'axes.labelsize': 9.5,
+    'axes.linewidth': 0.8,
+    'axes.spines.right': False,
+    'axes.spines.top': False,
+    'axes.titlelocation': 'left',
+    'axes.titlepad': 8.0,
+    'axes.titlesize': 10.0,
+    'figure.titlesize': 12.0,
+    'figure.titleweight': 'bold',
+    'font.family': ['DejaVu Sans'],
+    'font.size': 9.5,
+    'grid.color': '#e6e6e6',
+    'grid.linewidth': 0.7,
+    'legend.fontsize': 9.0,
+    'legend.frameon': False,
+    'lines.linewidth': 1.4,
+    'lines.solid_capstyle': 'round',
+    'path.simplify_threshold': 0.2,
+    'savefig.dpi': 150,
+    'svg.hashsalt': 'seal_friction_ros',
+    'text.parse_math': False,
+}
+
+
+class Plot(NamedTuple):
+    """One figure of a page."""
+
+    name: str
+    """file name without suffix, and id on the page"""
+    figure: Figure
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """The common look, independent of the user's matplotlibrc; a figure is made and rendered inside this context."""
+    with matplotlib.style.context(['default', _STYLE], after_reset=True):
+        yield
+
+
+def render(figure: Figure) -> dict[str, bytes]:
+    """A figure as ``svg`` and ``png``; equal figures give equal bytes."""
+    _fix_layout(figure)
+    rendered = {}
+    for kind, metadata in (('svg', {'Date': None, 'Creator': None}), ('png', {'Software': None})):
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=kind, metadata=metadata)
+        rendered[kind] = buffer.getvalue()
+    return rendered
+
+
+def _fix_layout(figure: Figure) -> None:
+    """Lay the figure out once, with rounded positions.
+
+    The layout solver takes its constraints in the order of their memory addresses, so the last bits of the positions
+    differ from run to run, and with them the names of the clip paths in an SVG. Rounding removes the difference.
+    """
+    figure.draw_without_rendering()
+    figure.set_layout_engine('none')
+    for ax in figure.axes:
+        left, bottom, width, height = (round(value, 5) for value in ax.get_position(original=True).bounds)
+        ax.set_position((left, bottom, width, height))
+
+
+def new_figure(title: str, height: float, **layout: Any) -> tuple[Figure, Any]:
+    """Figure of a height [inch] with its title at the left, and its axes as `Figure.subplots` returns them."""
+    figure = Figure(figsize=(WIDTH, height), layout='constrained')
+    figure.suptitle(title, x=0.012, ha='left')
+    return figure, figure.subplots(**layout)
+
+
+def panels(title: str, count: int, height: float, columns: int = 3) -> tuple[Figure, list[Axes]]:
+    """Figure of ``count`` panels of a height [inch] in rows, all on the same axes."""
+    rows, columns = -(-count // columns), min(count, columns)
+    layout: dict[str, Any] = {'nrows': rows, 'ncols': columns, 'squeeze': False, 'sharex': True, 'sharey': True}
+    figure, axes = new_figure(title, 0.6 + height * rows, **layout)
+    flat = list(axes.ravel())
+    for ax in flat[count:]:
+        ax.set_visible(False)
+    return figure, flat[:count]
+
+
+def label_panels(axes: Sequence[Axes], xlabel: str, ylabel: str, columns: int = 3) -> None:
+    """Label the lowest panel of each column and the first panel of each row."""
+    for ax in axes[-columns:]:
+        ax.set_xlabel(xlabel)
+        ax.tick_params(labelbottom=True)
+    for ax in axes[::columns]:
+        ax.set_ylabel(ylabel)
+
+
+def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:
+    """Legend in a row above the axes, with opaque dots; only the ``chosen`` of the labelled artists."""
+    handles, labels = ax.get_legend_handles_labels()
+    legend = ax.legend(
+        handles[chosen],
+        labels[chosen],
+        loc='lower right',
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=6,
+        borderaxespad=0.2,
+        columnspacing=1.2,
+        handlelength=1.6,
+        handletextpad=0.5,
+    )
+    for handle in legend.legend_handles:
+        if isinstance(handle, Line2D) and handle.get_linestyle() == 'None':
+            handle.set_alpha(1.0)
+
+
+def finish_figure_18(ax: Axes, unit: str) -> None:
+    """Axes and legend of the coefficient of friction over normal force, as Figure 18 of the thesis."""
+    ax.set(xlim=(0.0, None), xlabel=f'normal force of one seal [{unit}]')
+    ax.set(ylim=(0.0, None), ylabel='coefficient of dynamic friction [-]')
+    legend_above(ax)
+
+
+def finish_figure_19(ax: Axes, unit: str) -> None:
+    """Axes and legend of normal over axial force, as Figure 19 of the thesis."""
+    ax.set(xlabel=f'axial force of one seal, pressure times projected area [{unit}]')
+    ax.set(ylim=(0.0, None), ylabel=f'normal force of one seal [{unit}]')
+    legend_above(ax)
+
+
+def zero_lines(ax: Axes, *, vertical: bool = False) -> None:
+    """Thin line at zero of the y axis, and with ``vertical`` at zero of the x axis too."""
+    ax.axhline(0.0, color=GREY, lw=0.6, zorder=1.0)
+    if vertical:
+        ax.axvline(0.0, color=GREY, lw=0.6, zorder=1.0)
+
+
+def fill_band(ax: Axes, x: FloatArray, middle: FloatArray, half: FloatArray, **look: Any) -> None:
+    """Band of ``half`` on both sides of ``middle``."""
+    ax.fill_between(x, middle - half, middle + half, **{'color': SKY, 'alpha': 0.3, 'lw': 0, **look})
+
+
+def thinned(values: FloatArray, columns: int = COLUMNS) -> IntArray:
+    """Indices that keep the lowest and the highest value in each of ``columns`` parts of equal length.
+
+    A line through these values looks like the line through all values. A part of NaN keeps its first value.
+    """
+    n = len(values)
+    if n <= 4 * columns:
+        return np.arange(n)
+    length = -(-n // columns)
+    padded = np.full(length * columns, np.nan)
+    padded[:n] = values
+    rows = padded.reshape(columns, length)
+    missing = np.isnan(rows)
+    low = np.where(missing, np.inf, rows).argmin(axis=1)
+    high = np.where(missing, -np.inf, rows).argmax(axis=1)
+    first = np.arange(columns) * length
+    kept = np.unique(np.concatenate((first + low, first + high, [0, n - 1])))
+    return kept[kept < n]
+
+
+def thin_line(ax: Axes, x: FloatArray, values: FloatArray, **look: Any) -> None:
+    """Line over ``x``, `thinned`."""
+    kept = thinned(values)
+    ax.plot(x[kept], values[kept], **look)
+
+
+def true_spans(time: FloatArray, where: BoolArray) -> list[tuple[float, float]]:
+    """Start and length of each span of time in which ``where`` holds; a sample lasts until the next time."""
+    known = where[: len(time) - 1]
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
+    return [(float(time[a]), float(time[b] - time[a])) for a, b in edges.reshape(-1, 2)]
+
+
+def shade(ax: Axes, time: FloatArray, where: BoolArray, label: str | None = None) -> None:
+    """Shade the times at which ``where`` holds."""
+    if spans := true_spans(time, where):
+        transform = ax.get_xaxis_transform()
+        ax.broken_barh(
+            spans, (0.0, 1.0), transform=transform, color=LIGHT_GREY, alpha=0.7, lw=0, zorder=0.5, label=label
+        )

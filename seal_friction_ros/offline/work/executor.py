@@ -1,0 +1,186 @@
+"""Independent calls in parallel processes: the results do not depend on the number of processes.
+
+Every call runs in a forked process of its own, which inherits what the parent has loaded and compiled. A call that
+crashes (out of memory, signal) therefore costs its own result only.
+"""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any, Generic, NamedTuple, TypeVar, cast
+
+from seal_friction_ros.offline.work.progress import progress, report_shares_to
+
+Result = TypeVar('Result')
+_CRASHED = 'its process ended before it was done: is there enough memory?'
+
+
+class Outcome(NamedTuple, Generic[Result]):
+    """Outcome of one call."""
+
+    result: Result | None
+    error: str = ''
+    """one line; empty if there is a result"""
+
+
+def available_cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def error_text(error: ValueError | OSError) -> str:
+    """One line for an expected error."""
+    if isinstance(error, OSError) and error.strerror:
+        return f'{error.filename}: {error.strerror}' if error.filename else error.strerror
+    return str(error)
+
+
+def try_all(label: str, calls: Sequence[Callable[[], Result]], workers: int) -> list[Outcome[Result]]:
+    """Run every call, whatever becomes of the others.
+
+    Args:
+        label: Of the progress bar.
+        calls: Picklable functions without arguments that return picklable results. ``ValueError`` and ``OSError`` are
+            the errors of a call; any other exception is a bug: its traceback goes to stderr, and the call has crashed.
+        workers: Calls at a time.
+
+    Returns:
+        Outcomes in the order of the calls.
+    """
+    outcomes = dict(_completed(label, calls, workers, stop_at_error=False))
+    return [outcomes[number] for number in range(len(calls))]
+
+
+def run_all(
+    label: str,
+    calls: Sequence[Callable[[], Result]],
+    workers: int,
+    on_result: Callable[[int, Result], None] = lambda *_: None,
+) -> list[Result]:
+    """Run calls that are of use only together.
+
+    Args:
+        label: As `try_all`.
+        calls: As `try_all`.
+        workers: As `try_all`.
+        on_result: Called in this process with the number of a call and its result, as soon as it is done.
+
+    Returns:
+        Results in the order of the calls.
+
+    Raises:
+        ValueError: A call failed: the first one, in the order of the calls. No further call is begun after an error.
+    """
+    results: dict[int, Result] = {}
+    errors: dict[int, str] = {}
+    for number, (result, error) in _completed(label, calls, workers, stop_at_error=True):
+        if error:
+            errors[number] = error
+        else:
+            results[number] = cast(Result, result)
+            on_result(number, results[number])
+    if errors:
+        error = errors[min(errors)]
+        raise ValueError(f'{label}: {error}' if error == _CRASHED else error)
+    return [results[number] for number in range(len(calls))]
+
+
+class _Worker:
+    """One call in a process of its own.
+
+    Args:
+        number: Number of the call.
+        call: The call.
+        others: The parent's connections to other workers. This process closes its copies of them, so that a worker
+            whose parent has gone finds its connection broken.
+    """
+
+    def __init__(self, number: int, call: Callable[[], Any], others: Sequence[Connection]) -> None:
+        context = multiprocessing.get_context('fork')
+        self.number = number
+        self.done = 0.0  # share of the call
+        self.connection, its_end = context.Pipe(duplex=False)
+        arguments = (call, its_end, [*others, self.connection])
+        self._process: BaseProcess = context.Process(target=_work, args=arguments, daemon=True)
+        self._process.start()
+        its_end.close()
+
+    def receive(self) -> tuple[float, Outcome[Any] | None]:
+        """Share of the call done since the last time, and the outcome once there is one."""
+        try:
+            received: float | Outcome[Any] = self.connection.recv()
+        except EOFError:
+            received = Outcome(None, _CRASHED)
+        outcome = None if isinstance(received, float) else received
+        share = 1.0 - self.done if isinstance(received, Outcome) else min(received, 1.0 - self.done)
+        self.done += share
+        return share, outcome
+
+    def end(self) -> None:
+        """End the process, finished or not."""
+        self._process.terminate()
+        self._process.join()
+        self.connection.close()
+
+
+def _work(call: Callable[[], Any], connection: Connection, inherited: Sequence[Connection]) -> None:
+    """Body of a worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # ends silently: the parent writes the message
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    for other in inherited:
+        other.close()
+    report_shares_to(connection.send)
+    with suppress(BrokenPipeError):  # the parent has gone
+        connection.send(_outcome(call))
+
+
+def _outcome(call: Callable[[], Any]) -> Outcome[Any]:
+    try:
+        return Outcome(call())
+    except BrokenPipeError:
+        raise
+    except (ValueError, OSError) as error:
+        return Outcome(None, error_text(error))
+
+
+@contextmanager
+def _sigint_delayed() -> Iterator[None]:
+    """Deliver an interrupt after the block."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    try:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _completed(
+    label: str, calls: Sequence[Callable[[], Any]], workers: int, *, stop_at_error: bool
+) -> Iterator[tuple[int, Outcome[Any]]]:
+    """Number and outcome of each call as it is done; calls begin in the order given."""
+    waiting = list(range(len(calls)))[::-1]
+    running: dict[Connection, _Worker] = {}
+    with progress(label, len(calls)) as advance:
+        try:
+            while waiting or running:
+                while waiting and len(running) < max(workers, 1):
+                    number = waiting.pop()
+                    with _sigint_delayed():  # else a worker could begin and not be known
+                        worker = _Worker(number, calls[number], list(running))
+                        running[worker.connection] = worker
+                ready = wait(list(running))
+                for worker in [worker for connection, worker in running.items() if connection in ready]:
+                    share, outcome = worker.receive()
+                    advance(share)
+                    if outcome is not None:
+                        running.pop(worker.connection).end()
+                        if outcome.error and stop_at_error:
+                            waiting.clear()
+                        yield worker.number, outcome
+        finally:
+            for worker in running.values():
+                worker.end()

@@ -1,0 +1,130 @@
+"""The seal file of an identification, and the JSON numbers: the node computes what was fitted."""
+
+import shutil
+
+import numpy as np
+import pytest
+from identify_run import BARS, KEYS, THESIS, THESIS_RIG, Run, data, delft
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Status
+from seal_friction_ros.core.foundation.units import LBF
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.files import load_configuration
+from seal_friction_ros.offline.commands.main import main
+
+# --- the file works in the node ---
+
+
+def estimates_of(run: Run, pressure: float, velocity: float, force: float = 0.0):
+    """What the estimator says with the identified seals at one sample."""
+    chambers = tuple(run.figures['seal_chambers'])
+    selection = SealSelection((str(run.out),) * len(chambers), chambers)
+    parameters = load_configuration(selection, EstimatorSettings()).parameters().estimator
+    sample = RodSample(10, velocity, Pressure(10, pressure, pressure), Force(10, force))
+    return step(parameters, init(parameters), sample)[1]
+
+
+@pytest.mark.parametrize('law', ['constant_coulomb', 'pressure_power_law', 'physics_based', 'physics_based_asymmetric'])
+def test_the_node_says_what_was_fitted(law, tmp_path):
+    run = Run(tmp_path, str(THESIS), *THESIS_RIG, '--law', law)
+    for pressure, fitted, std in zip(*(run.figures[k] for k in ('pressure_Pa', 'fitted_N', 'std_N')), strict=True):
+        estimate = estimates_of(run, pressure, 0.01)
+        assert estimate.coulomb_friction == pytest.approx(fitted, rel=1e-5)
+        assert estimate.coulomb_friction_std == pytest.approx(std, rel=0.06)
+        assert estimate.status == 0
+        assert estimate.state == FrictionState.SLIDING
+        assert estimate.breakaway_force > estimate.coulomb_friction
+    asymmetry = run.figures['parameters'].get('asymmetry', 0.0)
+    both = [abs(estimates_of(run, 2e6, side * 0.01).friction_force) for side in (1.0, -1.0)]
+    assert both[0] / both[1] == pytest.approx((1.0 + asymmetry) / (1.0 - asymmetry))
+
+
+def test_viscous_friction_acts_in_the_node_and_is_not_in_the_coulomb_friction(friction_id):
+    run = friction_id
+    slow, fast = (estimates_of(run, 2e6, velocity) for velocity in (0.1, 0.4))
+    assert fast.coulomb_friction == slow.coulomb_friction
+    more = 2.0 * run.figures['parameters']['viscous_friction'] * 0.3  # [N] two seals, 0.3 m/s faster
+    assert fast.friction_force - slow.friction_force == pytest.approx(more, rel=1e-5)
+    assert estimates_of(run, 2e6, -0.4).friction_force == pytest.approx(-fast.friction_force)
+    at_rest = estimates_of(run, 2e6, 0.0, force=1e5)
+    assert at_rest.friction_force == at_rest.breakaway_force
+
+
+def test_beyond_the_pressures_that_were_measured_the_node_says_so(tmp_path):
+    run = Run(tmp_path, str(THESIS), *THESIS_RIG)
+    assert estimates_of(run, 8e6, 0.01).status == Status.OUTSIDE_IDENTIFIED_RANGE
+
+
+def test_a_bag_of_the_node_identifies_and_its_seal_file_replays(tmp_path):
+    run = Run(tmp_path, str(ROOT / 'bags' / 'pull_test'))
+    assert run.code == 0, run.errors
+    assert run.figures['seal_chambers'] == ['a', 'b']  # from the configuration in the bag, as is the geometry
+    assert run.ladder('physics_based')['error'] < 0.1
+    assert run.figures['measured_N'] == pytest.approx([x * LBF for x in (2.75, 5.0, 6.0)], rel=1e-5)
+    assert run.document['stiction'] > 1.0  # [N] the static readings are above the dynamic ones
+    replayed = tmp_path / 'replayed'
+    arguments = ['replay', str(ROOT / 'bags' / 'pull_test'), '--seal', str(run.out), '--out', str(replayed)]
+    assert main(arguments) == 0
+    assert main(['replay', str(replayed), '--verify']) == 0
+    again = Run(tmp_path, str(replayed), name='again')
+    assert again.figures['parameters'] == run.figures['parameters']
+
+
+def test_a_log_and_the_bag_imported_from_it_give_the_same_law(tmp_path):
+    bags = []
+    for bar in BARS:
+        log = data(f'delft/O-ring257_{bar}bar.csv')
+        bags.append(str(tmp_path / f'O{bar}'))
+        assert main(['import', 'log', str(log), '--rig', 'delft', '--out', bags[-1]]) == 0
+    of_bags = Run(tmp_path, *bags, name='bags')
+    of_logs = Run(tmp_path, *delft('O-ring257'), name='logs')
+    assert of_bags.figures['parameters'] == of_logs.figures['parameters']
+
+
+# --- the file itself ---
+
+
+def test_json_has_the_promised_keys_and_the_file_says_where_it_is_from(tmp_path):
+    run = Run(tmp_path, str(THESIS), *THESIS_RIG)
+    assert set(KEYS) <= set(run.figures)
+    part = run.document['identification']
+    assert {'law', 'parameters', 'standard_errors', 'residual_N', 'data', 'left_out_by', 'warnings'} <= set(part)
+    (source,) = part['data']
+    assert source['name'] == 'friction_tests.csv'
+    assert len(source['sha256']) == 64
+    assert run.figures['standard_errors'].keys() == run.figures['parameters'].keys()
+    assert np.array(part['measured_N']) - np.array(part['fitted_N']) == pytest.approx(part['residual_N'], abs=1e-4)
+
+
+def test_the_same_sources_give_the_same_bytes(tmp_path):
+    one, two = (Run(tmp_path, str(THESIS), *THESIS_RIG, '--name', 'x', name=n) for n in ('one', 'two'))
+    assert one.out.read_bytes() == two.out.read_bytes()
+    moved = shutil.copytree(ROOT / 'bags' / 'pull_test', tmp_path / 'elsewhere' / 'pull_test')
+    here = Run(tmp_path, str(ROOT / 'bags' / 'pull_test'), '--name', 'x', name='here')
+    there = Run(tmp_path, str(moved), '--name', 'x', name='there')
+    assert here.out.read_bytes() == there.out.read_bytes()
+
+
+def test_the_uncertainty_of_the_seals_adds_up_to_that_of_the_rig(tmp_path):
+    run = Run(tmp_path, str(THESIS), *THESIS_RIG)
+    seal = parse_seal(run.document)
+    both = actuator_friction((MountedSeal(seal, 'a'), MountedSeal(seal, 'b')), 2e6, 2e6)
+    expected = np.hypot(run.figures['relative_std'] * both.coulomb_friction, run.figures['absolute_std_N'])
+    assert both.coulomb_friction_std == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_law_by_name_is_saved_and_the_recommended_one_still_told(tmp_path):
+    run = Run(tmp_path, str(THESIS), '--law', 'constant_coulomb')
+    assert (run.figures['law'], run.figures['recommended_law']) == ('constant_coulomb', 'pressure_power_law')
+    assert Run(tmp_path, str(THESIS), '--law', 'magic').code == 2
+
+
+def test_estimator_needs_no_more_than_the_file(tmp_path):
+    run = Run(tmp_path, str(THESIS), *THESIS_RIG)
+    seal = parse_seal(run.document)
+    assert EstimatorParameters(EstimatorSettings(), (MountedSeal(seal, 'a'),))

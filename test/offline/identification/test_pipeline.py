@@ -1,0 +1,171 @@
+"""Identification from real measurements, against what is known of them."""
+
+import numpy as np
+import pytest
+from identify_run import BARS, DELFT, FRICTION_ID, OTHER, THESIS, THESIS_RIG, Run, data, delft
+
+from seal_friction_ros.core.foundation.units import LBF, PSI
+from seal_friction_ros.files import config_path, read_yaml
+from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
+from seal_friction_ros.offline.bags.import_thesis import import_thesis
+
+# --- thesis ---
+
+
+@pytest.fixture(scope='module', params=['physics_based', 'pressure_power_law'])
+def thesis(request, tmp_path_factory):
+    return Run(tmp_path_factory.mktemp('thesis'), str(THESIS), *THESIS_RIG, '--law', request.param)
+
+
+def test_thesis_mean_friction_per_pressure_is_that_of_the_tables(thesis):
+    expected = [2.50, 5.25, 6.42, 7.67, 8.42, 9.50, 10.17, 10.92, 11.67, 12.58, 13.33]  # [lbf]
+    assert thesis.figures['pressure_Pa'] == pytest.approx([100.0 * i * PSI for i in range(11)], rel=1e-5)
+    assert np.array(thesis.figures['measured_N']) / LBF == pytest.approx(expected, abs=0.006)
+
+
+def test_thesis_a_left_out_test_is_predicted_better_than_by_the_mean_of_the_other_two(thesis):
+    assert thesis.figures['left_out_by'] == 'test'
+    assert thesis.figures['cross_validation_mean_deviation_N'] <= thesis.figures['plain_mean_deviation_N']
+    assert thesis.figures['plain_mean_deviation_N'] == pytest.approx(3.295, abs=0.001)
+
+
+def test_thesis_the_band_covers_90_to_99_percent_of_left_out_readings(thesis):
+    assert 0.90 <= thesis.figures['band_coverage'] <= 0.99
+
+
+def test_thesis_fit_is_within_four_percent_of_every_mean(thesis):
+    shares = np.array(thesis.figures['fitted_N']) / np.array(thesis.figures['measured_N'])
+    assert np.abs(shares - 1.0).max() <= 0.041
+
+
+def test_thesis_stiction_is_half_a_pound_for_each_seal(thesis):
+    assert thesis.figures['stiction']['law'] == 'constant'
+    assert thesis.document['stiction'] / LBF == pytest.approx(1.11 / 2.0, abs=0.02)
+
+
+def test_thesis_constant_friction_is_beaten_and_the_repeatability_is_the_floor(thesis):
+    assert thesis.ladder('constant_coulomb')['is_beaten']
+    assert thesis.figures['recommended_law'] == 'pressure_power_law'
+    assert not thesis.ladder('physics_based')['is_beaten']
+    assert thesis.figures['repeatability'] == pytest.approx(0.085, abs=0.005)
+    assert thesis.ladder('physics_based')['error'] < thesis.figures['repeatability']
+
+
+def test_thesis_physics_based_law_is_that_of_the_shipped_seal(tmp_path):
+    run = Run(tmp_path, str(THESIS), *THESIS_RIG, '--law', 'physics_based')
+    shipped = read_yaml(config_path('seals', 'ms28775_114'))['friction_coefficient']
+    assert run.figures['parameters']['exponent'] == pytest.approx(shipped['exponent'], abs=0.01)
+    assert run.figures['parameters']['coefficient'] == pytest.approx(shipped['coefficient'], rel=0.03)
+    errors = run.figures['standard_errors']
+    assert abs(run.figures['parameters']['exponent'] - shipped['exponent']) < errors['exponent']
+    assert run.has_warning('coefficient and exponent trade off')
+
+
+def test_thesis_as_a_bag_gives_the_same_law_as_the_table(tmp_path):
+    import_thesis(tmp_path / 'bag')
+    bag = Run(tmp_path, str(tmp_path / 'bag'), *THESIS_RIG, '--law', 'physics_based', name='of_bag')
+    table = Run(tmp_path, str(THESIS), *THESIS_RIG, '--law', 'physics_based', name='of_table')
+    assert bag.figures['measured_N'] == pytest.approx(
+        table.figures['measured_N'], rel=0.06
+    )  # three readings: their median there, their mean here
+    assert bag.figures['parameters'] == pytest.approx(table.figures['parameters'], rel=0.03)
+    assert bag.document['stiction'] == pytest.approx(table.document['stiction'], rel=0.05)
+
+
+# --- Delft ---
+
+
+@pytest.mark.parametrize('ring', DELFT)
+def test_delft_half_range_friction_is_recovered(ring, tmp_path):
+    run = Run(tmp_path, *delft(ring))
+    assert run.figures['measured_N'] == pytest.approx(DELFT[ring], abs=0.2)
+    assert np.array(run.figures['pressure_Pa']) / 1e5 == pytest.approx(BARS, abs=0.1)
+
+
+@pytest.mark.parametrize('more', [(), ('--seal', 'delft_o_ring', '--squeeze-force', '--law', 'physics_based')])
+def test_delft_o_ring_law_predicts_a_pressure_it_has_not_seen(more, tmp_path):
+    run = Run(tmp_path, *delft('O-ring257'), *more)
+    assert run.figures['left_out_by'] == 'pressure'
+    assert run.figures['worst_left_out_error'] <= 0.12
+    assert run.figures['cross_validation_error'] <= 0.05
+    constant, law = run.ladder('constant_coulomb'), run.ladder(run.figures['law'])
+    assert constant['error'] >= 2.0 * law['error']
+    assert constant['rms_N'] >= 2.0 * law['rms_N']
+    assert not any(run.figures['is_outlier'])
+    assert run.has_warning('collinear', 'speed', 'pressure')
+
+
+def test_delft_standard_deviation_covers_runs_that_repeat_within_10_to_15_percent(tmp_path):
+    run = Run(tmp_path, *delft('O-ring257'))
+    shares = np.array(run.figures['std_N']) / np.array(run.figures['fitted_N'])
+    assert 0.10 <= shares.min() <= shares.max() <= 0.20
+    assert run.has_warning('every pressure was measured in one run', 'drift')
+    known = Run(tmp_path, *delft('O-ring257'), '--run-to-run', '0.05', name='known')
+    assert known.figures['relative_std'] < run.figures['relative_std']
+
+
+def test_delft_offsets_of_the_force_sum_are_told(tmp_path):
+    run = Run(tmp_path, *delft('O-ring257'))
+    assert run.figures['offset_N'] == pytest.approx([-1.2, -1.9, -2.2, -2.0], abs=0.15)  # config/rigs/delft.yaml
+    line = run.figures['offset_line']
+    assert line['area_error_m2'] * 1e6 == pytest.approx(-1.1, abs=0.4)  # [mm2] of a bore of 519
+    assert line['constant_N'] == pytest.approx(-1.35, abs=0.2)
+
+
+def test_delft_x_ring_at_7_bar_is_an_outlier_with_a_reason_to_look(tmp_path):
+    run = Run(tmp_path, *delft('X-ring257'))
+    assert run.figures['is_outlier'] == [False, False, False, True]
+    assert run.has_warning('outlier', '6.92 bar', 'A reason to look', 'had not settled')
+    assert not run.has_warning('one direction only')  # the outlier has both
+    assert run.figures['drift'][3] > 0.2  # the reason: it is still rising
+    assert max(map(abs, run.figures['drift'][:3])) < 0.1
+    assert run.figures['measured_N'][3] > 1.4 * run.figures['fitted_N'][3]
+    assert run.document['identified_pressure'][1] < 5.2e5  # nothing is claimed up there
+
+
+def test_delft_o_ring_and_x_ring_are_not_averaged(tmp_path):
+    run = Run(tmp_path, *delft('O-ring257'), *delft('X-ring257'))
+    assert run.code == 2
+    assert 'the friction has changed: 7.912 N in O-ring257_7bar.csv and 15.63 N in X-ring257_7bar.csv' in run.errors
+    assert not run.out.exists()
+
+
+# --- MBARI ---
+
+
+@pytest.fixture(scope='module')
+def other(tmp_path_factory):
+    return Run(tmp_path_factory.mktemp('mbari'), str(data(f'mbari/{OTHER}')))
+
+
+@pytest.mark.parametrize(('name', 'bar', 'table'), [('friction_id', 150.0, 197.0), ('other', 200.0, 504.0)])
+def test_mbari_blocks_are_predicted_from_the_others(name, bar, table, request):
+    run = request.getfixturevalue(name)
+    assert run.figures['left_out_by'] == 'block'
+    assert run.figures['cross_validation_rms_N'] <= bar < table
+    assert run.has_warning('velocity and pressure difference are collinear')
+    assert 0.90 <= run.figures['band_coverage'] <= 0.99
+    with_pressure = run.figures['law'].startswith('pressure')
+    assert with_pressure == (name == 'friction_id')  # there it pays out of sample, in the other it does not
+    assert run.has_warning('no gain is claimed for pressure') == (not with_pressure)
+    pays = [remark for remark in run.figures['remarks'] if remark.startswith('pressure pays')]
+    assert bool(pays) == with_pressure
+
+
+def test_mbari_uses_the_samples_that_the_bars_are_over(friction_id):
+    rig = read_rig(config_path('rigs', 'mbari'))
+    samples = read_samples(data(f'mbari/{FRICTION_ID}'), rig).samples
+    acceleration = np.gradient(samples.velocity, samples.stamp * 1e-9)
+    chosen = (np.abs(samples.velocity) > 0.01) & (np.abs(acceleration) < 0.05)  # [m/s], [m/s2]
+    assert friction_id.figures['samples_used'] == {FRICTION_ID: int(chosen.sum())}
+    assert sum(friction_id.figures['samples_left_out'].values()) == int((~chosen).sum())
+
+
+def test_mbari_friction_has_changed_between_the_files_and_is_not_averaged(tmp_path, friction_id):
+    both = Run(tmp_path, *(str(data(f'mbari/{name}')) for name in (FRICTION_ID, OTHER)))
+    (change,) = both.figures['changes']
+    assert change['is_change']
+    assert change['ratio'] == pytest.approx(0.64, abs=0.05)
+    assert both.has_warning('the friction has changed', '-36 %', 'was not averaged in')
+    assert both.figures['parameters'] == friction_id.figures['parameters']
+    assert [file['name'] for file in both.document['identification']['data']] == [FRICTION_ID]

@@ -1,0 +1,100 @@
+"""The page kit: values escaped, missing values refused, files written whole."""
+
+import re
+
+import pytest
+from jinja2 import UndefinedError
+from matplotlib.figure import Figure
+from paths import ROOT
+from report_page import Page, checked_page
+
+from seal_friction_ros.core.servo.motions import Sine
+from seal_friction_ros.offline.reports import page as kit
+from seal_friction_ros.offline.reports.figure_style import Plot, house_style, new_figure
+from seal_friction_ros.offline.reports.page import (
+    PARAMETER_HEADS,
+    TEMPLATES,
+    Table,
+    environment,
+    parameter_rows,
+    render_page,
+    write_page,
+)
+
+EVIL = '<script>alert("1")</script>&\''
+PARTS = {'base', 'macros', 'lubrication', 'lubrication_macros'}
+PAGES = sorted(path.stem for path in TEMPLATES.glob('*.html') if path.stem not in PARTS)
+EVERYTHING = """{% extends 'base.html' %}{% from 'macros.html' import figure, notes, table, tile with context %}
+{% block title %}{{ name }}{% endblock %}{% block body %}{{ tile(name, name) }}{{ notes([name]) }}
+{% call figure('shown') %}{{ name }} and "quoted" text{% endcall %}{% call figure('absent') %}{{ missing }}{% endcall %}
+{{ table(rows) }}{% endblock %}"""
+
+
+@pytest.fixture
+def everything(tmp_path, monkeypatch):
+    """Name of a template that has every part, in a folder beside copies of the parts."""
+    for part in ('base', 'macros'):
+        (tmp_path / f'{part}.html').write_text((TEMPLATES / f'{part}.html').read_text())
+    (tmp_path / 'everything.html').write_text(EVERYTHING)
+    monkeypatch.setattr(kit, 'TEMPLATES', tmp_path)
+    environment.cache_clear()
+    yield 'everything'
+    environment.cache_clear()
+
+
+def plot(name='shown') -> Plot:
+    with house_style():
+        figure, ax = new_figure('A line', 3.0)
+        ax.plot([0.0, 1.0], [0.0, 1.0])
+    assert isinstance(figure, Figure)
+    return Plot(name, figure)
+
+
+def test_every_value_is_escaped_and_read_back_unchanged(everything, tmp_path):
+    rows = Table((EVIL, 'number'), [(EVIL, 1)], (0,))
+    write_page(tmp_path / 'out' / 'page.html', everything, [plot()], name=EVIL, rows=rows)
+    page = checked_page(tmp_path / 'out' / 'page.html')
+    assert page.texts['title'] == page.texts['h1'] == page.texts['p.note'] == [EVIL]
+    assert page.tiles == {EVIL: EVIL}
+    assert page.table(EVIL) == [{EVIL: EVIL, 'number': '1'}]
+    assert page.texts['figcaption'] == [f'{EVIL} and "quoted" text']
+    assert page.texts['td.text'] == [EVIL]
+    assert page.texts['td'] == ['1']
+
+
+def test_a_figure_that_was_not_drawn_is_left_out_with_its_caption(everything, tmp_path):
+    write_page(tmp_path / 'page.html', everything, [], name='x', rows=Table((), ()))
+    assert Page(tmp_path / 'page.html').figures == []
+
+
+@pytest.mark.parametrize('name', PAGES)
+def test_a_template_is_strict_about_missing_values(name):
+    with pytest.raises(UndefinedError):
+        render_page(name, {})
+
+
+def test_every_template_belongs_to_a_report():
+    sources = ''.join(path.read_text() for path in TEMPLATES.parent.glob('*.py'))
+    assert sorted(re.findall(r"write_page\(\s*out,\s*'(\w+)'", sources)) == PAGES
+
+
+def test_the_templates_are_installed():
+    assert re.search(r"offline\.reports': \['templates/\*\.html'\]", (ROOT / 'setup.py').read_text())
+
+
+def test_parameters_come_with_unit_and_meaning():
+    rows = parameter_rows(Sine(amplitude=0.001, frequency=1.0 / 3.0), 'wave.')
+    assert [len(row) for row in rows] == [len(PARAMETER_HEADS)] * len(rows)
+    assert rows[0][:3] == ('wave.amplitude', '0.001', 'm')
+    assert rows[1][:3] == ('wave.frequency', '0.3333333333', 'Hz')
+    assert all(row[3] for row in rows)
+
+
+def test_a_page_that_is_there_is_replaced_and_one_that_cannot_be_written_is_one_clear_line(everything, tmp_path):
+    values = {'name': 'x', 'rows': Table((), ())}
+    (tmp_path / 'page.html').write_text('old')
+    assert write_page(tmp_path / 'page.html', everything, [], **values) == ()
+    assert (tmp_path / 'page.html').read_text().startswith('<!DOCTYPE html>')
+    with pytest.raises(ValueError, match='cannot write') as error:
+        write_page(tmp_path / 'page.html' / 'page.html', everything, [plot()], **values)
+    assert '\n' not in str(error.value)
