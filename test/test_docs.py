@@ -9,9 +9,9 @@ from pathlib import Path
 import demo
 import make_docs
 import pytest
+from harness.processes import free_domain, graph_environment
 from paths import ROOT
 
-from seal_friction_ros.nodes.processes import free_domain, graph_environment
 from seal_friction_ros.offline.replay.replay import replay
 
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]

@@ -40,13 +40,15 @@ def compilable(function: Function) -> Function:
 def compiled(function: Function) -> Function:
     """Decorator: ``function`` compiled at its first call.
 
-    No fast-math: sums keep their order, so both ways round alike. Not kept on disk: numba looks only at the file of a
-    function, not at the files of the functions it calls, so a change there would go unnoticed.
+    No fast-math: sums keep their order, so both ways round alike. The compiled code is kept on disk only if
+    ``NUMBA_CACHE_DIR`` names a folder for it. Use another folder after every change of the sources, as the tests do:
+    numba compares the file of a function, not the files of the functions it calls.
     """
     import numba  # noqa: PLC0415  half a second, and the live node does without
 
     make_known()
-    return cast(Function, numba.njit(error_model='numpy')(_with_unrolled_loops(function)))
+    config: Any = numba.config
+    return cast(Function, numba.njit(error_model='numpy', cache=bool(config.CACHE_DIR))(_with_unrolled_loops(function)))
 
 
 def make_known() -> None:

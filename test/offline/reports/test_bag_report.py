@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from closed_loop_bags import write_closed_loop
+from harness.closed_loop_bags import write_closed_loop
 
 from seal_friction_ros.core.estimation.configuration import SealSelection, first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from closed_loop_bags import with_coulomb_scale, write_closed_loop
+from harness.closed_loop_bags import with_coulomb_scale, write_closed_loop
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from example_bags import default_configuration
+from harness.example_bags import default_configuration
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.messages import (
