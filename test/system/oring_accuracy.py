@@ -15,7 +15,7 @@ import dataclasses
 import json
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from rich.console import Console
 from rich.table import Table
@@ -134,12 +134,12 @@ def friction() -> Rows:
     return rows
 
 
-def sensitivities() -> Rows:
+def variants() -> Rows:
     """Normal force of the blind case and its variants [N] at 0, 500 and 1000 psi, and deviation from Appendix B [%]."""
     case = parse_case(read_yaml(config_path('oring', 'ms28775_114_blind'))).case
     geometry = case.geometry
     nominal = dataclasses.replace(geometry, section_diameter=0.103 * INCH)
-    variants = {
+    cases = {
         'blind': case,
         'section 0.105 in instead of 0.106': _with(case, section_diameter=0.105 * INCH),
         'section 0.103 in, nominal': _with(case, section_diameter=0.103 * INCH),
@@ -161,7 +161,7 @@ def sensitivities() -> Rows:
     }
     compared = {psi: case.normal_force for psi, case in appendix_b().items() if psi in (0.0, 500.0, 1000.0)}
     rows: Rows = []
-    for name, variant in variants.items():
+    for name, variant in cases.items():
         row: dict[str, float | str] = {'variant': name}
         for psi, result in zip(compared, contact_results(variant, tuple(p * PSI for p in compared)), strict=True):
             row[f'F_n at {psi:.0f} psi [N]'] = result.rod.force
@@ -174,37 +174,40 @@ def _with(case: OringCase, **changes: float) -> OringCase:
     return dataclasses.replace(case, geometry=dataclasses.replace(case.geometry, **changes))
 
 
-def converging(name: str, choices: tuple[float, ...]) -> Rows:
+def converging(name: str, choices: Sequence[float]) -> Rows:
     """Figures of `contact` for several values of one number of `Numerics`."""
     return [{name: choice, **contact(dataclasses.replace(Numerics(), **{name: choice}))} for choice in choices]
 
 
+TABLES: dict[str, Callable[[Sequence[int]], Rows]] = {
+    'hertz': lambda _: hertz(),
+    'lines': lambda lines: converging('lines', lines),
+    'penalty': lambda _: converging('penalty', PENALTIES),
+    'transition': lambda _: converging('transition', TRANSITIONS),
+    'thesis': lambda _: thesis(),
+    'variants': lambda _: variants(),
+    'friction': lambda _: friction(),
+}
+"""Name -> its rows, given the meshes of the table ``lines``."""
+
+
 def main() -> int:
     """Compute the requested tables; print each, or all of them as one JSON object."""
-    makers: dict[str, Callable[[], Rows]] = {
-        'hertz': hertz,
-        'lines': lambda: converging('lines', tuple(arguments.lines)),
-        'penalty': lambda: converging('penalty', PENALTIES),
-        'transition': lambda: converging('transition', TRANSITIONS),
-        'thesis': thesis,
-        'variants': sensitivities,
-        'friction': friction,
-    }
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('tables', nargs='*', metavar='TABLE', help=', '.join(makers))
+    parser.add_argument('tables', nargs='*', metavar='TABLE', help=', '.join(TABLES))
     parser.add_argument('--json', action='store_true')
     parser.add_argument('--lines', type=int, nargs='+', default=LINES, help='meshes of the table ``lines``')
     arguments = parser.parse_args()
-    unknown = [name for name in arguments.tables if name not in makers]
+    unknown = [name for name in arguments.tables if name not in TABLES]
     if unknown:
-        parser.error(f'there is no table {unknown[0]}: there are {", ".join(makers)}')
-    made = {}
-    for name in arguments.tables or makers:
-        made[name] = makers[name]()
+        parser.error(f'there is no table {unknown[0]}: there are {", ".join(TABLES)}')
+    computed = {}
+    for name in arguments.tables or TABLES:
+        computed[name] = TABLES[name](arguments.lines)
         if not arguments.json:
-            _print(name, made[name])
+            _print(name, computed[name])
     if arguments.json:
-        print(json.dumps(made))
+        print(json.dumps(computed))
     return 0
 
 

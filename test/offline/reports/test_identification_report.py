@@ -51,6 +51,7 @@ def test_without_geometry_or_starts_the_page_says_which_figures_are_missing(tmp_
     assert 'Figure 17 (prior art) needs charts' in text
 
 
+@pytest.mark.renders
 def test_the_same_sources_give_the_same_page(tmp_path):
     pages = []
     for name in ('one', 'two'):

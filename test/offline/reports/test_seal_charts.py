@@ -79,7 +79,6 @@ def test_each_seal_file_of_the_project_makes_a_page(tmp_path, name):
     assert {'fig12_prior_art', 'fig17_prior_art_and_tests', 'fig24_model_over_pressure'} <= figures
     assert {'fig22_state_1', 'fig23_states_2_and_3'} <= figures
     assert ('fig18_coefficient_of_friction' in figures) == (name != 'ms28775_114_prior_art')
-    assert all(path.stat().st_size > 5000 for path in summary.figures)
     assert {path.suffix for path in summary.figures} == {'.svg', '.png'}
     page = re.sub(r'base64,[A-Za-z0-9+/=]+', '', summary.page.read_text())
     assert 'http' not in page
@@ -87,6 +86,7 @@ def test_each_seal_file_of_the_project_makes_a_page(tmp_path, name):
     assert (summary.seal, summary.seal_count, len(summary.measured)) == (name, 2, 11)
 
 
+@pytest.mark.renders
 def test_the_same_seal_gives_the_same_bytes(tmp_path):
     one = write_seal_charts(SEAL_FILE, tmp_path / 'a' / 'charts.html')
     other = write_seal_charts(SEAL_FILE, tmp_path / 'b' / 'charts.html')

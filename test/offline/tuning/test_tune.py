@@ -193,6 +193,7 @@ def test_recording_is_as_the_pipeline_saw_it(axis: Path):
     assert configuration == default_configuration()
 
 
+@pytest.mark.renders
 def test_own_file_is_replaced_and_two_runs_write_the_same_bytes(axis: Path, tmp_path: Path):
     arguments = ['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')]
     assert main(arguments) == 0
