@@ -16,6 +16,7 @@ from bisect import bisect_right
 from collections import namedtuple
 from collections.abc import Callable
 from functools import cache, partial
+from importlib import import_module
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -148,21 +149,41 @@ def _kept_type() -> Any:
         def __new__(cls, value: Any) -> Any:
             return structref.StructRefProxy.__new__(cls, value)
 
-    structref.register(KeptStruct)
-    structref.define_proxy(KeptProxy, KeptStruct, ['value'])
+    structref.register(_named(KeptStruct, 'KeptStruct'))
+    structref.define_proxy(_named(KeptProxy, 'KeptProxy'), KeptStruct, ['value'])
     return KeptProxy
 
 
 @cache
 def _record_type(name: str, fields: tuple[str, ...]) -> Any:
-    return namedtuple(name, fields)
+    return _named(namedtuple(name, fields), 'record', name, *fields)
 
 
 @cache
 def _bound_type(function: Callable[..., float]) -> Any:
     """Type of the parameters of ``function``, by which compiled code knows the function."""
     members = {'__slots__': (), 'function': staticmethod(function)}
-    return type(function.__name__, (namedtuple('bound', ['parameters']),), members)
+    made = type(function.__name__, (namedtuple('bound', ['parameters']),), members)
+    return _named(made, 'bound', function.__module__, function.__qualname__)
+
+
+def _named(made: Any, *parts: str) -> Any:
+    """Give a type the name by which `__getattr__` makes it in another process: compiled code on disk refers to it."""
+    made.__module__, made.__qualname__ = __name__, ':'.join(parts).replace('.', '/')
+    globals()[made.__qualname__] = made
+    return made
+
+
+def __getattr__(name: str) -> Any:
+    kind, *parts = name.replace('/', '.').split(':')
+    if kind == 'record':
+        return _record_type(parts[0], tuple(parts[1:]))
+    if kind == 'bound':
+        return _bound_type(getattr(import_module(parts[0]), parts[1]))
+    if kind in ('KeptStruct', 'KeptProxy'):
+        _kept_type()
+        return globals()[name]
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
 
 
 @cache
