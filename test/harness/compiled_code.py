@@ -12,10 +12,15 @@ from paths import ROOT
 
 
 def cache_folder() -> str:
-    """Folder for the compiled code of the present sources; removes those of other sources."""
+    """Folder for the compiled code of the present sources; removes those of other sources.
+
+    The sources are those of core, which compiled code calls, and the modules elsewhere that compile functions.
+    """
     digest = hashlib.sha256(importlib.metadata.version('numba').encode())
     for path in sorted((ROOT / 'seal_friction_ros').rglob('*.py')):
-        digest.update(path.read_bytes())
+        source = path.read_bytes()
+        if 'core' in path.relative_to(ROOT).parts or b'foundation.compiled import' in source:
+            digest.update(source)
     folder = ROOT / 'build' / 'numba' / digest.hexdigest()[:16]
     folder.mkdir(parents=True, exist_ok=True)
     for other in folder.parent.iterdir():

@@ -16,7 +16,7 @@ from bisect import bisect_right
 from collections import namedtuple
 from collections.abc import Callable
 from functools import cache, partial
-from importlib import import_module
+from pkgutil import resolve_name
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -169,7 +169,7 @@ def _bound_type(function: Callable[..., float]) -> Any:
 
 def _named(made: Any, *parts: str) -> Any:
     """Give a type the name by which `__getattr__` makes it in another process: compiled code on disk refers to it."""
-    made.__module__, made.__qualname__ = __name__, ':'.join(parts).replace('.', '/')
+    made.__module__, made.__qualname__ = __name__, ':'.join(parts).replace('.', '/')  # a name has no dots
     globals()[made.__qualname__] = made
     return made
 
@@ -179,7 +179,7 @@ def __getattr__(name: str) -> Any:
     if kind == 'record':
         return _record_type(parts[0], tuple(parts[1:]))
     if kind == 'bound':
-        return _bound_type(getattr(import_module(parts[0]), parts[1]))
+        return _bound_type(resolve_name(':'.join(parts)))
     if kind in ('KeptStruct', 'KeptProxy'):
         _kept_type()
         return globals()[name]
