@@ -29,7 +29,7 @@ test:
 bench: setup
 	@$(python) bench/step.py
 	@$(python) bench/servo.py
-	@$(python) bench/oring.py lines --lines 17 25 33
+	@$(python) bench/oring.py --lines 17 25 33
 	@$(python) bench/ehl.py
 	@$(python) bench/offline.py
 

@@ -39,12 +39,14 @@ from rich.progress import Progress
 from rich.table import Table
 from seal_friction_msgs.msg import CylinderPressure, ForceSum, FrictionEstimate, FrictionFeedForward, RodVelocity
 
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.processes import free_domain, graph_environment, node_process
+
 from seal_friction_ros.core.estimation.messages import encode
 from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import PROFILES
 from seal_friction_ros.nodes.executor import spin
-from seal_friction_ros.nodes.processes import free_domain, graph_environment, running
 
 RATES = (100, 500, 1000)  # [Hz]
 ROUND, SAMPLES = 0.5, 300  # [s], samples: a round of one case is no shorter
@@ -216,7 +218,7 @@ def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
             values: dict[str, Any] = {'feedforward.use_measured_velocity': True, 'realtime_priority': realtime}
             if case == RECORDING:
                 values |= {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
-            process = stack.enter_context(running('friction_estimator', domain, values, log))
+            process = stack.enter_context(node_process('friction_estimator', domain, values, log))
         for name in PROFILES:
             os.environ.pop(name, None)
         asker = stack.enter_context(Asker(case, domain, process))

@@ -21,8 +21,10 @@ from live import ALONE, Asker
 from rich.console import Console
 from rich.table import Table
 
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.processes import free_domain, node_process
+
 from seal_friction_ros.nodes.discovery import set_up_discovery
-from seal_friction_ros.nodes.processes import free_domain, running
 
 PATIENCE = 30.0  # [s]
 COMMAND = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main']
@@ -52,7 +54,7 @@ def first_estimate() -> float:
     domain = free_domain()
     with Asker(ALONE, domain, None) as asker, tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        with running('friction_estimator', domain, {}, Path(folder) / 'log'):
+        with node_process('friction_estimator', domain, {}, Path(folder) / 'log'):
             while not asker.round_trips:
                 if time.perf_counter() > start + PATIENCE:
                     raise RuntimeError('no estimate comes')

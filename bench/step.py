@@ -26,13 +26,15 @@ from rich.table import Table
 from rich.text import Text
 from seal_friction_msgs.msg import RodVelocity
 
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.processes import free_domain
+
 from seal_friction_ros.core.estimation.estimator import step
 from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, Output, decode, encode
 from seal_friction_ros.core.estimation.pipeline import WantedMotion, init, receive
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Velocity
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.discovery import set_up_discovery
-from seal_friction_ros.nodes.processes import free_domain
 from seal_friction_ros.offline.bags.recorder import Recorder
 
 CALLS = 2000

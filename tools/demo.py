@@ -19,10 +19,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.live_closed_loop import record_closed_loop
+from harness.processes import free_domain, play_live
+
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.files import config_path
-from seal_friction_ros.nodes.closed_loop import close_loop_live
-from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.nodes.realtime import realtime_granted
 from seal_friction_ros.offline.bags.import_log import import_log
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
@@ -141,7 +143,7 @@ def main() -> int:
         findings = [examined(bag) for bag, _ in recorded]
         console.print(f'closing the loop with the simulated servo for {2 * LOOP_TIME:.0f} s ...')
         simulator = ROOT / 'config' / 'servo_simulator.yaml'
-        recorded.append((LOOP_BAG, close_loop_live(LOOP_BAG, free_domain(), LOOP_TIME, simulator, priority())))
+        recorded.append((LOOP_BAG, record_closed_loop(LOOP_BAG, free_domain(), LOOP_TIME, simulator, priority())))
         findings.append(examined(LOOP_BAG))
         runs = [
             Run(bag, figures, same.result(), report.result())

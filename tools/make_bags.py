@@ -1,7 +1,7 @@
 """Make the small bags under ``bags/`` anew: ``python tools/make_bags.py``.
 
-They are reference runs: ``test/replay`` replays each and wants the recorded estimates back to the byte. So they are
-made anew only when an estimate is meant to change, and the change is then said in CHANGELOG.rst.
+They are reference runs: the tests replay each and require the recorded estimates byte for byte. Make them anew only
+when an estimate is meant to change, and note the change in CHANGELOG.rst.
 """
 
 import hashlib
@@ -14,6 +14,9 @@ from pathlib import Path
 
 import yaml
 
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.processes import free_domain, play_live
+
 from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,
     POSITION_TYPE,
@@ -23,7 +26,6 @@ from seal_friction_ros.core.estimation.messages import (
     encode,
 )
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
-from seal_friction_ros.nodes.processes import free_domain, play_live
 from seal_friction_ros.offline.bags.bag import (
     FORCE_TOPIC,
     POSITION_TOPIC,

@@ -32,7 +32,7 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
 from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
 
-sys.path.insert(0, str(Path(__file__).parents[1] / 'bench'))
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test' / 'system'))
 from fault_rows import SIGNAL_ROWS, Row
 from faults import REQUIRED, TRIALS
 

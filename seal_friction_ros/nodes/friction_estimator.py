@@ -39,6 +39,7 @@ from seal_friction_ros.nodes.graph_watch import GraphWatch
 from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 
+_WATCH_PERIOD = 0.05  # [s]
 SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
 
 
@@ -56,6 +57,7 @@ class FrictionEstimator(ManagedNode):
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._topics: dict[str, str] = {}
+        self._watch_timer: Any = None
         self._sent: list[tuple[str, Output, bytes]] = []
         super().__init__('friction_estimator', FRICTION_ESTIMATOR_PARAMETERS, **kwargs)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
@@ -85,6 +87,7 @@ class FrictionEstimator(ManagedNode):
         self._topics = {type_name: publisher.topic_name for type_name, publisher in self._outputs.items()}
         for name in INPUTS:
             self._subscribe(name, qos.STREAM)
+        self._watch_timer = self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer)
         self._configuration = configuration
 
     def release(self) -> None:
@@ -95,6 +98,9 @@ class FrictionEstimator(ManagedNode):
             self.destroy_publisher(publisher)
         self._inputs.clear()
         self._outputs.clear()
+        if self._watch_timer is not None:
+            self.destroy_timer(self._watch_timer)
+            self._watch_timer = None
         self._configuration = None
 
     def start(self) -> None:
@@ -129,9 +135,15 @@ class FrictionEstimator(ManagedNode):
             profile,
             raw=True,
             qos_overriding_options=overriding,
-            event_callbacks=SubscriptionEventCallbacks(matched=self.on_matched),
+            # An event of a subscription that is replaced meanwhile is a segmentation fault of the events executor.
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self._topics[name] = self._inputs[name].topic_name
+
+    def _on_watch_timer(self) -> None:
+        """Publish diagnostics when a publisher of an input has appeared or disappeared."""
+        if self._watch.has_changed():
+            self.publish_diagnostics()
 
     def _ros_time(self) -> int:
         return self.get_clock().now().nanoseconds

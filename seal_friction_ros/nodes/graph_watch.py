@@ -50,6 +50,7 @@ class GraphWatch:
         self._best_effort: dict[str, str] = {}
         self._without_node_name: set[str] = set()
         self._incompatible_outputs: set[str] = set()
+        self._connections: list[int] = []
 
     def findings(self, silent_inputs: list[str], *, retry: bool) -> GraphFindings:
         """State of the graph.
@@ -63,6 +64,11 @@ class GraphWatch:
         unheard = self._retry_silent_inputs(silent_inputs) if retry else []
         unheard += self._incompatible_subscribers()
         return GraphFindings(counts, duplicates, unheard, self._best_effort.copy())
+
+    def has_changed(self) -> bool:
+        """Whether a publisher of an input has appeared or disappeared since the last call."""
+        before, self._connections = self._connections, [self._publisher_count(name) for name in INPUTS]
+        return self._connections != before
 
     def duplicate_publishers(self) -> list[str]:
         """Topics with several publishers, and the nodes that publish them.

@@ -1,5 +1,6 @@
 """Base class of the nodes: lifecycle, parameters from dataclasses, diagnostics once a second."""
 
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import seal_friction_msgs.msg
@@ -151,9 +152,7 @@ class ManagedNode(LifecycleNode):
             self._diagnostics_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
             self.make()
             take_realtime_priority(self.settings(StartOptions).realtime_priority)
-            # Steady time: diagnostics continue while simulated time stands still.
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self._diagnostics_timer = self.create_timer(_DIAGNOSTICS_PERIOD, self._on_timer, clock=steady)
+            self._diagnostics_timer = self.create_steady_timer(_DIAGNOSTICS_PERIOD, self._on_timer)
         except Exception as error:  # noqa: BLE001  rclpy swallows exceptions of transitions
             self.get_logger().error(str(error))
             self._release()
@@ -197,10 +196,9 @@ class ManagedNode(LifecycleNode):
         self._diagnostics_timer = self._diagnostics_publisher = None
         self.release()
 
-    def on_matched(self, _: Any) -> None:
-        """Publish diagnostics immediately when a publisher appears or disappears."""
-        if self._diagnostics_timer is not None:
-            self.publish_diagnostics()
+    def create_steady_timer(self, period: float, callback: Callable[[], None]) -> Any:
+        """Timer with ``period`` [s] of steady time, which continues while simulated time stands still."""
+        return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_timer(self) -> None:
         self.publish_diagnostics()

@@ -4,11 +4,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-import rclpy
-from live_graph import graph
+from harness.live_graph import graph
+from harness.spin_nodes import ros_context
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from seal_friction_msgs.msg import FrictionEstimate, RodVelocity
@@ -65,9 +64,8 @@ def test_a_second_publisher_is_named_and_harmless_unless_refused(tmp_path: Path)
 
 
 def test_an_input_of_another_type_is_reported_with_the_node_and_the_reason():
-    with graph() as g:
-        context = Context()  # within one, the middleware itself refuses a second type
-        rclpy.init(context=context, domain_id=g.context.get_domain_id())
+    # Within one context the middleware itself refuses a second type.
+    with graph() as g, ros_context(g.context.get_domain_id()) as context:
         other = Node('other_driver', context=context)
         other.create_publisher(Float64, '/servo_reference', 10)
         words = (
@@ -75,7 +73,6 @@ def test_an_input_of_another_type_is_reported_with_the_node_and_the_reason():
         )
         assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''))
         other.destroy_node()
-        rclpy.try_shutdown(context=context)
 
 
 def test_a_subscriber_that_requests_what_is_not_offered_is_reported_with_the_reason():
@@ -83,7 +80,7 @@ def test_a_subscriber_that_requests_what_is_not_offered_is_reported_with_the_rea
         other = Node('logger', context=g.context)
         other.create_subscription(FrictionEstimate, 'friction_estimate', lambda _: None, LATCHED)
         words = '/friction_estimate: /logger wants incompatible quality of service (volatile where transient local'
-        assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''), 30.0)
+        assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''))
         other.destroy_node()
 
 

@@ -4,13 +4,11 @@ from contextlib import contextmanager
 from xml.etree import ElementTree
 
 import pytest
-import rclpy
+from harness.spin_nodes import ros_context
 from paths import ROOT
-from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
-from seal_friction_ros.nodes.processes import free_domain
 from seal_friction_ros.nodes.servo_simulator import ServoSimulator
 
 POLICY = ROOT / 'config' / 'security' / 'policy.xml'
@@ -31,16 +29,15 @@ def allowed(node: str, kind: str, direction: str) -> set[str]:
 
 @contextmanager
 def running(kind, values):
-    context = Context()
-    rclpy.init(context=context, domain_id=free_domain())
-    node = kind(context=context, parameter_overrides=[Parameter(name, value=value) for name, value in values.items()])
-    try:
-        assert node.autostart()
-        yield node
-    finally:
-        node.finish()
-        node.destroy_node()
-        rclpy.try_shutdown(context=context)
+    with ros_context() as context:
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        node = kind(context=context, parameter_overrides=overrides)
+        try:
+            assert node.autostart()
+            yield node
+        finally:
+            node.finish()
+            node.destroy_node()
 
 
 @pytest.mark.parametrize('name', WIRINGS)

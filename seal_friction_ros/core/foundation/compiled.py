@@ -16,6 +16,7 @@ from bisect import bisect_right
 from collections import namedtuple
 from collections.abc import Callable
 from functools import cache, partial
+from pkgutil import resolve_name
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -40,13 +41,15 @@ def compilable(function: Function) -> Function:
 def compiled(function: Function) -> Function:
     """Decorator: ``function`` compiled at its first call.
 
-    No fast-math: sums keep their order, so both ways round alike. Not kept on disk: numba looks only at the file of a
-    function, not at the files of the functions it calls, so a change there would go unnoticed.
+    No fast-math: sums keep their order, so both ways round alike. The compiled code is kept on disk only if
+    ``NUMBA_CACHE_DIR`` names a folder for it. Use another folder after every change of the sources, as the tests do:
+    numba compares the file of a function, not the files of the functions it calls.
     """
     import numba  # noqa: PLC0415  half a second, and the live node does without
 
     make_known()
-    return cast(Function, numba.njit(error_model='numpy')(_with_unrolled_loops(function)))
+    config: Any = numba.config
+    return cast(Function, numba.njit(error_model='numpy', cache=bool(config.CACHE_DIR))(_with_unrolled_loops(function)))
 
 
 def make_known() -> None:
@@ -146,21 +149,41 @@ def _kept_type() -> Any:
         def __new__(cls, value: Any) -> Any:
             return structref.StructRefProxy.__new__(cls, value)
 
-    structref.register(KeptStruct)
-    structref.define_proxy(KeptProxy, KeptStruct, ['value'])
+    structref.register(_named(KeptStruct, 'KeptStruct'))
+    structref.define_proxy(_named(KeptProxy, 'KeptProxy'), KeptStruct, ['value'])
     return KeptProxy
 
 
 @cache
 def _record_type(name: str, fields: tuple[str, ...]) -> Any:
-    return namedtuple(name, fields)
+    return _named(namedtuple(name, fields), 'record', name, *fields)
 
 
 @cache
 def _bound_type(function: Callable[..., float]) -> Any:
     """Type of the parameters of ``function``, by which compiled code knows the function."""
     members = {'__slots__': (), 'function': staticmethod(function)}
-    return type(function.__name__, (namedtuple('bound', ['parameters']),), members)
+    made = type(function.__name__, (namedtuple('bound', ['parameters']),), members)
+    return _named(made, 'bound', function.__module__, function.__qualname__)
+
+
+def _named(made: Any, *parts: str) -> Any:
+    """Give a type the name by which `__getattr__` makes it in another process: compiled code on disk refers to it."""
+    made.__module__, made.__qualname__ = __name__, ':'.join(parts).replace('.', '/')  # a name has no dots
+    globals()[made.__qualname__] = made
+    return made
+
+
+def __getattr__(name: str) -> Any:
+    kind, *parts = name.replace('/', '.').split(':')
+    if kind == 'record':
+        return _record_type(parts[0], tuple(parts[1:]))
+    if kind == 'bound':
+        return _bound_type(resolve_name(':'.join(parts)))
+    if kind in ('KeptStruct', 'KeptProxy'):
+        _kept_type()
+        return globals()[name]
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
 
 
 @cache

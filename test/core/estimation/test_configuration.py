@@ -6,7 +6,7 @@ import math
 import struct
 
 import pytest
-from answers import receive_one
+from harness.answers import receive_one
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT

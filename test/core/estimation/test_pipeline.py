@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from answers import NOTHING, receive_one
+from harness.answers import NOTHING, receive_one
 
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Limited
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, type_of

@@ -1,9 +1,9 @@
 """The film of a given gap: against closed forms, conserved, complementary."""
 
-import given_gap
 import numpy as np
 import pytest
-from given_gap import OPEN, film_of_gap
+from harness import given_gap
+from harness.given_gap import OPEN, film_of_gap
 from scipy.optimize import brentq
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError

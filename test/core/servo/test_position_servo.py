@@ -1,16 +1,13 @@
 """The servo as a whole: rest, Figure 25, feed-forward, and references that are no good."""
 
 import dataclasses
-import json
 import math
-import sys
 from functools import cache
 
 import numpy as np
 import pytest
 import yaml
 from paths import ROOT
-from servo import main as time_servo
 
 from seal_friction_ros.core.estimation import estimator, feedforward
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
@@ -272,11 +269,3 @@ def test_friction_that_rises_too_steeply_for_the_inner_step_is_refused_with_the_
     seal = dataclasses.replace(SEAL, velocity_terms=VelocityTerms(viscous_friction=1e6))
     with pytest.raises(ValueError, match=r'inner_step = 0.0001 s is too long: at most .*damping'):
         ServoParameters(seals=(MountedSeal(seal, 'a'),))
-
-
-def test_the_bench_says_how_much_faster_than_time_it_runs(monkeypatch, capsys):
-    monkeypatch.setattr(sys, 'argv', ['servo.py', '--seconds', '0.2', '--json'])
-    time_servo()
-    rows = json.loads(capsys.readouterr().out)['rows']
-    assert len(rows) == 4
-    assert all(min(row['step'], row['simulate']) > 0.0 for row in rows)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 import yaml
-from example_bags import write_inputs, write_recorded
+from harness.example_bags import write_inputs, write_recorded
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory

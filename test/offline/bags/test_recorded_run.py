@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from example_bags import STEP, default_configuration, rewrite, write_inputs, write_recorded
+from harness.example_bags import STEP, default_configuration, rewrite, write_inputs, write_recorded
 
 from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from example_bags import default_configuration, write_inputs
+from harness.example_bags import default_configuration, write_inputs
 from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from example_bags import default_configuration, write_inputs
+from harness.example_bags import default_configuration, write_inputs
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.messages import encode_text

@@ -1,6 +1,5 @@
 """``seal_friction ehl``: numbers, pages and seal files from case files; interrupted work resumes."""
 
-import importlib.util
 import json
 import os
 import re
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lubrication_findings import OUR_CHOICES, all_findings, influence
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.messages import FORCE_TYPE, POSITION_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
@@ -25,7 +25,6 @@ from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.commands.main import main
-from seal_friction_ros.offline.contact import lubrication_runs as ehl
 from seal_friction_ros.offline.contact.lubrication_runs import load_case
 
 SMALL = """name: small
@@ -133,6 +132,7 @@ def test_map_does_not_overwrite_a_seal_file(small, tmp_path, capsys):
     assert there.read_text() == 'mine'
 
 
+@pytest.mark.renders
 def test_every_command_of_the_page_is_one(small, tmp_path, capsys, monkeypatch):
     """With a small case instead of those of the page, so that it takes no longer than it must."""
     monkeypatch.chdir(tmp_path)
@@ -157,27 +157,21 @@ def test_every_command_of_the_page_is_one(small, tmp_path, capsys, monkeypatch):
     }  # fmt: skip
 
 
-def test_every_bench_of_the_page_is_one(small, capsys, monkeypatch):
-    """With a small case, like the commands."""
-    specification = importlib.util.spec_from_file_location('bench_ehl', ROOT / 'bench' / 'ehl.py')
-    bench = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(bench)
-    monkeypatch.setattr(bench, 'single_case', lambda _name, what: ehl.single_case(small, what))
-    monkeypatch.setattr(bench, 'SINGLE', ('small',))
-    monkeypatch.setattr(bench, 'OURS', {'small': ('topography.rms_height', 'seal.crown_radius')})
-    monkeypatch.setattr(bench, 'CELLS', (32, 48))
-    monkeypatch.setattr(bench, 'STEPS', (8e-3, 4e-3))
-    monkeypatch.setattr(bench, 'CALLS', 50)
-    lines = set(re.findall(r'`python (bench/ehl\.py[^`]*)`', (ROOT / 'docs' / 'ehl.md').read_text()))
-    assert len(lines) == 3
-    for line in lines:
-        monkeypatch.setattr(sys, 'argv', [*line.split(), '--json'])
-        bench.main()
-        found = json.loads(capsys.readouterr().out)
-        if '--findings' in line:
-            assert {'friction', 'deviation', 'retried_steps'} <= {row['name'] for row in found}
-        else:
-            assert ('topography.rms_height' if '--influence' in line else 'estimator step, friction_map [us]') in found
+def test_every_script_of_the_page_is_one():
+    scripts = set(re.findall(r'`python ([^` ]*)', (ROOT / 'docs' / 'ehl.md').read_text()))
+    assert scripts == {'bench/ehl.py', 'test/system/lubrication_findings.py'}
+    assert all((ROOT / script).is_file() for script in scripts)
+
+
+def test_findings_and_influence_of_our_choices_come_as_numbers(small, monkeypatch):
+    monkeypatch.setitem(OUR_CHOICES, 'small', ('topography.rms_height', 'seal.crown_radius'))
+    found = {row.name: row for row in all_findings([small])}
+    assert {'friction', 'deviation', 'mass_defect', 'retried_steps'} <= set(found)
+    assert 0.0 <= found['friction'].by_grid < 0.5 * found['friction'].value
+    changes = influence([small])
+    assert list(changes) == ['topography.rms_height', 'seal.crown_radius']
+    down, up = changes['topography.rms_height']['friction']
+    assert down < 0.0 < up
 
 
 def test_spool_adds_up_its_seals(small, tmp_path, capsys):

@@ -1,12 +1,10 @@
 """The command ``oring``: a case file to numbers, a seal file and a page; what is wrong is said in one line."""
 
 import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
+import oring_accuracy
 import pytest
 import yaml
 from paths import ROOT
@@ -167,16 +165,11 @@ def test_commands_and_case_file_of_the_docs_work(tmp_path: Path, monkeypatch: py
     assert parse_seal(read_yaml(Path('build/my_seal.yaml'))).name == 'my_ring'
 
 
-def test_the_tables_of_the_docs_are_those_of_the_bench():
+def test_the_tables_of_the_docs_are_those_of_the_script():
     page = (ROOT / 'docs' / 'oring.md').read_text()
-    named = {name for names in re.findall(r'bench/oring\.py ([a-z ]+)`', page) for name in names.split()}
-    bench = ROOT / 'bench' / 'oring.py'
-    (makers,) = re.findall(r'makers: .*? = {(.*?)}', bench.read_text(), re.DOTALL)
-    assert named == set(re.findall(r"'([a-z]+)': ", makers))
-    command = [sys.executable, str(bench), 'lines', '--lines', '9', '--json']
-    environment = {**os.environ, 'PYTHONPATH': str(ROOT)}
-    made = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    (row,) = json.loads(made.stdout)['lines']
+    named = {name for names in re.findall(r'oring_accuracy\.py ([a-z ]+)`', page) for name in names.split()}
+    assert named == set(oring_accuracy.TABLES)
+    (row,) = oring_accuracy.converging('lines', (9,))
     assert row['F_n at 1000 psi [N]'] == pytest.approx(419.2, rel=0.1)
 
 

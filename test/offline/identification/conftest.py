@@ -1,7 +1,7 @@
 """Identifications that several files of tests look at."""
 
 import pytest
-from identify_run import FRICTION_ID, Run, data
+from harness.identify_run import FRICTION_ID, Run, data
 
 
 @pytest.fixture(scope='session')

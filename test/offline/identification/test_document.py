@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from identify_run import BARS, KEYS, THESIS, THESIS_RIG, Run, data, delft
+from harness.identify_run import BARS, KEYS, THESIS, THESIS_RIG, Run, data, delft
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.configuration import SealSelection

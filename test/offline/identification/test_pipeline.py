@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from identify_run import BARS, DELFT, FRICTION_ID, OTHER, THESIS, THESIS_RIG, Run, data, delft
+from harness.identify_run import BARS, DELFT, FRICTION_ID, OTHER, THESIS, THESIS_RIG, Run, data, delft
 
 from seal_friction_ros.core.foundation.units import LBF, PSI
 from seal_friction_ros.files import config_path, read_yaml

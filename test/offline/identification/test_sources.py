@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from identify_run import THESIS, Run
+from harness.identify_run import THESIS, Run
 from paths import ROOT
 
 from seal_friction_ros.offline.bags.import_log import Samples, write_samples

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 import zstandard
-from closed_loop_bags import write_closed_loop
-from example_bags import default_configuration, rewrite, write_recorded
+from harness.closed_loop_bags import write_closed_loop
+from harness.example_bags import default_configuration, rewrite, write_recorded
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st

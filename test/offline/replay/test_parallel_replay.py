@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
-from example_bags import write_inputs
+from harness.example_bags import write_inputs
 from paths import ROOT
 
 from seal_friction_ros.offline.commands.main import main

@@ -4,7 +4,7 @@ import hashlib
 from pathlib import Path
 
 import pytest
-from example_bags import default_configuration, rewrite, write_inputs, write_recorded
+from harness.example_bags import default_configuration, rewrite, write_inputs, write_recorded
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.messages import (

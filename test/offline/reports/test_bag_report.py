@@ -3,12 +3,11 @@
 import dataclasses
 import json
 import math
-import time
 
 import numpy as np
 import pytest
-from closed_loop_bags import write_closed_loop
-from report_page import checked_page
+from harness.closed_loop_bags import write_closed_loop
+from harness.report_page import checked_page
 
 from seal_friction_ros.core.estimation.configuration import SealSelection, first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
@@ -63,6 +62,7 @@ def make_bag(folder, *, name='bag', frame=b'rod', topic='/rod_velocity', pressur
     return folder / name
 
 
+@pytest.mark.renders
 def test_the_page_stands_alone_and_each_figure_lies_beside_it(tmp_path):
     summary = write_report(make_bag(tmp_path), tmp_path / 'out' / 'report.html')
     page = checked_page(summary.page)
@@ -96,6 +96,7 @@ def test_the_page_shows_the_numbers_the_seal_and_the_settings(tmp_path):
     json.dumps(dataclasses.asdict(summary), default=str, allow_nan=False)
 
 
+@pytest.mark.renders
 def test_the_same_bag_gives_the_same_bytes(tmp_path):
     bag = make_bag(tmp_path)
     first = write_report(bag, tmp_path / 'a' / 'report.html')
@@ -118,6 +119,7 @@ def closed_loop(tmp_path_factory):
     return write_closed_loop(tmp_path_factory.mktemp('bag') / 'closed_loop', seconds=1.5)
 
 
+@pytest.mark.renders
 def test_a_closed_loop_is_shown_with_its_numbers(closed_loop, tmp_path):
     summary = write_report(closed_loop, tmp_path / 'report.html')
     page = checked_page(summary.page)
@@ -180,6 +182,7 @@ def test_nothing_is_written_for_a_bag_without_estimates(tmp_path):
     assert not (tmp_path / 'out').exists()
 
 
+@pytest.mark.renders
 def test_a_bag_in_which_nothing_slides_makes_a_page(tmp_path):
     with BagWriter(tmp_path / 'still_in') as writer:
         data = encode(Velocity(1, 0.0, b''))
@@ -202,9 +205,10 @@ def test_thinning_keeps_the_ends_and_every_spike():
     assert list(kept) == sorted(kept)
 
 
-def test_figures_of_a_long_bag_stay_small_and_quick(tmp_path):
+@pytest.mark.renders
+def test_figures_of_a_long_bag_stay_small(tmp_path):
     short = read_run(make_bag(tmp_path))
-    times = 2500  # one million estimates
+    times = 250  # 100 000 estimates
     step = short.time[-1] + 1.0 / RATE
     tiled = {
         field.name: np.tile(getattr(short, field.name), times)
@@ -213,10 +217,11 @@ def test_figures_of_a_long_bag_stay_small_and_quick(tmp_path):
     }
     tiled['time'] += np.repeat(np.arange(times) * step, len(short.time))
     run = dataclasses.replace(short, **tiled)
-    started = time.monotonic()
     evaluation = evaluate_run(run)
     with house_style():
-        sizes = [len(render(plot.figure)['svg']) for plot in run_figures(run, evaluation)]
-    assert time.monotonic() - started < 30.0
+        figures = [plot.figure for plot in run_figures(run, evaluation)]
+        sizes = [len(render(figure)['svg']) for figure in figures]
     assert sum(sizes) < 5_000_000
+    lines = [line for figure in figures for ax in figure.axes for line in ax.lines]
+    assert max(len(line.get_xdata()) for line in lines) < 5000
     assert len(evaluation.friction.sliding[0].events) == 2 * times

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from harness.report_page import checked_page
 from paths import ROOT
-from report_page import checked_page
 
 from seal_friction_ros.offline.bags.import_log import Samples, write_samples
 from seal_friction_ros.offline.commands.main import main
@@ -52,6 +52,7 @@ def test_without_geometry_or_starts_the_page_says_which_figures_are_missing(tmp_
     assert 'Figure 17 (prior art) needs charts' in text
 
 
+@pytest.mark.renders
 def test_the_same_sources_give_the_same_page(tmp_path):
     pages = []
     for name in ('one', 'two'):

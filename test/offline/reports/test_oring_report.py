@@ -2,8 +2,8 @@
 
 import pytest
 import yaml
+from harness.report_page import checked_page
 from paths import ROOT
-from report_page import checked_page
 
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.contact.oring_runs import compute_case

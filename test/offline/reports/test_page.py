@@ -3,10 +3,10 @@
 import re
 
 import pytest
+from harness.report_page import Page, checked_page
 from jinja2 import UndefinedError
 from matplotlib.figure import Figure
 from paths import ROOT
-from report_page import Page, checked_page
 
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.offline.reports import page as kit

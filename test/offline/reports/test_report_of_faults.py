@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from report_page import checked_page
+import pytest
+from harness.report_page import checked_page
 
 from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
 from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
@@ -13,6 +14,7 @@ from seal_friction_ros.offline.reports.bag_report import write_report
 ABSURD = 1e308  # [SI] finite, and what it is computed with overflows
 
 
+@pytest.mark.renders
 def test_absurd_velocities_pressures_and_forces_do_not_keep_the_report_from_being_made(tmp_path: Path):
     with BagWriter(tmp_path / 'inputs') as writer:
         for i in range(300):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from report_page import checked_page
+from harness.report_page import checked_page
 
 from seal_friction_ros.core.foundation.units import INCH, LBF, PSI
 from seal_friction_ros.core.friction.actuator import MountedSeal
@@ -90,6 +90,7 @@ def test_each_seal_file_of_the_project_makes_a_page(tmp_path, name):
     assert (summary.seal, summary.seal_count, len(summary.measured)) == (name, 2, 11)
 
 
+@pytest.mark.renders
 def test_the_same_seal_gives_the_same_bytes(tmp_path):
     one = write_seal_charts(SEAL_FILE, tmp_path / 'a' / 'charts.html')
     other = write_seal_charts(SEAL_FILE, tmp_path / 'b' / 'charts.html')

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from report_page import checked_page
+from harness.report_page import checked_page
 
 from seal_friction_ros.core.friction.states import state_friction
 from seal_friction_ros.core.servo.motions import Sine
@@ -68,6 +68,7 @@ def test_friction_force_is_that_of_the_estimator():
     assert friction_force(trajectory) == pytest.approx(np.array(expected))
 
 
+@pytest.mark.renders
 def test_the_page_stands_alone_and_gives_the_same_bytes_again(tmp_path):
     one = write_servo_charts(tmp_path / 'a' / 'servo.html')
     other = write_servo_charts(tmp_path / 'b' / 'servo.html')

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_page import checked_page
+from harness.report_page import checked_page
 
 from seal_friction_ros.offline.commands.main import main
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from closed_loop_bags import with_coulomb_scale, write_closed_loop
+from harness.closed_loop_bags import with_coulomb_scale, write_closed_loop
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
@@ -210,6 +210,7 @@ def test_stamps_that_stand_still_or_go_back_are_survived():
     assert 0 < stretch.samples < 1000
 
 
+@pytest.mark.renders
 @pytest.mark.parametrize('scales', [(), (0.0,), (0.0, 0.9)])
 @pytest.mark.parametrize('still', [False, True])
 def test_every_run_with_tracking_can_be_drawn(scales, still):

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from example_bags import default_configuration
-from report_page import checked_page
+from harness.example_bags import default_configuration
+from harness.report_page import checked_page
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.messages import (
@@ -201,6 +201,7 @@ def test_recording_is_as_the_pipeline_saw_it(axis: Path):
     assert configuration == default_configuration()
 
 
+@pytest.mark.renders
 def test_own_file_is_replaced_and_two_runs_write_the_same_bytes(axis: Path, tmp_path: Path):
     arguments = ['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')]
     assert main(arguments) == 0

@@ -1,4 +1,4 @@
-"""Every row of docs/degradation.md, tried once on the live node; ``bench/faults.py`` tries them twenty times."""
+"""Every row of docs/degradation.md, tried once on the live node; ``faults.py`` tries each twenty times."""
 
 from collections.abc import Iterator
 
@@ -6,6 +6,7 @@ import pytest
 from fault_rows import SIGNAL_ROWS, Row
 from fault_stage import Stage, stage, try_row
 from faults import TRIALS, Trial, attempt
+from harness.commands import run_json
 
 
 @pytest.fixture(scope='module')
@@ -32,3 +33,8 @@ def test_a_row_that_requires_what_does_not_happen_fails(place: Stage):
         Row('', stops.spoil, 'PRESSURE_STALE', feedforward='fades', level='OK'),
     ):
         assert len(try_row(place, wrong)) == 1
+
+
+def test_the_command_reports_a_fault_that_does_as_required():
+    found = run_json('test/system/faults.py', '--only', ' no ', '--times', '1')
+    assert found == {'bytes that are no message': [[]], 'an input has no publisher at first': [[]]}

@@ -1,50 +1,20 @@
-"""Recordings survive what kills the recorder: SIGKILL at any moment, a disk that is full, a disk that stalls."""
+"""Recordings survive SIGKILL at any moment, a disk that is full and a disk that stalls."""
 
 import json
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
-from benches import ENVIRONMENT, ROOT, bench
-from faults import OWN_MOUNTS
-
-from seal_friction_ros.nodes.processes import free_domain, graph_environment, running
-from seal_friction_ros.offline.bags.recover import recover
-from seal_friction_ros.offline.replay.replay import replay
+from harness.commands import ENVIRONMENT, run_json
+from process_faults import OWN_MOUNTS
 
 
 def test_three_recordings_killed_at_one_kilohertz_are_recovered_and_verify():
-    figures = bench('kill_recorder', '--times', '3', '--longest', '2')
+    figures = run_json('test/system/kill_recorder.py', '--times', '3', '--longest', '1.5', '--parallel', '3')
     assert figures['bad'] == []
     assert figures['recovered'] == figures['verified byte for byte'] == 3
-    assert figures['oldest message lost, before the kill [s]'] < 1.0
-    assert figures['messages recovered'] > 3000
-
-
-def test_a_node_that_is_killed_leaves_a_recording_that_is_recovered_and_verifies(tmp_path: Path):
-    domain, log = free_domain(), tmp_path / 'log'
-    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
-    player = [sys.executable, '-m', 'seal_friction_ros.nodes.bag_player', str(ROOT / 'bags' / 'pull_test')]
-    with (
-        running('friction_estimator', domain, recording, log) as node,
-        subprocess.Popen([*player, '--rate', '1'], env=graph_environment(domain), stderr=subprocess.DEVNULL) as playing,
-    ):
-        deadline = time.monotonic() + 30.0
-        while not (tmp_path / 'bag').is_dir() or sum(f.stat().st_size for f in (tmp_path / 'bag').iterdir()) < 150_000:
-            assert time.monotonic() < deadline, log.read_text()
-            time.sleep(0.05)
-        node.send_signal(signal.SIGKILL)
-        killed = time.time_ns()
-        node.wait()
-        playing.kill()
-    found = recover(tmp_path / 'bag')
-    verdict = replay(Path(found.out))
-    assert verdict.identical, verdict.first_difference
-    assert verdict.recorded_estimates > 100
-    assert (killed - found.last_ns) * 1e-9 < 1.0
+    assert figures['messages recovered'] > 1000
 
 
 RECORD_UNTIL_FULL = """
@@ -87,12 +57,10 @@ def test_a_disk_that_is_really_full_leaves_a_valid_bag_and_every_message_is_acco
     assert list(tmp_path.iterdir()) == []  # it was on the small disk
 
 
-def test_a_disk_that_stalls_holds_no_estimate_up_and_nothing_is_lost():
-    found = bench('stalled_disk', '--seconds', '3', '--stall', '1.5', '--times', '1')
+def test_a_disk_that_stalls_loses_no_message():
+    found = run_json('test/system/stalled_disk.py', '--seconds', '0.6', '--stall', '0.3', '--times', '1')
     quiet, stalled = found['quiet'][0], found['stalled'][0]
     assert stalled['stalls'] == 1
     assert stalled['dropped'] == 0
-    assert stalled['written'] == quiet['written'] == 21_001
-    assert stalled['largest [ms]'] < 1000.0  # one that waited for the disk would be 1500 ms late
-    assert stalled['p50 [ms]'] < 2.0 * quiet['p50 [ms]'] + 0.5
+    assert stalled['written'] == quiet['written'] == 4_201
     assert found['p99 ratio'] > 0.0

@@ -1,8 +1,8 @@
-"""Readers against files nobody would write: ``python bench/fuzz.py READER --cases 1000000 [--seed S] [--json]``.
+"""Fuzzing of the readers: ``python test/system/fuzz.py READER --cases 1000000 [--seed S] [--json]``.
 
-READER is ``all`` or one of those in the table. What is read are the files of test/corpus, and what random mutations
-make of them. The only way out of a reader is a result or a ValueError of one line; anything else counts as a crash, and
-its file is kept. Times are of the processor; memory is the most that the process ever held, libraries included.
+READER is ``all`` or a name of the table. Each reader reads the files of test/corpus and random mutations of them. It
+must give a result or a ValueError of one line; anything else counts as a crash, and the file is kept. Times are
+processor times; memory is the peak of the process, libraries included.
 """
 
 import argparse
@@ -38,10 +38,10 @@ from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
 from seal_friction_ros.offline.bags.recover import recover
 
-CORPUS = Path(__file__).parents[1] / 'test' / 'corpus'
+CORPUS = Path(__file__).parents[1] / 'corpus'
 SLOWEST = 1.0  # [s]
 MOST_MEMORY = 200.0  # [MB]
-COMPILER = 120.0  # [MB] that the compiler takes in the process of the bulk reader, beside that
+COMPILER = 120.0  # [MB] more for the compiler in the process of the bulk reader
 _HANGS = 5.0  # [s] of the processor after which a case is given up
 _ROOM = 1 << 30  # [bytes] of address space beyond what is in use: a claim of 1 TB fails at once
 _LONGEST_ERROR = 100_000  # characters
@@ -51,7 +51,7 @@ _LONGEST_ERROR = 100_000  # characters
 
 
 def read_bag(path: Path) -> None:
-    """A bag as every command reads it: topics, then messages, then what they say."""
+    """Read a bag as every command does: topics, messages, then their contents."""
     bag_topics(path)
     for message in read_messages(path):
         decode = DECODERS.get(message.type_name)
@@ -61,7 +61,7 @@ def read_bag(path: Path) -> None:
 
 
 def read_metadata(path: Path) -> None:
-    """The metadata.yaml of a folder with one good file in it."""
+    """Read the metadata.yaml of a folder with one good file."""
     bag = path.with_name('bag_0.mcap')
     if not bag.exists():
         shutil.copy(CORPUS / 'mcap' / 'plain', bag)
@@ -69,13 +69,13 @@ def read_metadata(path: Path) -> None:
 
 
 def read_seal(path: Path) -> None:
-    """A seal, and its friction at one pressure."""
+    """Read a seal and compute its friction at one pressure."""
     seal = parse_seal(read_yaml(path))
     seal.coulomb_law.coulomb_friction(1e6)
 
 
 def read_snapshot(path: Path) -> None:
-    """A snapshot; one that is taken is written again and taken again."""
+    """Read a snapshot; write and read it once more."""
     snapshot = parse_snapshot(path.read_bytes().decode())
     snapshot.configuration.parameters()
     if parse_snapshot(snapshot_text(snapshot)) is None:
@@ -83,7 +83,7 @@ def read_snapshot(path: Path) -> None:
 
 
 def read_wire(path: Path) -> None:
-    """The bytes as each of the messages; taken if one of them takes them."""
+    """Decode the bytes as each message type; accepted if one of them does."""
     data, taken = path.read_bytes(), 0
     for decode in DECODERS.values():
         with suppress(ValueError):
@@ -94,7 +94,7 @@ def read_wire(path: Path) -> None:
 
 
 def read_and_recover(path: Path) -> None:
-    """What can be recovered of a file is a bag that can be read."""
+    """Recover a file; the result must be a readable bag."""
     out = path.with_name('out')
     shutil.rmtree(out, ignore_errors=True)
     found = recover(path, out)
@@ -103,20 +103,20 @@ def read_and_recover(path: Path) -> None:
 
 
 def log_reader() -> Callable[[Path], None]:
-    """Reader of logs by a rig file of the corpus."""
+    """Reader of logs with a rig file of the corpus."""
     rig = read_rig(CORPUS / 'rig' / 'position')
     return lambda path: void(read_samples(path, rig))
 
 
 def bulk_reader() -> Callable[[Path], None]:
-    """Reader of bags in bulk: what it takes, it has to read as the general reader does."""
+    """Bulk reader of bags: what it accepts it must read like the general reader."""
     from seal_friction_ros.core.estimation.compiled_pipeline import Kind, UnsuitedError  # noqa: PLC0415  loads the compiler
     from seal_friction_ros.offline.bags.block_reader import compile_now, read_in_bulk  # noqa: PLC0415
 
     compile_now()
 
     def read(path: Path) -> None:
-        """All messages, twice."""
+        """Read all messages with both readers."""
         try:
             ours = [
                 block.message(number)
@@ -141,10 +141,10 @@ def void(result: object) -> None:
 
 
 class Reader(NamedTuple):
-    """A reader, its file and where its mutations start."""
+    """A reader, the name of its file and its folder of the corpus."""
 
     make: Callable[[], Callable[[Path], None]]
-    """makes ready, in the process that reads"""
+    """prepares the reader, in the process that reads"""
     file_name: str
     corpus: str
 
@@ -197,7 +197,7 @@ WORDS = [*(text.encode() for text in TEXTS), b'\xff', b'\x89MCAP0\r\n', *(bytes(
 
 
 def mutated(chance: random.Random, seeds: list[bytes]) -> bytes:
-    """One of the seeds after one to eight random changes."""
+    """A seed with one to eight random changes."""
     data = bytearray(chance.choice(seeds))
     for _ in range(min(1 + int(chance.expovariate(0.8)), 8)):
         place = chance.randrange(len(data) + 1)
@@ -232,29 +232,29 @@ def _change(chance: random.Random, data: bytearray, place: int, seeds: list[byte
 
 
 def most_memory(reader: str) -> float:
-    """The bar [MB] of a reader."""
+    """Memory limit of a reader [MB]."""
     return MOST_MEMORY + COMPILER * (reader == 'bag_bulk')
 
 
 @dataclass
 class Outcome:
-    """What became of the cases of one reader."""
+    """Outcome of the cases of one reader."""
 
     reader: str
     cases: int = 0
     taken: int = 0
-    """cases that were good files after all"""
+    """cases that are valid files"""
     crashes: int = 0
     slowest: float = 0.0
     """[s] of processor time"""
     memory: float = 0.0
-    """most that the process held [MB]"""
+    """peak memory of the process [MB]"""
     kept: list[str] = field(default_factory=list)
-    """first crashes: the file that makes it, and what was raised"""
+    """first crashes: the file that causes it and the exception"""
 
     @property
     def good(self) -> bool:
-        """Whether the bars are met."""
+        """Whether the limits are kept."""
         return not self.crashes and self.slowest <= SLOWEST and self.memory <= most_memory(self.reader)
 
 
@@ -291,7 +291,7 @@ def _one(read: Callable[[Path], None], path: Path, data: bytes, outcome: Outcome
         failure = (
             '' if len(str(error).splitlines()) <= 1 and len(str(error)) < _LONGEST_ERROR else 'error of many lines'
         )
-    except (Exception, Hang) as error:  # noqa: BLE001  that is what is looked for
+    except (Exception, Hang) as error:  # noqa: BLE001  every other exception is a crash
         failure = f'{type(error).__name__}: {error}; {traceback.format_exc().splitlines()[-3].strip()}'
     seconds = time.process_time() - started
     signal.setitimer(signal.ITIMER_PROF, 0.0)
@@ -315,7 +315,7 @@ def _limit_memory() -> None:
 
 
 def _start(name: str, arguments: argparse.Namespace) -> tuple[str, BaseProcess, Connection]:
-    """A process of its own: its memory is that of one reader, and a reader that kills it is noticed."""
+    """Start a process for one reader: its memory is that of one reader, and a killed process is noticed."""
     context = multiprocessing.get_context('fork')
     ours, theirs = context.Pipe(duplex=False)
 

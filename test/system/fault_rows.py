@@ -1,6 +1,6 @@
-"""Every fault of a signal: what is sent, and what is then required of estimate, feed-forward and diagnostics.
+"""The faults of a signal, one row each: what is sent, and the requirements for estimate, feed-forward and diagnostics.
 
-One row each; ``bench/faults.py`` tries them on the live node, and docs/degradation.md lists them.
+``faults.py`` tries them on the live node; docs/degradation.md lists them.
 """
 
 import math
@@ -13,20 +13,16 @@ from seal_friction_ros.core.friction.states import FrictionState
 MS = 1_000_000  # [ns] between two ticks: 1 kHz
 TIMEOUT = 0.02  # [s] of pressure, force sum, estimate and reference
 FADE_TIME = 0.04  # [s]
-BEFORE, FAULT, AFTER = (
-    60,
-    80,
-    60,
-)  # ticks without, with, and again without the fault: it is noticed, and fades, within it
+BEFORE, FAULT, AFTER = 60, 80, 60  # ticks without, with and without the fault, which lasts until the fade has ended
 SPEED, PRESSURE, FORCE = 0.05, 3e6, 60.0  # [m/s], [Pa], [N]
 
 Message = Pressure | Force | ServoReference | Velocity | bytes
 Tick = dict[str, list[Message]]
-"""What is sent at one moment: topic -> messages; the velocity goes last."""
+"""Messages of one moment: topic -> messages, the velocity last."""
 
 
 def good(stamp: int) -> Tick:
-    """A moment at which all is well."""
+    """The messages of a moment without fault; ``stamp`` in [ns]."""
     return {
         'cylinder_pressure': [Pressure(stamp, PRESSURE, PRESSURE)],
         'force_sum': [Force(stamp, FORCE)],
@@ -37,35 +33,35 @@ def good(stamp: int) -> Tick:
 
 @dataclass(frozen=True)
 class Row:
-    """One fault and what is required."""
+    """One fault and its requirements."""
 
     fault: str
     spoil: Callable[[Tick, int], Tick]
-    """the tick, spoilt; the number of ticks since the fault began"""
+    """changes a tick, given the number of ticks since the fault began"""
     status: str = ''
-    """bits that are set while it lasts, these and no others"""
+    """exactly the bits that are set during the fault"""
     state: tuple[FrictionState, ...] = (FrictionState.SLIDING,)
-    """states that are published while it lasts"""
+    """exactly the states that are published during the fault"""
     feedforward: str = 'as usual'
     """``as usual``, ``fades`` (to 0 within the fade time), ``dips`` (by less than a third), ``halves`` (once, and comes
-    back within the fade time) or ``nothing`` (none comes)"""
+    back within the fade time) or ``nothing`` (none is published)"""
     level: str = 'WARN'
-    """of the diagnostics"""
+    """level of the diagnostics"""
     shift: int = 0
-    """[ns] by which time has moved for good when it ends"""
+    """[ns] by which the clock stays shifted after the fault"""
     estimate: str = ''
-    """in words, for the documentation"""
+    """requirement as text, for the documentation"""
     recovery: str = 'with the next good sample'
-    """in words"""
+    """requirement as text"""
 
 
 def without(topic: str) -> Callable[[Tick, int], Tick]:
-    """Nothing comes on a topic."""
+    """No message on a topic."""
     return lambda tick, _: {**tick, topic: []}
 
 
 def with_value(topic: str, *values: float) -> Callable[[Tick, int], Tick]:
-    """Other values, on all ticks."""
+    """Other values on all ticks."""
     return lambda tick, _: {**tick, topic: [_changed(tick[topic][0], *values)]}
 
 
@@ -85,7 +81,7 @@ def _changed(message: Message, *values: float) -> Message:
 
 
 def delayed(topic: str, delay: int) -> Callable[[Tick, int], Tick]:
-    """Stamps of one topic, or of all, ``delay`` [ns] off."""
+    """Stamps of one topic, or of ``all``, shifted by ``delay`` [ns]."""
 
     def spoil(tick: Tick, _: int) -> Tick:
         """Shift the stamps."""
@@ -98,7 +94,7 @@ def delayed(topic: str, delay: int) -> Callable[[Tick, int], Tick]:
 
 
 def frozen(topic: str) -> Callable[[Tick, int], Tick]:
-    """The very same message again and again."""
+    """The same message again and again."""
     return lambda tick, n: {**tick, topic: [m._replace(stamp=m.stamp - (n + 1) * MS) for m in tick[topic]]}
 
 
@@ -116,12 +112,12 @@ def swapped(topic: str) -> Callable[[Tick, int], Tick]:
 
 
 def garbage(topic: str) -> Callable[[Tick, int], Tick]:
-    """Bytes that are no message, beside good ones."""
+    """Bytes that are no message, before each good one."""
     return lambda tick, n: {**tick, topic: [bytes(range(n % 40)), *tick[topic]]}
 
 
 def everything(tick: Tick, n: int) -> Tick:
-    """All at once."""
+    """All topics at once."""
     bad = (math.nan, -math.inf, 1e308)[n % 3]
     spoilt = tick
     for topic in tick:
@@ -135,7 +131,7 @@ LAST = 'the last usable {} stays in use'
 
 
 def _unusable() -> Iterator[Row]:
-    """NaN, infinite, out of range, for each input, all the time."""
+    """NaN, infinite and out of range for each input, on all ticks."""
     for words, value in (('NaN', math.nan), ('infinite', math.inf), ('minus infinite', -math.inf), ('1e300', 1e300)):
         bit = 'OUT_OF_RANGE' if math.isfinite(value) else 'NOT_FINITE'
         yield Row(
@@ -168,7 +164,7 @@ def _unusable() -> Iterator[Row]:
 
 
 def _spikes() -> Iterator[Row]:
-    """One sample in ten far away, but inside its range."""
+    """One sample in ten far off, but inside its range."""
     yield Row(
         'pressure spikes',
         spike('cylinder_pressure', 2e7),

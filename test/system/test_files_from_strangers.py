@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from benches import ROOT, bench
-from example_bags import write_inputs
+from harness.commands import run_json
+from harness.example_bags import write_inputs
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from paths import ROOT
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
@@ -50,7 +51,7 @@ def outcome(function: Callable, *arguments: object) -> tuple[object, str]:
 
 
 def test_two_thousand_mutations_of_the_corpus_crash_no_reader():
-    readers = bench('fuzz', 'all', '--cases', '2000', '--parallel', '2')['readers']
+    readers = run_json('test/system/fuzz.py', 'all', '--cases', '2000')['readers']
     assert len(readers) == 11
     for reader in readers:
         assert reader['cases'] == 2000

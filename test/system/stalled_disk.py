@@ -1,10 +1,9 @@
-"""Estimates while the disk stalls: ``python bench/stalled_disk.py [--seconds 12] [--stall 5] [--times 5] [--json]``.
+"""Latency while the disk stalls: ``python test/system/stalled_disk.py [--seconds 12] [--stall 5] [--json]``.
 
-Estimates at 1 kHz with all seven topics recorded, in turn on a disk that takes everything at once and on one that takes
-nothing for a while (the write blocks, as that of a busy disk does), so many times, and on the first again. Latency is
-from the moment a sample was due to its estimate and feed-forward having been recorded; the wake-up by the operating
-system is part of it. What counts is the p99 of each stalled run over the mean of the quiet ones before and after it;
-exit code 1 if the median of that ratio is above 1.10.
+Estimates at 1 kHz and records all seven topics, alternately on a normal disk and on one that blocks one write for
+``--stall`` seconds. The latency of a sample runs from its due time until estimate and feed-forward are recorded; the
+wake-up by the operating system is part of it. The result is the p99 of each stalled run over the mean of the quiet runs
+before and after it; exit code 1 if the median of this ratio over ``--times`` runs is above 1.10.
 """
 
 import argparse
@@ -35,7 +34,7 @@ LARGEST_RATIO = 1.10
 
 
 class StallingDisk:
-    """Stands for ``os`` in the module that writes: blocks once for ``stall`` [s], ``after`` [s] from now."""
+    """Stands in for ``os`` in `mcap_writer`: blocks once for ``stall`` [s], ``after`` [s] from now."""
 
     def __init__(self, stall: float, after: float) -> None:
         self.stalls = 0
@@ -45,7 +44,7 @@ class StallingDisk:
         return getattr(os, name)
 
     def pwrite(self, handle: int, data: bytes, offset: int) -> int:
-        """Write, after the stall if it is time for it."""
+        """Write, after the stall if it is due."""
         if self._stall and not self.stalls and time.monotonic() > self._moment:
             self.stalls += 1
             time.sleep(self._stall)
@@ -88,18 +87,18 @@ def figures(found: list[float], recorder: Recorder, stalls: int) -> dict[str, fl
 
 
 def measure(seconds: float, stall: float, times: int) -> tuple[list[dict[str, float]], list[dict[str, float]]]:
-    """Figures of the quiet runs, and of the stalled ones between them."""
+    """Figures of the quiet runs and of the stalled runs between them."""
     quiet, stalled = [], []
     for number in range(2 * times + 1):
         with tempfile.TemporaryDirectory() as folder:
-            disk = StallingDisk(stall * (number % 2), after=1.0)
+            disk = StallingDisk(stall * (number % 2), after=seconds / 12.0)
             found, recorder = latencies(Path(folder) / 'bag', seconds, disk)
             (stalled if number % 2 else quiet).append(figures(found, recorder, disk.stalls))
     return quiet, stalled
 
 
 def main() -> int:
-    """Measure both in turn; print a table, or JSON."""
+    """Measure both alternately; print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--seconds', type=float, default=12.0)
     parser.add_argument('--stall', type=float, default=5.0, help='[s]')

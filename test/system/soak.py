@@ -1,9 +1,9 @@
-"""Simulator and estimator at 1 kHz with recording for a set time: ``python bench/soak.py [--minutes 30] [--json]``.
+"""Simulator and estimator at 1 kHz with recording, for long: ``python test/system/soak.py [--minutes 30] [--json]``.
 
-Both run in processes of their own. Every few seconds memory, file handles and threads of both are read; latency and
-counts come from their diagnostics; what was lost is counted in the recording, from the stamps. Exit code 1 if memory
-grew by more than 1 MB after the first minute (or the first third of a shorter run), a handle or a thread was left over,
-or the number of samples lost is not the one reported.
+Both run in processes of their own. Memory, file handles and threads of both are read every ``--look`` seconds; latency
+and counts come from their diagnostics; lost samples are counted in the recording by their stamps. Exit code 1 if memory
+grows by more than 1 MB after the first minute (or the first third of a shorter run), if a file handle or a thread is
+left over, or if the number of lost samples is not the reported one.
 """
 
 import argparse
@@ -17,26 +17,25 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.processes import free_domain, node_process
+from harness.spin_nodes import SpunNodes, ros_context
+
 from seal_friction_ros.core.estimation.messages import VELOCITY_TYPE, decode
-from seal_friction_ros.nodes.discovery import set_up_discovery
-from seal_friction_ros.nodes.processes import free_domain, running
 from seal_friction_ros.offline.bags.bag import VELOCITY_TOPIC, read_messages
 
 PERIOD = 1_000_000  # [ns] of the simulator
-LOOK = 2.0  # [s] between two looks at the processes
-SETTLED = 60.0  # [s] until memory has to stand still
+SETTLED = 60.0  # [s] after which memory must not grow
 LARGEST_GROWTH = 1.0  # [MB]
-SIMULATOR = Path(__file__).parents[1] / 'config' / 'servo_simulator.yaml'
+SIMULATOR = Path(__file__).parents[2] / 'config' / 'servo_simulator.yaml'
 
 
 @dataclass(frozen=True)
@@ -60,69 +59,64 @@ def look(pid: int, since: float) -> Look:
 
 
 class Listener(Node):
-    """Keeps what the two nodes say of themselves."""
+    """Keeps the diagnostics of both nodes."""
 
     def __init__(self, context: Context) -> None:
         super().__init__('soak', context=context)
-        self.said: dict[str, dict[str, str]] = {}
+        self.diagnostics: dict[str, dict[str, str]] = {}
         self.latencies: list[tuple[float, float]] = []
+        self.reports = 0
+        """number of diagnostics of the estimator"""
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         for status in array.status:
             part = status.name.rpartition(': ')[2]
-            self.said[part] = {value.key: value.value for value in status.values}
-            latency = self.said[part].get('latency p50 [us]', 'none')
+            self.reports += part == 'estimate'
+            self.diagnostics[part] = {value.key: value.value for value in status.values}
+            latency = self.diagnostics[part].get('latency p50 [us]', 'none')
             if latency != 'none':
-                self.latencies.append((float(latency), float(self.said[part]['latency p99 [us]'])))
+                self.latencies.append((float(latency), float(self.diagnostics[part]['latency p99 [us]'])))
 
 
-def soak(minutes: float, folder: Path) -> dict[str, Any]:
-    """Run both, look at them, count what was recorded.
+def soak(minutes: float, look_every: float, folder: Path) -> dict[str, Any]:
+    """Run both nodes, look at them every ``look_every`` [s], count what was recorded.
 
     Raises:
-        RuntimeError: No estimate came within half a minute.
+        RuntimeError: No estimate comes.
     """
     domain, log, bag = free_domain(), folder / 'log', folder / 'bag'
-    set_up_discovery()
     recording = {
         'record': True,
         'record_directory': str(folder),
         'record_name': bag.name,
         'record_split_duration': 60.0,
     }
-    context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    listener = Listener(context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(listener)
     looks: dict[str, list[Look]] = {'estimator': [], 'simulator': []}
-    with (
-        running('friction_estimator', domain, recording, log) as estimator,
-        running('servo_simulator', domain, {}, log, parameter_file=SIMULATOR) as simulator,
-        Progress(console=Console(stderr=True)) as progress,
-    ):
-        start = time.monotonic()
-        while not listener.latencies:
-            if time.monotonic() > start + 30.0:
+    with node_process('friction_estimator', domain, recording, log) as estimator, ros_context(domain) as context:
+        listener = Listener(context)
+        spun = SpunNodes(context, listener)
+        with (
+            node_process('servo_simulator', domain, {}, log, parameter_file=SIMULATOR) as simulator,
+            Progress(console=Console(stderr=True)) as progress,
+        ):
+            if not spun.spin_until(lambda: listener.latencies and 'simulator' in listener.diagnostics):
                 raise RuntimeError(f'no estimate: {log.read_text()}')
-            executor.spin_once(timeout_sec=0.1)
-        start, task = time.monotonic(), progress.add_task('soak', total=60.0 * minutes)
-        while time.monotonic() < start + 60.0 * minutes:
-            until = time.monotonic() + LOOK
-            while time.monotonic() < until:
-                executor.spin_once(timeout_sec=0.1)
-            looks['estimator'].append(look(estimator.pid, start))
-            looks['simulator'].append(look(simulator.pid, start))
-            progress.update(task, completed=time.monotonic() - start)
-    said = listener.said
-    listener.destroy_node()
-    rclpy.try_shutdown(context=context)
-    return {**figures(looks, listener.latencies, said), **lost(bag, said['estimate'])}
+            start, task = time.monotonic(), progress.add_task('soak', total=60.0 * minutes)
+            while time.monotonic() < start + 60.0 * minutes:
+                spun.spin(look_every)
+                looks['estimator'].append(look(estimator.pid, start))
+                looks['simulator'].append(look(simulator.pid, start))
+                progress.update(task, completed=time.monotonic() - start)
+        reports = listener.reports
+        spun.spin_until(lambda: listener.reports > reports + 1)  # the second one covers all samples
+        listener.destroy_node()
+    found = figures(looks, listener.latencies, listener.diagnostics)
+    return {**found, **lost(bag, listener.diagnostics['estimate'])}
 
 
 def figures(
-    looks: dict[str, list[Look]], latencies: list[tuple[float, float]], said: dict[str, dict[str, str]]
+    looks: dict[str, list[Look]], latencies: list[tuple[float, float]], diagnostics: dict[str, dict[str, str]]
 ) -> dict[str, Any]:
     """Growth of each process, drift of the latency, counts."""
     found: dict[str, Any] = {}
@@ -139,23 +133,23 @@ def figures(
         first, last = (median(pair[number] for pair in part) for part in (latencies[:fifth], latencies[-fifth:]))
         found[f'latency {name} [us]'] = round(last, 1)
         found[f'latency {name} drift [us]'] = round(last - first, 1)
-    found['missed ticks'] = int(said['simulator']['missed ticks'])
-    found['ticks'] = int(said['simulator']['ticks'])
-    found['dropped by the recorder'] = int(said['recorder'].get('dropped', 0))
+    found['missed ticks'] = int(diagnostics['simulator']['missed ticks'])
+    found['ticks'] = int(diagnostics['simulator']['ticks'])
+    found['dropped by the recorder'] = int(diagnostics['recorder'].get('dropped', 0))
     return found
 
 
-def lost(bag: Path, said: dict[str, str]) -> dict[str, int]:
-    """Velocity samples that are not in the recording, by their stamps, and what the estimator reported."""
+def lost(bag: Path, diagnostics: dict[str, str]) -> dict[str, int]:
+    """Velocity samples missing in the recording, by their stamps, and the number that the estimator reports."""
     stamps = [
         decode(VELOCITY_TYPE, message.data).stamp for message in read_messages(bag) if message.topic == VELOCITY_TOPIC
     ]
     steps = [round((b - a) / PERIOD) - 1 for a, b in pairwise(stamps)]
-    return {'received': len(stamps), 'lost': sum(steps), 'reported missing': int(said['rod_velocity missing'])}
+    return {'received': len(stamps), 'lost': sum(steps), 'reported missing': int(diagnostics['rod_velocity missing'])}
 
 
-def complaints(found: dict[str, Any]) -> list[str]:
-    """What must not be."""
+def violations(found: dict[str, Any]) -> list[str]:
+    """Limits that are exceeded."""
     wrong = [f'{key} = {value}' for key, value in found.items() if key.endswith(' more') and value > 0]
     wrong += [
         f'{key} = {value}' for key, value in found.items() if key.endswith('growth [MB]') and value > LARGEST_GROWTH
@@ -166,23 +160,24 @@ def complaints(found: dict[str, Any]) -> list[str]:
 
 
 def main() -> int:
-    """Run, print, judge."""
+    """Run; print the figures and the limits exceeded."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--minutes', type=float, default=30.0)
+    parser.add_argument('--look', type=float, default=2.0, help='time between two looks at the processes [s]')
     parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        found = soak(arguments.minutes, Path(folder))
-    wrong = complaints(found)
+        found = soak(arguments.minutes, arguments.look, Path(folder))
+    wrong = violations(found)
     if arguments.json:
-        print(json.dumps({**found, 'complaints': wrong}))
+        print(json.dumps({**found, 'violations': wrong}))
     else:
         table = Table('figure', 'value', title=f'{arguments.minutes:g} minutes at 1 kHz with recording')
         for key, value in found.items():
             table.add_row(Text(key), str(value))
         console = Console()
         console.print(table)
-        console.print('\n'.join(wrong) or 'nothing leaks, what was lost was reported, no more and no less')
+        console.print('\n'.join(wrong) or 'no leak; lost samples are those reported')
     return int(bool(wrong))
 
 

@@ -1,10 +1,9 @@
-"""A graph of one test: the node under test and a probe that publishes inputs and collects what comes out."""
+"""The estimator on a graph of its own, with a probe that publishes its inputs and collects its outputs."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.node import Node
@@ -17,14 +16,13 @@ from seal_friction_msgs.msg import (
     FrictionEstimate,
     RodVelocity,
 )
-from spun import Spun
 
-from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
-from seal_friction_ros.nodes.processes import free_domain
+from harness.counted_estimator import CountedEstimator
+from harness.spin_nodes import SpunNodes, ros_context
 
 
 class Probe(Node):
-    """Stands for the drivers and the controller."""
+    """In the place of drivers and controller."""
 
     def __init__(self, qos: QoSProfile | int = 10, **kwargs: Any) -> None:
         super().__init__('probe', **kwargs)
@@ -42,7 +40,7 @@ class Probe(Node):
         )
 
     def send(self, stamp: int, velocity: float, pressure: float = 1e6, force: float = 0.0) -> None:
-        """Publish pressure, force sum and velocity of one moment, ``stamp`` in ns."""
+        """Publish pressure [Pa], force sum [N] and velocity [m/s] of one moment, ``stamp`` [ns]."""
         self.send_pressure(stamp, pressure)
         self.send_force(stamp, force)
         self.send_velocity(stamp, velocity)
@@ -58,7 +56,7 @@ class Probe(Node):
         self.velocity.publish(_stamped(RodVelocity(velocity=velocity), stamp))
 
     def values(self, part: str) -> dict[str, str]:
-        """Newest diagnostics of ``estimate`` or ``recorder``, by key; level and message among them."""
+        """Newest diagnostics of ``estimate`` or ``recorder``: values by key, level and message."""
         for array in reversed(self.diagnostics):
             for status in array.status:
                 if status.name.endswith(part):
@@ -73,30 +71,25 @@ def _stamped(message: Any, stamp: int) -> Any:
     return message
 
 
-class Graph(Spun):
-    """Estimator and probe on a domain of their own, spun together."""
+class Graph(SpunNodes):
+    """Estimator and probe."""
 
-    def __init__(self, context: Context, probe: Probe, estimator: FrictionEstimator) -> None:
+    def __init__(self, context: Context, probe: Probe, estimator: CountedEstimator) -> None:
         super().__init__(context, estimator, probe)
         self.probe, self.estimator = probe, estimator
 
-    def connect(self) -> None:
-        """Spin until the estimator hears the probe and the probe the estimator."""
-        assert self.spin_until(lambda: self.probe.count_publishers('friction_estimate'))
-        self.connect_to((self.probe.pressure, self.probe.force, self.probe.velocity))
-
     def estimate(self, stamp: int, velocity: float, pressure: float = 1e6, force: float = 0.0) -> FrictionEstimate:
-        """Send inputs of one moment; the estimate that answers."""
-        before = len(self.probe.estimates)
+        """Send the inputs of one moment; the estimate for it."""
+        before, taken = len(self.probe.estimates), self.estimator.taken
         self.probe.send_pressure(stamp, pressure)
         self.probe.send_force(stamp, force)
-        self.spin(0.03)
+        assert self.spin_until(lambda: self.estimator.taken >= taken + 2)
         self.probe.send_velocity(stamp, velocity)
         assert self.spin_until(lambda: len(self.probe.estimates) > before)
         return self.probe.estimates[-1]
 
     def call(self, kind: type, name: str, request: Any) -> Any:
-        """Call a service of the estimator."""
+        """Call a service of the estimator; its response."""
         client = self.probe.create_client(kind, name)
         assert self.spin_until(client.service_is_ready)
         future = client.call_async(request)
@@ -114,20 +107,18 @@ def graph(
     arguments: tuple[str, ...] = (),
     namespace: str = '',
 ) -> Iterator[Graph]:
-    """Estimator with ``parameters`` and command-line ``arguments`` (remapping), and a probe below ``namespace``."""
-    context = Context()
-    rclpy.init(context=context, domain_id=free_domain())
+    """Estimator with ROS ``parameters`` and command-line ``arguments`` (remapping), and a probe in ``namespace``."""
     overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
-    estimator = FrictionEstimator(
-        context=context, parameter_overrides=overrides, cli_args=['--ros-args', *arguments] if arguments else None
-    )
-    probe = Probe(qos, context=context, namespace=namespace)
-    try:
-        if autostart:
-            assert estimator.autostart()
-        yield Graph(context, probe, estimator)
-    finally:
-        estimator.finish()
-        estimator.destroy_node()
-        probe.destroy_node()
-        rclpy.try_shutdown(context=context)
+    with ros_context() as context:
+        estimator = CountedEstimator(
+            context=context, parameter_overrides=overrides, cli_args=['--ros-args', *arguments] if arguments else None
+        )
+        probe = Probe(qos, context=context, namespace=namespace)
+        try:
+            if autostart:
+                assert estimator.autostart()
+            yield Graph(context, probe, estimator)
+        finally:
+            estimator.finish()
+            estimator.destroy_node()
+            probe.destroy_node()

@@ -1,0 +1,1 @@
+"""What tests, campaigns, benches and the demo share: nodes as processes, spun nodes, example bags."""

@@ -1,0 +1,331 @@
+"""Faults of graph and disk, tried on an estimator in this process; see ``faults.py``.
+
+Each function is one try: it takes random numbers and an empty folder and returns the differences from the requirements.
+"""
+
+import os
+import random
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from fault_rows import AFTER, MS, UNKNOWN, Tick, good
+from fault_stage import Outputs, Stage, broken_invariants, stage, statuses, unless, verified
+from harness.blocked_disk import BlockedDisk
+from harness.spin_nodes import ros_context
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
+from seal_friction_msgs.msg import CylinderPressure, FrictionEstimate, RodVelocity
+from std_msgs.msg import Float64
+
+from seal_friction_ros.core.estimation import records
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.offline.bags import mcap_writer
+
+
+def unrecovered(place: Stage) -> list[str]:
+    """Send good samples; differences from normal operation, and broken invariants since the start."""
+    place.run(AFTER)
+    outputs = place.run(AFTER)
+    forces = [output for output in outputs if isinstance(output, FeedForward)]
+    wrong = unless(statuses(outputs) == {0}, f'after the fault: statuses {statuses(outputs)}')
+    wrong += unless(forces and not forces[-1].limited, f'after the fault: feed-forward {forces[-1:]}')
+    return wrong + broken_invariants(place.driver.outputs)
+
+
+def recording_to(folder: Path) -> dict[str, Any]:
+    """Parameters that record to ``bag`` in a folder."""
+    return {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
+
+
+def message(place: Stage) -> str:
+    """Message of the current diagnostics of the estimate."""
+    return str(place.estimator.diagnostics()['estimate'].message)
+
+
+def best_effort_publisher(place: Stage) -> str | None:
+    """Node whose velocity is taken with best effort, according to the diagnostics."""
+    values = {value.key: value.value for value in place.estimator.diagnostics()['estimate'].values}
+    return values.get('rod_velocity best effort only, from')
+
+
+# --- graph ---
+
+
+def topic_comes_late(chance: random.Random, folder: Path) -> list[str]:
+    """The pressure has no publisher at first."""
+    del chance, folder
+    with stage() as place:
+        place.restart()
+        place.driver.destroy_publisher(place.driver.inputs.pop('cylinder_pressure'))
+        early = place.run(30, lambda tick, _: {name: tick[name] for name in tick if name != 'cylinder_pressure'})
+        place.driver.inputs['cylinder_pressure'] = place.driver.create_publisher(
+            CylinderPressure, 'cylinder_pressure', QoSProfile(depth=100)
+        )
+        place.connect()
+        wrong = unless(statuses(early) == {Status.PRESSURE_MISSING}, f'before: {statuses(early)}')
+        estimates = [o for o in early if isinstance(o, records.FrictionEstimate)]
+        wrong += unless({e.state for e in estimates} == set(UNKNOWN), 'before: a state without pressure')
+        forces = {o.force for o in early if isinstance(o, FeedForward)}
+        wrong += unless(forces == {0.0}, f'before: feed-forward {forces}')
+        return wrong + unrecovered(place)
+
+
+@contextmanager
+def intruder(place: Stage, name: str = 'intruder') -> Iterator[Node]:
+    """A node with a context of its own, which the middleware treats like a node of another process."""
+    with ros_context(place.context.get_domain_id()) as context:
+        node = Node(name, context=context)
+        try:
+            yield node
+        finally:
+            node.destroy_node()
+
+
+def second_publisher(chance: random.Random, folder: Path, *, refuse: bool = False) -> list[str]:
+    """Another node publishes an input."""
+    del folder
+    topic, kind = chance.choice([('rod_velocity', RodVelocity), ('cylinder_pressure', CylinderPressure)])
+    expected = f'/{topic} has several publishers: /driver, /intruder'
+    with stage({'refuse_second_publisher': refuse}) as place:
+        wrong = []
+        place.run(60)
+        with intruder(place) as other:
+            other.create_publisher(kind, topic, 10)
+            wrong += unless(place.spin_until(lambda: expected in message(place)), f'not named: {message(place)}')
+            for _ in range(2):
+                place.level()
+                during = place.run(60)
+                level = place.level()
+                forces = [output for output in during if isinstance(output, FeedForward)]
+                if refuse:
+                    wrong += unless(statuses(during) == {Status.INPUT_REFUSED}, f'{statuses(during)} while refused')
+                    wrong += unless(forces[-1].force == 0.0, f'still {forces[-1].force} N')
+                    wrong += unless(level == 'ERROR', level)
+                else:
+                    wrong += unless(statuses(during) == {0}, f'{statuses(during)}') + unless(level == 'WARN', level)
+                wrong += broken_invariants(place.driver.outputs)
+                place.restart()  # inputs are refused after a restart, too
+        wrong += unless(place.spin_until(lambda: 'several' not in message(place)), 'named although it is gone')
+        return wrong + unrecovered(place)
+
+
+def second_publisher_refused(chance: random.Random, folder: Path) -> list[str]:
+    """Another node publishes an input, with ``refuse_second_publisher``."""
+    return second_publisher(chance, folder, refuse=True)
+
+
+def incompatible_quality(chance: random.Random, folder: Path) -> list[str]:
+    """A publisher with best effort, a subscriber that wants transient local, a publisher of another type."""
+    del chance, folder
+    with stage(autostart=False) as place:
+        place.driver.destroy_publisher(place.driver.inputs['rod_velocity'])
+        place.driver.inputs['rod_velocity'] = place.driver.create_publisher(
+            RodVelocity, 'rod_velocity', qos_profile_sensor_data
+        )
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        if not place.estimator.autostart():
+            return ['does not start']
+        with intruder(place, 'logger') as other, intruder(place, 'odd_driver') as odd:
+            other.create_subscription(FrictionEstimate, 'friction_estimate', lambda _: None, latched)
+            odd.create_publisher(Float64, 'rod_position', 10)
+            place.driver.destroy_publisher(place.driver.inputs.pop('rod_position'))
+            wrong = []
+            for text in (
+                '/logger wants incompatible quality of service (volatile where transient local is wanted)',
+                '/odd_driver publishes std_msgs/msg/Float64, not seal_friction_msgs/msg/RodPosition',
+            ):
+                found = place.spin_until(lambda text=text: text in message(place))
+                wrong += unless(found, f'missing: {text}; instead: {message(place)}')
+            found = best_effort_publisher(place)
+            wrong += unless(found == '/driver', f'best effort taken from {found}')
+        place.connect()
+        wrong += unrecovered(place)
+        for quality, wanted in ((qos.STREAM, None), (qos_profile_sensor_data, '/driver')):
+            place.driver.destroy_publisher(place.driver.inputs['rod_velocity'])
+            place.driver.inputs['rod_velocity'] = place.driver.create_publisher(RodVelocity, 'rod_velocity', quality)
+            found = place.spin_until(lambda wanted=wanted: best_effort_publisher(place) == wanted)
+            wrong += unless(found, f'best effort from {best_effort_publisher(place)}, not {wanted}')
+            place.connect()
+            wrong += unrecovered(place)
+        return wrong
+
+
+def second_estimator(chance: random.Random, folder: Path) -> list[str]:
+    """Another estimator with the same name."""
+    del chance, folder
+    with stage() as place:
+        expected = '/friction_estimate has several publishers: /friction_estimator, /friction_estimator'
+        with ros_context(place.context.get_domain_id()) as context:
+            twin = FrictionEstimator(context=context)
+            try:
+                wrong = unless(twin.autostart(), 'the second one does not start')
+                wrong += unless(place.spin_until(lambda: expected in message(place)), f'not named: {message(place)}')
+                during = place.run(30)
+            finally:
+                twin.finish()
+                twin.destroy_node()
+        wrong += unless(statuses(during) == {0}, f'{statuses(during)}')
+        gone = place.spin_until(lambda: 'several' not in message(place))
+        return wrong + unless(gone, 'named although it is gone') + unrecovered(place)
+
+
+def parameters_change(chance: random.Random, folder: Path) -> list[str]:
+    """Parameters change every few samples, some to invalid values."""
+    with stage(recording_to(folder)) as place:
+        outputs = place.run(60)
+        wrong = []
+        for _ in range(25):
+            name, value, is_valid = chance.choice(
+                [
+                    ('feedforward.coulomb_scale', chance.uniform(0.0, 1.5), True),
+                    ('feedforward.smoothing_velocity', chance.uniform(1e-4, 0.5), True),
+                    ('feedforward.force_limit', chance.uniform(0.0, 60.0), True),
+                    ('feedforward.lead_time', chance.uniform(0.0, 0.1), True),
+                    ('slip_velocity', chance.uniform(2e-3, 0.2), True),
+                    ('use_stiction', chance.random() < 0.5, True),
+                    ('feedforward.coulomb_scale', float('nan'), False),
+                    ('stick_velocity', 5.0, False),
+                    ('seals', ['nothing'], False),
+                    ('pressure_timeout', 'long', False),
+                ]
+            )
+            (result,) = place.estimator.set_parameters([Parameter(name, value=value)])
+            wrong += unless(result.successful == is_valid, f'{name} = {value}: {result}')
+            outputs += place.run(chance.randrange(1, 8))
+        wrong += broken_invariants(outputs) + unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+        place.estimator.finish()
+    return wrong + verified(folder / 'bag')
+
+
+LEGAL = {
+    ('unconfigured', Transition.TRANSITION_CONFIGURE): 'inactive',
+    ('inactive', Transition.TRANSITION_CLEANUP): 'unconfigured',
+    ('inactive', Transition.TRANSITION_ACTIVATE): 'active',
+    ('active', Transition.TRANSITION_DEACTIVATE): 'inactive',
+}
+"""State and transition -> next state."""
+
+
+def lifecycle_in_any_order(chance: random.Random, folder: Path) -> list[str]:
+    """Transitions by service, legal or not, repeated, while inputs come."""
+    del folder
+    with stage() as place:
+        client = place.driver.create_client(ChangeState, 'friction_estimator/change_state')
+        place.spin_until(client.service_is_ready)
+        state, wrong = 'active', []
+
+        def change(number: int) -> bool:
+            """Request a transition while inputs come; whether it succeeds."""
+            have_arrived = place.all_answers()
+            for _ in range(chance.randrange(4)):
+                place.now += MS
+                place.driver.publish(good(place.now))
+            future = client.call_async(ChangeState.Request(transition=Transition(id=number)))
+            return place.spin_until(lambda: future.done() and have_arrived()) and future.result().success
+
+        for _ in range(20):
+            number = chance.choice([number for _, number in LEGAL])
+            succeeded = change(number)
+            wrong += broken_invariants(place.driver.outputs)
+            wrong += unless(succeeded == ((state, number) in LEGAL), f'transition {number} while {state}: {succeeded}')
+            if succeeded:
+                place.driver.outputs.clear()  # the invariants hold from activation to deactivation
+                place.connect()
+            state = LEGAL.get((state, number), state)
+        for at, number in (
+            ('unconfigured', Transition.TRANSITION_CONFIGURE),
+            ('inactive', Transition.TRANSITION_ACTIVATE),
+        ):
+            if state == at:
+                wrong += unless(change(number), f'transition {number} at the end')
+                state = LEGAL[at, number]
+                place.connect()
+        return wrong + unrecovered(place)
+
+
+def simulated_time_is_reset(chance: random.Random, folder: Path) -> list[str]:
+    """``/clock`` jumps back to 0 and goes on from there."""
+    del chance
+    with stage(recording_to(folder) | {'use_sim_time': True}) as place:
+        clock = place.driver.create_publisher(Clock, '/clock', 10)
+        place.connect()
+
+        def run(ticks: int) -> Outputs:
+            """Move the clock and send, ``ticks`` times."""
+            outputs: Outputs = []
+            for _ in range(ticks):
+                now = Clock()
+                now.clock.sec, now.clock.nanosec = divmod(place.now + MS, 10**9)
+                clock.publish(now)
+                outputs += place.run(1)
+            return outputs
+
+        run(60)
+        place.now = 0
+        after = run(60)
+        marked = [o.status for o in after if isinstance(o, records.FrictionEstimate)]
+        wrong = unless(marked == [Status.STAMP_NOT_INCREASING] + [0] * 59, f'{marked[:5]}')
+        wrong += unrecovered(place)
+        place.estimator.finish()
+    return wrong + verified(folder / 'bag')
+
+
+def fifty_more_topics(chance: random.Random, folder: Path) -> list[str]:
+    """Fifty publishers of another node, all of them busy."""
+    del chance, folder
+    with stage() as place, intruder(place, 'crowd') as other:
+        publishers = [other.create_publisher(Float64, f'other_{number}', 10) for number in range(50)]
+        place.spin_until(lambda: len(place.driver.get_topic_names_and_types()) > 50)
+
+        def busy(tick: Tick, number: int) -> Tick:
+            for publisher in publishers[number % 5 :: 5]:
+                publisher.publish(Float64())
+            return tick
+
+        outputs = place.run(200, busy)
+        answered = sum(isinstance(output, records.FrictionEstimate) for output in outputs)
+        wrong = unless(answered == 200, f'{answered} of 200') + unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+        return wrong + unrecovered(place)
+
+
+# --- disk ---
+
+
+def disk_stalls(chance: random.Random, folder: Path) -> list[str]:
+    """The disk takes no write for 200 samples: an estimate that waited for it would never come."""
+    disk = BlockedDisk()
+    with stage(recording_to(folder)) as place:
+        outputs = place.run(chance.randrange(1, 200))
+        mcap_writer.os = disk
+        try:
+            wrong = unless(place.spin_until(lambda: place.run(10) and disk.is_blocking), 'nothing is written')
+            outputs += place.run(200)
+        finally:
+            mcap_writer.os = os
+            disk.release()
+        outputs += place.run(100)
+        wrong += unless(statuses(outputs) == {0}, f'{statuses(outputs)}')
+        wrong += broken_invariants(place.driver.outputs)
+        place.estimator.finish()
+    return wrong + verified(folder / 'bag')
+
+
+def directory_removed(chance: random.Random, folder: Path) -> list[str]:
+    """The folder of the bag is removed while it is written."""
+    with stage(recording_to(folder)) as place:
+        place.run(chance.randrange(20, 60))
+        shutil.rmtree(folder / 'bag')
+        report = place.estimator.diagnostics
+        place.spin_until(lambda: place.run(10) and report()['recorder'].level == b'\x02')
+        text = report()['recorder'].message
+        return unless('recording stopped' in text, f'recorder: {text}') + unrecovered(place)

@@ -1,0 +1,85 @@
+"""Live against offline: ``python test/system/live_replay.py BAG... [--rate R]... [--times N] [--json]``.
+
+Plays each bag into a live estimator, both in processes of their own, and compares the estimates with those of the
+offline replay of the bag byte for byte. Exit code 1 if any differ or if the recording does not verify.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.processes import free_domain, play_live
+
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE
+from seal_friction_ros.offline.bags.bag import read_messages
+from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
+
+
+class LiveRun(NamedTuple):
+    """One bag played live."""
+
+    live: list[bytes]
+    """estimates recorded live"""
+    offline: list[bytes]
+    """estimates of the offline replay of the same bag"""
+    verifies: bool
+    """whether the replay of the live recording is identical"""
+
+    @property
+    def identical(self) -> bool:
+        """Whether live and offline estimates are the same bytes and the recording verifies."""
+        return self.live == self.offline and self.verifies
+
+
+def play(bag: Path, rate: float, folder: Path) -> LiveRun:
+    """Play a bag live at ``rate`` times its pace (0: as fast as answered) and replay it offline.
+
+    Both use the default parameters of the node, not those of the bag.
+    """
+    play_live(bag, folder / 'live', free_domain(), rate)
+    default = folder / 'default.yaml'
+    default.write_text('/**:\n  ros__parameters: {}\n')
+    replay(bag, chosen_configuration(default, None), folder / 'offline')
+    return LiveRun(*(estimates(folder / name) for name in ('live', 'offline')), replay(folder / 'live').identical)
+
+
+def estimates(bag: Path) -> list[bytes]:
+    """Estimates of a bag, as recorded."""
+    return [message.data for message in read_messages(bag) if message.type_name == ESTIMATE_TYPE]
+
+
+def main() -> int:
+    """Play the bags; print a table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG')
+    parser.add_argument('--rate', type=float, action='append', help='times the pace of the bag; 0: as fast as answered')
+    parser.add_argument('--times', type=int, default=1, help='runs of each bag at each rate')
+    parser.add_argument('--json', action='store_true')
+    arguments = parser.parse_args()
+    table, rows = Table('bag', 'rate', 'live', 'offline', 'result', title='Estimates live and offline'), []
+    for bag in arguments.bags:
+        for rate in (arguments.rate or [1.0, 0.0]) * arguments.times:
+            folder = Path(tempfile.mkdtemp())
+            run = play(bag, rate, folder)
+            counts = len(run.live), len(run.offline)
+            table.add_row(str(bag), f'{rate:g}', *map(str, counts), 'identical' if run.identical else f'see {folder}')
+            rows.append({'bag': str(bag), 'rate': rate, 'estimates': counts, 'identical': run.identical})
+            if run.identical:
+                shutil.rmtree(folder)
+    if arguments.json:
+        print(json.dumps(rows))
+    else:
+        Console().print(table)
+    return int(not all(row['identical'] for row in rows))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

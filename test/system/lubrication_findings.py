@@ -1,0 +1,158 @@
+"""Findings of the lubricated contact as numbers: ``python test/system/lubrication_findings.py [--influence] [--json]``.
+
+The findings of the paper with their errors of time step and grid; with ``--influence`` the change of the findings with
+each parameter that the paper does not give, 20 % down and up.
+"""
+
+import argparse
+import dataclasses
+import json
+from collections.abc import Sequence
+
+from seal_friction_ros.core.lubrication.case import Case
+from seal_friction_ros.core.lubrication.findings import Findings, findings
+from seal_friction_ros.core.lubrication.transient import run
+from seal_friction_ros.offline.contact.lubrication_runs import run_case, run_study, single_case
+
+OUR_CHOICES = {  # case: parameters that the paper does not give and that act in this case
+    'inner_seal': (
+        'seal.crown_radius',
+        'seal.interference',
+        'seal.section_height',
+        'topography.rms_height',
+        'topography.rms_slope',
+        'topography.roll_off_length',
+        'topography.wall_share',
+        'groove.stiffness',
+        'grease.shear_rate_floor',
+        'numerics.film_width',
+    ),
+    'inner_seal_groove': ('groove.half_clearance',),
+    'inner_seal_pressure': ('air.pressure_interference',),
+    'inner_seal_control_edge': (
+        'control_edge.position',
+        'control_edge.slope',
+        'control_edge.depth',
+        'control_edge.rounding',
+    ),
+    'inner_seal_viscoelastic': ('viscoelasticity.stiffening', 'viscoelasticity.relaxation_time'),
+    'inner_seal_starved': ('film_supply.initial_film',),
+}
+COMPARED = ('friction', 'solid_share', 'rise_on_deceleration', 'edge_peak', 'after_edge')
+CHANGE = 0.2
+SINGLE = (
+    'inner_seal', 'inner_seal_groove', 'inner_seal_control_edge', 'inner_seal_viscoelastic', 'inner_seal_starved',
+    'inner_seal_pressure', 'outer_seal', 'outer_seal_pressure',
+)  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """A number, and its change with twice the time step and with half the cells; None: not computed."""
+
+    case: str
+    name: str
+    value: float
+    by_step: float | None = None
+    by_grid: float | None = None
+
+
+def all_findings(names: Sequence[str]) -> list[Row]:
+    """The findings of every case, and those of the study of the first case."""
+    rows = []
+    for name in names:
+        found = run_case(single_case(name, 'finding'))
+        values = found.found._asdict()
+        rows += [
+            Row(name, key, values[key], found.step_errors[key], found.grid_errors[key]) for key in found.step_errors
+        ]
+        rows.append(Row(name, 'mass_defect', found.result.mass_defect))
+        rows.append(Row(name, 'retried_steps', found.result.retried_steps))
+    return rows + study_rows(single_case(names[0], 'study'))
+
+
+def study_rows(case: Case) -> list[Row]:
+    """Deviation of friction over tau_c from its mean, with the errors of step and grid."""
+    n = case.numerics
+    longer = dataclasses.replace(n, time_step=2.0 * n.time_step)
+    coarser = dataclasses.replace(n, cells=max(32, n.cells // 2))
+    fine, step_, grid = (run_study(dataclasses.replace(case, numerics=g), 1).table for g in (n, longer, coarser))
+    return [
+        Row(
+            f'tau_c = {stress / 1e6:g} MPa',
+            name,
+            getattr(fine, name)[i],
+            abs(getattr(step_, name)[i] - getattr(fine, name)[i]),
+            abs(getattr(grid, name)[i] - getattr(fine, name)[i]),
+        )
+        for i, stress in enumerate(fine.solid_shear_stress)
+        for name in ('friction', 'solid_share', 'deviation', 'curve_deviation')
+    ]
+
+
+def influence(names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
+    """Changes of the findings with each of our choices 20 % down and up: relative; differences for share and rise."""
+    rows = {}
+    for name in names:
+        case = single_case(name, 'influence')
+        if case.name not in OUR_CHOICES:
+            continue
+        base = findings(run(case))
+        for parameter in OUR_CHOICES[case.name]:
+            down, up = (_changes(base, findings(run(_with(case, parameter, f)))) for f in (1 - CHANGE, 1 + CHANGE))
+            rows[parameter] = {finding: [down[finding], up[finding]] for finding in down}
+    return rows
+
+
+def _with(case: Case, parameter: str, factor: float) -> Case:
+    part, name = parameter.split('.')
+    record = getattr(case, part)
+    names = [f'{name}_left', f'{name}_right'] if name == 'crown_radius' else [name]
+    changed = dataclasses.replace(record, **{n: getattr(record, n) * factor for n in names})
+    return dataclasses.replace(case, **{part: changed})
+
+
+def _changes(base: Findings, other: Findings) -> dict[str, float]:
+    was, now = base._asdict(), other._asdict()
+    return {
+        name: now[name] - was[name] if name in ('solid_share', 'rise_on_deceleration') else now[name] / was[name] - 1.0
+        for name in COMPARED
+        if was[name] is not None
+    }
+
+
+def main() -> None:
+    """Compute; print the table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--json', action='store_true', help='print JSON')
+    parser.add_argument('--influence', action='store_true', help='influence of our own choices instead of the findings')
+    parser.add_argument('--cases', nargs='+', default=SINGLE, help='names or paths of the case files')
+    arguments = parser.parse_args()
+    if arguments.influence:
+        _print_influence(influence(arguments.cases), as_json=arguments.json)
+    else:
+        _print_findings(all_findings(arguments.cases), as_json=arguments.json)
+
+
+def _print_findings(found: list[Row], *, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps([dataclasses.asdict(row) for row in found]))
+        return
+    print(f'{"case":26}{"finding":22}{"value":>12}{"step":>12}{"grid":>12}')
+    for row in found:
+        errors = ''.join(f'{"" if e is None else f"{e:.2g}":>12}' for e in (row.by_step, row.by_grid))
+        print(f'{row.case:26}{row.name:22}{row.value:12.4g}{errors}')
+
+
+def _print_influence(rows: dict[str, dict[str, list[float]]], *, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(rows))
+        return
+    print(f'{"changes in % for -20 %, +20 % of":34}' + ''.join(f'{name:>22}' for name in COMPARED))
+    for name, found in rows.items():
+        cells = (', '.join(f'{100.0 * c:+.2f}' for c in found.get(finding, ())) for finding in COMPARED)
+        print(f'{name:34}' + ''.join(f'{cell:>22}' for cell in cells))
+
+
+if __name__ == '__main__':
+    main()

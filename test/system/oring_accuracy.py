@@ -1,0 +1,230 @@
+"""Accuracy of the finite-element O-ring: ``python test/system/oring_accuracy.py [TABLE ...] [--lines N ...] [--json]``.
+
+Tables, all of them by default:
+
+- ``hertz``: force and peak of a cylinder between two plates over those of Hertz [%], peak over that of its own force;
+- ``lines``, ``penalty``, ``transition``: the thesis's ring, calibrated, at its five pressures, with one number of
+  `Numerics` changed; normal forces in N;
+- ``thesis``: calibrated and blind case against Appendix B [%], axial force over pressure times area, volume lost;
+- ``variants``: the blind case with another section, modulus, ring or friction;
+- ``friction``: friction of one seal from geometry alone against the measured one, thesis's seals and Delft O-ring.
+"""
+
+import argparse
+import dataclasses
+import json
+import math
+import sys
+from collections.abc import Callable, Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, PSI
+from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
+from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
+from seal_friction_ros.core.oring_contact.case_file import parse_case
+from seal_friction_ros.core.oring_contact.hertz import cylinder_between_plates
+from seal_friction_ros.core.oring_contact.loading import model_of, squeeze
+from seal_friction_ros.core.oring_contact.material import Rubber
+from seal_friction_ros.core.oring_contact.results import contact_results, evaluate
+from seal_friction_ros.files import config_path, read_yaml
+from seal_friction_ros.offline.contact.oring_runs import compute_case
+from seal_friction_ros.offline.reports.oring_report import appendix_b, friction_deviation, thesis_case
+
+Rows = list[dict[str, float | str]]
+SQUEEZES = (0.02, 0.04, 0.06, 0.08)
+HERTZ_LINES = (33, 65)
+LINES = (13, 17, 25, 33, 41, 49)
+PENALTIES = (200.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
+TRANSITIONS = (0.01, 0.02, 0.05, 0.1)
+
+
+def contact(numerics: Numerics) -> dict[str, float]:
+    """Normal force of the calibrated case at each pressure; peak stress and width at the last one."""
+    file = parse_case(read_yaml(config_path('oring', 'ms28775_114')))
+    case = dataclasses.replace(file.case, numerics=numerics)
+    results = list(contact_results(case, file.pressures))
+    figures = {f'F_n at {result.pressure / PSI:.0f} psi [N]': result.rod.force for result in results}
+    last = results[-1]
+    figures['peak at the last [MPa]'] = last.rod.peak_stress / 1e6
+    figures['width at the last [mm]'] = last.rod.width / 1e-3
+    return figures
+
+
+def hertz() -> Rows:
+    """A ring of 2 mm section and 1 m radius, for which rod and gland are plates."""
+    diameter, inner, rubber = 2e-3, 2.0, Rubber(5e6)
+    rows: Rows = []
+    for lines in HERTZ_LINES:
+        for share in SQUEEZES:
+            depth = share * diameter
+            geometry = SealGeometry(diameter, inner, inner + depth, inner + 2.0 * diameter - depth)
+            numerics = Numerics(lines=lines)
+            case = OringCase(name='plates', geometry=geometry, groove=Groove(5e-3), rubber=rubber, numerics=numerics)
+            model = model_of(case)
+            rod = evaluate(model, squeeze(case, model)).rod
+            expected = cylinder_between_plates(share, diameter, rubber.elastic_modulus / 0.75)
+            force = rod.force / (math.pi * geometry.rod_diameter)
+            peak_of_force = expected.peak_stress * math.sqrt(force / expected.force_per_length)
+            rows.append(
+                {
+                    'lines': lines,
+                    'squeeze [%]': 100.0 * share,
+                    'force off [%]': 100.0 * (force / expected.force_per_length - 1.0),
+                    'peak off [%]': 100.0 * (rod.peak_stress / expected.peak_stress - 1.0),
+                    'peak off that of the force [%]': 100.0 * (rod.peak_stress / peak_of_force - 1.0),
+                }
+            )
+    return rows
+
+
+def thesis() -> Rows:
+    """Both cases of the thesis's ring against Appendix B."""
+    rows: Rows = []
+    for name in ('ms28775_114', 'ms28775_114_blind'):
+        computed = compute_case(config_path('oring', name))
+        area = projected_area(computed.file.case.geometry)
+        for result in computed.results:
+            its = thesis_case(computed, result)
+            if its is None:
+                raise ValueError(f'{name}: Appendix B has no {result.pressure / PSI:.0f} psi')
+            push = result.pressure * area
+            rows.append(
+                {
+                    'case': name,
+                    'psi': round(result.pressure / PSI),
+                    'F_n [lbf]': result.rod.force / LBF,
+                    'its [lbf]': its.normal_force / LBF,
+                    'F_n off [%]': 100.0 * (result.rod.force / its.normal_force - 1.0),
+                    'peak off [%]': 100.0 * (result.rod.peak_stress / its.peak_stress - 1.0),
+                    'width off [%]': 100.0 * (result.rod.width / its.width - 1.0),
+                    'axial off [%]': 100.0 * (result.axial_force / push - 1.0) if push else '-',
+                    'volume lost [%]': 100.0 * (1.0 - result.volume_ratio),
+                    'slope': computed.summary.area_deformation_gain or '-',
+                }
+            )
+    return rows
+
+
+def friction() -> Rows:
+    """Friction of one seal from geometry alone against the measured one."""
+    rows: Rows = []
+    for name in ('ms28775_114', 'ms28775_114_blind', 'delft_o_ring'):
+        computed = compute_case(config_path('oring', name))
+        measured = computed.file.measured
+        if measured is None:
+            raise ValueError(f'{name}: nothing measured')
+        off = friction_deviation(computed, measured)
+        for pressure, force, percent in zip(measured.pressures, measured.frictions, off, strict=True):
+            each = force / measured.seals
+            rows.append(
+                {
+                    'case': name,
+                    'bar': pressure / BAR,
+                    'psi': round(pressure / PSI),
+                    'measured [N]': each,
+                    'from geometry [N]': each * (1.0 + percent / 100.0),
+                    'measured [lbf]': each / LBF,
+                    'from geometry [lbf]': each * (1.0 + percent / 100.0) / LBF,
+                    'off [%]': float(percent),
+                }
+            )
+    return rows
+
+
+def variants() -> Rows:
+    """Normal force of the blind case and its variants [N] at 0, 500 and 1000 psi, and deviation from Appendix B [%]."""
+    case = parse_case(read_yaml(config_path('oring', 'ms28775_114_blind'))).case
+    geometry = case.geometry
+    nominal = dataclasses.replace(geometry, section_diameter=0.103 * INCH)
+    cases = {
+        'blind': case,
+        'section 0.105 in instead of 0.106': _with(case, section_diameter=0.105 * INCH),
+        'section 0.103 in, nominal': _with(case, section_diameter=0.103 * INCH),
+        'E 7.0 MPa instead of 5.5': dataclasses.replace(
+            case, rubber=dataclasses.replace(case.rubber, elastic_modulus=7e6)
+        ),
+        'ring inner diameter 0.607 in instead of 0.612': _with(case, ring_inner_diameter=0.607 * INCH),
+        'ring not stretched (0.625 in)': _with(case, ring_inner_diameter=0.625 * INCH),
+        'wall friction 0.03': dataclasses.replace(case, wall_friction=0.03),
+        'section 0.103 in and E 7.0 MPa (calibrated)': dataclasses.replace(
+            case, geometry=nominal, rubber=dataclasses.replace(case.rubber, elastic_modulus=7e6)
+        ),
+        'calibrated, wall friction 0.05': dataclasses.replace(
+            case,
+            geometry=nominal,
+            rubber=dataclasses.replace(case.rubber, elastic_modulus=7e6),
+            wall_friction=0.05,
+        ),
+    }
+    compared = {psi: case.normal_force for psi, case in appendix_b().items() if psi in (0.0, 500.0, 1000.0)}
+    rows: Rows = []
+    for name, variant in cases.items():
+        row: dict[str, float | str] = {'variant': name}
+        for psi, result in zip(compared, contact_results(variant, tuple(p * PSI for p in compared)), strict=True):
+            row[f'F_n at {psi:.0f} psi [N]'] = result.rod.force
+            row[f'off at {psi:.0f} psi [%]'] = 100.0 * (result.rod.force / compared[psi] - 1.0)
+        rows.append(row)
+    return rows
+
+
+def _with(case: OringCase, **changes: float) -> OringCase:
+    return dataclasses.replace(case, geometry=dataclasses.replace(case.geometry, **changes))
+
+
+def converging(name: str, choices: Sequence[float]) -> Rows:
+    """Figures of `contact` for several values of one number of `Numerics`."""
+    return [{name: choice, **contact(dataclasses.replace(Numerics(), **{name: choice}))} for choice in choices]
+
+
+TABLES: dict[str, Callable[[Sequence[int]], Rows]] = {
+    'hertz': lambda _: hertz(),
+    'lines': lambda lines: converging('lines', lines),
+    'penalty': lambda _: converging('penalty', PENALTIES),
+    'transition': lambda _: converging('transition', TRANSITIONS),
+    'thesis': lambda _: thesis(),
+    'variants': lambda _: variants(),
+    'friction': lambda _: friction(),
+}
+"""Name -> its rows, given the meshes of the table ``lines``."""
+
+
+def main() -> int:
+    """Compute the requested tables; print each, or all of them as one JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('tables', nargs='*', metavar='TABLE', help=', '.join(TABLES))
+    parser.add_argument('--json', action='store_true')
+    parser.add_argument('--lines', type=int, nargs='+', default=LINES, help='meshes of the table ``lines``')
+    arguments = parser.parse_args()
+    unknown = [name for name in arguments.tables if name not in TABLES]
+    if unknown:
+        parser.error(f'there is no table {unknown[0]}: there are {", ".join(TABLES)}')
+    computed = {}
+    for name in arguments.tables or TABLES:
+        computed[name] = TABLES[name](arguments.lines)
+        if not arguments.json:
+            _print(name, computed[name])
+    if arguments.json:
+        print(json.dumps(computed))
+    return 0
+
+
+def _print(name: str, rows: Rows) -> None:
+    table = Table(title=name)
+    for heading in rows[0]:
+        table.add_column(Text(heading), justify='right')
+    for row in rows:
+        table.add_row(*(_text(value) for value in row.values()))
+    Console(width=180).print(table)
+
+
+def _text(value: float | str) -> str:
+    if isinstance(value, str):
+        return value
+    return f'{value:.6g}' if value >= 1e3 else f'{value:.4g}'
+
+
+if __name__ == '__main__':
+    sys.exit(main())

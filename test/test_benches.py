@@ -1,0 +1,65 @@
+"""Every bench runs in its shortest form and counts what it should count; no test depends on the times it prints."""
+
+from harness.commands import run_json
+from paths import ROOT
+
+SMALL_CASE = """name: small
+motion: {cycles: 1}
+numerics: {cells: 48, time_step: 2.0e-3}
+map: {velocity_min: 1.0e-3, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+5, pressures: 2}
+"""
+
+
+def test_every_round_trip_is_answered_by_every_node():
+    found = run_json('bench/live.py', '--seconds', '0.6', '--rates', '500')
+    assert len(found['figures']) == 4
+    for figures in found['figures'].values():
+        assert figures['500']['missed'] == 0
+        assert 0.0 < figures['500']['p50 [us]'] <= figures['500']['p99 [us]']
+    assert len(found['ratios']) == 3
+    wakes = found['figures']['estimator']['500']['event thread woken per sample']
+    assert wakes < 3.0  # the effect of config/fastdds.xml; four to eight times without
+
+
+def test_the_start_is_timed():
+    found = run_json('bench/start.py', '--times', '1')
+    assert len(found) == 4
+    assert min(found.values()) > 0.0
+
+
+def test_a_sample_is_timed_stage_by_stage():
+    found = run_json('bench/step.py', '--batches', '1')
+    assert {'bare call [us]', 'receive velocity [us]', 'receive velocity, with feed-forward [us]'} <= set(found)
+    assert min(found.values()) > 0.0
+
+
+def test_files_are_timed_by_size():
+    found = run_json('bench/offline.py', '--largest', '10000', '--tasks', 'import', 'replay, message by message')
+    assert found['sizes'] == [10_000]
+    assert [task['time [s]']['10000'] > 0.0 for task in found['tasks'].values()] == [True, True]
+
+
+def test_the_servo_is_timed_by_inner_step():
+    rows = run_json('bench/servo.py', '--seconds', '0.1')['rows']
+    assert len(rows) == 4
+    assert all(min(row['step'], row['simulate']) > 0.0 for row in rows)
+
+
+def test_the_o_ring_is_timed_by_mesh():
+    (row,) = run_json('bench/oring.py', '--lines', '9')
+    assert row['unknowns'] > 100
+    assert row['Newton steps'] > 10
+
+
+def test_the_lubricated_contact_is_timed_by_grid_and_step(tmp_path):
+    (tmp_path / 'small.yaml').write_text(SMALL_CASE)
+    grid = ('--cells', '32', '48', '--steps', '8e-3', '4e-3')
+    found = run_json('bench/ehl.py', '--case', str(tmp_path / 'small.yaml'), *grid)
+    assert {'cycle, 32 cells [s]', 'exponent in steps', 'map, 3 x 2 [s]'} <= set(found)
+    assert found['estimator step, friction_map [us]'] > 0.0
+
+
+def test_every_bench_is_run_here():
+    benches = {path.name for path in (ROOT / 'bench').glob('*.py')} - {'one_core.py'}
+    source = (ROOT / 'test' / 'test_benches.py').read_text()
+    assert {name for name in benches if f"'bench/{name}'" not in source} == set()
