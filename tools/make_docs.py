@@ -19,16 +19,23 @@ from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGai
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
-from seal_friction_ros.core.lubrication import case as ehl
-from seal_friction_ros.core.lubrication import groove as ehl_groove
-from seal_friction_ros.core.lubrication.case import Air, MapGrid, Member, SealBody, Study, Viscoelasticity
 from seal_friction_ros.core.lubrication.grease import Grease
+from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
+from seal_friction_ros.core.lubrication.lubrication_case import (
+    AirPressure,
+    LubricationNumerics,
+    MapGrid,
+    SealBody,
+    ShearStressStudy,
+    SpoolSeal,
+    Viscoelasticity,
+)
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
-from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
-from seal_friction_ros.core.oring_contact.case_file import Measured
 from seal_friction_ros.core.oring_contact.material import Rubber
+from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
+from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
 from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
 
@@ -52,20 +59,22 @@ RECORDS = (
     Uncertainty,
     Groove,
     Rubber,
-    Numerics,
+    OringNumerics,
     OringCase,
-    Measured,
+    MeasuredFriction,
     SealBody,
     Topography,
     Grease,
-    Air,
+    GrooveSpring,
+    AirPressure,
     ConstantAcceleration,
+    LubricationNumerics,
     ControlEdge,
     FilmSupply,
     Viscoelasticity,
-    Study,
+    ShearStressStudy,
     MapGrid,
-    Member,
+    SpoolSeal,
     SavitzkyGolay,
     Sliding,
     SpoolEvaluation,
@@ -133,10 +142,6 @@ def other_faults() -> str:
 def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
     tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
-    tables |= {
-        'EhlGroove': table(ehl_groove.Groove),
-        'EhlNumerics': table(ehl.Numerics),
-    }  # the O-ring has these names, too
     tables['friction_laws'] = friction_laws()
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(

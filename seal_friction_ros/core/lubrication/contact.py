@@ -68,7 +68,7 @@ class ContactStep(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class LubricatedContact:
     """What a contact is made of."""
 
     half_plane: HalfPlane
@@ -211,7 +211,7 @@ def _flow_right_side(residual: FloatArray, rows: FloatArray, kept: FloatArray) -
 
 
 def _newton_change(
-    contact: Contact,
+    contact: LubricatedContact,
     residual: FloatArray,
     rows: FloatArray,
     kept: FloatArray,
@@ -254,7 +254,7 @@ def _newton_change(
 
 
 def contact_step(
-    contact: Contact,
+    contact: LubricatedContact,
     guess: ContactState,
     rigid_gap: FloatArray,
     wall_velocity: float,
@@ -317,7 +317,7 @@ def contact_step(
     )
 
 
-def dry_contact(contact: Contact, rigid_gap: FloatArray) -> FloatArray:
+def dry_contact(contact: LubricatedContact, rigid_gap: FloatArray) -> FloatArray:
     """Gap of the dry rough contact [m], shape (n,): h = g + K p_c(h).
 
     Raises:

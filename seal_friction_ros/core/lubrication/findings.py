@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
-from seal_friction_ros.core.lubrication.case import Case
-from seal_friction_ros.core.lubrication.transient import RunResult, last_cycle
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
+from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
 
 REFERENCE_HALF_WIDTH = 0.5e-3
 """[m] about the middle: where the paper takes its mean friction (chapter 6)"""
@@ -50,7 +50,7 @@ class Findings(NamedTuple):
     """[N] mean friction well inside the seat, after the control edge"""
 
 
-def findings(result: RunResult) -> Findings:
+def findings(result: TransientResult) -> Findings:
     """Findings of the last cycle.
 
     Raises:
@@ -91,7 +91,7 @@ def findings(result: RunResult) -> Findings:
 
 
 def discretisation_errors(
-    case: Case, fine: Findings, run: Callable[[Case], RunResult]
+    case: LubricationCase, fine: Findings, run: Callable[[LubricationCase], TransientResult]
 ) -> tuple[dict[str, float], dict[str, float]]:
     """How far each finding moves when the step is doubled, and when the grid is coarsened to half the cells.
 
@@ -121,7 +121,7 @@ def _mean(values: FloatArray) -> float | None:
     return float(np.mean(values)) if len(values) else None
 
 
-def _fast(result: RunResult, last: BoolArray) -> BoolArray:
+def _fast(result: TransientResult, last: BoolArray) -> BoolArray:
     """Steps of the last cycle at the highest speed, in the seat."""
     speed = np.abs(result.velocity)
     fast = last & (speed >= 0.99 * speed[last].max())
@@ -130,11 +130,11 @@ def _fast(result: RunResult, last: BoolArray) -> BoolArray:
     return np.asarray(inside if inside.any() else fast)
 
 
-def _half_width(result: RunResult) -> float:
+def _half_width(result: TransientResult) -> float:
     return 0.5 * result.case.numerics.film_width
 
 
-def _slowing(result: RunResult, stroke: BoolArray) -> tuple[int, int]:
+def _slowing(result: TransientResult, stroke: BoolArray) -> tuple[int, int]:
     """Step at which the stroke has slowed to 0.2 of its highest speed, and the last at the highest."""
     steps = np.flatnonzero(stroke)
     speed = np.abs(result.velocity[steps])
@@ -143,7 +143,7 @@ def _slowing(result: RunResult, stroke: BoolArray) -> tuple[int, int]:
     return int(steps[slow]), int(steps[fastest])
 
 
-def _assisted(result: RunResult, last: BoolArray) -> tuple[float | None, float | None]:
+def _assisted(result: TransientResult, last: BoolArray) -> tuple[float | None, float | None]:
     """Mean way after the reversals of the last cycle until friction changes sign, and what elasticity says."""
     reversals = [
         int(i)
@@ -165,14 +165,14 @@ def _assisted(result: RunResult, last: BoolArray) -> tuple[float | None, float |
     return (_mean(np.array(ways)), _mean(np.array(estimates))) if ways else (None, None)
 
 
-def _turning_point(result: RunResult, i: int) -> float:
+def _turning_point(result: TransientResult, i: int) -> float:
     """The end of the way nearest to the position of step ``i`` [m]."""
     motion = result.case.motion
     ends = motion.centre - 0.5 * motion.distance, motion.centre + 0.5 * motion.distance
     return min(ends, key=lambda end: abs(end - result.position[i]))
 
 
-def _second_lobe(result: RunResult, last: BoolArray) -> float | None:
+def _second_lobe(result: TransientResult, last: BoolArray) -> float | None:
     """Where on the stroke to the right friction has its first maximum while the seal sticks: vertex of a parabola."""
     if result.case.seated_groove.half_clearance == 0.0:
         return None
@@ -186,13 +186,13 @@ def _second_lobe(result: RunResult, last: BoolArray) -> float | None:
     return None
 
 
-def _edge_peak(result: RunResult, last: BoolArray) -> float | None:
+def _edge_peak(result: TransientResult, last: BoolArray) -> float | None:
     after = _after_edge(result, last)
     coming = last & (result.velocity < 0.0)
     return float(np.abs(result.friction[coming]).max() / after) if coming.any() and after else None
 
 
-def _after_edge(result: RunResult, last: BoolArray) -> float | None:
+def _after_edge(result: TransientResult, last: BoolArray) -> float | None:
     """Mean friction on the stroke into the seat while the film region is in it and the speed above half the highest."""
     edge = result.case.control_edge
     speed = np.abs(result.velocity)

@@ -10,9 +10,9 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.lubrication.case import Case, MapGrid
 from seal_friction_ros.core.lubrication.contact import ContactState, contact_step
-from seal_friction_ros.core.lubrication.transient import Model, fluid_force, rest, solid_limit
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
+from seal_friction_ros.core.lubrication.transient import LubricationModel, fluid_force, initial_state, solid_limit
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
 _MOST_RETRIES = 20
@@ -34,7 +34,7 @@ class SteadyFriction(NamedTuple):
     retried_steps: int
 
 
-class Memory(NamedTuple):
+class MemoryLength(NamedTuple):
     """How long friction remembers."""
 
     length: float
@@ -52,20 +52,20 @@ def map_pressures(grid: MapGrid) -> FloatArray:
     return np.linspace(0.0, grid.pressure_max, grid.pressures)
 
 
-def _plain(case: Case, pressure: float) -> Case:
+def _plain(case: LubricationCase, pressure: float) -> LubricationCase:
     """The case on a plain flooded wall, elastic, with ``pressure`` [Pa] on its left."""
     air = dataclasses.replace(case.air, pressure_left=pressure, pressure_right=0.0)
     return dataclasses.replace(case, air=air, control_edge=None, film_supply=None, viscoelasticity=None)
 
 
-def _friction(model: Model, state: ContactState, velocity: float) -> tuple[float, float]:
+def _friction(model: LubricationModel, state: ContactState, velocity: float) -> tuple[float, float]:
     """Friction and solid friction [N], magnitudes, at a sliding ``velocity`` [m/s]."""
     solid = solid_limit(model, state)
     return solid + math.copysign(1.0, velocity) * fluid_force(model, state, velocity), solid
 
 
 def _slid(
-    model: Model, start: ContactState, velocity: float, durations: Sequence[float]
+    model: LubricationModel, start: ContactState, velocity: float, durations: Sequence[float]
 ) -> tuple[ContactState, list[ContactState], int]:
     """Sliding at a ``velocity`` [m/s] by implicit Euler steps of ``durations`` [s]; one that fails is taken in halves.
 
@@ -100,7 +100,7 @@ def _slid(
     return state, states, retried
 
 
-def steady_state(model: Model, start: ContactState, velocity: float) -> tuple[ContactState, int]:
+def steady_state(model: LubricationModel, start: ContactState, velocity: float) -> tuple[ContactState, int]:
     """Film of steady sliding at a ``velocity`` [m/s] by ever longer steps from ``start``; how many steps failed.
 
     Raises:
@@ -111,16 +111,16 @@ def steady_state(model: Model, start: ContactState, velocity: float) -> tuple[Co
     return state, retried
 
 
-def steady_friction(case: Case, pressure: float) -> SteadyFriction:
+def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
     """Steady sliding friction of a case at one pressure [Pa], both directions, over the speeds of its grid.
 
     Raises:
         NotConvergedError: A film did not converge; the message says at which speed and pressure.
     """
-    model = Model(_plain(case, pressure))
+    model = LubricationModel(_plain(case, pressure))
     speeds = map_speeds(case.map)
     values = np.empty((2, 2, len(speeds)))
-    begin = rest(model, 0.0).state
+    begin = initial_state(model, 0.0).state
     retried = 0
     for k, direction in enumerate((1.0, -1.0)):
         state = begin
@@ -135,7 +135,7 @@ def steady_friction(case: Case, pressure: float) -> SteadyFriction:
     return SteadyFriction(pressure, friction, solid, values[1, 0] - values[0, 0], retried)
 
 
-def memory_length(case: Case) -> Memory:
+def memory_length(case: LubricationCase) -> MemoryLength:
     """Sliding over which friction follows a change of speed [m], without pressure.
 
     From steady sliding at a fifth of the highest speed of the motion the speed is set to the highest; the length is
@@ -144,19 +144,19 @@ def memory_length(case: Case) -> Memory:
     Raises:
         NotConvergedError: A step did not converge.
     """
-    model = Model(_plain(case, 0.0))
+    model = LubricationModel(_plain(case, 0.0))
     fast = case.motion.speed
-    slow, first = steady_state(model, rest(model, 0.0).state, 0.2 * fast)
+    slow, first = steady_state(model, initial_state(model, 0.0).state, 0.2 * fast)
     steady, second = steady_state(model, slow, fast)
     step = 4.0 * case.numerics.film_width / fast / _MEMORY_STEPS
     _, states, third = _slid(model, slow, fast, [step] * _MEMORY_STEPS)
     course = np.array([_friction(model, state, fast)[0] for state in (slow, *states)])
     end = _friction(model, steady, fast)[0]
     over = (course - end) / (course[0] - end)
-    return Memory(float(np.trapezoid(over) * step * fast), first + second + third)
+    return MemoryLength(float(np.trapezoid(over) * step * fast), first + second + third)
 
 
-def friction_map(case: Case, rows: list[SteadyFriction], memory: float) -> FrictionMap:
+def friction_map(case: LubricationCase, rows: list[SteadyFriction], memory: float) -> FrictionMap:
     """The law from its computed rows, one for each pressure of the grid, in any order.
 
     Raises:

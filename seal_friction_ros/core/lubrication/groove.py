@@ -6,7 +6,7 @@ from seal_friction_ros.core.foundation.parameters import check, parameter
 
 
 @dataclass(frozen=True)
-class Groove:
+class GrooveSpring:
     r"""Force of the spool on the seal over the lag e of the contact behind the spool.
 
     .. math:: F(e) = k (|e| - c)\,\mathrm{sgn}(e)\ (|e| \ge c),\quad F(e) = \tfrac{k}{2} e (e^2 / c^2 - 1)\ (|e| < c)

@@ -11,7 +11,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.parameters import check, parameter
 
 
-class Motion(Protocol):
+class SpoolMotion(Protocol):
     """Position over time; velocity follows from it step by step."""
 
     @property

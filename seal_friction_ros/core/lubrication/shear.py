@@ -8,18 +8,18 @@ from scipy.special import erf
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.lubrication.contact import Contact, asperity_pressure
+from seal_friction_ros.core.lubrication.contact import LubricatedContact, asperity_pressure
 from seal_friction_ros.core.lubrication.grease import apparent_viscosity
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
 
 
-def real_area_share(contact: Contact, gap: FloatArray) -> FloatArray:
+def real_area_share(contact: LubricatedContact, gap: FloatArray) -> FloatArray:
     """Local share A_real of the surface that touches, shape (n,), at a ``gap`` [m]; see `Topography`."""
     pressure, _ = asperity_pressure(gap, contact.asperities)
     return np.asarray(erf(pressure / contact.topography.real_area_pressure(contact.half_plane.modulus)))
 
 
-def solid_shear(contact: Contact, gap: FloatArray, solid_shear_stress: float) -> float:
+def solid_shear(contact: LubricatedContact, gap: FloatArray, solid_shear_stress: float) -> float:
     """Solid shear force [N/m]: integral of tau_c A_real over the seal.
 
     Source: spool-valve paper, equation (2).

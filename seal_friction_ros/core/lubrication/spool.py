@@ -6,15 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
-from seal_friction_ros.core.lubrication.case import Member
-from seal_friction_ros.core.lubrication.kinematics import Motion
-from seal_friction_ros.core.lubrication.transient import RunResult, last_cycle
+from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
+from seal_friction_ros.core.lubrication.lubrication_case import SpoolSeal
+from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
 
 
-class MemberMotion:
+class SpoolSealMotion:
     """Motion of the spool as one seal sees it: shifted, and the other way round if it is mirrored."""
 
-    def __init__(self, motion: Motion, member: Member) -> None:
+    def __init__(self, motion: SpoolMotion, member: SpoolSeal) -> None:
         self._motion, self._member = motion, member
 
     @property
@@ -43,7 +43,7 @@ class SpoolResult(NamedTuple):
     """whether each step is in the last cycle"""
 
 
-def superposed(members: Sequence[Member], runs: Sequence[RunResult]) -> SpoolResult:
+def superposed(members: Sequence[SpoolSeal], runs: Sequence[TransientResult]) -> SpoolResult:
     """Sum of the frictions of the seals of a spool, from the run of each with its `MemberMotion`.
 
     Raises:

@@ -6,7 +6,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.lubrication.findings import REFERENCE_HALF_WIDTH, findings
-from seal_friction_ros.core.lubrication.transient import RunResult, last_cycle
+from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
 
 
 class StudyTable(NamedTuple):
@@ -24,7 +24,7 @@ class StudyTable(NamedTuple):
     """largest of the same, position by position within 0.5 mm of the middle"""
 
 
-def study_table(runs: list[RunResult]) -> StudyTable:
+def study_table(runs: list[TransientResult]) -> StudyTable:
     """Table of runs that differ in tau_c alone.
 
     Raises:
@@ -47,7 +47,7 @@ def study_table(runs: list[RunResult]) -> StudyTable:
     )
 
 
-def _middle(run: RunResult) -> FloatArray:
+def _middle(run: TransientResult) -> FloatArray:
     """Friction of the steps within 0.5 mm of the middle in the last cycle [N]."""
     middle = np.abs(run.position - run.case.motion.centre) <= REFERENCE_HALF_WIDTH
     return np.asarray(run.friction[last_cycle(run) & middle])

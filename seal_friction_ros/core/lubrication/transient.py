@@ -16,17 +16,17 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
-from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.contact import (
-    Contact,
     ContactState,
+    LubricatedContact,
     asperity_pressure,
     contact_step,
     dry_contact,
     film_properties,
 )
 from seal_friction_ros.core.lubrication.elasticity import HalfPlane
-from seal_friction_ros.core.lubrication.kinematics import Motion
+from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
 from seal_friction_ros.core.lubrication.shear import fluid_shear, sliding_velocity, solid_shear
 from seal_friction_ros.core.lubrication.wall import WallFilm
@@ -37,7 +37,7 @@ _LARGEST_RECORD = 100_000_000  # numbers along the seal that a run may keep, 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class LubricationModel:
     """A case made ready to run.
 
     Air presses on the seal from all sides, and rubber passes that on like a fluid; so only what film and asperities
@@ -47,8 +47,8 @@ class Model:
         ValueError: The grid does not fit the seal.
     """
 
-    case: Case
-    contact: Contact = field(init=False)
+    case: LubricationCase
+    contact: LubricatedContact = field(init=False)
     place: FloatArray = field(init=False)
     """cells along the seal from its crown [m], shape (n,)"""
     ambient: FloatArray = field(init=False)
@@ -64,7 +64,7 @@ class Model:
         plane = HalfPlane(numerics.cells, width, case.seal.modulus, case.seal.section_height)
         place = (np.arange(numerics.cells) + 0.5) * width - 0.5 * numerics.film_width
         radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
-        object.__setattr__(self, 'contact', Contact(plane, case.topography, case.grease))
+        object.__setattr__(self, 'contact', LubricatedContact(plane, case.topography, case.grease))
         object.__setattr__(self, 'place', place)
         passed = np.clip(0.5 + 2.0 * place / numerics.film_width, 0.0, 1.0)
         ambient = case.air.pressure_left + passed * (case.air.pressure_right - case.air.pressure_left)
@@ -83,7 +83,7 @@ class Model:
         return FilmEnds(self.case.air.pressure_left, self.case.air.pressure_right, left, right)
 
 
-class Moment(NamedTuple):
+class TransientState(NamedTuple):
     """What one step leaves for the next."""
 
     time: float
@@ -104,7 +104,7 @@ class Moment(NamedTuple):
         return self.position - self.lag
 
 
-class Forces(NamedTuple):
+class SealForces(NamedTuple):
     """Forces of the wall on the seal at the end of a step [N]; together what the spool feels."""
 
     friction: float
@@ -117,10 +117,10 @@ class Forces(NamedTuple):
     """of the contact over the wall [m/s]"""
 
 
-class RunResult(NamedTuple):
+class TransientResult(NamedTuple):
     """A run; arrays with one entry per step, the first after the first step."""
 
-    case: Case
+    case: LubricationCase
     time: FloatArray
     """[s]"""
     position: FloatArray
@@ -156,13 +156,13 @@ class RunResult(NamedTuple):
     """largest difference between lubricant in and out and that in the film, over that in the film, of any step"""
 
 
-def last_cycle(result: RunResult) -> BoolArray:
+def last_cycle(result: TransientResult) -> BoolArray:
     """Whether each step is in the last cycle of the motion of the case, shape (steps,)."""
     begin = result.time[-1] * (1.0 - 1.0 / result.case.motion.cycles)
     return np.asarray(result.time > begin + 1e-12)
 
 
-def rest(model: Model, position: float) -> Moment:
+def initial_state(model: LubricationModel, position: float) -> TransientState:
     """The seal at rest and relaxed on its left seat: dry contact, gap as full of lubricant as the wall makes it.
 
     Raises:
@@ -193,10 +193,12 @@ def rest(model: Model, position: float) -> Moment:
             )
         start = position - reach
         wall_film = WallFilm(start, width, np.full(count, film * width))
-    return Moment(0.0, position, lag, ContactState(gap, np.array(model.ambient), saturation), wall_film, creep)
+    return TransientState(0.0, position, lag, ContactState(gap, np.array(model.ambient), saturation), wall_film, creep)
 
 
-def advance(model: Model, moment: Moment, time: float, position: float) -> tuple[Moment, Forces, int, float]:
+def transient_step(
+    model: LubricationModel, moment: TransientState, time: float, position: float
+) -> tuple[TransientState, SealForces, int, float]:
     """One step to ``time`` [s], when the spool is at ``position`` [m].
 
     Returns:
@@ -235,11 +237,11 @@ def advance(model: Model, moment: Moment, time: float, position: float) -> tuple
         creep = creep_kept + slow * relaxing / (1.0 + relaxing) * contact.half_plane.deflection(
             state.pressure + solid_pressure
         )
-    after = Moment(time, position, lag, state, wall_film, creep)
+    after = TransientState(time, position, lag, state, wall_film, creep)
     return after, _forces(model, after, velocity), done.iterations, defect
 
 
-def _edge_force(model: Model, moment: Moment) -> float:
+def _edge_force(model: LubricationModel, moment: TransientState) -> float:
     edge = model.case.control_edge
     if edge is None:
         return 0.0
@@ -249,18 +251,18 @@ def _edge_force(model: Model, moment: Moment) -> float:
     return -model.circumference * axial
 
 
-def fluid_force(model: Model, state: ContactState, velocity: float) -> float:
+def fluid_force(model: LubricationModel, state: ContactState, velocity: float) -> float:
     """Fluid friction [N] at a sliding ``velocity`` [m/s]."""
     numbers, width = model.case.grease.numbers, model.contact.half_plane.cell_width
     return -model.circumference * float(fluid_shear(*state, -velocity, numbers, width, model.ends()))
 
 
-def solid_limit(model: Model, state: ContactState) -> float:
+def solid_limit(model: LubricationModel, state: ContactState) -> float:
     """Magnitude of the solid friction [N] of a sliding contact."""
     return model.circumference * solid_shear(model.contact, state.gap, model.case.seal.solid_shear_stress)
 
 
-def _slide(model: Model, moment: Moment, step: float, position: float) -> tuple[float, float]:
+def _slide(model: LubricationModel, moment: TransientState, step: float, position: float) -> tuple[float, float]:
     """Sliding velocity [m/s] during the step and lag [m] after it."""
     groove = model.case.seated_groove
     stuck_lag = moment.lag + position - moment.position
@@ -280,7 +282,7 @@ def _slide(model: Model, moment: Moment, step: float, position: float) -> tuple[
     return velocity, stuck_lag - velocity * step
 
 
-def _forces(model: Model, moment: Moment, velocity: float) -> Forces:
+def _forces(model: LubricationModel, moment: TransientState, velocity: float) -> SealForces:
     fluid = fluid_force(model, moment.state, velocity)
     edge = _edge_force(model, moment)
     limit = solid_limit(model, moment.state)
@@ -289,10 +291,10 @@ def _forces(model: Model, moment: Moment, velocity: float) -> Forces:
     else:  # stuck: the asperities hold what the spring asks, up to their limit
         asked = model.case.seated_groove.force(moment.lag) - edge - fluid
         solid = min(max(asked, -limit), limit)
-    return Forces(solid + fluid + edge, solid, fluid, edge, velocity)
+    return SealForces(solid + fluid + edge, solid, fluid, edge, velocity)
 
 
-def _supply(model: Model, moment: Moment, way: float, step: float) -> tuple[FilmEnds, FloatArray]:
+def _supply(model: LubricationModel, moment: TransientState, way: float, step: float) -> tuple[FilmEnds, FloatArray]:
     """Ends of the film for a step by ``way`` [m], and the lubricant taken from each cell of the wall [m^2]."""
     if moment.wall_film is None or way == 0.0:
         return model.ends(), np.zeros(1)
@@ -306,13 +308,18 @@ def _supply(model: Model, moment: Moment, way: float, step: float) -> tuple[Film
     return (model.ends(right=filled) if way > 0.0 else model.ends(left=filled)), taken
 
 
-def _seal_ends(model: Model, contact_place: float) -> tuple[float, float]:
+def _seal_ends(model: LubricationModel, contact_place: float) -> tuple[float, float]:
     half = 0.5 * model.case.numerics.film_width
     return contact_place - half, contact_place + half
 
 
 def _wall_film_after(
-    model: Model, moment: Moment, wall_film: WallFilm, taken: FloatArray, through: FloatArray, contact_place: float
+    model: LubricationModel,
+    moment: TransientState,
+    wall_film: WallFilm,
+    taken: FloatArray,
+    through: FloatArray,
+    contact_place: float,
 ) -> WallFilm:
     """Film on the wall once the volumes ``through`` the faces [m^2] have moved and the seal is at ``contact_place``."""
     old_left, old_right = _seal_ends(model, moment.contact_place)
@@ -327,7 +334,9 @@ def _wall_film_after(
     return wall_film.moved(taken, pushed, left, right, old_right, float(through[-1]))
 
 
-def run(case: Case, motion: Motion | None = None, on_step: Callable[[int], None] | None = None) -> RunResult:
+def run_transient(
+    case: LubricationCase, motion: SpoolMotion | None = None, on_step: Callable[[int], None] | None = None
+) -> TransientResult:
     """Run a case through its motion, or through another.
 
     A step that fails is taken again in two halves, up to 10 times over.
@@ -342,14 +351,14 @@ def run(case: Case, motion: Motion | None = None, on_step: Callable[[int], None]
         ValueError: The result would not fit in memory.
     """
     moved = case.motion if motion is None else motion
-    model = Model(case)
+    model = LubricationModel(case)
     steps = max(1, math.ceil(moved.duration / case.numerics.time_step - 1e-9))
     if 4 * steps * case.numerics.cells > _LARGEST_RECORD:
         raise ValueError(
             f'case {case.name}: {steps} steps of {case.numerics.cells} cells are too many to keep: make the motion '
             'shorter, or numerics.time_step longer'
         )
-    moment = rest(model, moved.position(0.0))
+    moment = initial_state(model, moved.position(0.0))
     rows: list[tuple[float, ...]] = []
     profiles: list[tuple[FloatArray, ...]] = []
     retried = iterations = 0
@@ -359,7 +368,7 @@ def run(case: Case, motion: Motion | None = None, on_step: Callable[[int], None]
         while goals:
             goal = goals[-1]
             try:
-                after, forces, newton, defect = advance(model, moment, goal, moved.position(goal))
+                after, forces, newton, defect = transient_step(model, moment, goal, moved.position(goal))
             except NotConvergedError as error:
                 retried += 1
                 if len(goals) > _MOST_HALVINGS:
@@ -378,12 +387,12 @@ def run(case: Case, motion: Motion | None = None, on_step: Callable[[int], None]
             on_step(1)
     time, position, velocities, lag, friction, solid, fluid, edge, sliding = np.array(rows).T
     gap, film, contact, saturation = (np.array(values) for values in zip(*profiles, strict=True))
-    return RunResult(
+    return TransientResult(
         case, time, position, velocities, sliding, friction, solid, fluid, edge, lag, model.place,
         gap, film, contact, saturation, retried, iterations, worst,
     )  # fmt: skip
 
 
-def with_solid_shear_stress(case: Case, solid_shear_stress: float) -> Case:
+def with_solid_shear_stress(case: LubricationCase, solid_shear_stress: float) -> LubricationCase:
     """The case with another tau_c [Pa]."""
     return dataclasses.replace(case, seal=dataclasses.replace(case.seal, solid_shear_stress=solid_shear_stress))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError
-from seal_friction_ros.core.oring_contact.equilibrium import Assembly, Model, State, solve
+from seal_friction_ros.core.oring_contact.equilibrium import Assembly, OringModel, OringState, solve_equilibrium
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings
 
 _EASY = 6  # Newton steps of an easy step
@@ -12,10 +12,10 @@ _GROW, _SHRINK = 1.6, 0.5
 _SMALLEST = 1e-4  # part of the way
 
 
-class Reached(NamedTuple):
+class PathEnd(NamedTuple):
     """The end of a path."""
 
-    state: State
+    state: OringState
     surroundings: Surroundings
     newton_steps: int
     """those of failed attempts are not counted"""
@@ -23,14 +23,14 @@ class Reached(NamedTuple):
     """part of the way that the next step would have taken"""
 
 
-def follow(
-    model: Model,
+def follow_path(
+    model: OringModel,
     assembly: Assembly,
-    path: Callable[[float, State], Surroundings],
-    start: State,
+    path: Callable[[float, OringState], Surroundings],
+    start: OringState,
     stride: float = 1.0,
-    guess: Callable[[State, float, float], State] | None = None,
-) -> Reached:
+    guess: Callable[[OringState, float, float], OringState] | None = None,
+) -> PathEnd:
     """Follow an equilibrium along a path.
 
     Args:
@@ -53,7 +53,7 @@ def follow(
         first = guess(state, done, wanted) if guess else _ahead(before, (done, state), wanted)
         around = path(wanted, state)
         try:
-            after, steps = solve(model, assembly, around, first)
+            after, steps = solve_equilibrium(model, assembly, around, first)
         except NotConvergedError as error:
             stride = _SHRINK * (wanted - done)
             if stride < _SMALLEST:
@@ -64,10 +64,10 @@ def follow(
             stride = max(stride, _GROW * (wanted - done))
         before, done, state = (done, state), wanted, after
         surroundings, total = around, total + steps
-    return Reached(state, surroundings, total, stride)
+    return PathEnd(state, surroundings, total, stride)
 
 
-def _ahead(before: tuple[float, State], now: tuple[float, State], wanted: float) -> State:
+def _ahead(before: tuple[float, OringState], now: tuple[float, OringState], wanted: float) -> OringState:
     if before[0] >= now[0]:
         return now[1]
     ratio = (wanted - now[0]) / (now[0] - before[0])

@@ -27,7 +27,7 @@ _SHORTEST_STEP = 1.0 / 64.0  # of Newton's, before a fold is taken for final
 _PIVOT = 0.01  # entry on the diagonal over the largest of its column, from which on it is taken: little fill
 
 
-class Model(NamedTuple):
+class OringModel(NamedTuple):
     """A meshed ring of one material."""
 
     mesh: Mesh
@@ -41,7 +41,7 @@ class Model(NamedTuple):
     """force per difference of their axial displacements [N/m]"""
 
 
-class State(NamedTuple):
+class OringState(NamedTuple):
     """Where the ring is."""
 
     displacement: FloatArray
@@ -61,7 +61,7 @@ class Assembly(NamedTuple):
     starts: IntArray
 
 
-class Balance(NamedTuple):
+class ForceBalance(NamedTuple):
     """Forces out of balance and stiffness of the whole ring."""
 
     residual: FloatArray
@@ -74,7 +74,7 @@ class Balance(NamedTuple):
     """[Pa/m], shape (e, 8)"""
 
 
-def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float) -> Model:
+def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float) -> OringModel:
     """Model of a meshed ring.
 
     Between frictionless walls a round ring rolls almost freely: only that its fibres stay on their circles holds it,
@@ -91,23 +91,25 @@ def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float
     quarter = np.array([section_diameter / 4.0, 0.0])
     inner, outer = (int(np.argmin(np.linalg.norm(mesh.nodes - center - side * quarter, axis=1))) for side in (-1, 1))
     per_length = float(2.0 * np.pi * center[0] * rubber.elastic_modulus)
-    return Model(mesh, make_elements(mesh), rubber, per_length * section_diameter, (inner, outer), guide * per_length)
+    return OringModel(
+        mesh, make_elements(mesh), rubber, per_length * section_diameter, (inner, outer), guide * per_length
+    )
 
 
-def at_rest(model: Model, displacement: FloatArray | None = None) -> State:
+def unstressed_state(model: OringModel, displacement: FloatArray | None = None) -> OringState:
     """State without tension, by default without displacement either."""
     if displacement is None:
         displacement = np.zeros(model.mesh.nodes.size)
-    return State(displacement, np.zeros(len(model.mesh.elements)))
+    return OringState(displacement, np.zeros(len(model.mesh.elements)))
 
 
-def outline(model: Model, state: State) -> FloatArray:
+def outline(model: OringModel, state: OringState) -> FloatArray:
     """Position of the nodes of the outline [m], shape (s, 2)."""
     position: FloatArray = model.mesh.nodes + state.displacement.reshape(-1, 2)
     return position[model.mesh.surface]
 
 
-def make_assembly(model: Model, held: tuple[int, ...] = ()) -> Assembly:
+def make_assembly(model: OringModel, held: tuple[int, ...] = ()) -> Assembly:
     """Sparsity of the stiffness with the displacements ``held`` (2 node for r, 2 node + 1 for z) left out."""
     count = model.mesh.nodes.size
     number = np.full(count, -1)
@@ -125,7 +127,7 @@ def make_assembly(model: Model, held: tuple[int, ...] = ()) -> Assembly:
     return Assembly(free, slots, stored % len(free), starts)
 
 
-def balance(model: Model, surroundings: Surroundings, state: State) -> Balance | None:
+def force_balance(model: OringModel, surroundings: Surroundings, state: OringState) -> ForceBalance | None:
     """Forces out of balance at a state; None if an element is inside out."""
     gradient = deformation_gradient(model.elements, state.displacement)
     if is_inside_out(gradient):
@@ -141,7 +143,7 @@ def balance(model: Model, surroundings: Surroundings, state: State) -> Balance |
     residual[low] -= pull
     couple = model.guide_stiffness * np.array([1.0, -1.0, -1.0, 1.0])
     entries = np.concatenate((inner.stiffness.ravel(), outer.stiffness.ravel(), couple))
-    return Balance(residual, entries, inner.tension, inner.tension_rows)
+    return ForceBalance(residual, entries, inner.tension, inner.tension_rows)
 
 
 def stiffness_matrix(assembly: Assembly, entries: FloatArray) -> csc_array:
@@ -151,13 +153,15 @@ def stiffness_matrix(assembly: Assembly, entries: FloatArray) -> csc_array:
     return csc_array((data, assembly.rows, assembly.starts), shape=(count, count))
 
 
-def solve(model: Model, assembly: Assembly, surroundings: Surroundings, start: State) -> tuple[State, int]:
+def solve_equilibrium(
+    model: OringModel, assembly: Assembly, surroundings: Surroundings, start: OringState
+) -> tuple[OringState, int]:
     """State in equilibrium, from one to start with, and the Newton steps it took.
 
     Raises:
         NotConvergedError: None was found.
     """
-    state, now = start, balance(model, surroundings, start)
+    state, now = start, force_balance(model, surroundings, start)
     if now is None:
         raise NotConvergedError('an element is inside out at the start')
     imbalance = np.inf
@@ -167,7 +171,7 @@ def solve(model: Model, assembly: Assembly, surroundings: Surroundings, start: S
         if not np.isfinite(imbalance):
             break
         if imbalance < TOLERANCE:
-            return State(state.displacement, now.tension), step
+            return OringState(state.displacement, now.tension), step
         matrix = stiffness_matrix(assembly, now.entries)
         try:
             factors = splu(
@@ -180,16 +184,21 @@ def solve(model: Model, assembly: Assembly, surroundings: Surroundings, start: S
 
 
 def _take(
-    model: Model, surroundings: Surroundings, state: State, now: Balance, free: IntArray, step: FloatArray
-) -> tuple[State, Balance]:
+    model: OringModel,
+    surroundings: Surroundings,
+    state: OringState,
+    now: ForceBalance,
+    free: IntArray,
+    step: FloatArray,
+) -> tuple[OringState, ForceBalance]:
     """Take a Newton step, halved until no element is inside out; tensions follow it linearly."""
     length = 1.0
     while length >= _SHORTEST_STEP:
         change = np.zeros_like(state.displacement)
         change[free] = -length * step
         tension = now.tension + (now.tension_rows * change[model.elements.freedoms]).sum(axis=1)
-        trial = State(state.displacement + change, tension)
-        after = balance(model, surroundings, trial)
+        trial = OringState(state.displacement + change, tension)
+        after = force_balance(model, surroundings, trial)
         if after is not None:
             return trial, after
         length /= 2.0

@@ -78,7 +78,7 @@ def hardness_of_elastic_modulus(elastic_modulus: float) -> float:
     return (254.0 * ratio - 56.0) / (7.62336 + 2.54 * ratio)
 
 
-class Response(NamedTuple):
+class MaterialResponse(NamedTuple):
     """Energy, stress and stiffness at points, per reference volume; components in the order rr, rz, zr, zz, t."""
 
     energy: FloatArray
@@ -92,7 +92,7 @@ class Response(NamedTuple):
 _DETERMINANT_HESSIAN = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], dtype=float)
 
 
-def shear_response(rubber: Rubber, gradient: FloatArray) -> Response:
+def shear_response(rubber: Rubber, gradient: FloatArray) -> MaterialResponse:
     """Shear energy W of a deformation gradient, shape (..., 5), with its first and second derivative.
 
     The gradient must have D > 0 and t > 0.
@@ -132,10 +132,10 @@ def shear_response(rubber: Rubber, gradient: FloatArray) -> Response:
     stiffness[..., :4, 4] = mixed
     stiffness[..., 4, :4] = mixed
     stiffness[..., 4, 4] = w_tt
-    return Response(w - 3.0 * (c10 + c01), stress, stiffness)
+    return MaterialResponse(w - 3.0 * (c10 + c01), stress, stiffness)
 
 
-def volume_response(gradient: FloatArray) -> Response:
+def volume_response(gradient: FloatArray) -> MaterialResponse:
     """Volume ratio J = D t of a deformation gradient, shape (..., 5), with its derivatives [-]."""
     plane, hoop = gradient[..., :4], gradient[..., 4]
     cofactor = _cofactor(plane)
@@ -145,7 +145,7 @@ def volume_response(gradient: FloatArray) -> Response:
     second[..., :4, :4] = hoop[..., None, None] * _DETERMINANT_HESSIAN
     second[..., :4, 4] = cofactor
     second[..., 4, :4] = cofactor
-    return Response(area * hoop, first, second)
+    return MaterialResponse(area * hoop, first, second)
 
 
 def _cofactor(plane: FloatArray) -> FloatArray:

@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
-from seal_friction_ros.core.oring_contact.case import OringCase
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, volume_ratios
-from seal_friction_ros.core.oring_contact.equilibrium import Model, outline
-from seal_friction_ros.core.oring_contact.loading import Loaded, loaded_states, model_of
+from seal_friction_ros.core.oring_contact.equilibrium import OringModel, outline
+from seal_friction_ros.core.oring_contact.loading import LoadedRing, loaded_states, oring_model
 from seal_friction_ros.core.oring_contact.material import von_mises_stress
+from seal_friction_ros.core.oring_contact.oring_case import OringCase
 from seal_friction_ros.core.oring_contact.surroundings import (
     GLAND,
     ROD,
@@ -24,7 +24,7 @@ from seal_friction_ros.core.oring_contact.surroundings import (
 _TOUCHING = 20.0  # transitions outside a wall beyond which the contact stress is nothing
 
 
-class Contact(NamedTuple):
+class WallContact(NamedTuple):
     """Contact on one wall. Positions run along the wall: z for rod and gland, positive downstream; r for the wall."""
 
     position: FloatArray
@@ -44,7 +44,7 @@ class Contact(NamedTuple):
         return self.edges[1] - self.edges[0]
 
 
-class Shape(NamedTuple):
+class DeformedSection(NamedTuple):
     """The deformed section."""
 
     nodes: FloatArray
@@ -55,14 +55,14 @@ class Shape(NamedTuple):
     """mean of each element [Pa], shape (e,)"""
 
 
-class ContactResult(NamedTuple):
+class OringResult(NamedTuple):
     """The ring under one pressure."""
 
     pressure: float
     """[Pa, gauge]"""
-    rod: Contact
-    gland: Contact
-    wall: Contact
+    rod: WallContact
+    gland: WallContact
+    wall: WallContact
     axial_force: float
     """of what bears the ring on its downstream side, which must be that of the fluid [N]"""
     volume_ratio: float
@@ -70,22 +70,22 @@ class ContactResult(NamedTuple):
     expected_volume_ratio: float
     """that which its mean pressure and bulk modulus make [-]"""
     newton_steps: int
-    shape: Shape
+    shape: DeformedSection
 
 
-def contact_results(case: OringCase, pressures: tuple[float, ...]) -> Iterator[ContactResult]:
+def oring_results(case: OringCase, pressures: tuple[float, ...]) -> Iterator[OringResult]:
     """Contact of a case at increasing pressures [Pa, gauge], one after the other as they are computed.
 
     Raises:
         ValueError: The pressures make no sense, or the ring does not fit or does not seal.
         NotConvergedError: No equilibrium was found.
     """
-    model = model_of(case)
+    model = oring_model(case)
     for loaded in loaded_states(case, model, pressures):
-        yield evaluate(model, loaded)
+        yield evaluate_contact(model, loaded)
 
 
-def evaluate(model: Model, loaded: Loaded) -> ContactResult:
+def evaluate_contact(model: OringModel, loaded: LoadedRing) -> OringResult:
     """Contact, forces and shape of an equilibrium."""
     position = outline(model, loaded.state)
     pressure = surface_pressure(loaded.surroundings, position)
@@ -97,7 +97,7 @@ def evaluate(model: Model, loaded: Loaded) -> ContactResult:
     nodes = model.mesh.nodes + loaded.state.displacement.reshape(-1, 2)
     von_mises = von_mises_stress(model.rubber, gradient).mean(axis=1)
     rod, gland, wall = (_contact(loaded, position, which) for which in (ROD, GLAND, WALL))
-    return ContactResult(
+    return OringResult(
         pressure=loaded.pressure,
         rod=rod,
         gland=gland,
@@ -106,7 +106,7 @@ def evaluate(model: Model, loaded: Loaded) -> ContactResult:
         volume_ratio=float((ratios * volumes).sum() / volumes.sum()),
         expected_volume_ratio=float(1.0 + mean_tension / model.rubber.bulk_modulus),
         newton_steps=loaded.newton_steps,
-        shape=Shape(nodes, model.mesh.elements, von_mises),
+        shape=DeformedSection(nodes, model.mesh.elements, von_mises),
     )
 
 
@@ -121,14 +121,14 @@ def _axial_force(pressure: SurfacePressure, axial_areas: FloatArray, upstream: B
     return float(axial[~upstream].sum() + tilted[upstream].sum())
 
 
-def _upstream(loaded: Loaded, position: FloatArray) -> BoolArray:
+def _upstream(loaded: LoadedRing, position: FloatArray) -> BoolArray:
     """Nodes on the side of the fluid; of a ring that is squeezed only, the half away from the wall."""
     if loaded.pressure > 0.0:
         return loaded.surroundings.wetted
     return position[:, 1] < 0.0
 
 
-def _contact(loaded: Loaded, position: FloatArray, wall: int) -> Contact:
+def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact:
     surroundings = loaded.surroundings
     stresses = wall_stresses(surroundings, position)
     near = (stresses.argmax(axis=1) == wall) & (stresses[:, wall] > -_TOUCHING * surroundings.transition)
@@ -140,11 +140,11 @@ def _contact(loaded: Loaded, position: FloatArray, wall: int) -> Contact:
     inside = near & (stresses[:, wall] > fluid)
     order = np.argsort(along[inside], kind='stable')
     if not inside.any():
-        return Contact(np.zeros(0), np.zeros(0), force, 0.0, (0.0, 0.0))
+        return WallContact(np.zeros(0), np.zeros(0), force, 0.0, (0.0, 0.0))
     where, height = along[inside][order], stress[inside][order]
     above = (stresses[:, wall] - fluid)[inside][order]
     edges = _edge(where, above), _edge(where[::-1], above[::-1])
-    return Contact(where, height, force, float(height.max()), edges)
+    return WallContact(where, height, force, float(height.max()), edges)
 
 
 def _edge(where: FloatArray, above: FloatArray) -> float:

@@ -43,7 +43,7 @@ def add_parser(commands: Any) -> None:
 
 def run_case(arguments: argparse.Namespace) -> int:
     """Run a case or a spool, or a case on the motion of a bag."""
-    from seal_friction_ros.core.lubrication.case import Spool
+    from seal_friction_ros.core.lubrication.lubrication_case import Spool
     from seal_friction_ros.offline.contact import lubrication_runs as runs
     from seal_friction_ros.offline.reports import lubrication_report as report
 

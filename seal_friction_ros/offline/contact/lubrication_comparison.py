@@ -13,10 +13,10 @@ from seal_friction_ros.core.identification.spool_evaluation import (
     resonance_frequency,
     without_resonance,
 )
-from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.kinematics import MeasuredMotion
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
-from seal_friction_ros.core.lubrication.transient import RunResult
+from seal_friction_ros.core.lubrication.transient import TransientResult
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.contact.lubrication_runs import run_with_progress
 
@@ -30,7 +30,7 @@ class Comparison:
     bag: str
     chain: MeasuringChain
     """that ``shown`` is computed for"""
-    result: RunResult
+    result: TransientResult
     time: FloatArray
     """[s] of the measured samples"""
     position: FloatArray
@@ -71,7 +71,7 @@ class Comparison:
 
 
 def compare_with_bag(
-    case: Case, bag: Path, window: tuple[float, float] | None, evaluation: SpoolEvaluation | None = None
+    case: LubricationCase, bag: Path, window: tuple[float, float] | None, evaluation: SpoolEvaluation | None = None
 ) -> Comparison:
     """Run a case through the recorded position of a bag and compare the recorded force with the computed friction.
 
@@ -140,7 +140,7 @@ def _recorded(bag: Path, window: tuple[float, float] | None) -> _Recorded:
     return _Recorded(time - time[0], position[good], recorded.force_sum[good])
 
 
-def _run_through(case: Case, bag: Path, time: FloatArray, position: FloatArray) -> RunResult:
+def _run_through(case: LubricationCase, bag: Path, time: FloatArray, position: FloatArray) -> TransientResult:
     try:
         motion = MeasuredMotion(time.tolist(), position.tolist())
     except ValueError as error:

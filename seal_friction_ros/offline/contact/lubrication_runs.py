@@ -15,20 +15,27 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.lubrication.case import Case, Spool, parse_case
 from seal_friction_ros.core.lubrication.findings import Findings, discretisation_errors, findings
 from seal_friction_ros.core.lubrication.friction_map import (
-    Memory,
+    MemoryLength,
     SteadyFriction,
     friction_map,
     map_pressures,
     memory_length,
     steady_friction,
 )
-from seal_friction_ros.core.lubrication.kinematics import Motion
-from seal_friction_ros.core.lubrication.spool import MemberMotion, SpoolResult, superposed
+from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, Spool, parse_lubrication_case
+from seal_friction_ros.core.lubrication.spool import SpoolResult, SpoolSealMotion, superposed
 from seal_friction_ros.core.lubrication.study import StudyTable, study_table
-from seal_friction_ros.core.lubrication.transient import Model, RunResult, advance, rest, run, with_solid_shear_stress
+from seal_friction_ros.core.lubrication.transient import (
+    LubricationModel,
+    TransientResult,
+    initial_state,
+    run_transient,
+    transient_step,
+    with_solid_shear_stress,
+)
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.work.executor import run_all
 from seal_friction_ros.offline.work.finished_parts import Part, part_key, run_parts
@@ -36,10 +43,10 @@ from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
 
 _PROFILES = ('gap', 'film_pressure', 'contact_pressure', 'saturation')
-_CURVES = tuple(name for name in RunResult._fields if name not in (*_PROFILES, 'case'))
+_CURVES = tuple(name for name in TransientResult._fields if name not in (*_PROFILES, 'case'))
 
 
-def load_case(name: str) -> Case | Spool:
+def load_case(name: str) -> LubricationCase | Spool:
     """Case or spool from a path, or the name of one in config/ehl.
 
     Raises:
@@ -48,12 +55,12 @@ def load_case(name: str) -> Case | Spool:
     path = config_path('ehl', name)
     document = read_yaml(path)
     try:
-        return parse_case(document)
+        return parse_lubrication_case(document)
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
 
 
-def single_case(name: str, purpose: str) -> Case:
+def single_case(name: str, purpose: str) -> LubricationCase:
     """Case from a path or name; not a spool, which has no ``purpose`` (for the error message).
 
     Raises:
@@ -65,18 +72,18 @@ def single_case(name: str, purpose: str) -> Case:
     return case
 
 
-def compile_for(case: Case) -> None:
+def compile_for(case: LubricationCase) -> None:
     """Compile the code of a run in this process, so that worker processes inherit it."""
-    model = Model(case)
+    model = LubricationModel(case)
     time = case.numerics.time_step
     with suppress(NotConvergedError):
-        advance(model, rest(model, case.motion.position(0.0)), time, case.motion.position(time))
+        transient_step(model, initial_state(model, case.motion.position(0.0)), time, case.motion.position(time))
 
 
-def run_with_progress(case: Case, motion: Motion) -> RunResult:
+def run_with_progress(case: LubricationCase, motion: SpoolMotion) -> TransientResult:
     """Run a case through a motion, with a progress bar; errors as `run`."""
     with progress(case.name, round(motion.duration / case.numerics.time_step)) as on_step:
-        return run(case, motion, on_step)
+        return run_transient(case, motion, on_step)
 
 
 # -- one run ----------------------------------------------------------------------------------------------------------
@@ -98,7 +105,7 @@ def _with_units(found: dict[str, Any]) -> dict[str, Any]:
 class CaseRun:
     """A run, its findings, and their discretisation errors."""
 
-    result: RunResult
+    result: TransientResult
     found: Findings
     step_errors: dict[str, float]
     grid_errors: dict[str, float]
@@ -125,7 +132,7 @@ class CaseRun:
         )
 
 
-def run_case(case: Case) -> CaseRun:
+def run_case(case: LubricationCase) -> CaseRun:
     """Run a case once, and twice more with a coarser step and a coarser grid for the discretisation errors.
 
     Raises:
@@ -134,9 +141,9 @@ def run_case(case: Case) -> CaseRun:
     motion = case.motion
     steps = round(motion.duration / case.numerics.time_step)
     with progress(f'{case.name}: 3 runs', steps + steps // 2 + steps) as on_step:
-        result = run(case, on_step=on_step)
+        result = run_transient(case, on_step=on_step)
         found = findings(result)
-        by_step, by_grid = discretisation_errors(case, found, partial(run, on_step=on_step))
+        by_step, by_grid = discretisation_errors(case, found, partial(run_transient, on_step=on_step))
     return CaseRun(result, found, by_step, by_grid)
 
 
@@ -183,7 +190,7 @@ def run_spool(spool: Spool, case_file: str, workers: int) -> SpoolRun:
         local = beside / f'{member.case}.yaml'
         case = single_case(str(local) if local.is_file() else member.case, 'spool in it')
         moved = replace(case, motion=replace(spool.motion, centre=member.shift))
-        calls.append(partial(run_with_progress, moved, MemberMotion(spool.motion, member)))
+        calls.append(partial(run_with_progress, moved, SpoolSealMotion(spool.motion, member)))
     compile_for(calls[0].args[0])
     results = dict(zip(distinct, run_all(spool.name, calls, workers), strict=True))
     return SpoolRun(spool, superposed(spool.members, [results[member] for member in spool.members]))
@@ -196,7 +203,7 @@ class StudyRuns(NamedTuple):
     """A study of the solid shear stress and its runs, without profiles along the seal."""
 
     table: StudyTable
-    runs: list[RunResult]
+    runs: list[TransientResult]
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
@@ -207,7 +214,7 @@ class StudyRuns(NamedTuple):
             'solid_share': self.table.solid_share,
             'deviation': self.table.deviation,
             'curve_deviation': self.table.curve_deviation,
-            'retried_steps': [run.retried_steps for run in self.runs],
+            'retried_steps': [run_transient.retried_steps for run_transient in self.runs],
         }
 
     def summary(self) -> str:
@@ -219,7 +226,7 @@ class StudyRuns(NamedTuple):
         )
 
 
-def run_study(case: Case, workers: int, work: Path | None = None) -> StudyRuns:
+def run_study(case: LubricationCase, workers: int, work: Path | None = None) -> StudyRuns:
     """Run a case with each solid shear stress of its study.
 
     Args:
@@ -234,11 +241,11 @@ def run_study(case: Case, workers: int, work: Path | None = None) -> StudyRuns:
     parts = [Part(part_key('study', asdict(c)), _CURVES, partial(_curves, c)) for c in cases]
     found = run_parts(f'{case.name}: tau_c', parts, workers, work, partial(compile_for, case))
     no_profiles: dict[str, Any] = {name: np.empty((0, 0)) for name in _PROFILES}
-    runs = [RunResult(case=c, **no_profiles, **curves) for c, curves in zip(cases, found, strict=True)]
+    runs = [TransientResult(case=c, **no_profiles, **curves) for c, curves in zip(cases, found, strict=True)]
     return StudyRuns(study_table(runs), runs)
 
 
-def _curves(case: Case) -> Mapping[str, Any]:
+def _curves(case: LubricationCase) -> Mapping[str, Any]:
     result = run_with_progress(case, case.motion)
     return {name: getattr(result, name) for name in _CURVES}
 
@@ -249,7 +256,7 @@ def _curves(case: Case) -> Mapping[str, Any]:
 class MapRuns(NamedTuple):
     """The friction map of a case, and its rows."""
 
-    case: Case
+    case: LubricationCase
     law: FrictionMap
     rows: list[SteadyFriction]
     retried_steps: int
@@ -275,7 +282,7 @@ class MapRuns(NamedTuple):
         return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N'
 
 
-def run_map(case: Case, workers: int, work: Path | None = None) -> MapRuns:
+def run_map(case: LubricationCase, workers: int, work: Path | None = None) -> MapRuns:
     """Compute the friction map of a case; arguments and errors as `run_study`."""
     pressures = map_pressures(case.map).tolist()
     settings = asdict(case)
@@ -283,18 +290,18 @@ def run_map(case: Case, workers: int, work: Path | None = None) -> MapRuns:
         Part(part_key(f'map {pressure!r}', settings), SteadyFriction._fields, partial(_map_row, case, pressure))
         for pressure in pressures
     ]
-    parts.append(Part(part_key('memory', settings), Memory._fields, partial(_memory, case)))
+    parts.append(Part(part_key('memory', settings), MemoryLength._fields, partial(_memory, case)))
     *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for, case))
-    rows, memory = [SteadyFriction(**row) for row in found], Memory(**kept_memory)
+    rows, memory = [SteadyFriction(**row) for row in found], MemoryLength(**kept_memory)
     retried = memory.retried_steps + sum(row.retried_steps for row in rows)
     return MapRuns(case, friction_map(case, rows, memory.length), rows, retried)
 
 
-def _map_row(case: Case, pressure: float) -> Mapping[str, Any]:
+def _map_row(case: LubricationCase, pressure: float) -> Mapping[str, Any]:
     return steady_friction(case, pressure)._asdict()
 
 
-def _memory(case: Case) -> Mapping[str, Any]:
+def _memory(case: LubricationCase) -> Mapping[str, Any]:
     return memory_length(case)._asdict()
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from statistics import linear_regression
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.oring_contact.case import check_pressures
-from seal_friction_ros.core.oring_contact.case_file import CaseFile, Friction, parse_case
-from seal_friction_ros.core.oring_contact.results import Contact, ContactResult, contact_results
+from seal_friction_ros.core.oring_contact.oring_case import check_pressures
+from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, SealFriction, parse_oring_case
+from seal_friction_ros.core.oring_contact.results import OringResult, WallContact, oring_results
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
@@ -53,12 +53,12 @@ class OringSummary:
 class Computed(NamedTuple):
     """A case and its results."""
 
-    file: CaseFile
-    results: tuple[ContactResult, ...]
+    file: OringCaseFile
+    results: tuple[OringResult, ...]
     summary: OringSummary
 
 
-def sliding_contact(file: CaseFile, result: ContactResult) -> Contact:
+def sliding_contact(file: OringCaseFile, result: OringResult) -> WallContact:
     """Contact on the sliding wall."""
     return result.rod if file.case.geometry.sliding_wall == 'rod' else result.gland
 
@@ -77,14 +77,14 @@ def compute_case(path: Path, pressures: Sequence[float] = (), *, for_seal_file: 
     """
     document = read_yaml(path)
     try:
-        file = parse_case(document)
+        file = parse_oring_case(document)
         wanted = tuple(pressures) or file.pressures
         check_pressures(file.case, wanted)
         if for_seal_file:
             _friction_of_seal(file, wanted)
         results = []
         with progress(f'{file.case.name}: pressures', len(wanted)) as advance:
-            for result in contact_results(file.case, wanted):
+            for result in oring_results(file.case, wanted):
                 results.append(result)
                 advance(1)
     except ValueError as error:
@@ -92,7 +92,7 @@ def compute_case(path: Path, pressures: Sequence[float] = (), *, for_seal_file: 
     return Computed(file, tuple(results), _summary(file, results))
 
 
-def _summary(file: CaseFile, results: Sequence[ContactResult]) -> OringSummary:
+def _summary(file: OringCaseFile, results: Sequence[OringResult]) -> OringSummary:
     contacts = [sliding_contact(file, result) for result in results]
     normal = tuple(contact.force for contact in contacts)
     axial = tuple(result.axial_force for result in results)
@@ -115,11 +115,11 @@ def _summary(file: CaseFile, results: Sequence[ContactResult]) -> OringSummary:
     )
 
 
-def _profile(contact: Contact) -> Profile:
+def _profile(contact: WallContact) -> Profile:
     return Profile(tuple(contact.position.tolist()), tuple(contact.stress.tolist()))
 
 
-def _friction_of_seal(file: CaseFile, pressures: Sequence[float]) -> Friction:
+def _friction_of_seal(file: OringCaseFile, pressures: Sequence[float]) -> SealFriction:
     if file.friction is None:
         raise ValueError(f'case {file.case.name}: a seal file needs the section friction with a friction_coefficient')
     if len(pressures) < 2:

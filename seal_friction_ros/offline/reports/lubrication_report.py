@@ -13,10 +13,10 @@ from PIL import Image
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import BAR, MM, MPA, MS, UM
-from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.findings import REFERENCE_HALF_WIDTH
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.spool import SpoolResult
-from seal_friction_ros.core.lubrication.transient import RunResult, last_cycle
+from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
 from seal_friction_ros.offline.contact.lubrication_comparison import Comparison
 from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, MapRuns, StudyRuns
 from seal_friction_ros.offline.reports import figure_style as style
@@ -76,7 +76,7 @@ def write_run_page(run: CaseRun, out: Path) -> tuple[Path, ...]:
 
 
 @house_style()
-def write_study_page(case: Case, study: StudyRuns, out: Path) -> tuple[Path, ...]:
+def write_study_page(case: LubricationCase, study: StudyRuns, out: Path) -> tuple[Path, ...]:
     """Write the page of a study of the solid shear stress; see `write_page`."""
     heads = (
         'solid shear stress [MPa]', 'friction [N]', 'solid share [%]', 'friction over stress, off the mean by [%]',
@@ -158,7 +158,7 @@ def _finding_table(run: CaseRun) -> Table:
     return Table(heads, rows, (0, 1))
 
 
-def _parameter_table(case: Case) -> Table:
+def _parameter_table(case: LubricationCase) -> Table:
     parts = [(part.name, getattr(case, part.name)) for part in dataclasses.fields(case)]
     rows = [row for name, part in parts if dataclasses.is_dataclass(part) for row in parameter_rows(part, f'{name}.')]
     return Table(PARAMETER_HEADS, rows, (0, 2, 3))
@@ -167,7 +167,7 @@ def _parameter_table(case: Case) -> Table:
 # -- figures ----------------------------------------------------------------------------------------------------------
 
 
-def friction_loop_figure(result: RunResult) -> Plot:
+def friction_loop_figure(result: TransientResult) -> Plot:
     """Friction over displacement with its shares (as Figure 14 of the spool-valve paper)."""
     last = last_cycle(result)
     x, friction = result.position[last] / MM, result.friction[last]
@@ -191,7 +191,7 @@ def friction_loop_figure(result: RunResult) -> Plot:
     return Plot('friction_over_position', figure)
 
 
-def motion_figure(result: RunResult) -> Plot:
+def motion_figure(result: TransientResult) -> Plot:
     """Speed and friction over time."""
     figure, (upper, lower) = style.new_figure('Motion and friction over time', 4.6, nrows=2, sharex=True)
     time = result.time / MS
@@ -205,7 +205,7 @@ def motion_figure(result: RunResult) -> Plot:
     return Plot('over_time', figure)
 
 
-def moments(result: RunResult) -> dict[str, int]:
+def moments(result: TransientResult) -> dict[str, int]:
     """Steps of the last cycle at which the film is shown, by name."""
     steps = np.flatnonzero(last_cycle(result) & (result.velocity > 0.0))
     if not len(steps):
@@ -224,7 +224,7 @@ def moments(result: RunResult) -> dict[str, int]:
     return found
 
 
-def film_figure(result: RunResult) -> Plot:
+def film_figure(result: TransientResult) -> Plot:
     """Film, pressure and contact along the seal at chosen moments."""
     figure, axes = style.new_figure('Under the seal', 5.4, nrows=2, ncols=3, sharex=True, sharey='row')
     x = result.place / MM
@@ -241,19 +241,19 @@ def film_figure(result: RunResult) -> Plot:
     return Plot('film', figure)
 
 
-def _gap_limit(result: RunResult) -> float:
+def _gap_limit(result: TransientResult) -> float:
     """Height of the gap axis [m]: some films high."""
     touching = result.contact_pressure > 0.02 * result.contact_pressure.max()
     return float(3.0 * np.quantile(result.gap[touching], 0.9)) if touching.any() else float(result.gap.max())
 
 
-def _pressures(result: RunResult, step: int) -> dict[str, FloatArray]:
+def _pressures(result: TransientResult, step: int) -> dict[str, FloatArray]:
     """Pressures along the seal at one step [MPa]."""
     film, asperities = result.film_pressure[step] / MPA, result.contact_pressure[step] / MPA
     return {'together': film + asperities, 'asperities': asperities, 'film': film}
 
 
-def _draw_pressure(ax: Axes, x: FloatArray, result: RunResult, step: int) -> list[Line2D]:
+def _draw_pressure(ax: Axes, x: FloatArray, result: TransientResult, step: int) -> list[Line2D]:
     colours = {'together': style.BLACK, 'asperities': style.ORANGE, 'film': style.SKY}
     values = _pressures(result, step)
     return [ax.plot(x, values[name], color=colour, label=name)[0] for name, colour in colours.items()]
@@ -331,7 +331,7 @@ def spool_members_figure(result: SpoolResult, labels: list[str]) -> Plot:
     return Plot('spool', figure)
 
 
-def _write_animation(result: RunResult, path: Path) -> None:
+def _write_animation(result: TransientResult, path: Path) -> None:
     """Film and friction over the last cycle as an animated GIF; the same run gives the same bytes."""
     last = last_cycle(result)
     steps: IntArray = np.flatnonzero(last)

@@ -14,9 +14,9 @@ from matplotlib.patches import Rectangle
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, MPA, PSI
 from seal_friction_ros.core.friction.geometry import projected_area, squeeze, stretch
-from seal_friction_ros.core.oring_contact.case import gland_fill
-from seal_friction_ros.core.oring_contact.case_file import Measured
-from seal_friction_ros.core.oring_contact.results import Contact, ContactResult
+from seal_friction_ros.core.oring_contact.oring_case import gland_fill
+from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
+from seal_friction_ros.core.oring_contact.results import OringResult, WallContact
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
@@ -25,7 +25,7 @@ from seal_friction_ros.offline.reports.page import Table, write_page
 from seal_friction_ros.offline.reports.thesis_data import THESIS_SEAL, ThesisContact, appendix_b
 
 
-def thesis_case(computed: Computed, result: ContactResult) -> ThesisContact | None:
+def thesis_case(computed: Computed, result: OringResult) -> ThesisContact | None:
     """Contact of the same seal at the same pressure in the thesis, if there is one."""
     if not computed.file.case.name.startswith(THESIS_SEAL):
         return None
@@ -167,7 +167,7 @@ def geometry_friction(computed: Computed, pressures: FloatArray) -> FloatArray:
     return np.where(inside, [friction.law.coefficient_of_friction(force) * force for force in normal], np.nan)
 
 
-def friction_deviation(computed: Computed, measured: Measured) -> FloatArray:
+def friction_deviation(computed: Computed, measured: MeasuredFriction) -> FloatArray:
     """Computed over measured friction at the measured pressures [%]; NaN outside the computed pressures."""
     each = np.array(measured.frictions) / measured.seals
     off: FloatArray = 100.0 * (geometry_friction(computed, np.array(measured.pressures)) / each - 1.0)
@@ -217,7 +217,7 @@ def section_figure(computed: Computed) -> Plot:
     return Plot('deformed_shape', figure)
 
 
-def _closed_profile(contact: Contact) -> tuple[FloatArray, FloatArray]:
+def _closed_profile(contact: WallContact) -> tuple[FloatArray, FloatArray]:
     """Positions from the first point of contact [m] and stresses [Pa], with the zeros at both ends."""
     first, last = contact.edges
     position = np.concatenate(([first], contact.position, [last])) - first

@@ -14,8 +14,8 @@ from paths import ROOT
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.lubrication import contact as contact_module
 from seal_friction_ros.core.lubrication.contact import (
-    Contact,
     ContactState,
+    LubricatedContact,
     asperity_pressure,
     contact_step,
     dry_contact,
@@ -38,12 +38,12 @@ def profile(cells: int, interference: float = 36e-6):
     return x**2 / (2.0 * RADIUS) - interference
 
 
-def made(cells: int, topography: Topography = ROUGH, grease: Grease = GREASE) -> Contact:
-    return Contact(HalfPlane(cells, LENGTH / cells, MODULUS, DEPTH), topography, grease)
+def made(cells: int, topography: Topography = ROUGH, grease: Grease = GREASE) -> LubricatedContact:
+    return LubricatedContact(HalfPlane(cells, LENGTH / cells, MODULUS, DEPTH), topography, grease)
 
 
 def slid(
-    contact: Contact,
+    contact: LubricatedContact,
     state: ContactState,
     velocity: float,
     shares=(0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 20, 100, math.inf),
@@ -65,12 +65,14 @@ class Shear(NamedTuple):
     fluid: float
 
 
-def shear(contact: Contact, state: ContactState, wall_velocity: float, solid_shear_stress: float, ends: FilmEnds):
+def shear(
+    contact: LubricatedContact, state: ContactState, wall_velocity: float, solid_shear_stress: float, ends: FilmEnds
+):
     fluid = fluid_shear(*state, wall_velocity, contact.grease.numbers, contact.half_plane.cell_width, ends)
     return Shear(solid_shear(contact, state.gap, solid_shear_stress), float(fluid))
 
 
-def dry(contact: Contact) -> ContactState:
+def dry(contact: LubricatedContact) -> ContactState:
     gap = dry_contact(contact, profile(contact.half_plane.cells))
     return ContactState(gap, np.zeros_like(gap), np.ones_like(gap))
 

@@ -15,13 +15,13 @@ from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.core.lubrication import friction_map as module
-from seal_friction_ros.core.lubrication.case import Case, MapGrid, Numerics
 from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_friction
-from seal_friction_ros.core.lubrication.transient import Model, rest
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, LubricationNumerics, MapGrid
+from seal_friction_ros.core.lubrication.transient import LubricationModel, initial_state
 
-CASE = Case(
+CASE = LubricationCase(
     name='inner',
-    numerics=Numerics(cells=96, time_step=1e-3),
+    numerics=LubricationNumerics(cells=96, time_step=1e-3),
     map=MapGrid(velocity_min=1e-3, velocity_max=0.1, velocities=5, pressure_max=3e5, pressures=2),
 )
 LAW = FrictionMap(
@@ -72,8 +72,8 @@ def test_step_of_the_map_that_fails_is_taken_in_halves_and_counted(monkeypatch):
             raise NotConvergedError('told to')
         return really(*arguments)
 
-    model = Model(CASE)
-    start = rest(model, 0.0).state
+    model = LubricationModel(CASE)
+    start = initial_state(model, 0.0).state
     smoothly, none = module.steady_state(model, start, 0.01)
     monkeypatch.setattr(module, 'contact_step', fails_at_first)
     state, retried = module.steady_state(model, start, 0.01)

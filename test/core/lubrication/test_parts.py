@@ -16,7 +16,7 @@ from seal_friction_ros.core.lubrication.flow_factors import (
     shear_flow_factor,
 )
 from seal_friction_ros.core.lubrication.grease import Grease, apparent_viscosity
-from seal_friction_ros.core.lubrication.groove import Groove
+from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration, MeasuredMotion
 from seal_friction_ros.core.lubrication.krylov import StalledError, gmres
 from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
@@ -129,7 +129,7 @@ def test_gmres_solves_and_says_when_it_cannot():
 
 
 def test_groove_with_clearance_has_two_seats_and_a_ridge():
-    groove = Groove(stiffness=1e4, half_clearance=1e-4)
+    groove = GrooveSpring(stiffness=1e4, half_clearance=1e-4)
     assert [groove.force(lag) for lag in (-1e-4, 0.0, 1e-4)] == [0.0, 0.0, 0.0]
     assert groove.force(-0.5e-4) > 0.0 > groove.force(0.5e-4)
     assert groove.force(3e-4) == pytest.approx(2.0)
@@ -138,7 +138,7 @@ def test_groove_with_clearance_has_two_seats_and_a_ridge():
 
 
 def test_groove_without_clearance_is_a_spring():
-    assert Groove(stiffness=1e4).force(-2e-4) == pytest.approx(-2.0)
+    assert GrooveSpring(stiffness=1e4).force(-2e-4) == pytest.approx(-2.0)
 
 
 def test_control_edge_falls_by_its_depth_with_its_slope():

@@ -11,22 +11,34 @@ import pytest
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.lubrication import transient
-from seal_friction_ros.core.lubrication.case import Air, Case, Member, Numerics, Viscoelasticity, parse_case
 from seal_friction_ros.core.lubrication.findings import discretisation_errors, findings
-from seal_friction_ros.core.lubrication.groove import Groove
+from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration, MeasuredMotion
-from seal_friction_ros.core.lubrication.spool import MemberMotion, superposed
+from seal_friction_ros.core.lubrication.lubrication_case import (
+    AirPressure,
+    LubricationCase,
+    LubricationNumerics,
+    SpoolSeal,
+    Viscoelasticity,
+    parse_lubrication_case,
+)
+from seal_friction_ros.core.lubrication.spool import SpoolSealMotion, superposed
 from seal_friction_ros.core.lubrication.study import study_table
-from seal_friction_ros.core.lubrication.transient import RunResult, rest, run, with_solid_shear_stress
+from seal_friction_ros.core.lubrication.transient import (
+    TransientResult,
+    initial_state,
+    run_transient,
+    with_solid_shear_stress,
+)
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 
-INNER = Case(name='inner', numerics=Numerics(cells=96, time_step=1e-3))
+INNER = LubricationCase(name='inner', numerics=LubricationNumerics(cells=96, time_step=1e-3))
 EDGE = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=2.7e-3), control_edge=ControlEdge())
 
 
 @cache
-def done(case: Case) -> RunResult:
-    return run(case)
+def done(case: LubricationCase) -> TransientResult:
+    return run_transient(case)
 
 
 def test_solid_friction_has_the_largest_share_above_90_percent():
@@ -41,7 +53,7 @@ def test_solid_friction_falls_and_fluid_friction_rises_with_speed():
 
 def test_friction_rises_on_deceleration_by_more_than_step_and_grid_blur():
     found = findings(done(INNER))
-    by_step, by_grid = discretisation_errors(INNER, found, run)
+    by_step, by_grid = discretisation_errors(INNER, found, run_transient)
     assert found.rise_on_deceleration > 0.1
     assert by_step['rise_on_deceleration'] + by_grid['rise_on_deceleration'] < 0.3 * found.rise_on_deceleration
 
@@ -58,13 +70,13 @@ def test_friction_is_the_sum_of_its_shares_and_balances_the_groove_while_stickin
 def test_after_a_reversal_friction_pushes_along_for_as_long_as_elasticity_says():
     found = findings(done(INNER))
     assert found.assisted_length == pytest.approx(found.elastic_length, rel=0.01)
-    softer = dataclasses.replace(INNER, groove=Groove(stiffness=0.5 * INNER.groove.stiffness))
+    softer = dataclasses.replace(INNER, groove=GrooveSpring(stiffness=0.5 * INNER.groove.stiffness))
     assert findings(done(softer)).assisted_length == pytest.approx(2.0 * found.assisted_length, rel=0.1)
 
 
 def test_seal_that_may_lean_either_way_has_a_second_lobe_near_minus_1_4_mm():
     long_way = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=3e-3))
-    bistable = dataclasses.replace(long_way, groove=Groove(half_clearance=0.14e-3))
+    bistable = dataclasses.replace(long_way, groove=GrooveSpring(half_clearance=0.14e-3))
     result = done(bistable)
     assert findings(result).second_lobe == pytest.approx(-1.4e-3, abs=0.03e-3)
     forth = (result.time > 0.5 * result.time[-1]) & (result.velocity > 0.0)
@@ -74,7 +86,9 @@ def test_seal_that_may_lean_either_way_has_a_second_lobe_near_minus_1_4_mm():
 
 
 def test_pressure_difference_takes_the_second_seat_away():
-    under_air = dataclasses.replace(INNER, groove=Groove(half_clearance=0.14e-3), air=Air(pressure_left=1e5))
+    under_air = dataclasses.replace(
+        INNER, groove=GrooveSpring(half_clearance=0.14e-3), air=AirPressure(pressure_left=1e5)
+    )
     assert under_air.seated_groove.half_clearance == 0.0
 
 
@@ -93,7 +107,7 @@ def test_chamfer_gives_back_what_it_took_but_for_what_friction_changes():
         motion=ConstantAcceleration(distance=2.7e-3, speed=5e-3, cycles=1),
         film_supply=FilmSupply(1e-9),
         seal=dataclasses.replace(EDGE.seal, solid_shear_stress=1e3),
-        numerics=Numerics(cells=96, time_step=2e-3),
+        numerics=LubricationNumerics(cells=96, time_step=2e-3),
     )
     result = done(slow)
     way = result.sliding_velocity * np.diff(result.time, prepend=0.0)
@@ -110,9 +124,9 @@ def test_starved_film_removes_the_rise_on_deceleration():
 
 def test_starved_film_is_neither_made_nor_lost():
     starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), motion=ConstantAcceleration(cycles=1))
-    model = transient.Model(starved)
+    model = transient.LubricationModel(starved)
     motion = starved.motion
-    moment = rest(model, motion.position(0.0))
+    moment = initial_state(model, motion.position(0.0))
 
     def lubricant(moment) -> float:
         width = model.contact.half_plane.cell_width
@@ -121,7 +135,7 @@ def test_starved_film_is_neither_made_nor_lost():
     before = lubricant(moment)
     for i in range(1, 101):
         time = i * 1e-3
-        moment, *_ = transient.advance(model, moment, time, motion.position(time))
+        moment, *_ = transient.transient_step(model, moment, time, motion.position(time))
         assert lubricant(moment) == pytest.approx(before, rel=1e-12)
         assert moment.wall_film.volume.min() >= -1e-20
 
@@ -138,7 +152,7 @@ def test_viscoelastic_seal_rubs_more_after_a_control_edge_and_no_more_without_on
 
 def test_pressure_raises_the_friction():
     assert (
-        findings(done(dataclasses.replace(INNER, air=Air(pressure_left=6e5)))).friction
+        findings(done(dataclasses.replace(INNER, air=AirPressure(pressure_left=6e5)))).friction
         > 1.3 * findings(done(INNER)).friction
     )
 
@@ -168,12 +182,12 @@ def test_measured_motion_of_the_same_course_gives_the_same_friction():
     times = np.linspace(0.0, motion.duration, 4001)
     signal = MeasuredMotion(times.tolist(), [motion.position(t) for t in times])
     one = dataclasses.replace(INNER, motion=motion)
-    assert run(one, signal).friction == pytest.approx(done(one).friction, abs=2e-3)
+    assert run_transient(one, signal).friction == pytest.approx(done(one).friction, abs=2e-3)
 
 
 def test_runs_are_the_same_to_the_bit():
     one = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1))
-    assert run(one).friction.tobytes() == run(one).friction.tobytes()
+    assert run_transient(one).friction.tobytes() == run_transient(one).friction.tobytes()
 
 
 def test_step_that_fails_is_taken_in_halves_and_counted(monkeypatch):
@@ -187,7 +201,7 @@ def test_step_that_fails_is_taken_in_halves_and_counted(monkeypatch):
         return really(*arguments)
 
     monkeypatch.setattr(transient, 'contact_step', fails_at_first)
-    result = run(one)
+    result = run_transient(one)
     assert result.retried_steps == 2
     assert asked[3] == pytest.approx(0.5 * asked[2])
     assert asked[4] == pytest.approx(0.25 * asked[2])
@@ -201,13 +215,13 @@ def test_run_that_does_not_converge_ends_in_an_error_that_says_when(monkeypatch)
 
     monkeypatch.setattr(transient, 'contact_step', fails)
     with pytest.raises(NotConvergedError, match=r'^case inner at 9\.\d+e-07 s: told to$'):
-        run(INNER)
+        run_transient(INNER)
 
 
 def test_mirrored_pair_of_seals_makes_a_friction_without_preference():
-    members = (Member('edge', shift=0.33e-3), Member('edge', mirrored=True, shift=0.33e-3))
+    members = (SpoolSeal('edge', shift=0.33e-3), SpoolSeal('edge', mirrored=True, shift=0.33e-3))
     motion = ConstantAcceleration(distance=2.7e-3, cycles=2)
-    runs = [run(EDGE, MemberMotion(motion, member)) for member in members]
+    runs = [run_transient(EDGE, SpoolSealMotion(motion, member)) for member in members]
     both = superposed(members, runs)
     last = both.time > motion.duration - motion.stroke_time
     stroke_before = np.interp(both.time[last] - motion.stroke_time, both.time, both.friction)
@@ -216,8 +230,8 @@ def test_mirrored_pair_of_seals_makes_a_friction_without_preference():
 
 
 def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
-    case = parse_case({'name': 'x', 'groove': {'half_clearance': 1e-4}, 'viscoelasticity': {}})
-    assert isinstance(case, Case)
+    case = parse_lubrication_case({'name': 'x', 'groove': {'half_clearance': 1e-4}, 'viscoelasticity': {}})
+    assert isinstance(case, LubricationCase)
     assert (case.grease.yield_stress, case.motion.speed, case.numerics.cells) == (530.96, 34e-3, 226)
     assert case.seal.modulus == pytest.approx(8.0 * 1.785e6)
     assert case.groove.half_clearance == 1e-4
@@ -242,5 +256,5 @@ def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
 )
 def test_case_without_sense_is_refused_in_one_line(document, words):
     with pytest.raises(ValueError, match=words) as caught:
-        parse_case(document)
+        parse_lubrication_case(document)
     assert '\n' not in str(caught.value)

@@ -14,54 +14,54 @@ from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.foundation.units import INCH, LBF, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
 from seal_friction_ros.core.oring_contact import continuation, loading
-from seal_friction_ros.core.oring_contact.case import (
+from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
+from seal_friction_ros.core.oring_contact.hertz import LineContact, cylinder_between_plates
+from seal_friction_ros.core.oring_contact.loading import oring_model, squeeze_ring
+from seal_friction_ros.core.oring_contact.material import Rubber
+from seal_friction_ros.core.oring_contact.oring_case import (
     Groove,
-    Numerics,
     OringCase,
+    OringNumerics,
     check_pressures,
     gland_fill,
     stretched_section_diameter,
 )
-from seal_friction_ros.core.oring_contact.case_file import parse_case
-from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
-from seal_friction_ros.core.oring_contact.hertz import LineContact, cylinder_between_plates
-from seal_friction_ros.core.oring_contact.loading import model_of, squeeze
-from seal_friction_ros.core.oring_contact.material import Rubber
-from seal_friction_ros.core.oring_contact.results import ContactResult, contact_results, evaluate
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
+from seal_friction_ros.core.oring_contact.results import OringResult, evaluate_contact, oring_results
 from seal_friction_ros.offline.reports.thesis_data import appendix_b
 
 PRESSURES = tuple(psi * PSI for psi in (0.0, 250.0, 500.0, 750.0, 1000.0))
-COARSE = Numerics(lines=13)
+COARSE = OringNumerics(lines=13)
 
 
 def from_file(name: str) -> OringCase:
-    return parse_case(yaml.safe_load((ROOT / 'config' / 'oring' / f'{name}.yaml').read_text())).case
+    return parse_oring_case(yaml.safe_load((ROOT / 'config' / 'oring' / f'{name}.yaml').read_text())).case
 
 
 @pytest.fixture(scope='module')
-def calibrated() -> list[ContactResult]:
-    return list(contact_results(from_file('ms28775_114'), PRESSURES))
+def calibrated() -> list[OringResult]:
+    return list(oring_results(from_file('ms28775_114'), PRESSURES))
 
 
 @pytest.fixture(scope='module')
-def blind() -> list[ContactResult]:
-    case = dataclasses.replace(from_file('ms28775_114_blind'), numerics=Numerics(lines=21))
-    return list(contact_results(case, PRESSURES))
+def blind() -> list[OringResult]:
+    case = dataclasses.replace(from_file('ms28775_114_blind'), numerics=OringNumerics(lines=21))
+    return list(oring_results(case, PRESSURES))
 
 
 # -- Hertz
 
 
 @functools.cache
-def between_plates(squeeze_share: float, lines: int = 33) -> tuple[OringCase, ContactResult]:
+def between_plates(squeeze_share: float, lines: int = 33) -> tuple[OringCase, OringResult]:
     """A ring of 2 mm with a radius so large (1 m) that its two walls are plates."""
     d, inner = 2e-3, 2.0
     geometry = SealGeometry(d, inner, inner + squeeze_share * d, inner + 2.0 * d - squeeze_share * d)
     case = OringCase(
-        name='plates', geometry=geometry, groove=Groove(5e-3), rubber=Rubber(5e6), numerics=Numerics(lines=lines)
+        name='plates', geometry=geometry, groove=Groove(5e-3), rubber=Rubber(5e6), numerics=OringNumerics(lines=lines)
     )
-    model = model_of(case)
-    return case, evaluate(model, squeeze(case, model))
+    model = oring_model(case)
+    return case, evaluate_contact(model, squeeze_ring(case, model))
 
 
 def hertz(squeeze_share: float) -> LineContact:
@@ -123,9 +123,9 @@ def test_rubber_loses_the_volume_that_its_bulk_modulus_says_and_no_more(calibrat
 
 
 def test_rubber_ten_times_less_compressible_keeps_its_volume_to_0_1_percent_and_its_normal_force_to_2():
-    case = dataclasses.replace(from_file('ms28775_114'), numerics=Numerics(lines=13))
-    (usual,) = contact_results(case, PRESSURES[-1:])
-    (stiff,) = contact_results(dataclasses.replace(case, rubber=Rubber(7e6, bulk_modulus=2e10)), PRESSURES[-1:])
+    case = dataclasses.replace(from_file('ms28775_114'), numerics=OringNumerics(lines=13))
+    (usual,) = oring_results(case, PRESSURES[-1:])
+    (stiff,) = oring_results(dataclasses.replace(case, rubber=Rubber(7e6, bulk_modulus=2e10)), PRESSURES[-1:])
     assert 1.0 - stiff.volume_ratio < 1e-3
     assert stiff.rod.force == pytest.approx(usual.rod.force, rel=0.02)
 
@@ -134,8 +134,8 @@ def test_the_guide_against_rolling_hardly_changes_the_normal_force():
     case = from_file('ms28775_114')
     forces = []
     for guide in (0.0, 0.05):
-        numerics = Numerics(lines=17, guide=guide)
-        (result,) = contact_results(dataclasses.replace(case, numerics=numerics), PRESSURES[1:2])
+        numerics = OringNumerics(lines=17, guide=guide)
+        (result,) = oring_results(dataclasses.replace(case, numerics=numerics), PRESSURES[1:2])
         forces.append(result.rod.force)
     assert forces[0] == pytest.approx(forces[1], rel=0.01)
 
@@ -150,25 +150,25 @@ def test_fluid_enters_only_where_it_is_stronger_than_the_contact(calibrated):
 
 
 def test_hardly_any_pressure_gives_hardly_more_than_squeeze_and_spoils_nothing_after_it():
-    case = dataclasses.replace(from_file('ms28775_114'), numerics=Numerics(lines=13))
-    squeezed, hardly, pressed = contact_results(case, (0.0, 1e-3, 1e6))
-    (directly,) = contact_results(case, (1e6,))
+    case = dataclasses.replace(from_file('ms28775_114'), numerics=OringNumerics(lines=13))
+    squeezed, hardly, pressed = oring_results(case, (0.0, 1e-3, 1e6))
+    (directly,) = oring_results(case, (1e6,))
     assert hardly.rod.force == pytest.approx(squeezed.rod.force, rel=0.01)
     assert pressed.rod.force == directly.rod.force
 
 
 def test_walls_that_hold_the_ring_back_take_load_off_wall_and_rod():
     case = dataclasses.replace(from_file('ms28775_114'), numerics=COARSE)
-    (slippery,) = contact_results(case, PRESSURES[1:2])
-    (rough,) = contact_results(dataclasses.replace(case, wall_friction=0.03), PRESSURES[1:2])
+    (slippery,) = oring_results(case, PRESSURES[1:2])
+    (rough,) = oring_results(dataclasses.replace(case, wall_friction=0.03), PRESSURES[1:2])
     held = 0.03 * (rough.rod.force + rough.gland.force)
     assert rough.axial_force + held == pytest.approx(slippery.axial_force, rel=0.01)
     assert 0.95 < rough.rod.force / slippery.rod.force < 0.995
 
 
 def test_the_same_case_gives_the_same_numbers_to_the_bit():
-    case = dataclasses.replace(from_file('ms28775_114'), numerics=Numerics(lines=9))
-    one, other = (next(contact_results(case, PRESSURES[1:2])) for _ in range(2))
+    case = dataclasses.replace(from_file('ms28775_114'), numerics=OringNumerics(lines=9))
+    one, other = (next(oring_results(case, PRESSURES[1:2])) for _ in range(2))
     assert one.rod.force == other.rod.force
     assert (one.shape.nodes == other.shape.nodes).all()
 
@@ -204,7 +204,7 @@ def test_a_thicker_section_and_a_tighter_ring_explain_what_the_blind_case_is_off
 
     def without_pressure(**geometry: float) -> float:
         changed = dataclasses.replace(case, geometry=dataclasses.replace(case.geometry, **geometry))
-        return next(contact_results(changed, (0.0,))).rod.force
+        return next(oring_results(changed, (0.0,))).rod.force
 
     base = without_pressure()
     assert without_pressure(section_diameter=0.103 * INCH) < 0.6 * base
@@ -261,7 +261,7 @@ def test_a_squeezed_ring_longer_than_its_groove_is_refused():
     with pytest.raises(
         ValueError, match=r'overfilled gland: the squeezed ring is 0.00\d+ m long, groove.width = 0.0025 m'
     ):
-        next(contact_results(case, (0.0,)))
+        next(oring_results(case, (0.0,)))
 
 
 @pytest.mark.parametrize(
@@ -291,15 +291,15 @@ def test_no_equilibrium_is_an_error_and_not_a_number(monkeypatch: pytest.MonkeyP
     def never(*_):
         raise NotConvergedError('1.0e-03 2 pi R E d out of balance after 25 Newton steps')
 
-    monkeypatch.setattr(continuation, 'solve', never)
+    monkeypatch.setattr(continuation, 'solve_equilibrium', never)
     with pytest.raises(
         NotConvergedError, match=r'case mine: the squeezed ring finds no equilibrium: 0 % of the way: 1.0e-03'
     ):
-        next(contact_results(ring(), (0.0,)))
+        next(oring_results(ring(), (0.0,)))
 
 
 def test_a_step_that_fails_is_tried_again_shorter(monkeypatch: pytest.MonkeyPatch):
-    solve, failures = continuation.solve, []
+    solve, failures = continuation.solve_equilibrium, []
 
     def sometimes(model, assembly, surroundings, start):
         if len(failures) < 2 and surroundings.pressure > 1e6:
@@ -307,9 +307,9 @@ def test_a_step_that_fails_is_tried_again_shorter(monkeypatch: pytest.MonkeyPatc
             raise NotConvergedError('made to fail')
         return solve(model, assembly, surroundings, start)
 
-    (plain,) = contact_results(ring(), (2e6,))
-    monkeypatch.setattr(continuation, 'solve', sometimes)
-    (hindered,) = contact_results(ring(), (2e6,))
+    (plain,) = oring_results(ring(), (2e6,))
+    monkeypatch.setattr(continuation, 'solve_equilibrium', sometimes)
+    (hindered,) = oring_results(ring(), (2e6,))
     assert len(failures) == 2
     assert hindered.rod.force == pytest.approx(plain.rod.force, rel=0.01)
 
@@ -317,7 +317,7 @@ def test_a_step_that_fails_is_tried_again_shorter(monkeypatch: pytest.MonkeyPatc
 def test_a_ring_that_fluid_would_pass_is_refused(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(loading, 'wall_stresses', lambda *_: np.zeros((3, 3)))
     case = ring()
-    now = loading.Loaded(1e6, None, None, 0)
+    now = loading.LoadedRing(1e6, None, None, 0)
     monkeypatch.setattr(loading, 'outline', lambda *_: None)
     with pytest.raises(ValueError, match=r'mine: at 1e\+06 Pa the fluid passes the ring at the rod'):
         loading._check_sealed(case, None, now)

@@ -11,12 +11,12 @@ from seal_friction_ros.core.oring_contact.elements import (
     volume_ratios,
 )
 from seal_friction_ros.core.oring_contact.equilibrium import (
-    State,
-    at_rest,
-    balance,
+    OringState,
+    force_balance,
     make_assembly,
     make_model,
     stiffness_matrix,
+    unstressed_state,
 )
 from seal_friction_ros.core.oring_contact.material import Rubber, shear_response
 from seal_friction_ros.core.oring_contact.mesh import Mesh, o_grid
@@ -180,8 +180,8 @@ def test_the_stiffness_is_the_derivative_of_the_forces_to_1e_8(friction: float):
     model = make_model(MESH, RUBBER, SECTION, 0.05)
     assembly = make_assembly(model)
     surroundings = around(friction=friction)
-    state, step = State(shaken(), None), 1e-9
-    at = balance(model, surroundings, state)
+    state, step = OringState(shaken(), None), 1e-9
+    at = force_balance(model, surroundings, state)
     matrix = stiffness_matrix(assembly, at.entries).toarray()
     numeric = np.empty_like(matrix)
     for i in range(len(state.displacement)):
@@ -189,14 +189,14 @@ def test_the_stiffness_is_the_derivative_of_the_forces_to_1e_8(friction: float):
         for side in (-1.0, 1.0):
             moved = state.displacement.copy()
             moved[i] += side * step
-            sides.append(balance(model, surroundings, State(moved, None)).residual)
+            sides.append(force_balance(model, surroundings, OringState(moved, None)).residual)
         numeric[:, i] = (sides[1] - sides[0]) / (2.0 * step)
     assert np.abs(numeric - matrix).max() < 1e-8 * np.abs(matrix).max()
 
 
 def test_held_displacements_are_left_out_of_the_stiffness_and_nothing_else():
     model = make_model(MESH, RUBBER, SECTION, 0.05)
-    at = balance(model, around(), at_rest(model, shaken()))
+    at = force_balance(model, around(), unstressed_state(model, shaken()))
     whole = stiffness_matrix(make_assembly(model), at.entries).toarray()
     held = (3, 40)
     part = stiffness_matrix(make_assembly(model, held), at.entries)
@@ -207,7 +207,7 @@ def test_held_displacements_are_left_out_of_the_stiffness_and_nothing_else():
 
 def test_folded_elements_have_no_balance():
     model = make_model(MESH, RUBBER, SECTION, 0.05)
-    assert balance(model, around(), at_rest(model, shaken(1e-3))) is None
+    assert force_balance(model, around(), unstressed_state(model, shaken(1e-3))) is None
 
 
 def test_each_node_of_the_outline_feels_itself_and_its_two_neighbours():

@@ -17,10 +17,10 @@ from seal_friction_ros.core.estimation.messages import FORCE_TYPE, POSITION_TYPE
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, Velocity
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.lubrication.case import Case, Spool
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, Spool
 from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
-from seal_friction_ros.core.lubrication.transient import run
+from seal_friction_ros.core.lubrication.transient import run_transient
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.recorded_run import read_run
@@ -50,11 +50,11 @@ def answer(capsys, *arguments: str) -> dict:
 @pytest.mark.parametrize('path', sorted((ROOT / 'config' / 'ehl').glob('*.yaml')), ids=lambda path: path.stem)
 def test_every_case_of_the_repository_is_one_and_says_what_is_ours(path: Path):
     case = load_case(path.stem)
-    assert isinstance(case, Case | Spool)
+    assert isinstance(case, LubricationCase | Spool)
     assert case.name == path.stem
     assert case.source
     if isinstance(case, Spool):
-        assert all(isinstance(load_case(member.case), Case) for member in case.members)
+        assert all(isinstance(load_case(member.case), LubricationCase) for member in case.members)
 
 
 def test_run_gives_its_findings_with_their_errors(small, capsys):
@@ -181,7 +181,7 @@ def test_spool_adds_up_its_seals(small, tmp_path, capsys):
         'seals: [{case: small}, {case: small}, {case: small, mirrored: true}]\n'
     )
     found = answer(capsys, 'run', str(spool))
-    single = np.abs(run(load_case(small)).friction).max()
+    single = np.abs(run_transient(load_case(small)).friction).max()
     assert found['largest_friction_N'] == pytest.approx(3.0 * single, rel=0.01)
     assert found['seals'] == ['small', 'small', 'small, mirrored']
 
@@ -254,4 +254,4 @@ def test_run_that_does_not_converge_is_an_error_and_no_curve(tmp_path, capsys):
 
 def test_case_of_the_paper_stands_in_full_in_its_file_and_is_what_the_others_build_on():
     case = load_case('inner_seal')
-    assert replace(case, name='x', source='') == Case(name='x')
+    assert replace(case, name='x', source='') == LubricationCase(name='x')

@@ -12,7 +12,7 @@ from rich.progress import Progress
 
 from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.oring_contact.case_file import parse_case
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.contact.oring_runs import compute_case
@@ -64,7 +64,7 @@ def test_json_has_one_number_for_every_pressure(tmp_path: Path, capsys: pytest.C
     assert max(figures['rod_profile'][1]['stress_Pa']) == figures['peak_contact_stress_Pa'][1]
     assert figures['wall_profile'][0] == {'position_m': [], 'stress_Pa': []}
     assert figures['normal_force_N'] == sorted(figures['normal_force_N'])
-    area = projected_area(parse_case(document()).case.geometry)
+    area = projected_area(parse_oring_case(document()).case.geometry)
     assert figures['axial_force_N'][1] == pytest.approx(5e5 * area, rel=0.01)
 
 
@@ -99,7 +99,7 @@ def test_its_friction_from_geometry_is_within_5_percent_of_the_mean_of_the_tests
 
 @pytest.mark.parametrize('name', ['ms28775_114', 'ms28775_114_blind'])
 def test_measured_friction_in_the_case_files_is_that_of_the_tables(name: str):
-    measured = parse_case(read_yaml(CASES / f'{name}.yaml')).measured
+    measured = parse_oring_case(read_yaml(CASES / f'{name}.yaml')).measured
     pressures, friction = dynamic_readings()
     means = [friction[abs(pressures - p) < 1.0].mean() for p in measured.pressures]
     assert measured.frictions == pytest.approx(means, rel=1e-3)
@@ -107,7 +107,7 @@ def test_measured_friction_in_the_case_files_is_that_of_the_tables(name: str):
 
 @pytest.mark.parametrize('path', sorted(CASES.glob('*.yaml')), ids=lambda path: path.stem)
 def test_every_case_that_comes_with_the_package_is_one_and_says_where_it_is_from(path: Path):
-    file = parse_case(read_yaml(path))
+    file = parse_oring_case(read_yaml(path))
     assert len(file.source) > 80
     assert file.friction is not None
     assert file.measured is not None
@@ -134,7 +134,7 @@ def test_progress_is_one_step_a_pressure(tmp_path: Path, monkeypatch: pytest.Mon
             {'geometry': {'section_diameter': 2.6e-3}},
             'geometry lacks ring_inner_diameter, rod_diameter, gland_diameter',
         ),
-        ({'numerics': {'lines': 3}}, 'numerics: Numerics.lines = 3  is below its lower bound 9'),
+        ({'numerics': {'lines': 3}}, 'numerics: OringNumerics.lines = 3  is below its lower bound 9'),
         ({'pressures': [0.0, 1e8]}, 'extrudes the ring'),
         ({'pressures': 'all'}, "pressures = 'all' is not a list"),
         ({'friction': {'stiction': 1.0}}, 'friction_coefficient = None is not a mapping'),

@@ -7,29 +7,29 @@ import pytest
 from harness.report_page import checked_page
 
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.lubrication.case import parse_case
 from seal_friction_ros.core.lubrication.findings import Findings
 from seal_friction_ros.core.lubrication.friction_map import SteadyFriction
+from seal_friction_ros.core.lubrication.lubrication_case import parse_lubrication_case
 from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain
 from seal_friction_ros.core.lubrication.spool import SpoolResult
 from seal_friction_ros.core.lubrication.study import StudyTable
-from seal_friction_ros.core.lubrication.transient import RunResult
+from seal_friction_ros.core.lubrication.transient import TransientResult
 from seal_friction_ros.offline.contact.lubrication_comparison import Comparison
 from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, MapRuns, StudyRuns
 from seal_friction_ros.offline.reports import lubrication_report as report
 
 EVIL = '<b>case</b> & "1"'
-CASE = replace(parse_case({'name': 'case', 'motion': {'cycles': 1}}), name=EVIL, source='<i>source</i>')
+CASE = replace(parse_lubrication_case({'name': 'case', 'motion': {'cycles': 1}}), name=EVIL, source='<i>source</i>')
 STEPS, CELLS = 20, 24
 FINDINGS = Findings(0.6, 0.96, None, 0.5, None, 0.02, None, 31e-6, 30e-6, None, None, None, None, None)
 
 
-def result(case=CASE) -> RunResult:
+def result(case=CASE) -> TransientResult:
     """One cycle of a cosine with a friction of 0.6 N, of which the film bears a hundredth."""
     phase = np.linspace(0.0, 2.0 * np.pi, STEPS + 1)[1:]
     friction = 0.6 * np.sign(np.sin(phase))
     shape = np.ones((STEPS, CELLS)) * np.hanning(CELLS)
-    return RunResult(
+    return TransientResult(
         case=case,
         time=0.2 * phase / (2.0 * np.pi),
         position=-0.9e-3 * np.cos(phase),

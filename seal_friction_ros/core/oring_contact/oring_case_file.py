@@ -24,8 +24,8 @@ from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
 from seal_friction_ros.core.friction.seal_file import parse_friction_coefficient
-from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
+from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics, check_pressures
 
 _KEYS = (
     'name', 'source', 'geometry', 'groove', 'rubber', 'wall_friction', 'numerics', 'pressures', 'friction', 'measured',
@@ -33,7 +33,7 @@ _KEYS = (
 
 
 @dataclass(frozen=True)
-class Friction:
+class SealFriction:
     """What a seal file needs besides geometry and normal force."""
 
     friction_coefficient: Mapping[str, Any]
@@ -45,7 +45,7 @@ class Friction:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredFriction:
     """Friction that was measured, to set beside the computed one.
 
     Raises:
@@ -61,20 +61,20 @@ class Measured:
         check(self)
         if len(self.frictions) != len(self.pressures) or not self.pressures:
             raise ValueError(
-                f'Measured: {len(self.frictions)} frictions at {len(self.pressures)} pressures: give one a pressure'
+                f'MeasuredFriction: {len(self.frictions)} frictions at {len(self.pressures)} pressures: give one a pressure'
             )
 
 
 @dataclass(frozen=True)
-class CaseFile:
+class OringCaseFile:
     """A case, and what is wanted of it."""
 
     case: OringCase
     pressures: tuple[float, ...]
     """[Pa, gauge], increasing"""
     source: str
-    friction: Friction | None
-    measured: Measured | None
+    friction: SealFriction | None
+    measured: MeasuredFriction | None
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class _Pressures:
     pressures: tuple[float, ...]
 
 
-def parse_case(document: Any) -> CaseFile:
+def parse_oring_case(document: Any) -> OringCaseFile:
     """Make a case from the document of a case file.
 
     Raises:
@@ -103,11 +103,11 @@ def parse_case(document: Any) -> CaseFile:
         geometry=geometry,
         groove=from_mapping(Groove, document.get('groove'), f'{where}: groove'),
         rubber=rubber,
-        numerics=from_mapping(Numerics, document.get('numerics', {}), f'{where}: numerics'),
+        numerics=from_mapping(OringNumerics, document.get('numerics', {}), f'{where}: numerics'),
     )
     pressures = from_mapping(_Pressures, {'pressures': document.get('pressures')}, where).pressures
     check_pressures(case, pressures)
-    return CaseFile(case, pressures, source, _friction(document, where), _measured(document, where))
+    return OringCaseFile(case, pressures, source, _friction(document, where), _measured(document, where))
 
 
 def _rubber(values: Any, where: str) -> Rubber:
@@ -137,7 +137,7 @@ class _Stiction:
         check(self)
 
 
-def _friction(document: Mapping[str, Any], where: str) -> Friction | None:
+def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
     values = document.get('friction')
     if values is None:
         return None
@@ -148,9 +148,9 @@ def _friction(document: Mapping[str, Any], where: str) -> Friction | None:
     law = parse_friction_coefficient(values, where)
     stiction = from_mapping(_Stiction, {k: v for k, v in values.items() if k == 'stiction'}, where).stiction
     uncertainty = from_mapping(Uncertainty, values.get('uncertainty'), f'{where}: uncertainty')
-    return Friction(values['friction_coefficient'], law, stiction, uncertainty)
+    return SealFriction(values['friction_coefficient'], law, stiction, uncertainty)
 
 
-def _measured(document: Mapping[str, Any], where: str) -> Measured | None:
+def _measured(document: Mapping[str, Any], where: str) -> MeasuredFriction | None:
     values = document.get('measured')
-    return None if values is None else from_mapping(Measured, values, f'{where}: measured')
+    return None if values is None else from_mapping(MeasuredFriction, values, f'{where}: measured')

@@ -28,7 +28,7 @@ class Groove:
 
 
 @dataclass(frozen=True)
-class Numerics:
+class OringNumerics:
     """How finely it is computed. Defaults of ``lines`` and ``penalty`` converge the normal force to 1 %.
 
     ``transition`` is a choice: a sharp one (0.01) makes 3.0 to 3.6 % more normal force under pressure: docs/oring.md.
@@ -69,7 +69,7 @@ class OringCase:
     geometry: SealGeometry
     groove: Groove
     rubber: Rubber
-    numerics: Numerics = Numerics()
+    numerics: OringNumerics = OringNumerics()
     wall_friction: float = parameter(
         0.0, unit='1', lower=0.0, upper=0.1, description='Traction of rod and gland on the ring over contact stress.'
     )

@@ -16,7 +16,7 @@ from typing import Any
 
 from seal_friction_ros.core.foundation.parameters import check, check_names, from_mapping, name_and_source, parameter
 from seal_friction_ros.core.lubrication.grease import Grease
-from seal_friction_ros.core.lubrication.groove import Groove
+from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
@@ -63,7 +63,7 @@ class SealBody:
 
 
 @dataclass(frozen=True)
-class Air:
+class AirPressure:
     """Pressure on both sides of the seal, above that at which the film cavitates (ambient).
 
     Raises:
@@ -111,7 +111,7 @@ class Viscoelasticity:
 
 
 @dataclass(frozen=True)
-class Numerics:
+class LubricationNumerics:
     """Grid and time step.
 
     Raises:
@@ -127,7 +127,7 @@ class Numerics:
 
 
 @dataclass(frozen=True)
-class Study:
+class ShearStressStudy:
     """Study of section 7.2: the case with other solid shear stresses.
 
     Raises:
@@ -145,7 +145,7 @@ class Study:
     def __post_init__(self) -> None:
         check(self)
         if not self.solid_shear_stresses:
-            raise ValueError('Study.solid_shear_stresses is empty')
+            raise ValueError('ShearStressStudy.solid_shear_stresses is empty')
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class MapGrid:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Case:
+class LubricationCase:
     """One seal, its wall, lubricant and motion.
 
     Raises:
@@ -183,11 +183,11 @@ class Case:
     seal: SealBody = field(default_factory=SealBody)
     topography: Topography = field(default_factory=Topography)
     grease: Grease = field(default_factory=Grease)
-    groove: Groove = field(default_factory=Groove)
-    air: Air = field(default_factory=Air)
+    groove: GrooveSpring = field(default_factory=GrooveSpring)
+    air: AirPressure = field(default_factory=AirPressure)
     motion: ConstantAcceleration = field(default_factory=ConstantAcceleration)
-    numerics: Numerics = field(default_factory=Numerics)
-    study: Study = field(default_factory=Study)
+    numerics: LubricationNumerics = field(default_factory=LubricationNumerics)
+    study: ShearStressStudy = field(default_factory=ShearStressStudy)
     map: MapGrid = field(default_factory=MapGrid)
     control_edge: ControlEdge | None = None
     film_supply: FilmSupply | None = None
@@ -212,7 +212,7 @@ class Case:
         return self.seal.interference + self.air.pressure_interference * self.air.difference
 
     @property
-    def seated_groove(self) -> Groove:
+    def seated_groove(self) -> GrooveSpring:
         """The groove as it acts: a pressure difference holds the seal on one flank (paper, section 7.4)."""
         return dataclasses.replace(self.groove, half_clearance=0.0) if self.air.difference > 0.0 else self.groove
 
@@ -221,11 +221,11 @@ _PARTS: dict[str, type] = {
     'seal': SealBody,
     'topography': Topography,
     'grease': Grease,
-    'groove': Groove,
-    'air': Air,
+    'groove': GrooveSpring,
+    'air': AirPressure,
     'motion': ConstantAcceleration,
-    'numerics': Numerics,
-    'study': Study,
+    'numerics': LubricationNumerics,
+    'study': ShearStressStudy,
     'map': MapGrid,
     'control_edge': ControlEdge,
     'film_supply': FilmSupply,
@@ -234,7 +234,7 @@ _PARTS: dict[str, type] = {
 
 
 @dataclass(frozen=True)
-class Member:
+class SpoolSeal:
     """One seal of a spool with several.
 
     Raises:
@@ -264,14 +264,14 @@ class Spool:
     name: str
     source: str
     motion: ConstantAcceleration
-    members: tuple[Member, ...]
+    members: tuple[SpoolSeal, ...]
 
     def __post_init__(self) -> None:
         if not self.members:
             raise ValueError(f'spool {self.name}: seals is empty')
 
 
-def parse_case(document: Any) -> Case | Spool:
+def parse_lubrication_case(document: Any) -> LubricationCase | Spool:
     """Make a case, or a spool if the document has ``seals``, from the document of a case file.
 
     Raises:
@@ -287,13 +287,13 @@ def parse_case(document: Any) -> Case | Spool:
         for key, record in _PARTS.items()
         if key in document
     }
-    return Case(name=name, source=source, **parts)
+    return LubricationCase(name=name, source=source, **parts)
 
 
 def _parse_spool(document: Mapping[str, Any], name: str, source: str) -> Spool:
     seals = document['seals']
     if not isinstance(seals, list):
         raise ValueError(f'spool {name}: seals = {seals!r} is not a list')
-    members = tuple(from_mapping(Member, seal, f'spool {name}: seals[{i}]') for i, seal in enumerate(seals))
+    members = tuple(from_mapping(SpoolSeal, seal, f'spool {name}: seals[{i}]') for i, seal in enumerate(seals))
     motion = from_mapping(ConstantAcceleration, document.get('motion', {}), f'spool {name}: motion')
     return Spool(name, source, motion, members)
