@@ -1,1 +1,5 @@
-"""Finite-element O-ring: ring, gland, material and pressure -> contact stress, normal force and axial force."""
+"""Finite-element O-ring: contact stress, normal force and axial force from ring, gland, material and pressure.
+
+Data flow: `oring_case` (input), `mesh`, `material`, `elements`, `surroundings` (walls and fluid), `equilibrium`
+(Newton's method), `continuation` (adaptive steps), `loading` (squeeze, seat, pressure), `results`.
+"""

@@ -1,11 +1,11 @@
 r"""Internal force and stiffness of the section: bilinear quadrilaterals with mean dilatation.
 
-The energy of one element is that of the shear at its four Gauss points, plus that of its mean volume ratio
-:math:`\Theta = v / V`, which keeps it from locking [Nagtegaal1974]_, [Simo1985]_:
+The energy of an element is the shear energy at its four Gauss points plus the energy of its mean volume ratio
+:math:`\Theta = v / V`; the mean prevents volumetric locking [Nagtegaal1974]_, [Simo1985]_:
 
 .. math:: \Pi = \sum_g w_g W(F_g) + V \frac{K}{2} (\Theta - 1)^2, \quad v = \sum_g w_g J_g, \quad w_g = 2 \pi R_g \det
 
-Everything refers to the free ring, so F is linear in the displacements, F = F_0 + B u, with B made once.
+The formulation refers to the undeformed ring, so F = F_0 + B u is linear in the displacements and B is constant.
 """
 
 from typing import NamedTuple
@@ -22,18 +22,18 @@ _UNDEFORMED = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
 
 
 class Elements(NamedTuple):
-    """What of the elements does not change with the displacements."""
+    """Quantities of the elements that do not depend on the displacements."""
 
     freedoms: IntArray
-    """of each element: r and z of its corners in turn, shape (e, 8)"""
+    """degrees of freedom of each element: r and z of its corners in turn, shape (e, 8)"""
     gradient_rows: FloatArray
     """B [1/m], shape (e, 4, 5, 8)"""
     weights: FloatArray
-    """reference volume of each Gauss point, all around the axis [m^3], shape (e, 4)"""
+    """reference volume of each Gauss point over the full circumference [m^3], shape (e, 4)"""
 
 
 class ElementForces(NamedTuple):
-    """What elements add to the balance of the nodes, in the order of `Elements.freedoms`."""
+    """Contributions of the elements to the balance of forces, in the order of `Elements.freedoms`."""
 
     force: FloatArray
     """[N], shape (e, 8)"""
@@ -42,16 +42,16 @@ class ElementForces(NamedTuple):
     tension: FloatArray
     """mean tension K (Theta - 1) [Pa], shape (e,)"""
     tension_rows: FloatArray
-    """its change with the displacements [Pa/m], shape (e, 8)"""
+    """derivative of the tension by the displacements [Pa/m], shape (e, 8)"""
 
 
 def make_elements(mesh: Mesh) -> Elements:
-    """Gradients of the shape functions at the Gauss points of a mesh."""
+    """Elements of a mesh: gradients of the shape functions and weights at the Gauss points."""
     corners = mesh.nodes[mesh.elements]
     along_x = 1.0 + _POINTS[:, None, 0] * _CORNERS[:, 0]
     along_y = 1.0 + _POINTS[:, None, 1] * _CORNERS[:, 1]
     shape = 0.25 * along_x * along_y  # (4 points, 4 corners)
-    slope = 0.25 * np.stack((_CORNERS[:, 0] * along_y, _CORNERS[:, 1] * along_x), axis=-1)  # along the element's axes
+    slope = 0.25 * np.stack((_CORNERS[:, 0] * along_y, _CORNERS[:, 1] * along_x), axis=-1)  # in natural coordinates
     jacobian = np.einsum('gak,eai->egik', slope, corners)
     gradient = np.einsum('gak,egki->egai', slope, np.linalg.inv(jacobian))
     radius = corners[:, :, 0] @ shape.T
@@ -66,13 +66,13 @@ def make_elements(mesh: Mesh) -> Elements:
 
 
 def deformation_gradient(elements: Elements, displacement: FloatArray) -> FloatArray:
-    """Deformation gradient at the Gauss points, shape (e, 4, 5), of displacements [m], shape (2 n,)."""
+    """Deformation gradient at the Gauss points, shape (e, 4, 5), for displacements [m], shape (2 n,)."""
     change: FloatArray = np.einsum('egif,ef->egi', elements.gradient_rows, displacement[elements.freedoms])
     return _UNDEFORMED + change
 
 
 def is_inside_out(gradient: FloatArray) -> bool:
-    """Whether any Gauss point is folded over, which no material can be."""
+    """Whether the volume at any Gauss point is zero or negative, which is not physical."""
     area = gradient[..., 0] * gradient[..., 3] - gradient[..., 1] * gradient[..., 2]
     return bool((area <= 0.0).any() or (gradient[..., 4] <= 0.0).any())
 
@@ -82,10 +82,9 @@ def element_forces(
 ) -> ElementForces:
     """Internal force and stiffness of every element at a deformation gradient of shape (e, 4, 5).
 
-    The force always has the tension that follows from the volume. The stiffness takes the tension that multiplies
-    second derivatives of the volume from ``tension`` [Pa], shape (e,), if it is given: Newton's method then is that of
-    displacements and tensions as independent unknowns, the tensions condensed out, which takes far larger steps than
-    that of displacements alone while the volume is not yet right.
+    The force uses the tension that follows from the volume. The stiffness multiplies the second derivatives of the
+    volume by ``tension`` [Pa], shape (e,), if given. Newton's method then treats displacements and tensions as
+    independent unknowns, with the tensions condensed out: it converges from larger steps than with displacements alone.
     """
     shear, volume = shear_response(rubber, gradient), volume_response(gradient)
     weights, rows = elements.weights, elements.gradient_rows
@@ -94,12 +93,12 @@ def element_forces(
     true_tension: FloatArray = rubber.bulk_modulus * ((weights * volume.energy).sum(axis=1) / total - 1.0)
     assumed = true_tension if tension is None else tension
     flat = rows.reshape(count, 20, 8)
-    turned = np.swapaxes(flat, 1, 2)
-    growth = (turned @ (weights[..., None] * volume.stress).reshape(count, 20, 1))[..., 0]  # dv/du
-    force = (turned @ (weights[..., None] * shear.stress).reshape(count, 20, 1))[..., 0]
+    transposed = np.swapaxes(flat, 1, 2)
+    growth = (transposed @ (weights[..., None] * volume.stress).reshape(count, 20, 1))[..., 0]  # dv/du [m^2]
+    force = (transposed @ (weights[..., None] * shear.stress).reshape(count, 20, 1))[..., 0]
     force += true_tension[:, None] * growth
     stiffness = weights[..., None, None] * (shear.stiffness + assumed[:, None, None, None] * volume.stiffness)
-    matrix = turned @ (stiffness @ rows).reshape(count, 20, 8)
+    matrix = transposed @ (stiffness @ rows).reshape(count, 20, 8)
     tension_rows = (rubber.bulk_modulus / total)[:, None] * growth
     matrix += growth[:, :, None] * tension_rows[:, None, :]
     return ElementForces(force, matrix, true_tension, tension_rows)

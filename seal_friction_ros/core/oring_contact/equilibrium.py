@@ -1,4 +1,4 @@
-"""Equilibrium of the ring by Newton's method: sparse stiffness, direct solution, and a verdict."""
+"""Equilibrium of the ring by Newton's method with a sparse stiffness and a direct solver."""
 
 from typing import NamedTuple
 
@@ -20,29 +20,29 @@ from seal_friction_ros.core.oring_contact.mesh import Mesh
 from seal_friction_ros.core.oring_contact.surroundings import Surroundings, outline_freedoms, surface_forces
 
 TOLERANCE = 1e-9
-"""Largest force out of balance at a node as a share of 2 pi R E d (own choice)."""
+"""Largest residual force at a node over 2 pi R E d (our choice)."""
 MAX_ITERATIONS = 25
-"""Newton steps before giving up (own choice: good load steps take 3 to 8)."""
-_SHORTEST_STEP = 1.0 / 64.0  # of Newton's, before a fold is taken for final
-_PIVOT = 0.01  # entry on the diagonal over the largest of its column, from which on it is taken: little fill
+"""Limit of Newton steps (our choice: good load steps take 3 to 8)."""
+_SHORTEST_STEP = 1.0 / 64.0  # of the full Newton step, below which an inverted element is an error
+_PIVOT = 0.01  # diagonal entry over the largest of its column, above which it is the pivot: little fill-in
 
 
 class OringModel(NamedTuple):
-    """A meshed ring of one material."""
+    """Meshed ring of one material."""
 
     mesh: Mesh
     elements: Elements
     rubber: Rubber
     force_scale: float
-    """2 pi R E d, R the radius of the ring [N]: forces out of balance are small against it"""
+    """2 pi R E d, R the radius of the ring [N]: reference of the residual forces"""
     guide: tuple[int, int]
-    """nodes between which the guide against rolling acts, side by side over r"""
+    """inner and outer node of the guide against rolling"""
     guide_stiffness: float
-    """force per difference of their axial displacements [N/m]"""
+    """force over difference of their axial displacements [N/m]"""
 
 
 class OringState(NamedTuple):
-    """Where the ring is."""
+    """Displacements and tensions of the ring."""
 
     displacement: FloatArray
     """r and z of the nodes in turn [m], shape (2 n,)"""
@@ -51,18 +51,20 @@ class OringState(NamedTuple):
 
 
 class Assembly(NamedTuple):
-    """Where entries of element and node matrices go in the sparse matrix of the free displacements."""
+    """Places of the element, outline and guide entries in the sparse stiffness of the free displacements."""
 
     free: IntArray
     """free displacements, shape (f,)"""
     slots: IntArray
-    """place of each entry among the stored ones; the last is for what is not free"""
+    """index of each entry in the stored values; entries of fixed displacements go to one extra place at the end"""
     rows: IntArray
+    """row of each stored value"""
     starts: IntArray
+    """first stored value of each column, shape (f + 1,)"""
 
 
 class ForceBalance(NamedTuple):
-    """Forces out of balance and stiffness of the whole ring."""
+    """Residual forces and stiffness of the whole ring."""
 
     residual: FloatArray
     """[N], shape (2 n,)"""
@@ -77,15 +79,15 @@ class ForceBalance(NamedTuple):
 def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float) -> OringModel:
     """Model of a meshed ring.
 
-    Between frictionless walls a round ring rolls almost freely: only that its fibres stay on their circles holds it,
-    and facets of the mesh turn that into small jumps. A guide, a couple without net force, holds the two nodes half
-    way to rod and gland level with each other (own choice; see docs/oring.md for how little it changes).
+    Between frictionless walls a round ring rolls almost freely: only its hoop strain resists, and the facets of the
+    mesh make the motion jump. The guide, a couple without net force, keeps the two nodes halfway to rod and gland at
+    the same axial position (our choice; docs/oring.md has its influence).
 
     Args:
         mesh: Mesh of the section.
         rubber: Material.
         section_diameter: d [m].
-        guide: Stiffness of the guide as a share of 2 pi R E, R the radius of the ring.
+        guide: Stiffness of the guide over 2 pi R E, R the radius of the ring.
     """
     center = mesh.nodes.mean(axis=0)
     quarter = np.array([section_diameter / 4.0, 0.0])
@@ -97,27 +99,27 @@ def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float
 
 
 def unstressed_state(model: OringModel, displacement: FloatArray | None = None) -> OringState:
-    """State without tension, by default without displacement either."""
+    """State without tension; ``displacement`` [m], shape (2 n,), is zero by default."""
     if displacement is None:
         displacement = np.zeros(model.mesh.nodes.size)
     return OringState(displacement, np.zeros(len(model.mesh.elements)))
 
 
 def outline(model: OringModel, state: OringState) -> FloatArray:
-    """Position of the nodes of the outline [m], shape (s, 2)."""
+    """Positions of the nodes of the outline [m], shape (s, 2)."""
     position: FloatArray = model.mesh.nodes + state.displacement.reshape(-1, 2)
     return position[model.mesh.surface]
 
 
 def make_assembly(model: OringModel, held: tuple[int, ...] = ()) -> Assembly:
-    """Sparsity of the stiffness with the displacements ``held`` (2 node for r, 2 node + 1 for z) left out."""
+    """Sparsity of the stiffness without the fixed displacements ``held`` (2 node for r, 2 node + 1 for z)."""
     count = model.mesh.nodes.size
     number = np.full(count, -1)
     free = np.setdiff1d(np.arange(count), held)
     number[free] = np.arange(len(free))
-    around = outline_freedoms(model.mesh.surface)
+    stencil = outline_freedoms(model.mesh.surface)
     guided = np.array([[2 * node + 1 for node in model.guide]])
-    blocks = ((model.elements.freedoms, model.elements.freedoms), (around[:, 2:4], around), (guided, guided))
+    blocks = ((model.elements.freedoms, model.elements.freedoms), (stencil[:, 2:4], stencil), (guided, guided))
     row = number[np.concatenate([np.repeat(rows, columns.shape[1], axis=1).ravel() for rows, columns in blocks])]
     column = number[np.concatenate([np.tile(columns, (1, rows.shape[1])).ravel() for rows, columns in blocks])]
     keys = np.where((row >= 0) & (column >= 0), column * len(free) + row, len(free) ** 2)
@@ -128,7 +130,7 @@ def make_assembly(model: OringModel, held: tuple[int, ...] = ()) -> Assembly:
 
 
 def force_balance(model: OringModel, surroundings: Surroundings, state: OringState) -> ForceBalance | None:
-    """Forces out of balance at a state; None if an element is inside out."""
+    """Residual forces at a state; None if an element is inverted."""
     gradient = deformation_gradient(model.elements, state.displacement)
     if is_inside_out(gradient):
         return None
@@ -156,14 +158,14 @@ def stiffness_matrix(assembly: Assembly, entries: FloatArray) -> csc_array:
 def solve_equilibrium(
     model: OringModel, assembly: Assembly, surroundings: Surroundings, start: OringState
 ) -> tuple[OringState, int]:
-    """State in equilibrium, from one to start with, and the Newton steps it took.
+    """Equilibrium state from a start state, and the number of Newton steps.
 
     Raises:
-        NotConvergedError: None was found.
+        NotConvergedError: An element is inverted, the stiffness is singular, or 25 steps do not converge.
     """
     state, now = start, force_balance(model, surroundings, start)
     if now is None:
-        raise NotConvergedError('an element is inside out at the start')
+        raise NotConvergedError('an element is inverted at the start')
     imbalance = np.inf
     for step in range(MAX_ITERATIONS + 1):
         residual = now.residual[assembly.free]
@@ -179,11 +181,11 @@ def solve_equilibrium(
             )
         except RuntimeError as error:
             raise NotConvergedError(f'the stiffness is singular: {error}') from None
-        state, now = _take(model, surroundings, state, now, assembly.free, factors.solve(residual))
-    raise NotConvergedError(f'{imbalance:.1e} 2 pi R E d out of balance after {MAX_ITERATIONS} Newton steps')
+        state, now = _take_newton_step(model, surroundings, state, now, assembly.free, factors.solve(residual))
+    raise NotConvergedError(f'residual of {imbalance:.1e} 2 pi R E d after {MAX_ITERATIONS} Newton steps')
 
 
-def _take(
+def _take_newton_step(
     model: OringModel,
     surroundings: Surroundings,
     state: OringState,
@@ -191,7 +193,7 @@ def _take(
     free: IntArray,
     step: FloatArray,
 ) -> tuple[OringState, ForceBalance]:
-    """Take a Newton step, halved until no element is inside out; tensions follow it linearly."""
+    """Take a Newton step, halved until no element is inverted; tensions change linearly with it."""
     length = 1.0
     while length >= _SHORTEST_STEP:
         change = np.zeros_like(state.displacement)
@@ -202,4 +204,4 @@ def _take(
         if after is not None:
             return trial, after
         length /= 2.0
-    raise NotConvergedError('an element turns inside out')
+    raise NotConvergedError('a Newton step inverts an element')

@@ -1,4 +1,4 @@
-"""Pressure at which an O-ring is squeezed out through the clearance between rod and gland."""
+"""Pressure at which an O-ring extrudes through the clearance between rod and gland."""
 
 import math
 
@@ -10,22 +10,22 @@ _CLEARANCES = {
     70.0: (0.016 * INCH, 0.010 * INCH, 0.006 * INCH, 0.004 * INCH, 0.002 * INCH),  # [m]
     90.0: (0.028 * INCH, 0.024 * INCH, 0.020 * INCH, 0.016 * INCH, 0.010 * INCH),
 }
-"""Shore A -> largest diametral clearance at each of the pressures."""
+"""Shore A -> largest diametral clearance at each of `_PRESSURES`"""
 
 
 def extrusion_pressure(diametral_clearance: float, elastic_modulus: float) -> float:
     """Highest pressure [Pa, gauge] without a back-up ring.
 
-    A straight line of log pressure over clearance between the values of the table, continued beyond its ends, and
-    between the hardnesses of the table; a softer rubber counts as 70 Shore A less in proportion to its modulus, one
-    harder than 90 as 90.
+    The logarithm of the pressure is interpolated linearly over clearance (and extrapolated beyond the table), then
+    over hardness from 70 to 90 Shore A. Below 70 Shore A the limit of 70 is scaled with the modulus; above 90 the limit
+    of 90 holds.
 
     Args:
-        diametral_clearance: Difference of the diameters between which the ring could creep [m].
-        elastic_modulus: E of the rubber [Pa]; its hardness follows from it.
+        diametral_clearance: Diametral clearance behind the ring [m].
+        elastic_modulus: E of the rubber [Pa]; gives its hardness.
 
-    Source: [SealDesign]_, Limits of Diametral Clearance Against Fluid Pressure; each band counted at its upper end.
-    Interpolation and what is beyond the table are our choice.
+    Source: [SealDesign]_, Limits of Diametral Clearance Against Fluid Pressure, at the upper end of each band.
+    Interpolation and extrapolation are our choice.
     """
     soft = _limit(_CLEARANCES[70.0], diametral_clearance)
     at_70 = elastic_modulus_of_hardness(70.0)
@@ -37,7 +37,7 @@ def extrusion_pressure(diametral_clearance: float, elastic_modulus: float) -> fl
 
 
 def _limit(clearances: tuple[float, ...], clearance: float) -> float:
-    """Clearances fall; the two points around the wanted one, or the two last on its side."""
+    """Pressure limit [Pa] at a clearance [m], from the enclosing interval of the falling clearances or the end one."""
     i = next((i for i in range(1, len(clearances) - 1) if clearance >= clearances[i]), len(clearances) - 1)
     share = (clearance - clearances[i]) / (clearances[i - 1] - clearances[i])
     return math.exp(math.log(_PRESSURES[i]) + share * math.log(_PRESSURES[i - 1] / _PRESSURES[i]))

@@ -1,4 +1,4 @@
-"""The way of the ring from free to pressed: squeeze between rod and gland, seat on the wall, raise the pressure."""
+"""Loading of the ring: squeeze between rod and gland, seat on the downstream wall, raise the pressure."""
 
 import math
 from collections.abc import Iterator
@@ -31,25 +31,25 @@ from seal_friction_ros.core.oring_contact.surroundings import (
     wall_stresses,
 )
 
-_SOFTER = 100.0  # walls while the ring is squeezed: their penalty is this much smaller
-_SQUEEZE_STRIDE, _STIFFEN_STRIDE, _FRICTION_STRIDE = 1.0, 0.5, 0.1  # parts of their ways to try first
-_DRY = 0.1  # transition without fluid, where there is nothing to tell contact from, over that with it
-_SEATING = 1e-3  # depth of the ring in the wall when it is seated, over d
+_SOFTER = 100.0  # factor by which the penalty is reduced during squeezing
+_SQUEEZE_STRIDE, _STIFFEN_STRIDE, _FRICTION_STRIDE = 1.0, 0.5, 0.1  # first steps, as fractions of their paths
+_DRY = 0.1  # transition without fluid over transition with fluid
+_SEATING = 1e-3  # first penetration of the ring into the downstream wall, over d
 
 
 class LoadedRing(NamedTuple):
-    """The ring in equilibrium under one pressure."""
+    """Equilibrium of the ring under one pressure."""
 
     pressure: float
     """[Pa, gauge]"""
     surroundings: Surroundings
     state: OringState
     newton_steps: int
-    """since the last pressure that was asked for"""
+    """since the last requested pressure"""
 
 
 def oring_model(case: OringCase) -> OringModel:
-    """Mesh and material of a case."""
+    """Model of a case."""
     geometry, numerics = case.geometry, case.numerics
     center = (geometry.ring_inner_diameter + geometry.section_diameter) / 2.0
     mesh = o_grid(geometry.section_diameter, center, numerics.lines)
@@ -57,13 +57,13 @@ def oring_model(case: OringCase) -> OringModel:
 
 
 def loaded_states(case: OringCase, model: OringModel, pressures: tuple[float, ...]) -> Iterator[LoadedRing]:
-    """The ring under one pressure [Pa, gauge] after the other.
+    """Equilibria at increasing pressures [Pa, gauge].
 
-    At no pressure the ring is squeezed only and touches no wall, as in the first case of the thesis.
+    At 0 Pa the ring is squeezed only and does not touch the downstream wall, as in the first case of the thesis.
 
     Raises:
-        ValueError: The pressures make no sense, the squeezed ring is longer than the groove, or fluid passes the ring.
-        NotConvergedError: No equilibrium was found.
+        ValueError: The pressures are invalid, the squeezed ring is longer than the groove, or fluid passes the ring.
+        NotConvergedError: Newton's method did not converge.
     """
     check_pressures(case, pressures)
     now = squeeze_ring(case, model)
@@ -76,45 +76,46 @@ def loaded_states(case: OringCase, model: OringModel, pressures: tuple[float, ..
     base = seat_ring(case, model, free, now)
     lowest, rise = base.pressure, base.pressure
     for pressure in pressures:
-        now, next_rise = _raised(case, model, free, base, pressure, rise)
-        loaded = _held_back(case, model, free, now)
+        now, next_rise = _raise_pressure(case, model, free, base, pressure, rise)
+        loaded = _apply_wall_friction(case, model, free, now)
         _check_sealed(case, model, loaded)
         yield loaded
-        if pressure > lowest:  # below, the wall hardly holds the ring: no good place to start from
+        if pressure > lowest:  # at lower pressure the wall hardly supports the ring: a poor start for the next step
             base, rise = now, next_rise
         base = base._replace(newton_steps=0)
 
 
 def squeeze_ring(case: OringCase, model: OringModel) -> LoadedRing:
-    """The ring squeezed between rod and gland, held at one node along the axis.
+    """Ring squeezed between rod and gland, with one node fixed along the axis.
 
-    The walls come in from where they just touch the free ring, soft at first, and are stiffened when they are in place.
+    The walls move from first contact with the free ring to their final radii at reduced penalty, then the penalty rises
+    to its full value.
 
     Raises:
-        ValueError: The squeezed ring is longer than the groove is wide.
-        NotConvergedError: No equilibrium was found.
+        ValueError: The squeezed ring is longer than the groove.
+        NotConvergedError: Newton's method did not converge.
     """
-    assembly, walls = make_assembly(model, _held(model)), _walls(case, model)
+    assembly, walls = make_assembly(model, _fixed(model)), _dry_walls(case, model)
     inner = case.geometry.ring_inner_diameter / 2.0
-    rod_way = walls.rod_radius - inner
-    gland_way = walls.gland_radius - inner - case.geometry.section_diameter
+    rod_travel = walls.rod_radius - inner
+    gland_travel = walls.gland_radius - inner - case.geometry.section_diameter
 
     def closing(share: float, _: OringState) -> Surroundings:
         left = 1.0 - share
-        rod, gland = walls.rod_radius - left * rod_way, walls.gland_radius - left * gland_way
+        rod, gland = walls.rod_radius - left * rod_travel, walls.gland_radius - left * gland_travel
         return walls._replace(rod_radius=rod, gland_radius=gland, penalty=walls.penalty / _SOFTER)
 
-    def drawn(state: OringState, done: float, wanted: float) -> OringState:
-        return _drawn_along(model, state, closing(done, state), closing(wanted, state))
+    def stretched(state: OringState, done: float, wanted: float) -> OringState:
+        return _stretched_with_walls(model, state, closing(done, state), closing(wanted, state))
 
     def stiffening(share: float, _: OringState) -> Surroundings:
         return walls._replace(penalty=walls.penalty * _SOFTER ** (share - 1.0))
 
     try:
-        closed = follow_path(model, assembly, closing, unstressed_state(model), _SQUEEZE_STRIDE, drawn)
+        closed = follow_path(model, assembly, closing, unstressed_state(model), _SQUEEZE_STRIDE, stretched)
         reached = follow_path(model, assembly, stiffening, closed.state, _STIFFEN_STRIDE)
     except NotConvergedError as error:
-        raise NotConvergedError(f'case {case.name}: the squeezed ring finds no equilibrium: {error}') from None
+        raise NotConvergedError(f'case {case.name}: no equilibrium of the squeezed ring: {error}') from None
     length = float(np.ptp(outline(model, reached.state)[:, 1]))
     if length >= case.groove.width:
         raise ValueError(
@@ -125,13 +126,13 @@ def squeeze_ring(case: OringCase, model: OringModel) -> LoadedRing:
 
 
 def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: LoadedRing) -> LoadedRing:
-    """The squeezed ring against the wall, and the small pressure that keeps it there.
+    """Squeezed ring on the downstream wall, with the small pressure that holds it there.
 
-    The wall is put where the ring is, so nothing has to be moved across a gap; the ring is held by one node until the
-    wall holds it, and let go under the pressure that balances what the wall then bears.
+    The wall is placed at the ring, with a small penetration, so the ring need not cross a gap. One node of the ring
+    stays fixed while the wall takes load; it is then released under the pressure that balances the wall force.
 
     Raises:
-        NotConvergedError: No equilibrium was found.
+        NotConvergedError: Newton's method did not converge.
     """
     top = float(outline(model, squeezed.state)[:, 1].max())
     wall = squeezed.surroundings._replace(
@@ -139,52 +140,54 @@ def seat_ring(case: OringCase, model: OringModel, free: Assembly, squeezed: Load
         transition=case.numerics.transition * case.rubber.elastic_modulus,
     )
     try:
-        state, steps = solve_equilibrium(model, make_assembly(model, _held(model)), wall, squeezed.state)
+        state, steps = solve_equilibrium(model, make_assembly(model, _fixed(model)), wall, squeezed.state)
         position = outline(model, state)
         axial = surface_pressure(wall, position).total * node_areas(position)[:, 1]
         pressure = float(axial[position[:, 1] > 0.0].sum()) / projected_area(case.geometry)
         surroundings = wall._replace(pressure=pressure, wetted=wetted_nodes(wall, position))
         state, more = solve_equilibrium(model, free, surroundings, state)
     except NotConvergedError as error:
-        raise NotConvergedError(f'case {case.name}: the ring does not come to rest on the wall: {error}') from None
+        raise NotConvergedError(
+            f'case {case.name}: no equilibrium of the ring on the downstream wall: {error}'
+        ) from None
     return LoadedRing(pressure, surroundings, state, squeezed.newton_steps + steps + more)
 
 
 def wetted_nodes(surroundings: Surroundings, position: FloatArray) -> BoolArray:
-    """Nodes of the outline between the highest contact stresses on rod and gland, on the upstream side, shape (s,)."""
+    """Whether each node of the outline is upstream of the peak contact stresses on rod and gland, shape (s,)."""
     stresses = wall_stresses(surroundings, position)
     rod, gland = int(np.argmax(stresses[:, ROD])), int(np.argmax(stresses[:, GLAND]))
     wetted: BoolArray = (np.arange(len(position)) - rod) % len(position) <= (gland - rod) % len(position)
     return wetted
 
 
-def _held(model: OringModel) -> tuple[int]:
-    """Axial displacement of one node in the middle, which carries no load while the ring is squeezed evenly."""
+def _fixed(model: OringModel) -> tuple[int]:
+    """Axial degree of freedom of the central node, which carries no load while the ring is squeezed symmetrically."""
     return (2 * int(np.argmin(np.linalg.norm(model.mesh.nodes - model.mesh.nodes.mean(axis=0), axis=1))) + 1,)
 
 
-def _raised(
+def _raise_pressure(
     case: OringCase, model: OringModel, free: Assembly, now: LoadedRing, target: float, rise: float
 ) -> tuple[LoadedRing, float]:
-    """The ring under another pressure, and the rise of pressure [Pa] that is good for the next step."""
+    """Ring under the pressure ``target`` [Pa], and the pressure rise [Pa] to try in the next step."""
 
     def rising(share: float, state: OringState) -> Surroundings:
         wetted = wetted_nodes(now.surroundings, outline(model, state))
         return now.surroundings._replace(pressure=now.pressure + share * (target - now.pressure), wetted=wetted)
 
-    way = abs(target - now.pressure)
+    total_rise = abs(target - now.pressure)
     try:
-        reached = follow_path(model, free, rising, now.state, min(rise / way, 1.0))
+        reached = follow_path(model, free, rising, now.state, min(rise / total_rise, 1.0))
     except NotConvergedError as error:
         raise NotConvergedError(
-            f'case {case.name}: no equilibrium on the way from {now.pressure:.6g} to {target:.6g} Pa: {error}'
+            f'case {case.name}: no equilibrium between {now.pressure:.6g} and {target:.6g} Pa: {error}'
         ) from None
     newton_steps = now.newton_steps + reached.newton_steps
-    return LoadedRing(target, reached.surroundings, reached.state, newton_steps), reached.stride * way
+    return LoadedRing(target, reached.surroundings, reached.state, newton_steps), reached.stride * total_rise
 
 
-def _held_back(case: OringCase, model: OringModel, free: Assembly, loaded: LoadedRing) -> LoadedRing:
-    """Add the friction of rod and gland to a ring that is under pressure."""
+def _apply_wall_friction(case: OringCase, model: OringModel, free: Assembly, loaded: LoadedRing) -> LoadedRing:
+    """Add the friction of rod and gland to a ring under pressure."""
     if case.wall_friction == 0.0:
         return loaded
 
@@ -206,13 +209,13 @@ def _check_sealed(case: OringCase, model: OringModel, now: LoadedRing) -> None:
     for name, wall in (('rod', ROD), ('gland', GLAND)):
         if highest[wall] <= now.pressure:
             raise ValueError(
-                f'case {case.name}: at {now.pressure:.6g} Pa the fluid passes the ring at the {name}: the contact '
-                f'stress there reaches {highest[wall]:.6g} Pa only'
+                f'case {case.name}: at {now.pressure:.6g} Pa the fluid passes the ring at the {name}: the peak '
+                f'contact stress there is {highest[wall]:.6g} Pa'
             )
 
 
-def _walls(case: OringCase, model: OringModel) -> Surroundings:
-    """Rod and gland in place, no fluid, no downstream wall."""
+def _dry_walls(case: OringCase, model: OringModel) -> Surroundings:
+    """Rod and gland at their final radii, no fluid, no downstream wall."""
     geometry, elastic_modulus = case.geometry, case.rubber.elastic_modulus
     return Surroundings(
         rod_radius=geometry.rod_diameter / 2.0,
@@ -225,10 +228,12 @@ def _walls(case: OringCase, model: OringModel) -> Surroundings:
     )
 
 
-def _drawn_along(model: OringModel, state: OringState, before: Surroundings, after: Surroundings) -> OringState:
-    """A guess for moved walls: the ring drawn straight along with them, its volume kept as far as that goes."""
+def _stretched_with_walls(
+    model: OringModel, state: OringState, before: Surroundings, after: Surroundings
+) -> OringState:
+    """Start state for moved walls: the ring stretched linearly with the walls, at about constant volume."""
     r, z = (model.mesh.nodes + state.displacement.reshape(-1, 2)).T
-    thinner = (after.gland_radius - after.rod_radius) / (before.gland_radius - before.rod_radius)
-    wider = (after.gland_radius + after.rod_radius) / (before.gland_radius + before.rod_radius)
-    drawn = np.stack((after.rod_radius + (r - before.rod_radius) * thinner, z / (thinner * wider)), axis=1)
-    return state._replace(displacement=(drawn - model.mesh.nodes).ravel())
+    thinning = (after.gland_radius - after.rod_radius) / (before.gland_radius - before.rod_radius)
+    widening = (after.gland_radius + after.rod_radius) / (before.gland_radius + before.rod_radius)
+    position = np.stack((after.rod_radius + (r - before.rod_radius) * thinning, z / (thinning * widening)), axis=1)
+    return state._replace(displacement=(position - model.mesh.nodes).ravel())

@@ -1,15 +1,15 @@
-r"""Rubber: Mooney-Rivlin shear with a nearly incompressible bulk, for bodies of revolution.
+r"""Rubber: nearly incompressible Mooney-Rivlin material under axisymmetric deformation.
 
-With the deformation gradient of an axisymmetric motion
+With the deformation gradient
 
 .. math:: F = \begin{pmatrix} F_{rr} & F_{rz} \\ F_{zr} & F_{zz} \end{pmatrix} \oplus t, \quad
     T = \sum F_{ij}^2, \; D = \det, \; t = r / R, \quad I_1 = T + t^2, \; I_2 = D^2 + t^2 T, \; J = D t
 
-the shear energy per reference volume, free of volume change by its powers of J [Simo1985]_, is a sum of monomials:
+the shear energy per reference volume is independent of volume change through its powers of J [Simo1985]_:
 
 .. math:: W = C_{10} (J^{-2/3} I_1 - 3) + C_{01} (J^{-4/3} I_2 - 3)
 
-so its derivatives are written out below without any tensor algebra.
+It is a sum of monomials in T, D and t, so its derivatives need no tensor algebra.
 """
 
 from dataclasses import dataclass
@@ -23,20 +23,18 @@ from seal_friction_ros.core.foundation.parameters import check, parameter
 
 @dataclass(frozen=True)
 class Rubber:
-    """Constants of the material.
+    """Material constants.
 
     Raises:
-        ValueError: A constant is out of bounds.
+        ValueError: A value is out of bounds, or the bulk modulus is below 20 E.
     """
 
     elastic_modulus: float = parameter(
-        unit='Pa', lower=1e4, upper=1e10, description='Young modulus at small strain, E.'
+        unit='Pa', lower=1e4, upper=1e10, description="Young's modulus at small strain, E."
     )
-    mooney_ratio: float = parameter(
-        0.25, unit='1', lower=0.0, upper=10.0, description='C01 / C10; 0 is a neo-Hookean rubber.'
-    )
+    mooney_ratio: float = parameter(0.25, unit='1', lower=0.0, upper=10.0, description='C01 / C10; 0: neo-Hookean.')
     bulk_modulus: float = parameter(
-        2.0e9, unit='Pa', lower=1e6, upper=1e12, description='Bulk modulus, K; rubber has about 2 GPa.'
+        2.0e9, unit='Pa', lower=1e6, upper=1e12, description='Bulk modulus, K; about 2 GPa for rubber.'
     )
 
     def __post_init__(self) -> None:
@@ -58,28 +56,30 @@ def mooney_rivlin_constants(rubber: Rubber) -> tuple[float, float]:
 
 
 def elastic_modulus_of_hardness(shore_a: float) -> float:
-    """Young modulus [Pa] of a rubber of hardness ``shore_a`` [Shore A].
+    """Young's modulus [Pa] of a rubber of hardness ``shore_a`` [Shore A].
 
     E = 0.0981 MPa (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)); 5.52 MPa at 70.
 
     Raises:
-        ValueError: The hardness is not between 20 and 95, where the rule is of use.
+        ValueError: The hardness is not between 20 and 95.
 
     Source: [Gent1958]_; the bounds are our choice.
     """
     if not 20.0 <= shore_a <= 95.0:
-        raise ValueError(f'hardness = {shore_a} Shore A is outside 20 to 95, where E follows from it')
+        raise ValueError(
+            f'hardness = {shore_a} Shore A is outside 20 to 95, the range of the hardness-modulus relation'
+        )
     return 0.0981e6 * (56.0 + 7.62336 * shore_a) / (0.137505 * (254.0 - 2.54 * shore_a))
 
 
 def hardness_of_elastic_modulus(elastic_modulus: float) -> float:
-    """Hardness [Shore A] of a rubber of Young modulus ``elastic_modulus`` [Pa], the same rule solved for S."""
+    """Hardness [Shore A] of a rubber of modulus ``elastic_modulus`` [Pa]: `elastic_modulus_of_hardness` inverted."""
     ratio = 0.137505 * elastic_modulus / 0.0981e6
     return (254.0 * ratio - 56.0) / (7.62336 + 2.54 * ratio)
 
 
 class MaterialResponse(NamedTuple):
-    """Energy, stress and stiffness at points, per reference volume; components in the order rr, rz, zr, zz, t."""
+    """An energy density W(F) with its derivatives by F, at points; components in the order rr, rz, zr, zz, t."""
 
     energy: FloatArray
     """W [Pa], shape (...)"""
@@ -93,16 +93,13 @@ _DETERMINANT_HESSIAN = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1,
 
 
 def shear_response(rubber: Rubber, gradient: FloatArray) -> MaterialResponse:
-    """Shear energy W of a deformation gradient, shape (..., 5), with its first and second derivative.
-
-    The gradient must have D > 0 and t > 0.
-    """
+    """Shear energy density with its derivatives, for a deformation gradient of shape (..., 5) with D > 0 and t > 0."""
     c10, c01 = mooney_rivlin_constants(rubber)
     plane, hoop = gradient[..., :4], gradient[..., 4]
     squares = (plane**2).sum(axis=-1)
     cofactor = _cofactor(plane)
     area = 0.5 * (plane * cofactor).sum(axis=-1)
-    # W = sum of a T^k D^m t^n over four monomials, k = 0 or 1
+    # W = sum of factor T^k D^m t^n, k = 0 or 1
     monomials = ((c10, 1, -2 / 3, -2 / 3), (c10, 0, -2 / 3, 4 / 3), (c01, 0, 2 / 3, -4 / 3), (c01, 1, -4 / 3, 2 / 3))
     w, w_T, w_D, w_t, w_TD, w_Tt, w_DD, w_Dt, w_tt = (np.zeros_like(hoop) for _ in range(9))
     for factor, k, m, n in monomials:
@@ -136,7 +133,7 @@ def shear_response(rubber: Rubber, gradient: FloatArray) -> MaterialResponse:
 
 
 def volume_response(gradient: FloatArray) -> MaterialResponse:
-    """Volume ratio J = D t of a deformation gradient, shape (..., 5), with its derivatives [-]."""
+    """Volume ratio J = D t [-] (as ``energy``) with its derivatives, for a deformation gradient of shape (..., 5)."""
     plane, hoop = gradient[..., :4], gradient[..., 4]
     cofactor = _cofactor(plane)
     area = 0.5 * (plane * cofactor).sum(axis=-1)
@@ -149,13 +146,13 @@ def volume_response(gradient: FloatArray) -> MaterialResponse:
 
 
 def _cofactor(plane: FloatArray) -> FloatArray:
-    """Derivative of D by F, of (rr, rz, zr, zz), shape (..., 4)."""
+    """dD/dF for components rr, rz, zr, zz, shape (..., 4)."""
     cofactor: FloatArray = plane[..., ::-1] * np.array([1.0, -1.0, -1.0, 1.0])
     return cofactor
 
 
 def von_mises_stress(rubber: Rubber, gradient: FloatArray) -> FloatArray:
-    """Von Mises stress [Pa], shape (...), of the Cauchy stress P F^T / J; the bulk has no part in it."""
+    """Von Mises stress [Pa], shape (...), of the Cauchy stress P F^T / J; independent of the bulk modulus."""
     piola = shear_response(rubber, gradient).stress
     plane = gradient[..., :4].reshape(*gradient.shape[:-1], 2, 2)
     ratio = volume_response(gradient).energy

@@ -1,4 +1,4 @@
-"""Mesh of the ring section: an O-grid of quadrilaterals, a square core inside layers that follow the circle."""
+"""Mesh of the ring section: an O-grid of quadrilaterals, a square core surrounded by layers that follow the circle."""
 
 from itertools import pairwise
 from typing import NamedTuple
@@ -8,26 +8,26 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 
 CORE = 0.5
-"""Half width of the core as a share of the section radius (own choice: keeps the elements well shaped)."""
+"""Half width of the core over the section radius (our choice: well-shaped elements)."""
 ROUNDING = 0.4
-"""How far the core's sides are bent towards a circle, 0 to 1 (own choice, as above)."""
+"""Bending of the core's sides towards a circle, 0 to 1 (our choice: well-shaped elements)."""
 LAYER_RATIO = 0.5
-"""Thickness of the outermost layer as a share of the innermost one (own choice: the contact is at the surface)."""
+"""Thickness of the outermost over that of the innermost layer (our choice: the contact is at the surface)."""
 CROWDING = 0.4
-"""Share by which edges in the middle of sides are shorter than even ones (own choice: the fluid's edge is there)."""
+"""Relative shortening of the edges in the middle of each side (our choice: the edge of the fluid lies there)."""
 AXIAL_SHARE = 0.6
-"""Edges facing the wall over those facing the rod (own choice: what is to be known precisely is at rod and gland)."""
+"""Number of edges facing the wall over that facing the rod (our choice: rod and gland need the higher resolution)."""
 
 
 class Mesh(NamedTuple):
-    """Quadrilaterals of the free ring section in the half plane of the axis."""
+    """Quadrilaterals of the section of the undeformed ring, in the (r, z) half plane."""
 
     nodes: FloatArray
     """position (r, z) [m], shape (n, 2)"""
     elements: IntArray
-    """corners, counterclockwise with r to the right and z up, shape (e, 4)"""
+    """corner nodes, counterclockwise with r to the right and z up, shape (e, 4)"""
     surface: IntArray
-    """nodes of the outline, counterclockwise from the one next to the axis, shape (s,)"""
+    """nodes of the outline, counterclockwise from the one nearest to the axis, shape (s,)"""
 
 
 def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
@@ -36,14 +36,14 @@ def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
     Args:
         section_diameter: Diameter of the section, d [m].
         center_radius: Distance of its centre from the axis [m].
-        lines: Grid lines that end on the quarter of the outline that faces the rod, at least 5; as many face the
-            gland, fewer the wall and the fluid.
+        lines: Grid lines that end on the quarter of the outline that faces the rod, at least 5; the same number face
+            the gland, fewer the wall and the fluid.
 
     Raises:
-        ValueError: There are too few lines.
+        ValueError: ``lines`` is below 5.
     """
     if lines < 5:
-        raise ValueError(f'o_grid: lines = {lines} is below 5: the contact would be a node or two')
+        raise ValueError(f'o_grid: lines = {lines} is below 5: the contact would have one or two nodes')
     z_sides = lines - 1
     r_sides = max(2, round(AXIAL_SHARE * z_sides))
     layers = max(2, round(0.5 * z_sides))
@@ -55,13 +55,13 @@ def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:
     for layer, fraction in enumerate(share / share[-1]):
         nodes.append((1.0 - fraction) * position[around] + fraction * circle)
         rows.append(len(position) + layer * len(around) + np.arange(len(around)))
-    blocks = [_quadrilaterals(index), *(_ring(a, b) for a, b in pairwise(rows))]
+    blocks = [_core_quadrilaterals(index), *(_layer_quadrilaterals(a, b) for a, b in pairwise(rows))]
     center = np.array([center_radius, 0.0])
     return Mesh(center + section_diameter / 2.0 * np.concatenate(nodes), np.concatenate(blocks), rows[-1])
 
 
 def _core(r_sides: int, z_sides: int) -> tuple[FloatArray, IntArray]:
-    """Nodes of the core for a circle of radius 1, shape (n, 2), and their indices in a grid over (r, z)."""
+    """Nodes of the core of a unit circle, shape (n, 2), and their indices, shape (r_sides + 1, z_sides + 1)."""
     grid = np.stack(np.meshgrid(_tangents(r_sides), _tangents(z_sides), indexing='ij'), axis=-1).reshape(-1, 2)
     level = np.abs(grid).max(axis=1, keepdims=True)
     length = np.linalg.norm(grid, axis=1, keepdims=True)
@@ -73,25 +73,25 @@ def _core(r_sides: int, z_sides: int) -> tuple[FloatArray, IntArray]:
 
 
 def _tangents(sides: int) -> FloatArray:
-    """Where lines to the surface cross a side of the core, -1 to 1: their angles are closer in the middle."""
+    """Positions along a side of the core, -1 to 1, of the grid lines to the surface; denser in the middle."""
     even = np.linspace(-1.0, 1.0, sides + 1)
     angle: FloatArray = np.pi / 4.0 * (even - CROWDING * np.sin(np.pi * even) / np.pi)
     return np.tan(angle)
 
 
 def _outline(index: IntArray) -> IntArray:
-    """Indices around the core, counterclockwise from the middle of the side next to the axis.
+    """Indices around the core, counterclockwise from the middle of the side nearest to the axis.
 
-    With an odd number of sides there is no node in the middle: then from the one past it.
+    With an odd number of edges on that side, the first index is the node after the middle.
     """
     loop = np.concatenate((index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]))
     return np.roll(loop, index.shape[1] // 2)
 
 
-def _quadrilaterals(index: IntArray) -> IntArray:
+def _core_quadrilaterals(index: IntArray) -> IntArray:
     corners = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
     return np.stack([corner.ravel() for corner in corners], axis=1)
 
 
-def _ring(inner: IntArray, outer: IntArray) -> IntArray:
+def _layer_quadrilaterals(inner: IntArray, outer: IntArray) -> IntArray:
     return np.stack((inner, outer, np.roll(outer, -1), np.roll(inner, -1)), axis=1)

@@ -1,4 +1,4 @@
-"""What is to be computed: ring, gland, rubber, and how finely."""
+"""Input of the computation: ring, gland, rubber and discretisation."""
 
 import math
 from dataclasses import dataclass
@@ -12,15 +12,15 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 
 @dataclass(frozen=True)
 class Groove:
-    """What of the gland is not in its diameters.
+    """Dimensions of the gland besides its diameters.
 
     Raises:
         ValueError: A dimension is out of bounds.
     """
 
-    width: float = parameter(unit='m', lower=1e-4, upper=1.0, description='Axial width between the two walls.')
+    width: float = parameter(unit='m', lower=1e-4, upper=1.0, description='Axial distance between the two side walls.')
     diametral_clearance: float = parameter(
-        0.0, unit='m', lower=0.0, upper=0.01, description='Difference of the diameters behind the downstream wall.'
+        0.0, unit='m', lower=0.0, upper=0.01, description='Diametral clearance behind the downstream wall.'
     )
 
     def __post_init__(self) -> None:
@@ -29,25 +29,38 @@ class Groove:
 
 @dataclass(frozen=True)
 class OringNumerics:
-    """How finely it is computed. Defaults of ``lines`` and ``penalty`` converge the normal force to 1 %.
+    """Discretisation. The default ``lines`` and ``penalty`` converge the normal force to 1 %.
 
-    ``transition`` is a choice: a sharp one (0.01) makes 3.0 to 3.6 % more normal force under pressure: docs/oring.md.
+    ``transition`` is our choice; a sharp one (0.01) raises the normal force under pressure by 3.0 to 3.6 %:
+    docs/oring.md.
 
     Raises:
-        ValueError: A number is out of bounds.
+        ValueError: A value is out of bounds.
     """
 
     lines: int = parameter(
-        33, unit='', lower=9, upper=129, description='Grid lines that end on the quarter of the section facing the rod.'
+        33,
+        unit='',
+        lower=9,
+        upper=129,
+        description='Grid lines that end on the quarter of the outline that faces the rod.',
     )
     penalty: float = parameter(
-        2000.0, unit='1', lower=50.0, upper=1e5, description='Contact stress over depth inside a wall, times d / E.'
+        2000.0,
+        unit='1',
+        lower=50.0,
+        upper=1e5,
+        description='Penalty stiffness: contact stress per penetration depth, times d / E.',
     )
     transition: float = parameter(
-        0.05, unit='1', lower=0.002, upper=0.2, description='Width of the transition from fluid to contact over E.'
+        0.05, unit='1', lower=0.002, upper=0.2, description='Width of the transition from fluid to contact, over E.'
     )
     guide: float = parameter(
-        0.05, unit='1', lower=0.0, upper=10.0, description='Guide against rolling over 2 pi R E; 0 is none.'
+        0.05,
+        unit='1',
+        lower=0.0,
+        upper=10.0,
+        description='Stiffness of the guide against rolling, over 2 pi R E; 0: no guide.',
     )
 
     def __post_init__(self) -> None:
@@ -58,11 +71,11 @@ class OringNumerics:
 class OringCase:
     """A ring in its gland.
 
-    ``wall_friction`` holds the ring back, at rod and gland alike, as where rising pressure has pushed it towards the
-    wall; without pressure there is none. The known cases have none at all: it is there to show what it would change.
+    ``wall_friction`` opposes the motion of the ring towards the downstream wall, on rod and gland alike; it acts only
+    under pressure. All case files in config/oring leave it at 0; it serves sensitivity studies.
 
     Raises:
-        ValueError: A number is out of bounds, the ring is not squeezed, or its rubber does not fit in the gland.
+        ValueError: A value is out of bounds, the ring is not squeezed, or the gland is overfilled.
     """
 
     name: str
@@ -71,7 +84,11 @@ class OringCase:
     rubber: Rubber
     numerics: OringNumerics = OringNumerics()
     wall_friction: float = parameter(
-        0.0, unit='1', lower=0.0, upper=0.1, description='Traction of rod and gland on the ring over contact stress.'
+        0.0,
+        unit='1',
+        lower=0.0,
+        upper=0.1,
+        description='Axial traction of rod and gland on the ring, over contact stress.',
     )
 
     def __post_init__(self) -> None:
@@ -93,22 +110,22 @@ class OringCase:
 
 
 def stretched_section_diameter(geometry: SealGeometry) -> float:
-    """Section diameter of the ring once it is on the rod [m]: its volume stays, so d sqrt((d_i + d) / (D + d')).
+    """Section diameter of the ring on the rod [m]: d' = d sqrt((d_i + d) / (D + d')), at constant volume.
 
-    A ring that is loose on the rod keeps its own. Source: volume; that the section stays round is an estimate of ours,
-    used only to refuse what cannot be squeezed.
+    A ring that is loose on the rod keeps d. The section is taken as round (our choice): this estimate serves only to
+    reject rings that cannot be squeezed.
     """
     if stretch(geometry) <= 0.0:
         return geometry.section_diameter
     section = geometry.section_diameter
     volume = section**2 * (geometry.ring_inner_diameter + section)
-    for _ in range(20):  # converges by a factor of some 20 each time
+    for _ in range(20):  # the error falls by a factor of about 20 per iteration
         section = math.sqrt(volume / (geometry.rod_diameter + section))
     return section
 
 
 def gland_fill(geometry: SealGeometry, groove: Groove) -> float:
-    """Volume of the ring over that of its gland [-]."""
+    """Volume of the ring over volume of the gland [-]."""
     d = geometry.section_diameter
     ring = math.pi**2 / 4.0 * d**2 * (geometry.ring_inner_diameter + d)
     gland = math.pi / 4.0 * (geometry.gland_diameter**2 - geometry.rod_diameter**2) * groove.width
@@ -116,21 +133,21 @@ def gland_fill(geometry: SealGeometry, groove: Groove) -> float:
 
 
 def check_pressures(case: OringCase, pressures: tuple[float, ...]) -> None:
-    """Check that pressures [Pa, gauge] can be computed one after the other.
+    """Check pressures [Pa, gauge] for a computation in increasing order.
 
     Raises:
-        ValueError: There are none, they are not finite or negative, do not increase, or extrude the ring.
+        ValueError: The pressures are empty, not finite, negative or not increasing, or extrude the ring.
     """
     if not pressures:
         raise ValueError(f'case {case.name}: no pressures to compute')
     for pressure in pressures:
         if not (math.isfinite(pressure) and pressure >= 0.0):
-            raise ValueError(f'case {case.name}: pressure {pressure} Pa is not a gauge pressure of 0 or more')
+            raise ValueError(f'case {case.name}: pressure {pressure} Pa is not a gauge pressure, finite and 0 or more')
     if any(high <= low for low, high in pairwise(pressures)):
         raise ValueError(f'case {case.name}: pressures {list(pressures)} Pa do not increase')
     limit = extrusion_pressure(case.groove.diametral_clearance, case.rubber.elastic_modulus)
     if pressures[-1] > limit:
         raise ValueError(
             f'case {case.name}: a pressure of {pressures[-1]:.6g} Pa extrudes the ring through a diametral clearance '
-            f'of {case.groove.diametral_clearance} m: up to {limit:.3g} Pa without a back-up ring'
+            f'of {case.groove.diametral_clearance} m: the limit without a back-up ring is {limit:.3g} Pa'
         )

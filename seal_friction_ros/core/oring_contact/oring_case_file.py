@@ -1,18 +1,18 @@
-"""The document of a case file (a mapping, as YAML gives it) -> `CaseFile`.
+"""Case file of an O-ring: parsed document (YAML mapping) -> `OringCaseFile`.
 
-A case file looks like this; every field is in docs/oring.md::
+Example; docs/oring.md describes every field::
 
     name: ms28775_114
-    source: where the numbers are from
+    source: origin of the numbers
     geometry: {section_diameter: 2.62e-3, ring_inner_diameter: 15.54e-3, rod_diameter: ..., gland_diameter: ...}
     groove: {width: 3.6e-3, diametral_clearance: 0.1e-3}
     rubber: {hardness: 70.0}            # or elastic_modulus [Pa]; mooney_ratio, bulk_modulus
     pressures: [0.0, 3.4e+6, 6.9e+6]    # [Pa, gauge]
-    friction:                           # optional: for a seal file, and for friction from geometry alone
+    friction:                           # optional: needed for a seal file and for computed friction
       friction_coefficient: {law: power_law, coefficient: 2.1, exponent: 0.56}
       stiction: 2.5
       uncertainty: {relative_std: 0.2}
-    measured: {seals: 2, pressures: [...], frictions: [...], source: ...}   # optional: to set beside it
+    measured: {seals: 2, pressures: [...], frictions: [...], source: ...}   # optional: for comparison
 """
 
 from collections.abc import Mapping
@@ -34,10 +34,10 @@ _KEYS = (
 
 @dataclass(frozen=True)
 class SealFriction:
-    """What a seal file needs besides geometry and normal force."""
+    """Friction data of a seal file besides geometry and normal force."""
 
     friction_coefficient: Mapping[str, Any]
-    """as in a seal file"""
+    """mapping as in a seal file"""
     law: FrictionCoefficientLaw
     stiction: float
     """[N]"""
@@ -46,28 +46,33 @@ class SealFriction:
 
 @dataclass(frozen=True)
 class MeasuredFriction:
-    """Friction that was measured, to set beside the computed one.
+    """Measured friction, for comparison with the computed one.
 
     Raises:
-        ValueError: A number is out of bounds, or there are not as many frictions as pressures.
+        ValueError: A value is out of bounds, or the numbers of frictions and pressures differ.
     """
 
-    seals: int = parameter(unit='', lower=1, upper=100, description='Seals that the friction is of.')
-    pressures: tuple[float, ...] = parameter(unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures.')
-    frictions: tuple[float, ...] = parameter(unit='N', lower=0.0, upper=1e9, description='Sliding friction at each.')
+    seals: int = parameter(unit='', lower=1, upper=100, description='Number of seals in the measured friction.')
+    pressures: tuple[float, ...] = parameter(
+        unit='Pa', lower=0.0, upper=1e9, description='Gauge pressures, one per reading.'
+    )
+    frictions: tuple[float, ...] = parameter(
+        unit='N', lower=0.0, upper=1e9, description='Sliding friction at each pressure.'
+    )
     source: str = ''
 
     def __post_init__(self) -> None:
         check(self)
         if len(self.frictions) != len(self.pressures) or not self.pressures:
             raise ValueError(
-                f'MeasuredFriction: {len(self.frictions)} frictions at {len(self.pressures)} pressures: give one a pressure'
+                f'MeasuredFriction: {len(self.frictions)} frictions at {len(self.pressures)} pressures: '
+                'give one friction per pressure'
             )
 
 
 @dataclass(frozen=True)
 class OringCaseFile:
-    """A case, and what is wanted of it."""
+    """Content of a case file."""
 
     case: OringCase
     pressures: tuple[float, ...]
@@ -83,10 +88,10 @@ class _Pressures:
 
 
 def parse_oring_case(document: Any) -> OringCaseFile:
-    """Make a case from the document of a case file.
+    """Parse the document of a case file.
 
     Raises:
-        ValueError: The document makes no sense; the message names the case, the field, its value and its bound.
+        ValueError: A value is invalid; the message names case, field, value and bound.
     """
     name, source = name_and_source(document, 'case')
     where = f'case {name}'
@@ -111,9 +116,9 @@ def parse_oring_case(document: Any) -> OringCaseFile:
 
 
 def _rubber(values: Any, where: str) -> Rubber:
-    """Rubber by its modulus or its hardness, one of the two."""
+    """Rubber from either its modulus or its hardness."""
     if not isinstance(values, Mapping) or ('hardness' in values) == ('elastic_modulus' in values):
-        raise ValueError(f'{where}: give one of hardness [Shore A] and elastic_modulus [Pa], not {values!r}')
+        raise ValueError(f'{where}: give one of hardness [Shore A] and elastic_modulus [Pa]; got {values!r}')
     others = {key: value for key, value in values.items() if key != 'hardness'}
     if 'hardness' in values:
         hardness = from_mapping(_Hardness, {'hardness': values['hardness']}, where).hardness
@@ -131,7 +136,9 @@ class _Hardness:
 
 @dataclass(frozen=True)
 class _Stiction:
-    stiction: float = parameter(0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway above Coulomb friction.')
+    stiction: float = parameter(
+        0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway friction above Coulomb friction.'
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -144,7 +151,7 @@ def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
     where = f'{where}: friction'
     allowed = ('friction_coefficient', 'stiction', 'uncertainty')
     if not isinstance(values, Mapping) or not set(values) <= set(allowed):
-        raise ValueError(f'{where} is not a mapping with {", ".join(allowed)} but {values!r}')
+        raise ValueError(f'{where} = {values!r} is not a mapping of {", ".join(allowed)}')
     law = parse_friction_coefficient(values, where)
     stiction = from_mapping(_Stiction, {k: v for k, v in values.items() if k == 'stiction'}, where).stiction
     uncertainty = from_mapping(Uncertainty, values.get('uncertainty'), f'{where}: uncertainty')

@@ -1,4 +1,4 @@
-"""What the pressed ring tells: contact stress along each wall, contact width, normal and axial force, shape."""
+"""Results of an equilibrium: contact stress along each wall, contact width, normal and axial force, shape."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -21,22 +21,22 @@ from seal_friction_ros.core.oring_contact.surroundings import (
     wall_stresses,
 )
 
-_TOUCHING = 20.0  # transitions outside a wall beyond which the contact stress is nothing
+_TOUCHING = 20.0  # distance from a wall, in transitions, beyond which the contact stress is negligible
 
 
 class WallContact(NamedTuple):
-    """Contact on one wall. Positions run along the wall: z for rod and gland, positive downstream; r for the wall."""
+    """Contact on one wall; position is z, positive downstream, on rod and gland, and r on the downstream wall."""
 
     position: FloatArray
-    """of the nodes in contact, increasing [m], shape (k,)"""
+    """of the nodes in contact [m], increasing, shape (k,)"""
     stress: FloatArray
-    """contact stress there [Pa], shape (k,)"""
+    """contact stress [Pa], shape (k,)"""
     force: float
-    """on the whole wall, all around the axis [N]"""
+    """contact force, over the full circumference [N]"""
     peak_stress: float
     """[Pa]"""
     edges: tuple[float, float]
-    """first and last position in contact [m]; equal if there is none"""
+    """begin and end of the contact [m]; equal without contact"""
 
     @property
     def width(self) -> float:
@@ -45,18 +45,18 @@ class WallContact(NamedTuple):
 
 
 class DeformedSection(NamedTuple):
-    """The deformed section."""
+    """Deformed section with its stress."""
 
     nodes: FloatArray
     """(r, z) [m], shape (n, 2)"""
     elements: IntArray
     """shape (e, 4)"""
     von_mises: FloatArray
-    """mean of each element [Pa], shape (e,)"""
+    """mean von Mises stress of each element [Pa], shape (e,)"""
 
 
 class OringResult(NamedTuple):
-    """The ring under one pressure."""
+    """Contacts, forces and shape under one pressure."""
 
     pressure: float
     """[Pa, gauge]"""
@@ -64,21 +64,21 @@ class OringResult(NamedTuple):
     gland: WallContact
     wall: WallContact
     axial_force: float
-    """of what bears the ring on its downstream side, which must be that of the fluid [N]"""
+    """axial force of the supports on the downstream side [N]; in equilibrium that of the fluid"""
     volume_ratio: float
-    """volume of the rubber over that of the free ring [-]"""
+    """volume of the ring over that of the undeformed ring [-]"""
     expected_volume_ratio: float
-    """that which its mean pressure and bulk modulus make [-]"""
+    """volume ratio that follows from mean tension and bulk modulus [-]"""
     newton_steps: int
     shape: DeformedSection
 
 
 def oring_results(case: OringCase, pressures: tuple[float, ...]) -> Iterator[OringResult]:
-    """Contact of a case at increasing pressures [Pa, gauge], one after the other as they are computed.
+    """Results of a case at increasing pressures [Pa, gauge], each yielded when it is computed.
 
     Raises:
-        ValueError: The pressures make no sense, or the ring does not fit or does not seal.
-        NotConvergedError: No equilibrium was found.
+        ValueError: The pressures are invalid, or the ring does not fit or does not seal.
+        NotConvergedError: Newton's method did not converge.
     """
     model = oring_model(case)
     for loaded in loaded_states(case, model, pressures):
@@ -111,10 +111,10 @@ def evaluate_contact(model: OringModel, loaded: LoadedRing) -> OringResult:
 
 
 def _axial_force(pressure: SurfacePressure, axial_areas: FloatArray, upstream: BoolArray) -> float:
-    """Everything on the downstream side, less what tilted facets of rod and gland add from upstream [N].
+    """Axial force on the downstream side, corrected for tilted facets at rod and gland upstream [N].
 
-    Rod and gland are smooth and bear nothing along the axis, but the facets where their contact begins are not quite
-    parallel to them, which is an error of the mesh.
+    Rod and gland carry no axial load. The facets at the upstream edges of their contacts are not exactly parallel to
+    the axis: a discretisation error.
     """
     axial = pressure.total * axial_areas
     tilted = (pressure.shares[:, 1 + ROD] + pressure.shares[:, 1 + GLAND]) * axial
@@ -122,7 +122,7 @@ def _axial_force(pressure: SurfacePressure, axial_areas: FloatArray, upstream: B
 
 
 def _upstream(loaded: LoadedRing, position: FloatArray) -> BoolArray:
-    """Nodes on the side of the fluid; of a ring that is squeezed only, the half away from the wall."""
+    """Nodes on the fluid side; without pressure, the upstream half (z < 0)."""
     if loaded.pressure > 0.0:
         return loaded.surroundings.wetted
     return position[:, 1] < 0.0
@@ -141,20 +141,20 @@ def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact
     order = np.argsort(along[inside], kind='stable')
     if not inside.any():
         return WallContact(np.zeros(0), np.zeros(0), force, 0.0, (0.0, 0.0))
-    where, height = along[inside][order], stress[inside][order]
+    contact_position, contact_stress = along[inside][order], stress[inside][order]
     above = (stresses[:, wall] - fluid)[inside][order]
-    edges = _edge(where, above), _edge(where[::-1], above[::-1])
-    return WallContact(where, height, force, float(height.max()), edges)
+    edges = _edge(contact_position, above), _edge(contact_position[::-1], above[::-1])
+    return WallContact(contact_position, contact_stress, force, float(contact_stress.max()), edges)
 
 
-def _edge(where: FloatArray, above: FloatArray) -> float:
-    """Where contact begins, just outside the first node in it [m].
+def _edge(position: FloatArray, above: FloatArray) -> float:
+    """Edge of the contact [m], outside the first node in contact.
 
-    Near its edge a contact stress rises, from the fluid's pressure on, with the root of the distance [Johnson1985]_:
-    its square is carried on in a straight line, by one spacing of the nodes at most.
+    Near the edge the contact stress above the fluid pressure grows with the square root of the distance
+    [Johnson1985]_: its square is extrapolated linearly, by one node spacing at most.
     """
-    if len(where) < 2:
-        return float(where[0])
+    if len(position) < 2:
+        return float(position[0])
     rise = above[1] ** 2 - above[0] ** 2
     spacings = min(above[0] ** 2 / rise, 1.0) if rise > 0.0 else 1.0
-    return float(where[0] - spacings * (where[1] - where[0]))
+    return float(position[0] - spacings * (position[1] - position[0]))

@@ -289,11 +289,11 @@ def test_a_wider_clearance_and_a_softer_rubber_extrude_sooner():
 
 def test_no_equilibrium_is_an_error_and_not_a_number(monkeypatch: pytest.MonkeyPatch):
     def never(*_):
-        raise NotConvergedError('1.0e-03 2 pi R E d out of balance after 25 Newton steps')
+        raise NotConvergedError('1.0e-03 2 pi R E d after 25 Newton steps')
 
     monkeypatch.setattr(continuation, 'solve_equilibrium', never)
     with pytest.raises(
-        NotConvergedError, match=r'case mine: the squeezed ring finds no equilibrium: 0 % of the way: 1.0e-03'
+        NotConvergedError, match=r'case mine: no equilibrium of the squeezed ring: at 0 % of the path: 1.0e-03'
     ):
         next(oring_results(ring(), (0.0,)))
 
