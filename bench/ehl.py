@@ -17,9 +17,9 @@ from seal_friction_ros.core.estimation.estimator import EstimatorParameters, ini
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.friction_map import friction_map, map_pressures, memory_length, steady_friction
-from seal_friction_ros.core.lubrication.transient import run
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
+from seal_friction_ros.core.lubrication.transient import run_transient
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.contact.lubrication_runs import single_case
 
@@ -28,19 +28,19 @@ STEPS = (1e-3, 5e-4, 2.5e-4)  # [s]
 CALLS = 5_000
 
 
-def one_cycle(case: Case, cells: int, time_step: float) -> float:
+def one_cycle(case: LubricationCase, cells: int, time_step: float) -> float:
     """Processor time of one cycle of 1.8 mm [s]; the better of two."""
     numerics = dataclasses.replace(case.numerics, cells=cells, time_step=time_step)
     once = dataclasses.replace(case, numerics=numerics, motion=dataclasses.replace(case.motion, cycles=1))
     times = []
     for _ in range(2):
         start = processor_time()
-        run(once)
+        run_transient(once)
         times.append(processor_time() - start)
     return min(times)
 
 
-def times(case: Case, cells: Sequence[int], steps: Sequence[float]) -> dict[str, float]:
+def times(case: LubricationCase, cells: Sequence[int], steps: Sequence[float]) -> dict[str, float]:
     """All times [s], and the exponents of the time in cells and in steps."""
     one_cycle(case, 64, 5e-3)  # compiles
     by_cells = [one_cycle(case, count, steps[len(steps) // 2]) for count in cells]

@@ -13,10 +13,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from seal_friction_ros.core.oring_contact.case import Numerics
-from seal_friction_ros.core.oring_contact.case_file import parse_case
-from seal_friction_ros.core.oring_contact.loading import model_of
-from seal_friction_ros.core.oring_contact.results import contact_results
+from seal_friction_ros.core.oring_contact.loading import oring_model
+from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
+from seal_friction_ros.core.oring_contact.results import oring_results
 from seal_friction_ros.files import config_path, read_yaml
 
 LINES = (13, 17, 25, 33, 41, 49)
@@ -24,13 +24,13 @@ LINES = (13, 17, 25, 33, 41, 49)
 
 def measure(lines: int) -> dict[str, float]:
     """Size of the problem, Newton steps and time of all pressures."""
-    file = parse_case(read_yaml(config_path('oring', 'ms28775_114')))
-    case = dataclasses.replace(file.case, numerics=Numerics(lines=lines))
+    file = parse_oring_case(read_yaml(config_path('oring', 'ms28775_114')))
+    case = dataclasses.replace(file.case, numerics=OringNumerics(lines=lines))
     begin = processor_time()
-    results = list(contact_results(case, file.pressures))
+    results = list(oring_results(case, file.pressures))
     return {
         'lines': lines,
-        'unknowns': model_of(case).mesh.nodes.size,
+        'unknowns': oring_model(case).mesh.nodes.size,
         'Newton steps': sum(result.newton_steps for result in results),
         'time [s]': processor_time() - begin,
     }

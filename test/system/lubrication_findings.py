@@ -9,9 +9,9 @@ import dataclasses
 import json
 from collections.abc import Sequence
 
-from seal_friction_ros.core.lubrication.case import Case
 from seal_friction_ros.core.lubrication.findings import Findings, findings
-from seal_friction_ros.core.lubrication.transient import run
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
+from seal_friction_ros.core.lubrication.transient import run_transient
 from seal_friction_ros.offline.contact.lubrication_runs import run_case, run_study, single_case
 
 OUR_CHOICES = {  # case: parameters that the paper does not give and that act in this case
@@ -71,7 +71,7 @@ def all_findings(names: Sequence[str]) -> list[Row]:
     return rows + study_rows(single_case(names[0], 'study'))
 
 
-def study_rows(case: Case) -> list[Row]:
+def study_rows(case: LubricationCase) -> list[Row]:
     """Deviation of friction over tau_c from its mean, with the errors of step and grid."""
     n = case.numerics
     longer = dataclasses.replace(n, time_step=2.0 * n.time_step)
@@ -97,14 +97,16 @@ def influence(names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
         case = single_case(name, 'influence')
         if case.name not in OUR_CHOICES:
             continue
-        base = findings(run(case))
+        base = findings(run_transient(case))
         for parameter in OUR_CHOICES[case.name]:
-            down, up = (_changes(base, findings(run(_with(case, parameter, f)))) for f in (1 - CHANGE, 1 + CHANGE))
+            down, up = (
+                _changes(base, findings(run_transient(_with(case, parameter, f)))) for f in (1 - CHANGE, 1 + CHANGE)
+            )
             rows[parameter] = {finding: [down[finding], up[finding]] for finding in down}
     return rows
 
 
-def _with(case: Case, parameter: str, factor: float) -> Case:
+def _with(case: LubricationCase, parameter: str, factor: float) -> LubricationCase:
     part, name = parameter.split('.')
     record = getattr(case, part)
     names = [f'{name}_left', f'{name}_right'] if name == 'crown_radius' else [name]

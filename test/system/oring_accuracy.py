@@ -4,7 +4,7 @@ Tables, all of them by default:
 
 - ``hertz``: force and peak of a cylinder between two plates over those of Hertz [%], peak over that of its own force;
 - ``lines``, ``penalty``, ``transition``: the thesis's ring, calibrated, at its five pressures, with one number of
-  `Numerics` changed; normal forces in N;
+  `OringNumerics` changed; normal forces in N;
 - ``thesis``: calibrated and blind case against Appendix B [%], axial force over pressure times area, volume lost;
 - ``variants``: the blind case with another section, modulus, ring or friction;
 - ``friction``: friction of one seal from geometry alone against the measured one, thesis's seals and Delft O-ring.
@@ -23,12 +23,12 @@ from rich.text import Text
 
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
-from seal_friction_ros.core.oring_contact.case import Groove, Numerics, OringCase
-from seal_friction_ros.core.oring_contact.case_file import parse_case
 from seal_friction_ros.core.oring_contact.hertz import cylinder_between_plates
-from seal_friction_ros.core.oring_contact.loading import model_of, squeeze
+from seal_friction_ros.core.oring_contact.loading import oring_model, squeeze_ring
 from seal_friction_ros.core.oring_contact.material import Rubber
-from seal_friction_ros.core.oring_contact.results import contact_results, evaluate
+from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
+from seal_friction_ros.core.oring_contact.results import evaluate_contact, oring_results
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.oring_runs import compute_case
 from seal_friction_ros.offline.reports.oring_report import appendix_b, friction_deviation, thesis_case
@@ -41,11 +41,11 @@ PENALTIES = (200.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 TRANSITIONS = (0.01, 0.02, 0.05, 0.1)
 
 
-def contact(numerics: Numerics) -> dict[str, float]:
+def contact(numerics: OringNumerics) -> dict[str, float]:
     """Normal force of the calibrated case at each pressure; peak stress and width at the last one."""
-    file = parse_case(read_yaml(config_path('oring', 'ms28775_114')))
+    file = parse_oring_case(read_yaml(config_path('oring', 'ms28775_114')))
     case = dataclasses.replace(file.case, numerics=numerics)
-    results = list(contact_results(case, file.pressures))
+    results = list(oring_results(case, file.pressures))
     figures = {f'F_n at {result.pressure / PSI:.0f} psi [N]': result.rod.force for result in results}
     last = results[-1]
     figures['peak at the last [MPa]'] = last.rod.peak_stress / 1e6
@@ -61,10 +61,10 @@ def hertz() -> Rows:
         for share in SQUEEZES:
             depth = share * diameter
             geometry = SealGeometry(diameter, inner, inner + depth, inner + 2.0 * diameter - depth)
-            numerics = Numerics(lines=lines)
+            numerics = OringNumerics(lines=lines)
             case = OringCase(name='plates', geometry=geometry, groove=Groove(5e-3), rubber=rubber, numerics=numerics)
-            model = model_of(case)
-            rod = evaluate(model, squeeze(case, model)).rod
+            model = oring_model(case)
+            rod = evaluate_contact(model, squeeze_ring(case, model)).rod
             expected = cylinder_between_plates(share, diameter, rubber.elastic_modulus / 0.75)
             force = rod.force / (math.pi * geometry.rod_diameter)
             peak_of_force = expected.peak_stress * math.sqrt(force / expected.force_per_length)
@@ -136,7 +136,7 @@ def friction() -> Rows:
 
 def variants() -> Rows:
     """Normal force of the blind case and its variants [N] at 0, 500 and 1000 psi, and deviation from Appendix B [%]."""
-    case = parse_case(read_yaml(config_path('oring', 'ms28775_114_blind'))).case
+    case = parse_oring_case(read_yaml(config_path('oring', 'ms28775_114_blind'))).case
     geometry = case.geometry
     nominal = dataclasses.replace(geometry, section_diameter=0.103 * INCH)
     cases = {
@@ -163,7 +163,7 @@ def variants() -> Rows:
     rows: Rows = []
     for name, variant in cases.items():
         row: dict[str, float | str] = {'variant': name}
-        for psi, result in zip(compared, contact_results(variant, tuple(p * PSI for p in compared)), strict=True):
+        for psi, result in zip(compared, oring_results(variant, tuple(p * PSI for p in compared)), strict=True):
             row[f'F_n at {psi:.0f} psi [N]'] = result.rod.force
             row[f'off at {psi:.0f} psi [%]'] = 100.0 * (result.rod.force / compared[psi] - 1.0)
         rows.append(row)
@@ -175,8 +175,8 @@ def _with(case: OringCase, **changes: float) -> OringCase:
 
 
 def converging(name: str, choices: Sequence[float]) -> Rows:
-    """Figures of `contact` for several values of one number of `Numerics`."""
-    return [{name: choice, **contact(dataclasses.replace(Numerics(), **{name: choice}))} for choice in choices]
+    """Figures of `contact` for several values of one number of `OringNumerics`."""
+    return [{name: choice, **contact(dataclasses.replace(OringNumerics(), **{name: choice}))} for choice in choices]
 
 
 TABLES: dict[str, Callable[[Sequence[int]], Rows]] = {
