@@ -28,6 +28,7 @@ from seal_friction_ros.core.estimation.messages import (
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     SECOND,
+    TICK_TYPE,
     VELOCITY_TYPE,
     Layout,
 )
@@ -37,6 +38,7 @@ from seal_friction_ros.core.estimation.pipeline import (
     receive_force,
     receive_pressure,
     receive_reference,
+    receive_tick,
     receive_velocity,
     send,
 )
@@ -47,6 +49,7 @@ from seal_friction_ros.core.estimation.records import (
     Pressure,
     ServoReference,
     Velocity,
+    WatchdogTick,
 )
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 
@@ -64,17 +67,26 @@ class Kind(IntEnum):
     FORCE = 1
     PRESSURE = 2
     REFERENCE = 3
-    VELOCITY = 4
-    ESTIMATE = 5
-    FEEDFORWARD = 6
-    CONFIGURATION = 7
-    OTHER_ESTIMATE = 8
+    TICK = 4
+    VELOCITY = 5
+    ESTIMATE = 6
+    FEEDFORWARD = 7
+    CONFIGURATION = 8
+    OTHER_ESTIMATE = 9
     """of another estimator"""
 
 
-_FORCE, _PRESSURE, _REFERENCE, _VELOCITY = int(Kind.FORCE), int(Kind.PRESSURE), int(Kind.REFERENCE), int(Kind.VELOCITY)
+_FORCE, _PRESSURE, _REFERENCE, _TICK, _VELOCITY = (
+    int(kind) for kind in (Kind.FORCE, Kind.PRESSURE, Kind.REFERENCE, Kind.TICK, Kind.VELOCITY)
+)
 _LAYOUTS = {layout.message_type: layout for layout in LAYOUTS}
-_INPUT_TYPES = {_FORCE: FORCE_TYPE, _PRESSURE: PRESSURE_TYPE, _REFERENCE: REFERENCE_TYPE, _VELOCITY: VELOCITY_TYPE}
+_INPUT_TYPES = {
+    _FORCE: FORCE_TYPE,
+    _PRESSURE: PRESSURE_TYPE,
+    _REFERENCE: REFERENCE_TYPE,
+    _TICK: TICK_TYPE,
+    _VELOCITY: VELOCITY_TYPE,
+}
 _NUMBERS = tuple(len(_LAYOUTS[_INPUT_TYPES[kind]].codes) if kind in _INPUT_TYPES else 0 for kind in Kind)
 """How many numbers an input of each kind has, all of them float64."""
 _MOST_NUMBERS = max(_NUMBERS)
@@ -101,10 +113,13 @@ class Messages(NamedTuple):
     """where each begins in ``data``, shape (n,)"""
     sizes: Integers
     """[bytes] shape (n,)"""
+    received: Integers
+    """[ns] log time of each, shape (n,)"""
 
     def taken(self, first: int, end: int) -> 'Messages':
         """The messages from number ``first`` to before number ``end``."""
-        return Messages(self.data, self.kinds[first:end], self.offsets[first:end], self.sizes[first:end])
+        part = slice(first, end)
+        return Messages(self.data, self.kinds[part], self.offsets[part], self.sizes[part], self.received[part])
 
     def message(self, number: int) -> bytes:
         """Bytes of one message."""
@@ -138,6 +153,7 @@ class _Outbox(NamedTuple):
     data: Any
     """the messages, whose stamps and frame names the answers take over"""
     message_offsets: Any
+    received: Any
 
 
 def receive_all(
@@ -170,6 +186,7 @@ def receive_all(
         np.zeros(16),
         messages.data,
         messages.offsets,
+        messages.received,
     )
     state, wrong = _receive_all(for_compiler(parameters), state, messages.kinds, outbox)
     if wrong >= 0:
@@ -217,7 +234,9 @@ def _stamp(data: Bytes, offset: int) -> int:
 
 
 @compiled
-def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers) -> tuple[int, int]:
+def _check(
+    data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, received: Integers
+) -> tuple[int, int]:
     """Check inputs as `messages.decode` does.
 
     Returns:
@@ -228,6 +247,8 @@ def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers) -> tup
         kind, offset, size = kinds[i], offsets[i], sizes[i]
         if not _FORCE <= kind <= _VELOCITY:
             continue
+        if not 0 <= received[i] <= _LATEST:
+            return i, 0
         if size < 16 or data[offset] != 0 or data[offset + 1] != 1:
             return i, 0
         nanoseconds, length = _integer(data, offset + 8, 4), _integer(data, offset + 12, 4)
@@ -239,7 +260,7 @@ def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers) -> tup
         head = _head_size(max(length, 1))  # an empty name is answered by one of one byte, its end
         if kind == _VELOCITY:
             room += 8 + head + _BODY_SIZES[0]
-        if kind >= _REFERENCE:
+        if kind >= _TICK:
             room += 8 + head + _BODY_SIZES[1]
     return -1, room
 
@@ -253,7 +274,7 @@ def _receive_all(parameters: Any, state: PipelineState, kinds: Bytes, outbox: An
         kind = kinds[i]
         if not _FORCE <= kind <= _VELOCITY:
             continue
-        offset = outbox.message_offsets[i]
+        offset, received = outbox.message_offsets[i], outbox.received[i]
         body = offset + 4 + _head_size(_integer(data, offset + 12, 4))
         stamp = _stamp(data, offset)
         first = _number(data, body)
@@ -262,13 +283,16 @@ def _receive_all(parameters: Any, state: PipelineState, kinds: Bytes, outbox: An
         if _NUMBERS[kind] > 2:
             third = _number(data, body + 16)
         if kind == _VELOCITY:
-            state = receive_velocity(parameters, state, Velocity(stamp, first, i), outbox)
+            state = receive_velocity(parameters, state, Velocity(stamp, first, i), received, outbox)
         elif kind == _PRESSURE:
-            state = receive_pressure(parameters, state, Pressure(stamp, first, second), outbox)
+            state = receive_pressure(parameters, state, Pressure(stamp, first, second), received, outbox)
         elif kind == _FORCE:
-            state = receive_force(parameters, state, Force(stamp, first), outbox)
+            state = receive_force(parameters, state, Force(stamp, first), received, outbox)
+        elif kind == _TICK:
+            state = receive_tick(parameters, state, WatchdogTick(stamp, first, i), received, outbox)
         else:
-            state = receive_reference(parameters, state, ServoReference(stamp, first, second, third, i), outbox)
+            wanted = ServoReference(stamp, first, second, third, i)
+            state = receive_reference(parameters, state, wanted, received, outbox)
         if outbox.cursor[0] < 0:
             return state, i
     return state, -1

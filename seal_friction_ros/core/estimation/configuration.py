@@ -10,13 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, get_type_hints
 
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
-from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, WantedMotion, init
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
 from seal_friction_ros.core.estimation.records import Force, Pressure
-from seal_friction_ros.core.foundation.parameters import check, from_mapping, parameter
+from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.seal_file import mount_seals
-from seal_friction_ros.core.friction.states import FrictionState
 
 
 @dataclass(frozen=True)
@@ -72,11 +71,22 @@ class Configuration:
         return PipelineParameters(EstimatorParameters(self.settings, seals), self.feedforward)
 
 
+ALGORITHM_VERSION = 2
+"""Version of estimator and feed-forward: it changes when the same messages give other bytes.
+
+1: until the feed-forward had one gain, and time was the stamps of the messages.
+"""
+
+_RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
+
+
 class Snapshot(NamedTuple):
     """Everything that the next answer depends on besides the messages to come."""
 
     configuration: Configuration
     state: PipelineState
+    version: int = ALGORITHM_VERSION
+    """of the algorithm that recorded it"""
 
 
 def first_snapshot(configuration: Configuration) -> Snapshot:
@@ -86,8 +96,9 @@ def first_snapshot(configuration: Configuration) -> Snapshot:
 
 def snapshot_text(snapshot: Snapshot) -> str:
     """Snapshot as JSON; equal snapshots give equal text. Numbers of the state are hexadecimal, NaN included."""
-    configuration, state = snapshot
+    configuration, state, version = snapshot
     document = {
+        'version': version,
         'selection': dataclasses.asdict(configuration.selection),
         'seal_documents': configuration.seal_documents,
         'settings': dataclasses.asdict(configuration.settings),
@@ -105,39 +116,51 @@ def parse_snapshot(text: str) -> Snapshot:
     """
     try:
         document = json.loads(text)
+        version = int(document.get('version', 1))
         configuration = Configuration(
             from_mapping(SealSelection, document['selection'], 'configuration: selection'),
             tuple(document['seal_documents']),
-            from_mapping(EstimatorSettings, document['settings'], 'configuration: settings'),
-            from_mapping(FeedForwardSettings, document['feedforward'], 'configuration: feedforward'),
+            _settings(EstimatorSettings, document['settings'], version, 'configuration: settings'),
+            _settings(FeedForwardSettings, document['feedforward'], version, 'configuration: feedforward'),
         )
-        state = _state(document['state'])
-        return Snapshot(configuration, state)
-    except (TypeError, LookupError, OverflowError, RecursionError) as error:
+        state = _state(configuration, document['state'], version)
+        return Snapshot(configuration, state, version)
+    except (TypeError, AttributeError, LookupError, OverflowError, RecursionError) as error:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
 
-def _state(document: Any) -> PipelineState:
-    """State of the pipeline: inverse of `_encoded_record`.
+def _settings(record_type: Any, document: Any, version: int, where: str) -> Any:
+    """Settings of a snapshot; those of another version as far as they are settings still, within the present bounds."""
+    if version == ALGORITHM_VERSION:
+        return from_mapping(record_type, document, where)
+    known, kept = meanings(record_type), {}
+    for old_name, value in document.items():
+        name = _RENAMED.get(old_name, old_name)
+        if name in known:
+            lower, upper = known[name].lower, known[name].upper
+            kept[name] = value if lower is None or upper is None else min(max(value, lower), upper)
+    return from_mapping(record_type, kept, where)
+
+
+def _state(configuration: Configuration, document: Any, version: int) -> PipelineState:
+    """State of the pipeline: inverse of `_encoded_record`; of another version only the newest inputs.
 
     Raises:
         ValueError: A computed number or a usable sample is not finite.
     """
-    seen: EstimatorState = _parsed(EstimatorState, document['estimator'])
-    fed: FeedForwardState = _parsed(FeedForwardState, document['feedforward'])
-    FrictionState(fed.estimate.state)
-    usable = (seen.pressure, seen.force, seen.velocity, seen.leapt_pressure, seen.leapt_force, seen.leapt_velocity)
-    computed = (fed.force, fed.fade, fed.velocity, *fed.estimate)
-    if not all(math.isfinite(value) for value in (*computed, *(number for sample in usable for number in sample))):
+    if version != ALGORITHM_VERSION:
+        pressure, force = _parsed(Pressure, document['pressure']), _parsed(Force, document['force'])
+        return init(configuration.parameters())._replace(
+            pressure=pressure, force=force, refused=bool(document['refused'])
+        )
+    state: PipelineState = _parsed(PipelineState, document)
+    if not all(map(_is_finite, (state.estimator, state.feedforward, state.friction, state.reference))):
         raise ValueError('configuration: a number in the state is not finite')
-    return PipelineState(
-        seen,
-        fed,
-        _parsed(Pressure, document['pressure']),
-        _parsed(Force, document['force']),
-        _parsed(WantedMotion, document['reference']),
-        bool(document['refused']),
-    )
+    return state
+
+
+def _is_finite(value: Any) -> bool:
+    return all(map(_is_finite, value)) if isinstance(value, tuple) else math.isfinite(value)
 
 
 def _encoded_record(value: Any) -> Any:

@@ -9,6 +9,11 @@ import math
 from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple
 
+from seal_friction_ros.core.estimation.conditioned_velocity import (
+    NOT_CONDITIONED,
+    ConditionedVelocity,
+    condition_velocity,
+)
 from seal_friction_ros.core.estimation.records import (
     NEVER,
     NO_FORCE,
@@ -45,14 +50,28 @@ class EstimatorSettings:
     slip_velocity: float = parameter(
         2e-3, unit='m/s', lower=0.0, upper=1.0, description='A rod at rest slides above this speed.'
     )
+    velocity_resolution: float = parameter(
+        0.0,
+        unit='m/s',
+        lower=0.0,
+        upper=1.0,
+        description='Smallest ripple of the measured velocity at rest: encoder count times sample rate; 0: learnt.',
+    )
     use_stiction: bool = parameter(
         True, unit='', description='Breakaway force above Coulomb friction by the stiction of the seals.'
     )
     pressure_timeout: float = parameter(
-        0.1, unit='s', lower=1e-4, upper=60.0, description='Largest time between the stamps of velocity and pressure.'
+        0.1, unit='s', lower=1e-3, upper=1.0, description='Largest time between the stamps of velocity and pressure.'
     )
     force_timeout: float = parameter(
-        0.1, unit='s', lower=1e-4, upper=60.0, description='Largest time between the stamps of velocity and force sum.'
+        0.1, unit='s', lower=1e-3, upper=1.0, description='Largest time between the stamps of velocity and force sum.'
+    )
+    stamp_age_max: float = parameter(
+        1.0,
+        unit='s',
+        lower=0.0,
+        upper=3600.0,
+        description='Largest time between the stamp of a velocity and its receipt, either way; 0: not checked.',
     )
     pressure_min: float = parameter(
         -1.2e5, unit='Pa', lower=-1.2e5, upper=0.0, description='A pressure below this is a sensor fault.'
@@ -152,6 +171,8 @@ class EstimatorState(NamedTuple):
     """likewise"""
     leapt_velocity: Speed
     """likewise"""
+    motion: ConditionedVelocity
+    """of the usable velocities"""
 
 
 class Observation(NamedTuple):
@@ -160,7 +181,7 @@ class Observation(NamedTuple):
     stamp: int
     """[ns]"""
     velocity: float
-    """[m/s] at which the seals slide; 0 at rest and where it is not known"""
+    """[m/s] at which the seals slide, conditioned; 0.0 at rest and where it is not known"""
     status: int
     """bits of `Status`"""
     input_age: float
@@ -170,7 +191,7 @@ class Observation(NamedTuple):
 def init(parameters: EstimatorParameters) -> EstimatorState:
     """State before the first sample: no inputs, the rod counts as moving."""
     del parameters
-    return EstimatorState(NEVER, False, NO_PRESSURE, NO_FORCE, NO_SPEED, NO_PRESSURE, NO_FORCE, NO_SPEED)
+    return EstimatorState(NEVER, False, NO_PRESSURE, NO_FORCE, NO_SPEED, NO_PRESSURE, NO_FORCE, NO_SPEED, NOT_CONDITIONED)
 
 
 # Status bits as plain integers: IntFlag arithmetic costs a microsecond each time.
@@ -190,13 +211,18 @@ _PRESSURE_LEAP = int(Status.PRESSURE_LEAP)
 _FORCE_LEAP = int(Status.FORCE_LEAP)
 _VELOCITY_LEAP = int(Status.VELOCITY_LEAP)
 _INPUT_REFUSED = int(Status.INPUT_REFUSED)
+_STAMP_AGE = int(Status.STAMP_AGE)
+_MOTION_UNCERTAIN = int(Status.MOTION_UNCERTAIN)
 
-_NO_MOTION = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
-_NO_STATE = _NO_MOTION | _INPUT_REFUSED | _PRESSURE_MISSING
+NO_VELOCITY = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
+"""Status bits of a velocity that is not used."""
+_NO_STATE = NO_VELOCITY | _INPUT_REFUSED | _PRESSURE_MISSING
 _NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE
 _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
+CREEP = 0.1  # [-] our choice: a rod in the band of rest is known to be at rest up to this share of stick_velocity
+SETTLING_TIME = 0.01  # [s] our choice: in this time the way of a sliding rod exceeds the ripple of its signal clearly
 SHORTEST_INTERVAL = 1e-3  # [s] our choice: over less, noise exceeds any rate, and some drivers stamp no finer
 
 
@@ -242,6 +268,8 @@ def assess_inputs(
     status = _INPUT_REFUSED if sample.refused else 0
     if state.stamp != NEVER and sample.stamp <= state.stamp:
         status |= _STAMP_NOT_INCREASING
+    if abs(sample.stamp_age) > settings.stamp_age_max > 0.0:
+        status |= _STAMP_AGE
 
     pressure, leapt_pressure, fault = _usable_pressure(settings, sample.pressure, state.pressure, state.leapt_pressure)
     status |= fault
@@ -260,15 +288,31 @@ def assess_inputs(
     newest = Speed(sample.stamp, sample.velocity)
     velocity, leapt_velocity, fault = _usable_velocity(settings, newest, state.velocity, state.leapt_velocity)
     status |= fault
-    at_rest, sliding_velocity = state.at_rest, 0.0
+    at_rest, motion, sliding_velocity = state.at_rest, state.motion, 0.0
     if not fault:
-        at_rest = is_at_rest(sample.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
-        if not at_rest:
-            sliding_velocity = sample.velocity
+        motion = condition_velocity(motion, sample.stamp, sample.velocity, settings.velocity_resolution)
+        at_rest = is_at_rest(motion.velocity, state.at_rest, settings.stick_velocity, settings.slip_velocity)
+        uncertain = _is_uncertain(settings, motion, at_rest)
+        if uncertain:
+            status |= _MOTION_UNCERTAIN
+        # Friction never drives: a rod in the band of rest that moves against the force sum slides.
+        if not at_rest or (uncertain and motion.velocity * force.force < 0.0):
+            sliding_velocity = motion.velocity
     state = EstimatorState(
-        sample.stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity
+        sample.stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion
     )
     return state, Observation(sample.stamp, sliding_velocity, status, input_age)
+
+
+@compilable
+def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_rest: bool) -> bool:
+    """Whether the velocity does not tell if the rod is at rest."""
+    speed = abs(motion.velocity)
+    if at_rest:
+        return speed > CREEP * settings.stick_velocity
+    if motion.half_width == 0.0:
+        return False
+    return motion.is_waiting or speed <= settings.slip_velocity + motion.half_width / SETTLING_TIME
 
 
 @compilable
@@ -281,10 +325,10 @@ def estimate_of(
     breakaway = coulomb + friction.stiction if settings.use_stiction else coulomb
     if not friction.in_identified_range:
         status |= _OUTSIDE_IDENTIFIED_RANGE
-    acting = _UNKNOWN
-    if not (status & _NO_STATE or (state.at_rest and status & _NO_FORCE_SUM)):
+    acting, slides = _UNKNOWN, seen.velocity != 0.0
+    if not status & _NO_STATE and (slides or not status & _NO_FORCE_SUM):
         sliding = coulomb + friction.velocity_friction
-        acting = state_friction(state.velocity.velocity, state.force.force, state.at_rest, sliding, breakaway)
+        acting = state_friction(seen.velocity, state.force.force, not slides, sliding, breakaway)
     return FrictionEstimate(
         seen.stamp,
         coulomb,

@@ -1,18 +1,22 @@
-r"""Estimate and reference velocity -> the force that cancels the seal friction before the controller has to.
+r"""Estimate and wanted velocity -> the force that cancels the seal friction before the controller has to.
 
-``state = init(settings)``, then ``state, feedforward = step(settings, state, stamp, estimate, motion)``.
+``state = init(settings)``, then ``state, feedforward = step(settings, state, stamp, received, friction, velocity)``.
 
 .. math::
-    F = \tanh(v / w)\,[s_C f_c + s_S (f_b - f_c)\, e^{-|v / v_S|^\delta} + s_V f_v] + s_V \sigma v
+    F = s\,\max(f, 0) \tanh(v / w)
 
-with v the reference velocity, seen ``lead_time`` ahead, and f_v what the seals add at it by the velocity terms of their
-seal files (viscous, Stribeck, direction). It comes from the reference and not from the rod, so it closes
-no loop: too large a force makes an error, but no limit cycle. Scales below 1 leave some friction to the controller,
-which a wrong model needs. tanh is smooth through zero here, where it shapes a command; the friction itself
-is never smoothed.
+with v the wanted velocity, `wanted_velocity`, and f the friction of the seals at it: Coulomb friction, and what the law or the
+velocity terms of the seal file add to it. One gain s scales everything, so F is 0 N for s = 0, and F v >= 0 for every law, gain
+and velocity: the force never acts against the wanted motion.
 
-Source: [Armstrong1994]_ (feed-forward from the desired velocity) and eq. (5) (Stribeck); fade, slew and
-clamp are our choice.
+The velocity comes from the reference and not from the rod, so the feed-forward closes no loop: too large a force makes
+an error, but no limit cycle. A gain below 1 leaves some friction to the controller, which a wrong model needs. tanh is
+smooth through zero here, where it shapes a command; the friction itself is never smoothed.
+
+Time is the time of receipt: stamps that freeze, alternate or jump neither hold the force nor speed it up. The slew limit holds
+for the force before it is faded, so the fade takes its time whatever the slew limit is.
+
+Source: [Armstrong1994]_ (feed-forward from the desired velocity); fade, slew and clamp are our choice.
 """
 
 import math
@@ -20,13 +24,14 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
+from seal_friction_ros.core.estimation.records import NEVER, FrictionEstimate, Status
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.states import UNKNOWN
 
 FASTEST = 100.0  # [m/s] no rod is faster
-LONGEST_STEP = 0.02  # [s] after a longer gap, or a stamp that leaps, fade and slew go on as if this time had passed
+LONGEST_STEP = 0.02  # [s] after a longer gap the force changes, and fades in, as if this time had passed
+LARGEST_RIPPLE = 0.1  # [-] of the smoothing velocity; see `wanted_velocity`
 
 
 class Limited(IntFlag):
@@ -58,24 +63,11 @@ class FeedForwardSettings:
         ValueError: A setting is out of bounds.
     """
 
-    coulomb_scale: float = parameter(
-        0.9, unit='1', lower=0.0, upper=2.0, description='s_C, share of the Coulomb friction that is compensated.'
-    )
-    stribeck_scale: float = parameter(
-        0.0, unit='1', lower=0.0, upper=2.0, description='s_S, share of what breakaway has above Coulomb friction.'
-    )
-    stribeck_velocity: float = parameter(
-        0.005, unit='m/s', lower=1e-6, upper=10.0, description='v_S, speed over which breakaway falls to Coulomb.'
-    )
-    stribeck_exponent: float = parameter(2.0, unit='1', lower=0.1, upper=10.0, description='delta.')
-    viscous_scale: float = parameter(
-        0.9, unit='1', lower=0.0, upper=2.0, description='s_V, share of the viscous friction that is compensated.'
-    )
-    viscous_friction: float = parameter(
-        0.0, unit='N s/m', lower=0.0, upper=1e7, description='sigma, viscous friction of all seals; 0: they have none.'
+    scale: float = parameter(
+        0.9, unit='1', lower=0.0, upper=2.0, description='s, share of the friction that is compensated; 0: no force.'
     )
     smoothing_velocity: float = parameter(
-        0.001, unit='m/s', lower=1e-6, upper=1.0, description='w, speed at which 76 % of the Coulomb term is there.'
+        0.001, unit='m/s', lower=1e-6, upper=1.0, description='w, speed at which 76 % of the force is there.'
     )
     lead_time: float = parameter(
         0.003,
@@ -90,51 +82,50 @@ class FeedForwardSettings:
     slew_limit: float = parameter(5e4, unit='N/s', lower=1e-3, upper=1e9, description='Largest rate of the force.')
     force_limit: float = parameter(150.0, unit='N', lower=0.0, upper=1e6, description='Largest force.')
     estimate_timeout: float = parameter(
-        0.1, unit='s', lower=1e-4, upper=60.0, description='An estimate older than this is not used.'
+        0.03,
+        unit='s',
+        lower=1e-3,
+        upper=1.0,
+        description='Longest time since an input of the estimator was received; then the force fades out.',
     )
     reference_timeout: float = parameter(
-        0.1, unit='s', lower=1e-4, upper=60.0, description='A reference older than this is not used.'
+        0.03, unit='s', lower=1e-3, upper=1.0, description='Longest time since the reference was received; likewise.'
     )
     fade_time: float = parameter(
-        0.2,
-        unit='s',
-        lower=1e-4,
-        upper=60.0,
-        description='Time to fade out without a usable estimate or reference, and back in.',
+        0.2, unit='s', lower=1e-3, upper=1.0, description='Time in which the force fades out, and back in.'
     )
 
     def __post_init__(self) -> None:
         check(self)
 
 
-class Motion(NamedTuple):
-    """The motion that is asked for, and the one that is."""
+class WantedMotion(NamedTuple):
+    """Motion of the rod that the feed-forward compensates for, conditioned."""
 
-    reference_velocity: float
-    """[m/s]"""
-    reference_acceleration: float = 0.0
-    """[m/s^2] for ``lead_time``; 0 if it is not known"""
-    measured_velocity: float = 0.0
-    """[m/s]"""
-    reference_age: float = 0.0
-    """[s] how long ago the reference was for"""
-    velocity_friction: float = 0.0
-    """[N] f_v, at `wanted_velocity`"""
+    velocity: float
+    """[m/s] NaN: not known"""
+    acceleration: float
+    """[m/s^2] for ``lead_time``; 0.0 if it is not known"""
+    ripple: float
+    """[m/s] ripple of the velocity as it was given; 0.0 for a clean signal"""
+
+
+NO_MOTION = WantedMotion(math.nan, 0.0, 0.0)
 
 
 class FeedForwardState(NamedTuple):
     """What one step leaves for the next."""
 
-    stamp: int
-    """[ns] of the last step; `NEVER` before the first"""
+    received: int
+    """[ns] time of the last step; `NEVER` before the first"""
     force: float
-    """[N]"""
+    """[N] before the fade"""
     fade: float
     """[-] 0: faded out, 1: not faded"""
-    estimate: FrictionEstimate
-    """last usable estimate; `NO_ESTIMATE` before the first"""
+    friction: float
+    """[N] f of the last usable estimate; negative before the first"""
     velocity: float
-    """[m/s] last usable velocity"""
+    """[m/s] last usable wanted velocity"""
 
 
 class FeedForward(NamedTuple):
@@ -145,7 +136,7 @@ class FeedForward(NamedTuple):
     force: float
     """[N] positive on extension"""
     scale: float
-    """[-] share of the estimated Coulomb friction that is compensated"""
+    """[-] share of the estimated friction that is compensated"""
     limited: int
     """bits of `Limited`"""
 
@@ -153,7 +144,7 @@ class FeedForward(NamedTuple):
 def init(settings: FeedForwardSettings) -> FeedForwardState:
     """Before the first estimate: faded out."""
     del settings
-    return FeedForwardState(NEVER, 0.0, 0.0, NO_ESTIMATE, 0.0)
+    return FeedForwardState(NEVER, 0.0, 0.0, -1.0, 0.0)
 
 
 @compilable
@@ -168,16 +159,27 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
 
 
 @compilable
-def compensation(
-    settings: FeedForwardSettings, estimate: FrictionEstimate, velocity: float, velocity_friction: float = 0.0
-) -> float:
-    """Force [N] for a velocity [m/s] and f_v [N], before fade and limits: the equation at the head of this file."""
-    stribeck = math.exp(-(abs(velocity / settings.stribeck_velocity) ** settings.stribeck_exponent))
-    stiction = estimate.breakaway_force - estimate.coulomb_friction
-    coulomb = settings.coulomb_scale * estimate.coulomb_friction + settings.stribeck_scale * stiction * stribeck
-    coulomb += settings.viscous_scale * velocity_friction
-    viscous = settings.viscous_scale * settings.viscous_friction * velocity
-    return math.tanh(velocity / settings.smoothing_velocity) * coulomb + viscous
+def wanted_velocity(settings: FeedForwardSettings, motion: WantedMotion) -> float:
+    """Velocity v [m/s] of the equation, ``lead_time`` ahead; NaN if it is not known.
+
+    The lead reverses a clean velocity before the motion does. The lead of a velocity with a ripple that matters to tanh(v / w)
+    stops at 0: a difference of a rounded velocity says nothing about a reversal to come.
+    """
+    velocity = motion.velocity
+    if not math.isfinite(velocity):
+        return math.nan
+    lead = settings.lead_time * motion.acceleration
+    if motion.ripple > LARGEST_RIPPLE * settings.smoothing_velocity:
+        lead = _between(-abs(velocity), lead, abs(velocity))
+    return _between(-FASTEST, velocity + lead, FASTEST) if math.isfinite(lead) else _between(-FASTEST, velocity, FASTEST)
+
+
+@compilable
+def compensation(settings: FeedForwardSettings, friction: float, velocity: float) -> float:
+    """Force [N] for a friction f [N] and a velocity [m/s], before fade and limits: the equation at the head of this file."""
+    if not friction > 0.0:
+        return 0.0
+    return settings.scale * friction * math.tanh(velocity / settings.smoothing_velocity)
 
 
 @compilable
@@ -185,56 +187,46 @@ def step(
     settings: FeedForwardSettings,
     state: FeedForwardState,
     stamp: int,
-    estimate: FrictionEstimate,
-    motion: Motion,
+    received: int,
+    friction: float,
+    velocity: float,
 ) -> tuple[FeedForwardState, FeedForward]:
     """Feed-forward at one moment.
 
-    Without a usable estimate and a usable velocity the last usable ones are faded out over ``fade_time``; with them the
-    force fades in again. Fade, then clamp, then slew: so the rate is bounded whatever happens.
+    Without a usable friction and velocity the last usable ones are faded out over ``fade_time``; with them the force fades
+    in. Clamp, then slew, then fade.
 
     Args:
         settings: Settings.
         state: From `init` or the step before.
-        stamp: Now [ns].
-        estimate: Newest estimate; `NO_ESTIMATE` while there is none.
-        motion: Reference and measured motion. A velocity that is not finite is not usable.
+        stamp: For the header of the answer [ns].
+        received: Now [ns], on the clock of receipt.
+        friction: f at ``velocity`` [N]; negative: none is usable.
+        velocity: From `wanted_velocity`; NaN: not usable.
     """
-    elapsed = 0.0 if state.stamp == NEVER else _between(0.0, (stamp - state.stamp) * 1e-9, LONGEST_STEP)
-    good, valid = state.estimate, False
-    if estimate.stamp != NEVER and usable(settings, estimate):
-        good = estimate
-        valid = abs(stamp - estimate.stamp) * 1e-9 <= settings.estimate_timeout
-    velocity = wanted_velocity(settings, motion)
+    elapsed = 0.0 if state.received == NEVER or received < state.received else (received - state.received) * 1e-9
+    valid = friction >= 0.0 and not math.isnan(velocity)
+    if not friction >= 0.0:
+        friction = state.friction
     if math.isnan(velocity):
-        velocity, valid = state.velocity, False
-    change = elapsed / settings.fade_time
-    first = valid and state.estimate.stamp == NEVER and state.stamp == NEVER
-    fade = 1.0 if first else _between(0.0, state.fade + (change if valid else -change), 1.0)
+        velocity = state.velocity
+    short = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
+    change = short / settings.fade_time if valid else -elapsed / settings.fade_time
+    fade = _between(0.0, state.fade + change, 1.0)
 
     limited = _FADE if fade < 1.0 or not valid else 0
-    wanted = 0.0 if good.stamp == NEVER else fade * compensation(settings, good, velocity, motion.velocity_friction)
+    wanted = compensation(settings, friction, velocity)
     clamped = _between(-settings.force_limit, wanted, settings.force_limit)
     if clamped != wanted:
         limited |= _CLAMP
-    most = settings.slew_limit * elapsed
+    most = settings.slew_limit * short
     force = _between(state.force - most, clamped, state.force + most)
     if force != clamped:
         limited |= _SLEW
-    feedforward = FeedForward(stamp, force, settings.coulomb_scale * fade, limited)
-    return FeedForwardState(stamp, force, fade, good, velocity), feedforward
-
-
-@compilable
-def wanted_velocity(settings: FeedForwardSettings, motion: Motion) -> float:
-    """Velocity v [m/s] of the equation; NaN if it is not usable."""
-    if settings.use_measured_velocity:
-        velocity = motion.measured_velocity
-    elif abs(motion.reference_age) > settings.reference_timeout:
-        return math.nan
-    else:
-        velocity = motion.reference_velocity + settings.lead_time * motion.reference_acceleration
-    return _between(-FASTEST, velocity, FASTEST) if math.isfinite(velocity) else math.nan
+    if settings.scale == 0.0:
+        force = 0.0
+    feedforward = FeedForward(stamp, fade * force + 0.0, settings.scale * fade, limited)
+    return FeedForwardState(received, force, fade, friction, velocity), feedforward
 
 
 @compilable

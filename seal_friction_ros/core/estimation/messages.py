@@ -21,6 +21,7 @@ from seal_friction_ros.core.estimation.records import (
     Pressure,
     ServoReference,
     Velocity,
+    WatchdogTick,
 )
 from seal_friction_ros.core.friction.states import FrictionState
 
@@ -32,6 +33,7 @@ POSITION_TYPE = f'{PACKAGE}/msg/RodPosition'
 REFERENCE_TYPE = f'{PACKAGE}/msg/ServoReference'
 ESTIMATE_TYPE = f'{PACKAGE}/msg/FrictionEstimate'
 FEEDFORWARD_TYPE = f'{PACKAGE}/msg/FrictionFeedForward'
+TICK_TYPE = f'{PACKAGE}/msg/WatchdogTick'
 CONFIGURATION_TYPE = f'{PACKAGE}/msg/EstimatorConfiguration'
 
 INPUTS: dict[str, str] = {
@@ -46,7 +48,7 @@ INPUTS: dict[str, str] = {
 OUTPUTS: dict[str, str] = {'friction_estimate': ESTIMATE_TYPE, 'friction_feedforward': FEEDFORWARD_TYPE}
 """Topic that the estimator publishes -> message type."""
 
-Input = Pressure | Force | ServoReference | Position | Velocity
+Input = Pressure | Force | ServoReference | Position | Velocity | WatchdogTick
 """A message that the estimator takes."""
 Output = FrictionEstimate | FeedForward
 """A message that the estimator makes."""
@@ -99,6 +101,7 @@ LAYOUTS = (
     Layout(VELOCITY_TYPE, Velocity, 'd'),
     Layout(POSITION_TYPE, Position, 'd'),
     Layout(REFERENCE_TYPE, ServoReference, 'ddd'),
+    Layout(TICK_TYPE, WatchdogTick, 'd'),
     Layout(ESTIMATE_TYPE, FrictionEstimate, 'ddddBbId', lambda estimate: FrictionState(estimate.state)),
     Layout(FEEDFORWARD_TYPE, FeedForward, 'ddI'),
 )

@@ -1,11 +1,15 @@
 """The path of every message: what comes in, what is kept of it, what goes out. The same for the node and for replay.
 
-``state = init(parameters)``, then ``state = receive(parameters, state, message, emit)`` for every message, in order of
-receipt. The node passes a function that publishes, replay one that collects.
+``state = init(parameters)``, then ``state = receive(parameters, state, message, received, emit)`` for every message, in order
+of receipt. The node passes a function that publishes, replay one that collects.
 
 A velocity sample makes an estimate with the newest pressure and force sum, and, once there has been a reference, a
-feed-forward. The estimate is emitted before the feed-forward is computed. While no velocity sample comes, references
-make the feed-forward, so that it fades out.
+feed-forward. The estimate is emitted before the feed-forward is computed. While no velocity sample comes, the ticks of the
+watchdog make the feed-forward, so that it fades out.
+
+``received`` is the time of receipt, which a bag holds as log time. How old an input is for the feed-forward is counted on this
+clock, which never jumps; a message with the stamp of the one before is no new sample. `PipelineState.clock_offset` leads from
+it to the clock of the stamps.
 
 Inputs with several publishers are refused, since nobody knows which publisher is right: they still make estimates, so
 that everybody sees it, but the estimates are marked and the feed-forward fades out.
@@ -16,30 +20,42 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import estimator, feedforward
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
+from seal_friction_ros.core.estimation.conditioned_velocity import (
+    NOT_CONDITIONED,
+    SETTLING,
+    ConditionedVelocity,
+    condition_velocity,
+)
+from seal_friction_ros.core.estimation.estimator import NO_VELOCITY, EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.estimator import step as estimator_step
 from seal_friction_ros.core.estimation.feedforward import (
+    NO_MOTION,
     FeedForwardSettings,
     FeedForwardState,
-    Motion,
+    WantedMotion,
+    usable,
     wanted_velocity,
 )
 from seal_friction_ros.core.estimation.feedforward import step as feedforward_step
 from seal_friction_ros.core.estimation.messages import Input, Output, encode, type_of
 from seal_friction_ros.core.estimation.records import (
     NEVER,
-    NO_ESTIMATE,
     NO_FORCE,
     NO_PRESSURE,
     Force,
+    FrictionEstimate,
     Position,
     Pressure,
     RodSample,
     ServoReference,
     Velocity,
+    WatchdogTick,
 )
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.friction.actuator import friction_of_seals
+
+ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
+TICK_INTERVAL = 10_000_000  # [ns] of the watchdog: it acts if no feed-forward was made for this time
 
 Emit = Callable[[Output, bytes], object]
 """Takes what goes out, and the frame name of the message that it answers."""
@@ -52,18 +68,26 @@ class PipelineParameters(NamedTuple):
     feedforward: FeedForwardSettings
 
 
-class WantedMotion(NamedTuple):
-    """Motion that the rod shall make."""
+class Reference(NamedTuple):
+    """What is kept of the references."""
 
-    stamp: int
-    """[ns] the moment it is for"""
-    velocity: float
-    """[m/s]"""
+    velocity: ConditionedVelocity
     acceleration: float
-    """[m/s^2]"""
+    """[m/s^2] smoothed like the velocity"""
+    last_acceleration: float
+    """[m/s^2] of the last reference, as given"""
 
 
-NO_REFERENCE = WantedMotion(NEVER, 0.0, 0.0)
+NO_REFERENCE = Reference(NOT_CONDITIONED, 0.0, 0.0)
+
+
+class ReceiptTimes(NamedTuple):
+    """When the last new sample of each input was received [ns]; `NEVER` before the first."""
+
+    velocity: int = NEVER
+    pressure: int = NEVER
+    force: int = NEVER
+    reference: int = NEVER
 
 
 class PipelineState(NamedTuple):
@@ -71,11 +95,16 @@ class PipelineState(NamedTuple):
 
     estimator: EstimatorState
     feedforward: FeedForwardState
+    friction: float = -1.0
+    """[N] of the newest usable estimate; negative: the newest is not usable"""
     pressure: Pressure = NO_PRESSURE
     force: Force = NO_FORCE
-    reference: WantedMotion = NO_REFERENCE
+    reference: Reference = NO_REFERENCE
+    receipt: ReceiptTimes = ReceiptTimes()
     refused: bool = False
-    """whether an input has several publishers"""
+    """whether no input may act: one has several publishers, or the node is stopping"""
+    clock_offset: int = 0
+    """[ns] what the clock of the stamps shows after the clock of receipt"""
 
 
 def init(parameters: PipelineParameters) -> PipelineState:
@@ -83,23 +112,26 @@ def init(parameters: PipelineParameters) -> PipelineState:
     return PipelineState(estimator.init(parameters.estimator), feedforward.init(parameters.feedforward))
 
 
-def receive(parameters: PipelineParameters, state: PipelineState, message: Input, emit: Emit) -> PipelineState:
+def receive(
+    parameters: PipelineParameters, state: PipelineState, message: Input, received: int, emit: Emit
+) -> PipelineState:
     """Take one message.
 
     Args:
         parameters: Settings and seals.
         state: From `init` or the message before.
         message: As `messages.decode` makes it; its values may be anything.
+        received: When it was received [ns].
         emit: Called with each estimate and feed-forward that the message makes; every number in them is finite.
 
     Returns:
         The next state.
     """
-    return _RECEIVERS[type(message)](parameters, state, message, emit)
+    return _RECEIVERS[type(message)](parameters, state, message, received, emit)
 
 
 def answered(
-    parameters: PipelineParameters, state: PipelineState, message: Input
+    parameters: PipelineParameters, state: PipelineState, message: Input, received: int
 ) -> tuple[PipelineState, list[tuple[str, bytes]]]:
     """`receive` with the answers collected: message type and bytes of each, in the order they are emitted."""
     answers: list[tuple[str, bytes]] = []
@@ -107,7 +139,7 @@ def answered(
     def collect(record: Output, frame_id: bytes) -> None:
         answers.append((type_of(record), encode(record, frame_id)))
 
-    return receive(parameters, state, message, collect), answers
+    return receive(parameters, state, message, received, collect), answers
 
 
 def send(emit: Any, record: Any, frame_id: Any) -> None:
@@ -116,72 +148,155 @@ def send(emit: Any, record: Any, frame_id: Any) -> None:
 
 
 @compilable
-def receive_velocity(parameters: Any, state: PipelineState, velocity: Any, emit: Any) -> PipelineState:
+def receive_velocity(parameters: Any, state: PipelineState, velocity: Any, received: int, emit: Any) -> PipelineState:
     """An estimate, and with a reference a feed-forward."""
-    known, guided, pressure, force, reference, refused = state
-    sample = RodSample(velocity.stamp, velocity.velocity, pressure, force, refused)
+    known, guided, _, pressure, force, reference, receipt, refused, offset = state
+    is_new = known.stamp != velocity.stamp
+    age = (received + offset - velocity.stamp) * 1e-9
+    sample = RodSample(velocity.stamp, velocity.velocity, pressure, force, refused, age)
     known, estimate = estimator_step(parameters.estimator, known, sample)
     send(emit, estimate, velocity.frame_id)
-    if reference.stamp != NEVER or parameters.feedforward.use_measured_velocity:
-        motion = _motion(parameters, reference, velocity.stamp, velocity.velocity, known.pressure)
-        guided, compensation = feedforward_step(parameters.feedforward, guided, velocity.stamp, estimate, motion)
-        send(emit, compensation, velocity.frame_id)
-    return PipelineState(known, guided, pressure, force, reference, refused)
+    if is_new and not estimate.status & NO_VELOCITY:
+        receipt = ReceiptTimes(received, receipt.pressure, receipt.force, receipt.reference)
+    friction = estimate.coulomb_friction if usable(parameters.feedforward, estimate) else -1.0
+    state = PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
+    if receipt.reference == NEVER and not parameters.feedforward.use_measured_velocity:
+        return state
+    return _feed_forward(parameters, state, velocity.stamp, received, velocity.frame_id, emit)
 
 
 @compilable
-def receive_pressure(_parameters: Any, state: PipelineState, newest: Pressure, _emit: Any) -> PipelineState:
+def receive_pressure(
+    _parameters: Any, state: PipelineState, newest: Pressure, received: int, _emit: Any
+) -> PipelineState:
     """Keep the pressure for the next velocity sample."""
-    known, guided, _, force, reference, refused = state
-    return PipelineState(known, guided, newest, force, reference, refused)
+    known, guided, friction, pressure, force, reference, receipt, refused, offset = state
+    if newest.stamp != pressure.stamp:
+        receipt = ReceiptTimes(receipt.velocity, received, receipt.force, receipt.reference)
+    return PipelineState(known, guided, friction, newest, force, reference, receipt, refused, offset)
 
 
 @compilable
-def receive_force(_parameters: Any, state: PipelineState, newest: Force, _emit: Any) -> PipelineState:
+def receive_force(_parameters: Any, state: PipelineState, newest: Force, received: int, _emit: Any) -> PipelineState:
     """Keep the force sum for the next velocity sample."""
-    known, guided, pressure, _, reference, refused = state
-    return PipelineState(known, guided, pressure, newest, reference, refused)
+    known, guided, friction, pressure, force, reference, receipt, refused, offset = state
+    if newest.stamp != force.stamp and math.isfinite(newest.force):
+        receipt = ReceiptTimes(receipt.velocity, receipt.pressure, received, receipt.reference)
+    return PipelineState(known, guided, friction, pressure, newest, reference, receipt, refused, offset)
 
 
 @compilable
-def receive_reference(parameters: Any, state: PipelineState, wanted: Any, emit: Any) -> PipelineState:
-    """Keep the reference; while no velocity comes, let the feed-forward fade."""
-    known, guided, pressure, force, _, refused = state
-    reference = WantedMotion(wanted.stamp, wanted.velocity, wanted.acceleration)
-    timeout = parameters.feedforward.estimate_timeout
-    if known.stamp == NEVER or abs(reference.stamp - known.stamp) * 1e-9 > timeout:
-        motion = Motion(reference.velocity, reference.acceleration, 0.0, 0.0, 0.0)
-        guided, compensation = feedforward_step(parameters.feedforward, guided, reference.stamp, NO_ESTIMATE, motion)
-        send(emit, compensation, wanted.frame_id)
-    return PipelineState(known, guided, pressure, force, reference, refused)
+def receive_reference(_parameters: Any, state: PipelineState, wanted: Any, received: int, _emit: Any) -> PipelineState:
+    """Condition the reference and keep it for the next velocity sample; one that is not finite is no new sample."""
+    known, guided, friction, pressure, force, reference, receipt, refused, offset = state
+    if wanted.stamp != reference.velocity.stamp and math.isfinite(wanted.velocity):
+        reference = _conditioned(reference, wanted)
+        receipt = ReceiptTimes(receipt.velocity, receipt.pressure, receipt.force, received)
+    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
 
 
-def receive_position(_parameters: Any, state: PipelineState, _position: Position, _emit: Any) -> PipelineState:
+@compilable
+def receive_tick(parameters: Any, state: PipelineState, tick: Any, received: int, emit: Any) -> PipelineState:
+    """A feed-forward without a velocity sample, which fades once an input is too old."""
+    return _feed_forward(parameters, state, tick.stamp, received, tick.frame_id, emit)
+
+
+def receive_position(
+    _parameters: Any, state: PipelineState, _position: Position, _received: int, _emit: Any
+) -> PipelineState:
     """Nothing depends on the position; it is recorded to show how the servo tracks."""
     return state
 
 
-_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, Any], PipelineState]] = {
+_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, Any], PipelineState]] = {
     Velocity: receive_velocity,
     Pressure: receive_pressure,
     Force: receive_force,
     ServoReference: receive_reference,
     Position: receive_position,
+    WatchdogTick: receive_tick,
 }
 
 
+def is_tick_due(state: PipelineState, now: int) -> bool:
+    """Whether the watchdog must act: there is a force, and no feed-forward was made for `TICK_INTERVAL`.
+
+    Args:
+        state: Of the last message.
+        now: [ns] on the clock of receipt.
+    """
+    made = state.feedforward
+    return made.received != NEVER and made.fade * made.force != 0.0 and now - made.received >= TICK_INTERVAL
+
+
 @compilable
-def _motion(parameters: Any, reference: WantedMotion, stamp: int, measured: float, pressure: Pressure) -> Motion:
-    """Motion at a velocity sample of ``stamp`` [ns] and ``measured`` [m/s], with the velocity friction of the seals."""
-    age = math.inf
-    if reference.stamp != NEVER:
-        age = (stamp - reference.stamp) * 1e-9
-    motion = Motion(reference.velocity, reference.acceleration, measured, age, 0.0)
-    if pressure.stamp == NEVER or not parameters.estimator.depends_on_velocity:
-        return motion
-    velocity = wanted_velocity(parameters.feedforward, motion)
-    if math.isnan(velocity):
-        return motion
-    seals = parameters.estimator.seal_numbers
-    friction = friction_of_seals(seals, pressure.chamber_a, pressure.chamber_b, velocity)
-    return Motion(reference.velocity, reference.acceleration, measured, age, friction.velocity_friction)
+def _conditioned(reference: Reference, wanted: Any) -> Reference:
+    """Reference after a new one, with a velocity without ripple and an acceleration that two references agree on.
+
+    Two accelerations in a row of the same sign count with the smaller magnitude, others as 0: the difference of a rounded velocity
+    alternates, that of a clean one does not.
+    """
+    stamp = reference.velocity.stamp
+    velocity = condition_velocity(reference.velocity, wanted.stamp, wanted.velocity, 0.0)
+    given, last = wanted.acceleration if math.isfinite(wanted.acceleration) else 0.0, reference.last_acceleration
+    agreed = 0.0
+    if given * last > 0.0:
+        agreed = given if abs(given) < abs(last) else last
+    acceleration = agreed
+    if velocity.half_width > 0.0 and velocity.smoothing > 0.0 and stamp != NEVER:
+        step = abs(wanted.stamp - stamp) * 1e-9
+        share = step / (step + ACCELERATION_SMOOTHING * velocity.smoothing)
+        acceleration = reference.acceleration + share * (agreed - reference.acceleration)
+    return Reference(velocity, acceleration, given)
+
+
+@compilable
+def _feed_forward(
+    parameters: Any, state: PipelineState, stamp: int, received: int, frame_id: Any, emit: Any
+) -> PipelineState:
+    """Make and emit the feed-forward of this moment."""
+    known, guided, friction, pressure, force, reference, receipt, refused, offset = state
+    settings = parameters.feedforward
+    motion = _wanted_motion(settings, known, reference, receipt, received)
+    velocity = wanted_velocity(settings, motion)
+    ground = friction
+    if refused or not _is_fresh(receipt, received, settings.estimate_timeout):
+        ground = -1.0
+    if ground >= 0.0 and parameters.estimator.depends_on_velocity and not math.isnan(velocity):
+        seals, used = parameters.estimator.seal_numbers, known.pressure
+        ground += friction_of_seals(seals, used.chamber_a, used.chamber_b, velocity).velocity_friction
+        if ground < 0.0:
+            ground = 0.0
+    guided, compensation = feedforward_step(settings, guided, stamp, received, ground, velocity)
+    send(emit, compensation, frame_id)
+    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
+
+
+@compilable
+def _wanted_motion(
+    settings: FeedForwardSettings, known: EstimatorState, reference: Reference, receipt: ReceiptTimes, received: int
+) -> WantedMotion:
+    """Conditioned motion of the reference, or with ``use_measured_velocity`` of the rod."""
+    if settings.use_measured_velocity:
+        if known.motion.samples < SETTLING:
+            return NO_MOTION
+        return WantedMotion(known.motion.velocity, 0.0, 0.0)
+    if not _is_younger(receipt.reference, received, settings.reference_timeout):
+        return NO_MOTION
+    conditioned = reference.velocity
+    if conditioned.samples < SETTLING:
+        return NO_MOTION
+    return WantedMotion(conditioned.velocity, reference.acceleration, conditioned.ripple)
+
+
+@compilable
+def _is_fresh(receipt: ReceiptTimes, received: int, timeout: float) -> bool:
+    """Whether every input of the estimator that ever came has come within ``timeout`` [s]."""
+    if receipt.force != NEVER and not _is_younger(receipt.force, received, timeout):
+        return False
+    return _is_younger(receipt.velocity, received, timeout) and _is_younger(receipt.pressure, received, timeout)
+
+
+@compilable
+def _is_younger(receipt: int, received: int, timeout: float) -> bool:
+    return receipt != NEVER and (received - receipt) * 1e-9 <= timeout

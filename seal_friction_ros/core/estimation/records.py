@@ -32,6 +32,8 @@ class Status(IntFlag):
     FORCE_LEAP = 8192
     VELOCITY_LEAP = 16384
     INPUT_REFUSED = 32768
+    STAMP_AGE = 65536
+    MOTION_UNCERTAIN = 131072
 
 
 class Pressure(NamedTuple):
@@ -93,6 +95,17 @@ class ServoReference(NamedTuple):
     """bytes; in compiled code the number of the message"""
 
 
+class WatchdogTick(NamedTuple):
+    """The watchdog of the node acts: there is a force, and no velocity sample has renewed it."""
+
+    stamp: int
+    """[ns] when it acts, on the clock of receipt"""
+    idle_time: float
+    """[s] since the last feed-forward"""
+    frame_id: Any = b''
+    """bytes; in compiled code the number of the message"""
+
+
 class RodSample(NamedTuple):
     """One rod-velocity sample with the newest pressure and force sum received before it."""
 
@@ -104,6 +117,8 @@ class RodSample(NamedTuple):
     force: Force
     refused: bool = False
     """whether an input has several publishers, so that none may act"""
+    stamp_age: float = 0.0
+    """[s] time of receipt after the stamp; negative for a stamp in the future"""
 
 
 class FrictionEstimate(NamedTuple):
