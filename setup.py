@@ -39,9 +39,9 @@ setup(
     entry_points={
         'console_scripts': [
             'seal_friction = seal_friction_ros.offline.commands.main:run_and_exit',
-            'friction_estimator = seal_friction_ros.nodes.friction_estimator:main',
-            'servo_simulator = seal_friction_ros.nodes.servo_simulator:main',
-            'bag_player = seal_friction_ros.nodes.bag_player:main',
+            'friction_estimator = seal_friction_ros.nodes.entry_points:friction_estimator',
+            'servo_simulator = seal_friction_ros.nodes.entry_points:servo_simulator',
+            'bag_player = seal_friction_ros.nodes.entry_points:bag_player',
         ],
     },
 )

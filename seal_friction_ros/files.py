@@ -10,7 +10,11 @@ import yaml
 from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, ROS_PARAMETERS
+from seal_friction_ros.core.estimation.node_options import (
+    FRICTION_ESTIMATOR_PARAMETERS,
+    REMOVED_PARAMETERS,
+    ROS_PARAMETERS,
+)
 from seal_friction_ros.core.foundation.parameters import from_mapping, printable, similar_names
 from seal_friction_ros.core.friction.actuator import MountedSeal
 
@@ -194,6 +198,7 @@ def unknown_parameters(node: str, names: Iterable[str]) -> str:
     similar = similar_names(names, [name for group in tables[node] for name in group.names()])
     hints = {name: f' (did you mean {other}?)' for name, other in similar.items()}
     hints |= {name: f' (a parameter of {owners[name]})' for name in names if name in owners}
+    hints |= {name: f' (replaced by {REMOVED_PARAMETERS[name]})' for name in names if name in REMOVED_PARAMETERS}
     texts = [printable(name) + hints.get(name, '') for name in names]
     return f'{node} has no parameter {", ".join(texts)}'
 

@@ -12,6 +12,19 @@ from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 _SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one
+_LARGEST_UNCERTAIN = 0.1  # [-] share of estimates with MOTION_UNCERTAIN; each reversal has some
+_LARGEST_SHARE = {
+    Limited.CLAMP: 0.01,
+    Limited.SLEW: 0.2,
+    Limited.FADE: 0.0,
+}
+"""[-] of the feed-forwards; each reversal slews"""
+_LIMIT_MESSAGES = {
+    Limited.CLAMP: 'cut by force_limit',
+    Limited.SLEW: 'held back by slew_limit',
+    Limited.FADE: 'faded: an input or the reference is not usable',
+}
+_MOST_REVERSALS = 50  # [1/s] of the force; faster motion is not compensated, so this is chatter
 _LARGEST_DELAY = 1_000_000_000  # [ns] a stamp further back than this means that its clock was set
 
 
@@ -56,7 +69,7 @@ class EstimatorDiagnostics:
         self._missing = {name: MissingSamples() for name in INPUTS}
         self._by_status: Counter[int] = Counter()
         self._feedforwards_by_limit: Counter[int] = Counter()
-        self._feedforward_force = 0.0
+        self._feedforward_force = self._feedforward_sign = 0.0
         self._input_age = -1.0
         self._latencies: list[int] = []
         self.start_interval()
@@ -67,7 +80,9 @@ class EstimatorDiagnostics:
         self._started = time.monotonic()
         self._received_before = self._received.copy()
         self._malformed_before = self._malformed.copy()
-        self._recent_status = self._recent_limit = 0
+        self._status_before = self._by_status.copy()
+        self._limits_before = self._feedforwards_by_limit.copy()
+        self._reversals, self._travel = 0, 0.0
         self._latencies = []
 
     def on_input(self, name: str, stamp: int) -> None:
@@ -82,15 +97,19 @@ class EstimatorDiagnostics:
     def on_estimate(self, estimate: FrictionEstimate, latency: int) -> None:
         """Count one estimate; ``latency`` [ns] is the time since its velocity sample was taken."""
         self._by_status[estimate.status] += 1
-        self._recent_status |= estimate.status
         self._latencies.append(latency)
         self._input_age = estimate.input_age
 
     def on_feedforward(self, feedforward: FeedForward) -> None:
         """Count one feed-forward."""
         self._feedforwards_by_limit[feedforward.limited] += 1
-        self._recent_limit |= feedforward.limited
-        self._feedforward_force = feedforward.force
+        force, before = feedforward.force, self._feedforward_force
+        self._travel += abs(force - before)
+        if force * self._feedforward_sign < 0.0:
+            self._reversals += 1
+        if force:
+            self._feedforward_sign = force
+        self._feedforward_force = force
 
     @property
     def silent_inputs(self) -> list[str]:
@@ -123,14 +142,32 @@ class EstimatorDiagnostics:
         """Level and message of an active estimator ``seconds`` [s] after the start of the interval."""
         if not self._latencies and (seconds > _SHORTEST_SILENCE or not self._estimated_before):
             return DiagnosticStatus.STALE, 'no rod_velocity received'
-        if self._recent_status:
-            return DiagnosticStatus.WARN, str(Status(self._recent_status).name)
+        estimates = self._by_status - self._status_before
+        status = 0
+        for bits in estimates:
+            status |= bits
+        if status & ~Status.MOTION_UNCERTAIN:
+            return DiagnosticStatus.WARN, str(Status(status & ~Status.MOTION_UNCERTAIN).name)
         if self._malformed != self._malformed_before:
             names = ', '.join(sorted((self._malformed - self._malformed_before).keys()))
             return DiagnosticStatus.WARN, f'malformed messages on {names}'
-        if self._recent_limit & Limited.FADE:
-            return DiagnosticStatus.WARN, 'the feed-forward fades: no usable reference'
-        return DiagnosticStatus.OK, 'estimating'
+        findings = self._feedforward_findings(seconds)
+        uncertain = _share(estimates, Status.MOTION_UNCERTAIN)
+        if uncertain > _LARGEST_UNCERTAIN:
+            findings.append(f'{uncertain:.0%} of rod_velocity near rest or too noisy to tell rest from motion')
+        return (DiagnosticStatus.WARN, '; '.join(findings)) if findings else (DiagnosticStatus.OK, 'estimating')
+
+    def _feedforward_findings(self, seconds: float) -> list[str]:
+        """What limits the feed-forward more than a motion does by itself."""
+        recent = self._feedforwards_by_limit - self._limits_before
+        findings = [
+            f'feed-forward {_share(recent, bit):.0%} {_LIMIT_MESSAGES[bit]}'
+            for bit, largest in _LARGEST_SHARE.items()
+            if _share(recent, bit) > largest
+        ]
+        if self._reversals > _MOST_REVERSALS * seconds:
+            findings.append(f'feed-forward reverses {self._reversals / seconds:.0f} times a second')
+        return findings
 
     def _input_values(self, seconds: float, graph: GraphFindings) -> dict[str, str]:
         values: dict[str, str] = {}
@@ -144,6 +181,7 @@ class EstimatorDiagnostics:
         return values
 
     def _output_values(self, seconds: float) -> dict[str, str]:
+        recent = self._feedforwards_by_limit - self._limits_before
         return {
             'estimate rate [Hz]': f'{len(self._latencies) / seconds:.1f}',
             'estimates': str(self._by_status.total()),
@@ -151,6 +189,9 @@ class EstimatorDiagnostics:
             **{f'estimates {bit.name}': str(_count(self._by_status, bit)) for bit in Status},
             'feed-forwards': str(self._feedforwards_by_limit.total()),
             **{f'feed-forwards {bit.name}': str(_count(self._feedforwards_by_limit, bit)) for bit in Limited},
+            **{f'feed-forward {bit.name} share': f'{_share(recent, bit):.3f}' for bit in Limited},
+            'feed-forward reversals [1/s]': f'{self._reversals / seconds:.1f}',
+            'feed-forward travel [N/s]': f'{self._travel / seconds:.0f}',
             'feed-forward [N]': f'{self._feedforward_force:.3f}',
             'input age [s]': f'{self._input_age:.4f}',
             **latency_values(self._latencies),
@@ -160,6 +201,11 @@ class EstimatorDiagnostics:
 def _count(by_bits: Counter[int], bit: int) -> int:
     """Number of messages with a bit set."""
     return sum(number for bits, number in by_bits.items() if bits & bit)
+
+
+def _share(by_bits: Counter[int], bit: int) -> float:
+    """Share of messages with a bit set."""
+    return _count(by_bits, bit) / max(by_bits.total(), 1)
 
 
 def latency_values(latencies: list[int], what: str = 'latency') -> dict[str, str]:

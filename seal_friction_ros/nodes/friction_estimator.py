@@ -20,6 +20,7 @@ from seal_friction_ros.core.estimation.messages import (
     ESTIMATE_TYPE,
     INPUTS,
     OUTPUTS,
+    TICK_TYPE,
     Output,
     encode,
     encode_text,
@@ -30,7 +31,8 @@ from seal_friction_ros.core.estimation.node_options import (
     InputOptions,
     RecordingOptions,
 )
-from seal_friction_ros.core.estimation.pipeline import init, receive
+from seal_friction_ros.core.estimation.pipeline import TICK_INTERVAL, init, is_tick_due, receive
+from seal_friction_ros.core.estimation.records import WatchdogTick
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
@@ -40,6 +42,8 @@ from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 
 _WATCH_PERIOD = 0.05  # [s]
+_LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
+_STOP_PERIOD = 0.005  # [s] between two forces while the node stops
 SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
 
 
@@ -57,7 +61,7 @@ class FrictionEstimator(ManagedNode):
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._topics: dict[str, str] = {}
-        self._watch_timer: Any = None
+        self._timers: list[Any] = []
         self._sent: list[tuple[str, Output, bytes]] = []
         super().__init__('friction_estimator', FRICTION_ESTIMATOR_PARAMETERS, **kwargs)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
@@ -87,7 +91,11 @@ class FrictionEstimator(ManagedNode):
         self._topics = {type_name: publisher.topic_name for type_name, publisher in self._outputs.items()}
         for name in INPUTS:
             self._subscribe(name, qos.STREAM)
-        self._watch_timer = self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer)
+        self._topics[TICK_TYPE] = self.resolve_topic_name('~/watchdog_tick')
+        self._timers = [
+            self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
+            self.create_steady_timer(TICK_INTERVAL * 1e-9, self._on_watchdog),
+        ]
         self._configuration = configuration
 
     def release(self) -> None:
@@ -98,9 +106,9 @@ class FrictionEstimator(ManagedNode):
             self.destroy_publisher(publisher)
         self._inputs.clear()
         self._outputs.clear()
-        if self._watch_timer is not None:
-            self.destroy_timer(self._watch_timer)
-            self._watch_timer = None
+        for timer in self._timers:
+            self.destroy_timer(timer)
+        self._timers.clear()
         self._configuration = None
 
     def start(self) -> None:
@@ -109,7 +117,8 @@ class FrictionEstimator(ManagedNode):
         self._state = init(self._known)._replace(refused=self._is_refused(self._watch.duplicate_publishers()))
         self._statistics = EstimatorDiagnostics()
         self._logged_errors.clear()
-        self._now = self._ros_time if self.get_parameter('use_sim_time').value else time.time_ns
+        self._receipt_offset = time.time_ns() - time.monotonic_ns()
+        self._now = self._ros_time if self.get_parameter('use_sim_time').value else self._steady_time
         if self.settings(RecordingOptions).record:
             self._start_recording()
         else:
@@ -117,7 +126,9 @@ class FrictionEstimator(ManagedNode):
         self.get_logger().info('estimating')
 
     def finish(self) -> None:
-        """Stop estimating; finish the bag."""
+        """Bring the force to 0 N, stop estimating, finish the bag."""
+        if self.active:
+            self._fade_out()
         self.active = False
         outcome = self._recording.close()
         if outcome:
@@ -141,12 +152,22 @@ class FrictionEstimator(ManagedNode):
         self._topics[name] = self._inputs[name].topic_name
 
     def _on_watch_timer(self) -> None:
-        """Publish diagnostics when a publisher of an input has appeared or disappeared."""
+        """Publish diagnostics when a publisher of an input has appeared or disappeared; follow a clock that was set."""
         if self._watch.has_changed():
             self.publish_diagnostics()
+        if self.active and self._now == self._steady_time:
+            offset = time.time_ns() - self._now()
+            if abs(offset - self._state.clock_offset) > _LARGEST_CLOCK_STEP:
+                self.get_logger().warning(f'the clock was set by {(offset - self._state.clock_offset) * 1e-9:.3f} s')
+                self._state = self._state._replace(clock_offset=offset)
+                self._publish_configuration()
 
     def _ros_time(self) -> int:
         return self.get_clock().now().nanoseconds
+
+    def _steady_time(self) -> int:
+        """Time of receipt [ns]: the clock as it was at activation, which no setting of the clock changes."""
+        return time.monotonic_ns() + self._receipt_offset
 
     # --- the live path ---
 
@@ -163,20 +184,47 @@ class FrictionEstimator(ManagedNode):
             return
         received = self._now()
         self._sent.clear()
-        self._state = receive(self._known, self._state, message, self._send)
+        self._state = receive(self._known, self._state, message, received, self._send)
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
         self._recording.record(self._topics[name], type_name, received, data)
         self._statistics.on_input(name, message.stamp)
+        self._record_answers(done - taken)
+        if name == 'rod_velocity':
+            self._recording.flush_if_idle()
+
+    def _record_answers(self, latency: int = 0) -> None:
+        """Record and count what was sent, ``latency`` [ns] after its input was taken."""
         for answer_type, answer, answer_data in self._sent:
             self._recording.record(self._topics[answer_type], answer_type, self._now(), answer_data)
             if answer_type == ESTIMATE_TYPE:
-                self._statistics.on_estimate(answer, done - taken)
+                self._statistics.on_estimate(answer, latency)
             else:
                 self._statistics.on_feedforward(answer)
-        if name == 'rod_velocity':
-            self._recording.flush_if_idle()
+
+    def _on_watchdog(self) -> None:
+        """Renew the feed-forward while no velocity sample does, so that it fades out."""
+        if self.active and is_tick_due(self._state, self._now()):
+            self._tick(self._now())
+
+    def _tick(self, received: int) -> None:
+        tick = WatchdogTick(received, (received - self._state.feedforward.received) * 1e-9)
+        self._sent.clear()
+        self._state = receive(self._known, self._state, tick, received, self._send)
+        self._recording.record(self._topics[TICK_TYPE], TICK_TYPE, received, encode(tick))
+        self._record_answers()
+
+    def _fade_out(self) -> None:
+        """Fade the force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""
+        if self._state.feedforward.fade * self._state.feedforward.force == 0.0:
+            return
+        self._state = self._state._replace(refused=True)
+        self._publish_configuration()  # a replay fades from here on
+        began, start = time.monotonic(), self._now()
+        while self._state.feedforward.fade > 0.0:
+            time.sleep(_STOP_PERIOD)
+            self._tick(start + int((time.monotonic() - began) * 1e9))
 
     def _send(self, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once; the rest waits until all answers are out."""

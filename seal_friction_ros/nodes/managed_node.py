@@ -11,7 +11,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
-from seal_friction_ros.core.estimation.node_options import StartOptions
+from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX, StartOptions
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.files import unknown_parameters
 from seal_friction_ros.nodes.parameters import declare, read
@@ -57,6 +57,8 @@ class ManagedNode(LifecycleNode):
         # rclpy ignores overrides of undeclared parameters silently.
         given = getattr(self, '_parameter_overrides', {})
         unknown = [n for n in given if not n.startswith('qos_overrides') and not self.has_parameter(n)]
+        if any(n.startswith(FEEDFORWARD_PREFIX) for n in unknown):
+            raise ValueError(unknown_parameters(name, unknown))
         if unknown:
             self.get_logger().warning(f'ignored: {unknown_parameters(name, unknown)}')
         self.add_on_set_parameters_callback(self._on_set_parameters)

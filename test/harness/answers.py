@@ -18,8 +18,10 @@ class Answer(NamedTuple):
 NOTHING = Answer(None, None, b'')
 
 
-def receive_one(parameters: PipelineParameters, state: PipelineState, message: Any) -> tuple[PipelineState, Answer]:
-    """The next state and the answer."""
+def receive_one(
+    parameters: PipelineParameters, state: PipelineState, message: Any, received: int | None = None
+) -> tuple[PipelineState, Answer]:
+    """The next state and the answer; by default the message is received at its stamp."""
     answer = NOTHING
 
     def take(record: Any, frame_id: bytes) -> None:
@@ -27,4 +29,4 @@ def receive_one(parameters: PipelineParameters, state: PipelineState, message: A
         field = 'estimate' if isinstance(record, FrictionEstimate) else 'feedforward'
         answer = answer._replace(**{field: record, 'frame_id': frame_id})
 
-    return receive(parameters, state, message, take), answer
+    return receive(parameters, state, message, message.stamp if received is None else received, take), answer

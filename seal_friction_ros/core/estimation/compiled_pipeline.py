@@ -234,9 +234,7 @@ def _stamp(data: Bytes, offset: int) -> int:
 
 
 @compiled
-def _check(
-    data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, received: Integers
-) -> tuple[int, int]:
+def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, received: Integers) -> tuple[int, int]:
     """Check inputs as `messages.decode` does.
 
     Returns:

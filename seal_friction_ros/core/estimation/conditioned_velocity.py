@@ -3,15 +3,15 @@
 ``state = condition_velocity(state, stamp, velocity, resolution)`` for every sample; ``state.velocity`` is the result.
 
 An encoder at rest makes velocities of one count a sample, to and fro. Their sum, the displacement, stays within a few
-counts. So the displacement passes through a play (a backlash) of half-width h, and only displacement that pushes the play
-counts as motion: the direction changes after a way back of 2 h, and at rest nothing moves.
+counts. So the displacement passes through a play (a backlash) of half-width h, and only displacement that pushes the
+play counts as motion: the direction changes after a way back of 2 h, and at rest nothing moves.
 
-The half-width is learnt: a velocity that goes up and at once down again, at a low speed, is a ripple; h is the largest
-ripple times the sample period so far, forgotten with `MEMORY`. Reversals after ways of only a few h widen it by half. A
-clean signal has no ripple: h is 0 and the velocity comes out unchanged, without delay.
+The half-width is learnt: a velocity that goes up and at once down again, at a low speed, is a ripple; h is the
+largest ripple so far that came twice, times the sample period, forgotten with `MEMORY`. Reversals after ways of only
+a few h widen it by half. A clean signal has no ripple: h is 0 and the velocity comes out unchanged, without delay.
 
-The speed is the way of a push over the time since the last push (the period method of encoders), smoothed over
-``10 h / |v|``, at most `LONGEST_SMOOTHING`; a way of more than 2 h counts over its own sample. While nothing pushes, the speed
+The speed is the way of a push over the time since the last push (the period method of encoders), smoothed over 10 h /
+|v|, at most `LONGEST_SMOOTHING`; a way of more than 2 h counts over its own sample. While nothing pushes, the speed
 is at most 2 h over the time since the last push.
 
 Source: play operator, [Visintin1994]_; learning and all numbers are our choice.
@@ -21,13 +21,14 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.foundation.limits import between
 
 LONGEST_STEP = 0.02  # [s] a longer time between two samples counts as this one
 LONGEST_SMOOTHING = 0.02  # [s]
-LONGEST_WAIT = 0.2  # [s] a signal that has not pushed for this time is at rest
+LONGEST_WAIT = 0.2  # [s] a signal that has not pushed for this time, or takes it for h, is at rest
 MEMORY = 60.0  # [s] time constant with which a learnt half-width is forgotten
 SLOW_RIPPLE = 4.0  # [-] a ripple counts at speeds up to this multiple of it; a sharp peak of a fast motion is none
-SETTLING = 10  # samples after which a ripple of a signal in motion is known; until then nothing may push by it
+SETTLING = 100  # samples after which a ripple of a signal in motion is known; until then nothing may push by it
 SHORT_WAY = 8.0  # [-] a reversal after a way of less than this multiple of h widens the play
 
 
@@ -50,6 +51,8 @@ class ConditionedVelocity(NamedTuple):
     """[m/s] of the last sample, as given"""
     last_change: float
     """[m/s] last change of the given velocity"""
+    last_ripple: float
+    """[m] last half-width that a ripple asked for"""
     slack: float
     """[m] place in the play, between -h and h"""
     last_push: int
@@ -60,7 +63,7 @@ class ConditionedVelocity(NamedTuple):
     """number of samples, counted up to `SETTLING`"""
 
 
-NOT_CONDITIONED = ConditionedVelocity(NEVER, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0.0, NEVER, 0.0, 0)
+NOT_CONDITIONED = ConditionedVelocity(NEVER, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0.0, 0.0, NEVER, 0.0, 0)
 
 
 @compilable
@@ -71,82 +74,96 @@ def condition_velocity(
 
     Args:
         state: `NOT_CONDITIONED` or the result before.
-        stamp: Of the sample [ns]. A repeated stamp is no new sample: the state stays.
+        stamp: Of the sample [ns]. With a ripple, a repeated stamp is no new sample.
         velocity: Finite [m/s].
         resolution: Smallest ripple to assume [m/s], 0: what is learnt.
     """
     if state.stamp == NEVER:
-        return ConditionedVelocity(stamp, velocity, 0.0, 0.0, 0.0, False, velocity, 0.0, 0.0, stamp, 0.0, 1)
+        return _clean(stamp, velocity, 0.0, 0.0, 1)
     if stamp == state.stamp:
-        return state
+        if state.half_width > 0.0:
+            return state
+        return _clean(stamp, velocity, state.last_change, state.last_ripple, state.samples)
     step = (stamp - state.stamp) * 1e-9
     if not 0.0 < step <= LONGEST_STEP:  # a gap, or a clock that was set back: samples count from now on
         step = LONGEST_STEP
-    change = velocity - state.last_velocity
     samples = state.samples + 1 if state.samples < SETTLING else SETTLING
-    half_width = _half_width(state, velocity, change, step)
-    if half_width < resolution * step:
-        half_width = resolution * step
-    if change == 0.0:
-        change = state.last_change
+    change = velocity - state.last_velocity
+    half_width, ripple = _learnt(state, velocity, change, step)
+    half_width = max(half_width, resolution * step)
     if half_width == 0.0:
-        return ConditionedVelocity(stamp, velocity, 0.0, 0.0, 0.0, False, velocity, change, 0.0, stamp, 0.0, samples)
-    return _pushed(state, stamp, velocity, change, half_width, step, samples)
-
-
-@compilable
-def _half_width(state: ConditionedVelocity, velocity: float, change: float, step: float) -> float:
-    """h [m] after a sample of ``step`` [s]."""
-    learnt = state.half_width * (1.0 - step / MEMORY)
-    if change * state.last_change < 0.0:
-        ripple = _smaller(change, state.last_change)
-        speed = _larger(velocity, state.last_velocity)
-        if speed <= SLOW_RIPPLE * ripple and ripple * step > learnt:
-            return ripple * step
-    return learnt
-
-
-@compilable
-def _pushed(
-    state: ConditionedVelocity,
-    stamp: int,
-    velocity: float,
-    change: float,
-    half_width: float,
-    step: float,
-    samples: int,
-) -> ConditionedVelocity:
-    """A sample through a play of ``half_width`` [m]."""
+        return _clean(stamp, velocity, change, ripple, samples)
     slack = state.slack + velocity * step
-    push = 0.0
-    if slack > half_width:
-        push, slack = slack - half_width, half_width
-    elif slack < -half_width:
-        push, slack = slack + half_width, -half_width
-    pause = (stamp - state.last_push) * 1e-9
-    if pause < step:
-        pause = step
-    result, way, speed = state.velocity, state.way, abs(state.velocity)
+    push = slack - between(-half_width, slack, half_width)
+    slack -= push
     smoothing = LONGEST_SMOOTHING
-    if 10.0 * half_width < speed * LONGEST_SMOOTHING:
-        smoothing = 10.0 * half_width / speed
+    if 10.0 * half_width < abs(state.velocity) * LONGEST_SMOOTHING:
+        smoothing = 10.0 * half_width / abs(state.velocity)
+    if push * state.way < 0.0 and abs(state.way) < SHORT_WAY * half_width:
+        half_width = 1.5 * half_width
+    result = _speed(state, stamp, push, half_width, smoothing, step)
+    return ConditionedVelocity(
+        stamp,
+        result,
+        half_width,
+        half_width / step,
+        smoothing,
+        push == 0.0 and result != state.velocity,
+        velocity,
+        change,
+        ripple,
+        slack,
+        stamp if push != 0.0 else state.last_push,
+        push if push * state.way < 0.0 else state.way + push,
+        samples,
+    )
+
+
+@compilable
+def confirmed_velocity(state: ConditionedVelocity) -> float:
+    """The velocity [m/s] to act on: 0.0 until two samples agree on a direction, as the ripple may not be known yet."""
+    if state.samples < SETTLING:
+        return 0.0
+    before = state.last_velocity - state.last_change
+    return 0.0 if state.half_width == 0.0 and state.velocity * before <= 0.0 else state.velocity
+
+
+@compilable
+def _learnt(state: ConditionedVelocity, velocity: float, change: float, step: float) -> tuple[float, float]:
+    """Half-width h, and the last half-width that a ripple asked for [m], after a sample of ``step`` [s]."""
+    forgotten = 1.0 - step / MEMORY
+    half_width, ripple = forgotten * state.half_width, forgotten * state.last_ripple
+    turns_back = change * state.last_change < 0.0
+    if turns_back and _larger(velocity, state.last_velocity) <= SLOW_RIPPLE * _smaller(change, state.last_change):
+        asked = step * _smaller(change, state.last_change)
+        half_width = max(half_width, _smaller(asked, ripple))
+        ripple = asked
+    return half_width, ripple
+
+
+@compilable
+def _speed(
+    state: ConditionedVelocity, stamp: int, push: float, half_width: float, smoothing: float, step: float
+) -> float:
+    """Velocity [m/s] after a push [m], which is 0.0 within the play."""
+    pause = max((stamp - state.last_push) * 1e-9, step)
     if push == 0.0:
         fastest = 2.0 * half_width / pause if pause < LONGEST_WAIT else 0.0
-        is_waiting = speed > fastest
-        if is_waiting:
-            result = fastest if result > 0.0 else -fastest
-        return ConditionedVelocity(
-            stamp, result, half_width, half_width / step, smoothing, is_waiting, velocity, change, slack, state.last_push, way, samples
-        )
-    if push * way < 0.0:
-        if abs(way) < SHORT_WAY * half_width:
-            half_width = 1.5 * half_width
-        result, way = 0.0, 0.0
+        if abs(state.velocity) <= fastest:
+            return state.velocity
+        return fastest if state.velocity > 0.0 else -fastest
+    before = 0.0 if push * state.way < 0.0 else state.velocity
     if abs(push) > 2.0 * half_width:
         pause = step
-    result += (push / pause - result) * pause / (pause + smoothing)
+    speed = before + (push / pause - before) * pause / (pause + smoothing)
+    return speed if abs(speed) > half_width / LONGEST_WAIT else 0.0
+
+
+@compilable
+def _clean(stamp: int, velocity: float, change: float, ripple: float, samples: int) -> ConditionedVelocity:
+    """A sample of a signal without ripple: the velocity as it is."""
     return ConditionedVelocity(
-        stamp, result, half_width, half_width / step, smoothing, False, velocity, change, slack, stamp, way + push, samples
+        stamp, velocity, 0.0, 0.0, 0.0, False, velocity, change, ripple, 0.0, stamp, 0.0, samples
     )
 
 

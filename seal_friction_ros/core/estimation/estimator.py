@@ -191,7 +191,9 @@ class Observation(NamedTuple):
 def init(parameters: EstimatorParameters) -> EstimatorState:
     """State before the first sample: no inputs, the rod counts as moving."""
     del parameters
-    return EstimatorState(NEVER, False, NO_PRESSURE, NO_FORCE, NO_SPEED, NO_PRESSURE, NO_FORCE, NO_SPEED, NOT_CONDITIONED)
+    return EstimatorState(
+        NEVER, False, NO_PRESSURE, NO_FORCE, NO_SPEED, NO_PRESSURE, NO_FORCE, NO_SPEED, NOT_CONDITIONED
+    )
 
 
 # Status bits as plain integers: IntFlag arithmetic costs a microsecond each time.

@@ -5,16 +5,16 @@ r"""Estimate and wanted velocity -> the force that cancels the seal friction bef
 .. math::
     F = s\,\max(f, 0) \tanh(v / w)
 
-with v the wanted velocity, `wanted_velocity`, and f the friction of the seals at it: Coulomb friction, and what the law or the
-velocity terms of the seal file add to it. One gain s scales everything, so F is 0 N for s = 0, and F v >= 0 for every law, gain
-and velocity: the force never acts against the wanted motion.
+with v the wanted velocity, `wanted_velocity`, and f the friction of the seals at it: Coulomb friction, and what the
+law or the velocity terms of the seal file add to it. One gain s scales everything, so F is 0 N for s = 0, and F v >=
+0 for every law, gain and velocity: the force never acts against the wanted motion.
 
 The velocity comes from the reference and not from the rod, so the feed-forward closes no loop: too large a force makes
 an error, but no limit cycle. A gain below 1 leaves some friction to the controller, which a wrong model needs. tanh is
 smooth through zero here, where it shapes a command; the friction itself is never smoothed.
 
-Time is the time of receipt: stamps that freeze, alternate or jump neither hold the force nor speed it up. The slew limit holds
-for the force before it is faded, so the fade takes its time whatever the slew limit is.
+Time is the time of receipt: stamps that freeze, alternate or jump neither hold the force nor speed it up. The slew
+limit holds for the force before it is faded, so the fade takes its time whatever the slew limit is.
 
 Source: [Armstrong1994]_ (feed-forward from the desired velocity); fade, slew and clamp are our choice.
 """
@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.records import NEVER, FrictionEstimate, Status
 from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.states import UNKNOWN
 
@@ -162,21 +163,21 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
 def wanted_velocity(settings: FeedForwardSettings, motion: WantedMotion) -> float:
     """Velocity v [m/s] of the equation, ``lead_time`` ahead; NaN if it is not known.
 
-    The lead reverses a clean velocity before the motion does. The lead of a velocity with a ripple that matters to tanh(v / w)
-    stops at 0: a difference of a rounded velocity says nothing about a reversal to come.
+    The lead reverses a clean velocity before the motion does. The lead of a velocity with a ripple that matters to
+    tanh(v / w) stops at 0: a difference of a rounded velocity says nothing about a reversal to come.
     """
     velocity = motion.velocity
     if not math.isfinite(velocity):
         return math.nan
     lead = settings.lead_time * motion.acceleration
     if motion.ripple > LARGEST_RIPPLE * settings.smoothing_velocity:
-        lead = _between(-abs(velocity), lead, abs(velocity))
-    return _between(-FASTEST, velocity + lead, FASTEST) if math.isfinite(lead) else _between(-FASTEST, velocity, FASTEST)
+        lead = between(-abs(velocity), lead, abs(velocity))
+    return between(-FASTEST, velocity + lead, FASTEST) if math.isfinite(lead) else between(-FASTEST, velocity, FASTEST)
 
 
 @compilable
 def compensation(settings: FeedForwardSettings, friction: float, velocity: float) -> float:
-    """Force [N] for a friction f [N] and a velocity [m/s], before fade and limits: the equation at the head of this file."""
+    """Force [N] for a friction f [N] and a velocity [m/s], before fade and limits: the equation at the top."""
     if not friction > 0.0:
         return 0.0
     return settings.scale * friction * math.tanh(velocity / settings.smoothing_velocity)
@@ -193,8 +194,8 @@ def step(
 ) -> tuple[FeedForwardState, FeedForward]:
     """Feed-forward at one moment.
 
-    Without a usable friction and velocity the last usable ones are faded out over ``fade_time``; with them the force fades
-    in. Clamp, then slew, then fade.
+    Without a usable friction and velocity the last usable ones are faded out over ``fade_time``; with them the force
+    fades in. Clamp, then slew, then fade.
 
     Args:
         settings: Settings.
@@ -212,25 +213,18 @@ def step(
         velocity = state.velocity
     short = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
     change = short / settings.fade_time if valid else -elapsed / settings.fade_time
-    fade = _between(0.0, state.fade + change, 1.0)
+    fade = between(0.0, state.fade + change, 1.0)
 
     limited = _FADE if fade < 1.0 or not valid else 0
     wanted = compensation(settings, friction, velocity)
-    clamped = _between(-settings.force_limit, wanted, settings.force_limit)
+    clamped = between(-settings.force_limit, wanted, settings.force_limit)
     if clamped != wanted:
         limited |= _CLAMP
     most = settings.slew_limit * short
-    force = _between(state.force - most, clamped, state.force + most)
+    force = between(state.force - most, clamped, state.force + most)
     if force != clamped:
         limited |= _SLEW
     if settings.scale == 0.0:
         force = 0.0
     feedforward = FeedForward(stamp, fade * force + 0.0, settings.scale * fade, limited)
     return FeedForwardState(received, force, fade, friction, velocity), feedforward
-
-
-@compilable
-def _between(lowest: float, value: float, highest: float) -> float:
-    if value < lowest:
-        return lowest
-    return highest if value > highest else value

@@ -41,7 +41,7 @@ class InputOptions:
     """Acceptance of inputs, one ROS parameter per field."""
 
     refuse_second_publisher: bool = parameter(
-        False,
+        True,
         unit='',
         description='Reject all inputs while an input or output topic has more than one publisher: the estimate is '
         'invalid and the feed-forward fades out.',
@@ -91,6 +91,17 @@ FRICTION_ESTIMATOR_PARAMETERS = (
     ParameterGroup(RecordingOptions),
 )
 """Every parameter that the node ``friction_estimator`` declares."""
+
+_VELOCITY_TERMS = 'velocity_terms of the seal file'
+REMOVED_PARAMETERS = {
+    'feedforward.coulomb_scale': 'feedforward.scale',
+    'feedforward.viscous_scale': 'feedforward.scale',
+    'feedforward.stribeck_scale': 'feedforward.scale',
+    'feedforward.viscous_friction': _VELOCITY_TERMS,
+    'feedforward.stribeck_velocity': _VELOCITY_TERMS,
+    'feedforward.stribeck_exponent': _VELOCITY_TERMS,
+}
+"""Parameter of an earlier version -> what replaces it."""
 
 ROS_PARAMETERS = ('use_sim_time', 'start_type_description_service', 'qos_overrides')
 """Parameters and parameter groups that rclpy declares for every node."""

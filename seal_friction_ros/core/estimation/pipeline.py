@@ -1,15 +1,15 @@
 """The path of every message: what comes in, what is kept of it, what goes out. The same for the node and for replay.
 
-``state = init(parameters)``, then ``state = receive(parameters, state, message, received, emit)`` for every message, in order
-of receipt. The node passes a function that publishes, replay one that collects.
+``state = init(parameters)``, then ``state = receive(parameters, state, message, received, emit)`` for every message,
+in order of receipt. The node passes a function that publishes, replay one that collects.
 
 A velocity sample makes an estimate with the newest pressure and force sum, and, once there has been a reference, a
-feed-forward. The estimate is emitted before the feed-forward is computed. While no velocity sample comes, the ticks of the
-watchdog make the feed-forward, so that it fades out.
+feed-forward. The estimate is emitted before the feed-forward is computed. While no velocity sample comes, the ticks
+of the watchdog make the feed-forward, so that it fades out.
 
-``received`` is the time of receipt, which a bag holds as log time. How old an input is for the feed-forward is counted on this
-clock, which never jumps; a message with the stamp of the one before is no new sample. `PipelineState.clock_offset` leads from
-it to the clock of the stamps.
+``received`` is the time of receipt, which a bag holds as log time. How old an input is for the feed-forward is
+counted on this clock, which never jumps; a message with the stamp of the one before is no new sample.
+`PipelineState.clock_offset` leads from it to the clock of the stamps.
 
 Inputs with several publishers are refused, since nobody knows which publisher is right: they still make estimates, so
 that everybody sees it, but the estimates are marked and the feed-forward fades out.
@@ -25,10 +25,12 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     SETTLING,
     ConditionedVelocity,
     condition_velocity,
+    confirmed_velocity,
 )
 from seal_friction_ros.core.estimation.estimator import NO_VELOCITY, EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.estimator import step as estimator_step
 from seal_friction_ros.core.estimation.feedforward import (
+    FASTEST,
     NO_MOTION,
     FeedForwardSettings,
     FeedForwardState,
@@ -43,7 +45,6 @@ from seal_friction_ros.core.estimation.records import (
     NO_FORCE,
     NO_PRESSURE,
     Force,
-    FrictionEstimate,
     Position,
     Pressure,
     RodSample,
@@ -52,9 +53,11 @@ from seal_friction_ros.core.estimation.records import (
     WatchdogTick,
 )
 from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.friction.actuator import friction_of_seals
 
 ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
+LARGEST_ACCELERATION = 1e6  # [m/s^2] no rod accelerates faster
 TICK_INTERVAL = 10_000_000  # [ns] of the watchdog: it acts if no feed-forward was made for this time
 
 Emit = Callable[[Output, bytes], object]
@@ -233,12 +236,14 @@ def is_tick_due(state: PipelineState, now: int) -> bool:
 def _conditioned(reference: Reference, wanted: Any) -> Reference:
     """Reference after a new one, with a velocity without ripple and an acceleration that two references agree on.
 
-    Two accelerations in a row of the same sign count with the smaller magnitude, others as 0: the difference of a rounded velocity
-    alternates, that of a clean one does not.
+    Two accelerations in a row of the same sign count with the smaller magnitude, others as 0: the difference of a
+    rounded velocity alternates, that of a clean one does not.
     """
     stamp = reference.velocity.stamp
-    velocity = condition_velocity(reference.velocity, wanted.stamp, wanted.velocity, 0.0)
-    given, last = wanted.acceleration if math.isfinite(wanted.acceleration) else 0.0, reference.last_acceleration
+    velocity = condition_velocity(reference.velocity, wanted.stamp, between(-FASTEST, wanted.velocity, FASTEST), 0.0)
+    given, last = 0.0, reference.last_acceleration
+    if math.isfinite(wanted.acceleration):
+        given = between(-LARGEST_ACCELERATION, wanted.acceleration, LARGEST_ACCELERATION)
     agreed = 0.0
     if given * last > 0.0:
         agreed = given if abs(given) < abs(last) else last
@@ -265,8 +270,7 @@ def _feed_forward(
     if ground >= 0.0 and parameters.estimator.depends_on_velocity and not math.isnan(velocity):
         seals, used = parameters.estimator.seal_numbers, known.pressure
         ground += friction_of_seals(seals, used.chamber_a, used.chamber_b, velocity).velocity_friction
-        if ground < 0.0:
-            ground = 0.0
+        ground = max(ground, 0.0)
     guided, compensation = feedforward_step(settings, guided, stamp, received, ground, velocity)
     send(emit, compensation, frame_id)
     return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
@@ -278,15 +282,12 @@ def _wanted_motion(
 ) -> WantedMotion:
     """Conditioned motion of the reference, or with ``use_measured_velocity`` of the rod."""
     if settings.use_measured_velocity:
-        if known.motion.samples < SETTLING:
-            return NO_MOTION
-        return WantedMotion(known.motion.velocity, 0.0, 0.0)
+        return WantedMotion(confirmed_velocity(known.motion), 0.0, 0.0)
     if not _is_younger(receipt.reference, received, settings.reference_timeout):
         return NO_MOTION
-    conditioned = reference.velocity
-    if conditioned.samples < SETTLING:
-        return NO_MOTION
-    return WantedMotion(conditioned.velocity, reference.acceleration, conditioned.ripple)
+    given = reference.velocity
+    acceleration = reference.acceleration if given.samples >= SETTLING else 0.0
+    return WantedMotion(confirmed_velocity(given), acceleration, given.ripple)
 
 
 @compilable

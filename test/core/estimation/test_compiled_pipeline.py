@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import pairwise
 
@@ -24,13 +25,14 @@ from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
+    TICK_TYPE,
     VELOCITY_TYPE,
     decode,
     encode,
     type_of,
 )
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init, receive
-from seal_friction_ros.core.estimation.records import NEVER, Force, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.estimation.records import NEVER, Force, Pressure, ServoReference, Velocity, WatchdogTick
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal, friction_of_seals
@@ -99,13 +101,27 @@ def serialised(record: object, frame: bytes) -> tuple[Kind, bytes]:
             return Kind.VELOCITY, encode(record._replace(frame_id=frame))
         case ServoReference():
             return Kind.REFERENCE, encode(record._replace(frame_id=frame))
+        case WatchdogTick():
+            return Kind.TICK, encode(record._replace(frame_id=frame))
     return Kind.OTHER, b'something'
 
 
-def in_memory(pieces: Sequence[tuple[Kind, bytes]]) -> Messages:
+def receipts(pieces: Sequence[tuple[Kind, bytes]]) -> list[int]:
+    """Times of receipt [ns]: the newest stamp so far, a little later, as far as the pieces have stamps."""
+    newest, times = 0, []
+    for kind, data in pieces:
+        if kind in TYPES:
+            with suppress(ValueError):
+                newest = max(newest, decode(TYPES[kind], data).stamp)
+        times.append(newest + 20_000)
+    return times
+
+
+def in_memory(pieces: Sequence[tuple[Kind, bytes]], times: Sequence[int] | None = None) -> Messages:
     sizes = np.array([len(data) for _, data in pieces], np.int64)
     data = np.frombuffer(b''.join(data for _, data in pieces), np.uint8)
-    return Messages(data, np.array([kind for kind, _ in pieces], np.uint8), np.cumsum(sizes) - sizes, sizes)
+    kinds = np.array([kind for kind, _ in pieces], np.uint8)
+    return Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, np.array(times or receipts(pieces), np.int64))
 
 
 TYPES = {
@@ -113,6 +129,7 @@ TYPES = {
     Kind.FORCE: FORCE_TYPE,
     Kind.VELOCITY: VELOCITY_TYPE,
     Kind.REFERENCE: REFERENCE_TYPE,
+    Kind.TICK: TICK_TYPE,
 }
 
 
@@ -120,28 +137,29 @@ def _collect(answers: dict[str, bytes], record: object, frame_id: bytes) -> None
     answers[type_of(record)] = encode(record, frame_id)
 
 
-def one_by_one(parameters: PipelineParameters, state: PipelineState, pieces: Sequence[tuple[Kind, bytes]]):
+def one_by_one(parameters: PipelineParameters, state: PipelineState, pieces, times):
     answers = []
-    for kind, data in pieces:
+    for (kind, data), received in zip(pieces, times, strict=True):
         given_back: dict[str, bytes] = {}
         if kind in TYPES:
             collect = partial(_collect, given_back)
-            state = receive(parameters, state, decode(TYPES[kind], data), collect)
+            state = receive(parameters, state, decode(TYPES[kind], data), received, collect)
         answers.append((given_back.get(ESTIMATE_TYPE, b''), given_back.get(FEEDFORWARD_TYPE, b'')))
     return state, answers
 
 
-def all_at_once(parameters: PipelineParameters, state: PipelineState, pieces: Sequence[tuple[Kind, bytes]]):
-    state, found = receive_all(parameters, state, in_memory(pieces))
+def all_at_once(parameters: PipelineParameters, state: PipelineState, pieces, times):
+    state, found = receive_all(parameters, state, in_memory(pieces, times))
     places = zip(*(column.tolist() for column in found[1:]), strict=True)
     return state, [(found.data[a : a + b].tobytes(), found.data[c : c + d].tobytes()) for a, b, c, d in places]
 
 
 def assert_same(parameters: PipelineParameters, state: PipelineState, pieces: Sequence[tuple[Kind, bytes]], cuts=()):
-    expected_state, expected = one_by_one(parameters, state, pieces)
+    times = receipts(pieces)
+    expected_state, expected = one_by_one(parameters, state, pieces, times)
     answers = []
     for first, end in pairwise([0, *sorted(cuts), len(pieces)]):
-        state, some = all_at_once(parameters, state, pieces[first:end])
+        state, some = all_at_once(parameters, state, pieces[first:end], times[first:end])
         answers += some
     assert answers == expected
     assert repr(state) == repr(expected_state)  # NaN is not equal to itself
@@ -162,7 +180,7 @@ def runs(draw) -> list[tuple[Kind, bytes]]:
     for _ in range(draw(st.integers(1, 30))):
         stamp += draw(later)
         stamp = max(min(stamp, (2**31 - 1) * 10**9), -(2**31) * 10**9)
-        what = draw(st.integers(0, 7))
+        what = draw(st.integers(0, 8))
         at = stamp + draw(st.sampled_from([0, 0, 0, -200 * MS if stamp > 0 else 0]))
         if what in (0, 1):
             record: object = Pressure(at, draw(pressures), draw(pressures))
@@ -172,6 +190,8 @@ def runs(draw) -> list[tuple[Kind, bytes]]:
             record = ServoReference(at, 0.0, draw(small), draw(st.floats(-2.0, 2.0) | odd))
         elif what == 5:
             record = None
+        elif what == 6:
+            record = WatchdogTick(stamp, draw(odd))
         else:
             record = Velocity(at, draw(small), b'')
         kind, data = serialised(record, draw(frames))
@@ -189,10 +209,9 @@ changes = st.fixed_dictionaries(
     {},
     optional={
         'use_measured_velocity': st.booleans(),
-        'stribeck_scale': st.floats(0.0, 2.0),
-        'stribeck_exponent': st.sampled_from([0.5, 1.0, 2.0, 3.7]),
-        'viscous_friction': st.floats(0.0, 1e4),
-        'fade_time': st.floats(1e-4, 1.0),
+        'scale': st.floats(0.0, 2.0),
+        'velocity_resolution': st.floats(0.0, 0.1),
+        'fade_time': st.floats(1e-3, 1.0),
         'force_limit': st.floats(0.0, 200.0),
         'slew_limit': st.floats(1e-3, 1e6),
         'use_stiction': st.booleans(),
@@ -264,8 +283,14 @@ def test_the_friction_of_many_moments_is_that_of_each(actuator):
 
 @pytest.mark.parametrize('kind', TYPES)
 def test_what_the_decoder_refuses_is_refused_and_what_it_takes_is_taken(kind):
-    record = {Kind.PRESSURE: Pressure(1, 2.0, 3.0), Kind.FORCE: Force(1, 2.0), Kind.VELOCITY: Velocity(1, 2.0, b'')}
-    good = serialised(record.get(kind, ServoReference(1, 2.0, 3.0, 4.0)), b'rod')[1]
+    records = (
+        Pressure(1, 2.0, 3.0),
+        Force(1, 2.0),
+        Velocity(1, 2.0),
+        ServoReference(1, 2.0, 3.0, 4.0),
+        WatchdogTick(1, 2.0),
+    )
+    good = dict(serialised(record, b'rod') for record in records)[kind]
     bad = [good[:n] for n in range(len(good))] + [good + bytes(n) for n in range(6)]
     for place in range(16):
         bad += [good[:place] + bytes([value]) + good[place + 1 :] for value in (0, 1, 4, 5, 127, 128, 255)]

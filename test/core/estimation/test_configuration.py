@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, ConditionedVelocity
 from seal_friction_ros.core.estimation.configuration import (
     Configuration,
     SealSelection,
@@ -21,62 +22,81 @@ from seal_friction_ros.core.estimation.configuration import (
 from seal_friction_ros.core.estimation.estimator import NO_SPEED, EstimatorSettings, EstimatorState, Speed
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
 from seal_friction_ros.core.estimation.messages import decode_text, encode_text
-from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, PipelineState, WantedMotion, init
+from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, PipelineState, ReceiptTimes, Reference, init
 from seal_friction_ros.core.estimation.records import (
     NEVER,
-    NO_ESTIMATE,
     NO_FORCE,
     NO_PRESSURE,
     Force,
-    FrictionEstimate,
     Pressure,
     ServoReference,
     Velocity,
 )
-from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import load_configuration, read_yaml
 
+MS = 1_000_000  # [ns]
 SEALS = ROOT / 'config' / 'seals'
 CONFIGURATION = load_configuration(SealSelection(), EstimatorSettings())
-ESTIMATE = FrictionEstimate(5, 40.0, 1.5, 50.0, -40.0, FrictionState.SLIDING, -1, 0, 0.001)
+CONDITIONED = ConditionedVelocity(5, 0.1, 1e-6, 1e-3, 0.01, True, 0.11, -0.01, 2e-6, -5e-7, 4, 0.02, 10)
 SNAPSHOT = Snapshot(
     CONFIGURATION,
     PipelineState(
         EstimatorState(
-            5, True, Pressure(3, 1e6, 2e6), Force(4, -3.5), Speed(5, 0.1), NO_PRESSURE, Force(5, 9e5), NO_SPEED
+            5,
+            True,
+            Pressure(3, 1e6, 2e6),
+            Force(4, -3.5),
+            Speed(5, 0.1),
+            NO_PRESSURE,
+            Force(5, 9e5),
+            NO_SPEED,
+            CONDITIONED,
         ),
-        FeedForwardState(5, 12.5, 0.75, ESTIMATE, -0.02),
+        FeedForwardState(5, 12.5, 0.75, 40.0, -0.02),
+        40.0,
         Pressure(3, math.nan, -0.0),
         NO_FORCE,
-        WantedMotion(4, -0.02, math.inf),
+        Reference(CONDITIONED, -0.02, 0.5),
+        ReceiptTimes(6, 4, NEVER, 5),
         refused=True,
+        clock_offset=-7,
     ),
 )
 
 stamps = st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1)
 usable = st.floats(allow_nan=False, allow_infinity=False)
 anything = st.floats()
-estimates = st.builds(
-    FrictionEstimate,
-    stamps,
-    *[usable] * 4,
-    st.sampled_from(FrictionState),
-    st.integers(-1, 1),
-    st.integers(0, 2**16 - 1),
-    usable,
-)
 stamps_or_never = st.just(NEVER) | stamps
 usable_pressures = st.just(NO_PRESSURE) | st.builds(Pressure, stamps, usable, usable)
 usable_forces = st.just(NO_FORCE) | st.builds(Force, stamps, usable)
 usable_speeds = st.just(NO_SPEED) | st.builds(Speed, stamps, usable)
+conditioned = st.just(NOT_CONDITIONED) | st.builds(
+    ConditionedVelocity,
+    stamps,
+    *[usable] * 4,
+    st.booleans(),
+    *[usable] * 4,
+    stamps_or_never,
+    usable,
+    st.integers(0, 10),
+)
 states = st.builds(
     PipelineState,
-    st.builds(EstimatorState, stamps_or_never, st.booleans(), *[usable_pressures, usable_forces, usable_speeds] * 2),
-    st.builds(FeedForwardState, stamps_or_never, usable, usable, st.just(NO_ESTIMATE) | estimates, usable),
+    st.builds(
+        EstimatorState,
+        stamps_or_never,
+        st.booleans(),
+        *[usable_pressures, usable_forces, usable_speeds] * 2,
+        conditioned,
+    ),
+    st.builds(FeedForwardState, stamps_or_never, usable, usable, usable, usable),
+    usable,
     st.just(NO_PRESSURE) | st.builds(Pressure, stamps, anything, anything),
     st.just(NO_FORCE) | st.builds(Force, stamps, anything),
-    st.just(NO_REFERENCE) | st.builds(WantedMotion, stamps, anything, anything),
+    st.just(NO_REFERENCE) | st.builds(Reference, conditioned, usable, usable),
+    st.builds(ReceiptTimes, *[stamps_or_never] * 4),
     st.booleans(),
+    stamps,
 )
 
 
@@ -116,8 +136,8 @@ def test_the_text_is_a_fixed_point(state):
 
 
 @given(
-    st.builds(EstimatorSettings, use_stiction=st.booleans(), pressure_timeout=st.floats(1e-4, 60.0)),
-    st.builds(FeedForwardSettings, use_measured_velocity=st.booleans(), coulomb_scale=st.floats(0.0, 2.0)),
+    st.builds(EstimatorSettings, use_stiction=st.booleans(), pressure_timeout=st.floats(1e-3, 1.0)),
+    st.builds(FeedForwardSettings, use_measured_velocity=st.booleans(), scale=st.floats(0.0, 2.0)),
 )
 def test_settings_come_back_exactly(settings, feedforward):
     configuration = Configuration(SealSelection(), CONFIGURATION.seal_documents, settings, feedforward)
@@ -146,13 +166,16 @@ def test_every_shipped_seal_survives_the_text_and_the_wire(path):
 
 def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
     parameters = CONFIGURATION.parameters()
-    before = [Pressure(0, 3e6, 3e6), Force(0, 12.0), ServoReference(0, 0.0, 0.02, 0.0), Velocity(1, 5e-4, b'')]
+    before = []
+    for stamp in range(0, 40 * MS, MS):
+        before += [Pressure(stamp, 3e6, 3e6), Force(stamp, 12.0), ServoReference(stamp, 0.0, 0.02, 0.0)]
+        before += [Velocity(stamp, 5e-4, b'')]
     state = init(parameters)
     for message in before:
         state, _ = receive_one(parameters, state, message)
     back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state)))
-    straight = receive_one(parameters, state, Velocity(2000, 1.5e-3, b'rod'))
-    taken_up = receive_one(back.configuration.parameters(), back.state, Velocity(2000, 1.5e-3, b'rod'))
+    straight = receive_one(parameters, state, Velocity(40 * MS, 1.5e-3, b'rod'))
+    taken_up = receive_one(back.configuration.parameters(), back.state, Velocity(40 * MS, 1.5e-3, b'rod'))
     assert straight[1].feedforward.force > 0.0
     assert taken_up == straight
 
@@ -180,7 +203,7 @@ def test_what_is_no_snapshot_is_refused_with_a_value_error(text):
         ('state.force.force', 'x', 'hexadecimal'),
         ('state.force.stamp', 'x', 'invalid literal'),
         ('state.estimator.velocity.velocity', 'nan', 'a number in the state is not finite'),
-        ('state.feedforward.estimate.state', 9, '9 is not a valid FrictionState'),
+        ('version', 'new', 'invalid literal'),
         ('selection.seals', 'ms28775_114', "configuration: selection.seals = 'ms28775_114' is not a list"),
         ('selection.seal_chambers', ['a'], 'has 1 entries but there are 2 seals'),
         ('settings.stick_velocity', -1.0, 'stick_velocity = -1.0 m/s is below its lower bound'),
@@ -227,10 +250,25 @@ def test_a_hostile_snapshot_is_refused_with_a_value_error(text):
         'state.estimator.velocity.velocity',
         'state.estimator.leapt_force.force',
         'state.feedforward.fade',
-        'state.feedforward.estimate.coulomb_friction',
+        'state.friction',
+        'state.reference.velocity.half_width',
     ],
 )
 @pytest.mark.parametrize('value', ['nan', '-inf'])
 def test_a_value_in_use_that_is_not_finite_is_refused(path, value):
     with pytest.raises(ValueError, match='a number in the state is not finite'):
         parse_snapshot(with_part(path, value))
+
+
+def test_a_snapshot_of_the_version_before_is_taken_as_far_as_it_goes():
+    document = json.loads(snapshot_text(SNAPSHOT))
+    del document['version']
+    document['feedforward'] |= {'coulomb_scale': 0.4, 'viscous_scale': 0.2, 'estimate_timeout': 60.0}
+    del document['feedforward']['scale']
+    back = parse_snapshot(json.dumps(document))
+    assert back.version == 1
+    feedforward = back.configuration.feedforward
+    assert (feedforward.scale, feedforward.estimate_timeout) == (0.4, 1.0)
+    assert back.state.pressure.stamp == SNAPSHOT.state.pressure.stamp
+    assert back.state.refused
+    assert back.state.feedforward == init(CONFIGURATION.parameters()).feedforward

@@ -77,8 +77,8 @@ all_settings = st.builds(
     lambda speeds, **others: EstimatorSettings(stick_velocity=min(speeds), slip_velocity=max(speeds), **others),
     st.tuples(*[st.sampled_from([0.0, 1e-3, 2e-3]) | st.floats(0.0, 1.0)] * 2),
     use_stiction=st.booleans(),
-    pressure_timeout=st.floats(1e-4, 60.0),
-    force_timeout=st.floats(1e-4, 60.0),
+    pressure_timeout=st.floats(1e-3, 1.0),
+    force_timeout=st.floats(1e-3, 1.0),
     pressure_min=st.floats(-1.2e5, 0.0),
     pressure_max=st.floats(1e4, 1e9),
     velocity_max=st.floats(1e-3, 100.0),
@@ -238,6 +238,8 @@ PROVOKED = {
     'FORCE_LEAP': ([GOOD], sample(START + MS, force=-1.1e5), Status.FORCE_LEAP),
     'VELOCITY_LEAP': ([GOOD], sample(START + MS, velocity=-1.1), Status.VELOCITY_LEAP),
     'INPUT_REFUSED': ([GOOD], sample(START + MS)._replace(refused=True), Status.INPUT_REFUSED),
+    'STAMP_AGE': ([GOOD], sample(START + MS)._replace(stamp_age=-1.01), Status.STAMP_AGE),
+    'MOTION_UNCERTAIN': ([GOOD], sample(START + MS, velocity=9e-4), Status.MOTION_UNCERTAIN),
 }
 
 
@@ -453,8 +455,8 @@ def test_input_age_is_that_of_the_value_in_use_not_of_the_unusable_newest():
     [
         ({'stick_velocity': 3e-3}, 'slip_velocity = 0.002 m/s is below stick_velocity = 0.003 m/s'),
         ({'stick_velocity': -1e-3}, 'stick_velocity = -0.001 m/s is below its lower bound 0.0 m/s'),
-        ({'pressure_timeout': 0.0}, 'pressure_timeout = 0.0 s is below its lower bound 0.0001 s'),
-        ({'force_timeout': 61.0}, 'force_timeout = 61.0 s is above its upper bound 60.0 s'),
+        ({'pressure_timeout': 0.0}, 'pressure_timeout = 0.0 s is below its lower bound 0.001 s'),
+        ({'force_timeout': 61.0}, 'force_timeout = 61.0 s is above its upper bound 1.0 s'),
         ({'pressure_max': 0.0}, 'pressure_max = 0.0 Pa is below its lower bound 10000.0 Pa'),
         ({'pressure_min': 1.0}, 'pressure_min = 1.0 Pa is above its upper bound 0.0 Pa'),
         ({'velocity_max': math.nan}, 'velocity_max = nan m/s is not finite'),

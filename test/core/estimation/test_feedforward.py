@@ -1,3 +1,5 @@
+"""The feed-forward: one gain, never against the wanted motion, and 0 N when anything is missing."""
+
 import dataclasses
 import math
 from itertools import pairwise
@@ -9,71 +11,77 @@ from hypothesis import strategies as st
 from seal_friction_ros.core.estimation.feedforward import (
     FeedForwardSettings,
     Limited,
-    Motion,
+    WantedMotion,
     compensation,
     init,
     step,
+    usable,
+    wanted_velocity,
 )
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate, Status
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import FrictionState
 
-MS = 1_000_000
-GOOD = FrictionEstimate(0, 42.0, 3.0, 47.0, 42.0, FrictionState.SLIDING, 1, 0, 0.0)
-FORWARD = Motion(0.1)
+MS = 1_000_000  # [ns]
+NONE = -1.0  # no usable friction
 SHARP = FeedForwardSettings(slew_limit=1e9, lead_time=0.0)
 
 
-def run(settings, n, estimate=GOOD, motion=FORWARD, *, state=None, start=0):
-    """Take n steps of 1 ms with estimates that are always fresh (or none); all outputs."""
-    state, rows = state or init(settings), []
+def run(settings, n, friction=42.0, velocity=0.1, *, state=None, start=0, step_time=MS):
+    """Take n steps of ``step_time`` [ns], by default faded in; the state and all outputs."""
+    state, rows = state or init(settings)._replace(fade=1.0), []
     for i in range(start, start + n):
-        now = estimate if estimate is NO_ESTIMATE else estimate._replace(stamp=i * MS)
-        state, out = step(settings, state, i * MS, now, motion)
+        state, out = step(settings, state, i * step_time, i * step_time, friction, velocity)
         rows.append(out)
     return state, rows
 
 
-def test_share_of_the_coulomb_friction_in_the_direction_of_the_reference():
+def test_share_of_the_friction_in_the_direction_of_the_wanted_velocity():
     for velocity in (0.1, -0.1):
-        _, rows = run(SHARP, 3, motion=Motion(velocity))
+        _, rows = run(SHARP, 3, velocity=velocity)
         assert rows[-1].force == pytest.approx(math.copysign(0.9 * 42.0, velocity))
-        assert rows[-1].limited == 0
-        assert rows[-1].scale == 0.9
+        assert (rows[-1].limited, rows[-1].scale) == (0, 0.9)
 
 
-def test_default_scales_are_below_1_and_terms_the_seal_lacks_are_0():
-    settings = FeedForwardSettings()
-    assert settings.coulomb_scale < 1.0
-    assert settings.viscous_scale < 1.0
-    assert settings.viscous_friction == settings.stribeck_scale == 0.0
+@given(st.floats(0.0, 2.0), st.floats(-1e6, 1e6), st.floats(-100.0, 100.0), st.floats(1e-6, 1.0))
+def test_one_gain_scales_everything_and_the_force_never_acts_against_the_velocity(scale, friction, velocity, width):
+    settings = dataclasses.replace(SHARP, scale=scale, smoothing_velocity=width)
+    force = compensation(settings, friction, velocity)
+    assert force * velocity >= 0.0
+    assert compensation(settings, friction, -velocity) == -force
+    assert force == pytest.approx(scale * compensation(dataclasses.replace(settings, scale=1.0), friction, velocity))
+    assert abs(force) <= scale * max(friction, 0.0)
 
 
-def test_viscous_and_stribeck_terms():
-    settings = dataclasses.replace(SHARP, viscous_friction=100.0, viscous_scale=0.5, stribeck_scale=0.8)
-    velocity = 0.005
-    expected = math.tanh(5.0) * (0.9 * 42.0 + 0.8 * 5.0 * math.exp(-1.0)) + 0.5 * 100.0 * velocity
-    assert compensation(settings, GOOD, velocity) == pytest.approx(expected)
+def test_scale_0_is_0_newton_at_once():
+    state, rows = run(SHARP, 10)
+    assert rows[-1].force > 30.0
+    _, rows = run(dataclasses.replace(SHARP, scale=0.0, slew_limit=1.0), 3, state=state, start=10)
+    assert [row.force for row in rows] == [0.0] * 3
+    assert all(math.copysign(1.0, row.force) == 1.0 for row in rows)
 
 
 @given(st.floats(-1.0, 1.0))
-def test_odd_bounded_and_smooth_through_zero(velocity):
-    force = compensation(SHARP, GOOD, velocity)
-    assert compensation(SHARP, GOOD, -velocity) == -force
-    assert abs(force) <= 0.9 * 42.0
+def test_smooth_through_zero(velocity):
     steepest = 0.9 * 42.0 / SHARP.smoothing_velocity
-    assert abs(compensation(SHARP, GOOD, velocity + 1e-6) - force) <= 1.001e-6 * steepest
+    change = compensation(SHARP, 42.0, velocity + 1e-6) - compensation(SHARP, 42.0, velocity)
+    assert abs(change) <= 1.001e-6 * steepest
 
 
-def test_lead_sees_the_reversal_before_it_comes():
+def test_the_lead_of_a_clean_velocity_sees_the_reversal_before_it_comes():
     settings = dataclasses.replace(SHARP, lead_time=0.01)
-    _, rows = run(settings, 3, motion=Motion(0.005, -1.0))
-    assert rows[-1].force < 0.0
+    assert wanted_velocity(settings, WantedMotion(0.005, -1.0, 0.0)) == pytest.approx(-0.005)
 
 
-def test_measured_velocity_is_an_option():
-    settings = dataclasses.replace(SHARP, use_measured_velocity=True)
-    _, rows = run(settings, 3, motion=Motion(0.1, 0.0, -0.1))
-    assert rows[-1].force < 0.0
+def test_the_lead_of_a_velocity_with_a_ripple_does_not_reverse_it():
+    settings = dataclasses.replace(SHARP, lead_time=0.01)
+    assert wanted_velocity(settings, WantedMotion(0.005, -1.0, 1e-3)) == 0.0
+    assert wanted_velocity(settings, WantedMotion(0.005, 1.0, 1e-3)) == pytest.approx(0.01)
+
+
+@given(st.floats(), st.floats(), st.floats(0.0, 10.0))
+def test_a_velocity_that_is_not_finite_is_not_known_and_others_are_bounded(velocity, acceleration, ripple):
+    wanted = wanted_velocity(FeedForwardSettings(), WantedMotion(velocity, acceleration, ripple))
+    assert abs(wanted) <= 100.0 if math.isfinite(velocity) else math.isnan(wanted)
 
 
 def test_slew_limits_the_rate_and_says_so():
@@ -93,13 +101,10 @@ def test_clamp_cuts_and_says_so():
     assert rows[-1].limited == Limited.CLAMP
 
 
-@pytest.mark.parametrize(
-    'bad',
-    [GOOD._replace(status=int(Status.PRESSURE_STALE)), GOOD._replace(status=int(Status.INPUT_REFUSED)), NO_ESTIMATE],
-)
-def test_fades_out_without_a_usable_estimate_and_back_in(bad):
+@pytest.mark.parametrize(('friction', 'velocity'), [(NONE, 0.1), (42.0, math.nan), (NONE, math.nan)])
+def test_fades_out_without_a_usable_input_and_back_in(friction, velocity):
     state, _ = run(SHARP, 10)
-    state, rows = run(SHARP, 300, bad, state=state, start=10)
+    state, rows = run(SHARP, 300, friction, velocity, state=state, start=10)
     assert rows[0].limited == Limited.FADE
     assert rows[99].force == pytest.approx(37.8 * 0.5, rel=0.02)
     assert all(b.force <= a.force for a, b in pairwise(rows))
@@ -110,57 +115,79 @@ def test_fades_out_without_a_usable_estimate_and_back_in(bad):
     assert rows[-1].limited == 0
 
 
-def test_estimate_that_is_too_old_fades_out():
+def test_the_fade_beats_the_slew_limit():
+    """A slew limit of 20 N/s made a fade of 0.2 s take 1.9 s."""
     state, _ = run(SHARP, 10)
-    for i in range(10, 500):
-        state, out = step(SHARP, state, i * MS, GOOD._replace(stamp=9 * MS), Motion(0.1))
-        assert out.limited == (Limited.FADE if i > 109 else 0)
-    assert out.force == 0.0
-
-
-def test_bad_force_leaves_the_coulomb_friction_usable():
-    _, rows = run(SHARP, 3, GOOD._replace(status=int(Status.FORCE_STALE), state=FrictionState.UNKNOWN))
-    assert rows[-1].force == pytest.approx(37.8)
-    measured = dataclasses.replace(SHARP, use_measured_velocity=True)
-    _, rows = run(measured, 3, GOOD._replace(state=FrictionState.UNKNOWN), Motion(0.1, 0.0, 0.1))
+    _, rows = run(dataclasses.replace(SHARP, slew_limit=20.0), 201, NONE, state=state, start=10)
     assert rows[-1].force == 0.0
 
 
-def test_nothing_before_the_first_estimate():
-    _, rows = run(SHARP, 5, NO_ESTIMATE)
-    assert [r.force for r in rows] == [0.0] * 5
-    assert rows[0].limited == Limited.FADE
+def test_a_gap_counts_whole_for_the_fade_and_little_for_the_slew():
+    settings = dataclasses.replace(SHARP, slew_limit=100.0)
+    state, _ = run(SHARP, 10)
+    _, out = step(settings, state, 5000 * MS, 5000 * MS, NONE, 0.1)
+    assert out.force == 0.0
+    _, out = step(settings, state, 5000 * MS, 5000 * MS, 42.0, -0.1)
+    assert out.force == pytest.approx(37.8 - 100.0 * 0.02)
+
+
+def test_while_the_force_fades_it_follows_the_wanted_direction():
+    state, _ = run(SHARP, 10)
+    _, rows = run(SHARP, 100, NONE, -0.1, state=state, start=10)
+    assert all(row.force < 0.0 for row in rows)
+
+
+def test_the_first_force_fades_in():
+    _, rows = run(SHARP, 400, state=init(SHARP))
+    assert rows[0].force == 0.0
+    assert rows[100].force == pytest.approx(37.8 / 2, rel=0.02)
+    assert rows[-1].force == pytest.approx(37.8)
+
+
+def test_a_clock_of_receipt_that_goes_back_makes_no_step():
+    state, _ = run(SHARP, 10)
+    _, out = step(dataclasses.replace(SHARP, slew_limit=1.0), state, 0, -5000 * MS, 42.0, -0.1)
+    assert out.force == pytest.approx(37.8)
+
+
+def test_an_estimate_is_usable_with_a_good_pressure_and_by_measured_velocity_with_a_known_state():
+    good = FrictionEstimate(0, 42.0, 3.0, 47.0, 42.0, FrictionState.SLIDING, 1, 0, 0.0)
+    measured = dataclasses.replace(SHARP, use_measured_velocity=True)
+    assert usable(SHARP, good)
+    for bad in (Status.PRESSURE_STALE, Status.INPUT_REFUSED, Status.PRESSURE_LEAP, Status.PRESSURE_MISSING):
+        assert not usable(SHARP, good._replace(status=int(bad)))
+    unknown = good._replace(state=FrictionState.UNKNOWN, status=int(Status.FORCE_STALE))
+    assert usable(SHARP, unknown)
+    assert not usable(measured, unknown)
 
 
 @given(
     st.lists(
         st.tuples(
             st.integers(-2 * MS, 20 * MS),
-            st.one_of(st.none(), st.tuples(st.floats(0.0, 1e3), st.integers(0, 2**16 - 1))),
-            st.floats(),
-            st.floats(),
+            st.just(NONE) | st.floats(0.0, 1e3),
+            st.floats(-100.0, 100.0) | st.just(math.nan),
         ),
         max_size=40,
     )
 )
 def test_finite_bounded_and_slow_whatever_comes(events):
-    settings = FeedForwardSettings(viscous_friction=50.0)
-    state, stamp, last = init(settings), 0, 0.0
-    for change, seen, velocity, acceleration in events:
-        stamp += change
-        estimate = NO_ESTIMATE
-        if seen is not None:
-            estimate = GOOD._replace(
-                stamp=stamp, coulomb_friction=seen[0], breakaway_force=seen[0] + 5.0, status=seen[1]
-            )
-        state, out = step(settings, state, stamp, estimate, Motion(velocity, acceleration))
+    settings = FeedForwardSettings()
+    state, received, last = init(settings), 0, 0.0
+    for change, friction, velocity in events:
+        received += change
+        state, out = step(settings, state, 0, received, friction, velocity)
         assert math.isfinite(out.force)
         assert abs(out.force) <= settings.force_limit
-        assert abs(out.force - last) <= settings.slew_limit * max(change, 0) * 1e-9 + 1e-9
-        assert 0.0 <= out.scale <= settings.coulomb_scale
+        elapsed = max(change, 0) * 1e-9
+        most = settings.slew_limit * elapsed + settings.force_limit * elapsed / settings.fade_time
+        assert abs(out.force - last) <= most + 1e-9
+        assert 0.0 <= out.scale <= settings.scale
         last = out.force
 
 
-def test_setting_that_makes_no_sense_is_refused():
+def test_a_setting_out_of_bounds_is_refused():
     with pytest.raises(ValueError, match=r'fade_time = 0\.0 s is below'):
         FeedForwardSettings(fade_time=0.0)
+    with pytest.raises(ValueError, match=r'estimate_timeout = 60\.0 s is above'):
+        FeedForwardSettings(estimate_timeout=60.0)
