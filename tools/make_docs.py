@@ -1,4 +1,4 @@
-"""Write the tables of docs/ that follow from the code: ``python tools/make_docs.py``; a test holds them to it.
+"""Write the tables of docs/ that follow from the code: ``python tools/make_docs.py``; a test compares them.
 
 Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
 """

@@ -89,7 +89,7 @@ def draw_architecture(path: Path) -> None:
 
 
 def main() -> int:
-    """Draw a replay of the pull test, charts of its seal, the servo and the lubricated contact; keep what is shown."""
+    """Draw the architecture, a replay of the pull test, charts of its seal, the servo and the lubricated contact."""
     FIGURES.mkdir(parents=True, exist_ok=True)
     draw_architecture(FIGURES / 'architecture.png')
     with tempfile.TemporaryDirectory() as name:
