@@ -6,24 +6,22 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.identification.fitting import (
+from seal_friction_ros.core.identification.diagnostics import (
     ILL_CONDITIONED,
     SETTLED,
-    Change,
-    CrossValidation,
+    FrictionChange,
     Outlier,
-    Score,
     collinear_regressors,
-    is_beaten,
     traded_off,
 )
+from seal_friction_ros.core.identification.fitting import CrossValidation, LawScore, is_beaten
 from seal_friction_ros.offline.identification.results import (
     FEWEST_PRESSURES_FOR_EXPONENT,
     Identification,
     IdentificationData,
     LawQuality,
     LawSelection,
-    Level,
+    PressureLevel,
 )
 
 Named = tuple[str, CrossValidation]
@@ -34,7 +32,7 @@ Named = tuple[str, CrossValidation]
 
 
 def warnings_of(
-    data: IdentificationData, selection: LawSelection, quality: LawQuality, levels: Sequence[Level]
+    data: IdentificationData, selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]
 ) -> Iterator[str]:
     """Limits of the law that its user has to know, one line each."""
     first = data.sources.files[0].name
@@ -52,11 +50,11 @@ def warnings_of(
     yield from _no_pressure_gain_text(selection)
     yield from _parameter_texts(selection)
     yield from _scatter_texts(selection, quality, levels)
-    if quality.stiction is None:
+    if quality.breakaway is None:
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
 
 
-def _change_text(first: str, change: Change) -> str:
+def _change_text(first: str, change: FrictionChange) -> str:
     percent = f'{100.0 * (change.ratio - 1.0):+.0f} % (standard error {100.0 * change.standard_error:.0f} %)'
     left = f'the law of {first} leaves an RMS of {change.rms:.3g} N there, one fitted there {change.own_rms:.3g} N'
     if change.is_change:
@@ -67,7 +65,7 @@ def _change_text(first: str, change: Change) -> str:
     return f'{change.name} agrees with {first}: friction {percent}; {left}; both are fitted together'
 
 
-def _outlier_text(outlier: Outlier, levels: Sequence[Level]) -> str:
+def _outlier_text(outlier: Outlier, levels: Sequence[PressureLevel]) -> str:
     level = next(level for level in levels if not level.is_used)
     others = [abs(other.drift) for other in levels if other.is_used and math.isfinite(other.drift)]
     largest = max(others, default=0.0)
@@ -116,33 +114,33 @@ def _gain_text(with_it: Named, without: Named) -> str:
     )
 
 
-def pressure_gain(scores: Sequence[Score]) -> tuple[Named | None, Named | None]:
+def pressure_gain(scores: Sequence[LawScore]) -> tuple[Named | None, Named | None]:
     """The best law with and the best law without a pressure-dependent Coulomb friction; None if there is none."""
     found: dict[bool, Named] = {}
     for score in scores:
         if score.validation is not None:
-            side = score.rung.depends_on_pressure
+            side = score.law.depends_on_pressure
             if side not in found or score.validation.losses.mean() < found[side][1].losses.mean():
-                found[side] = score.rung.name, score.validation
+                found[side] = score.law.name, score.validation
     return found.get(True), found.get(False)
 
 
 def _parameter_texts(selection: LawSelection) -> Iterator[str]:
-    for parameter in selection.rung.parameters:
+    for parameter in selection.law.parameters:
         value = selection.fit.values[parameter.name]
         span = parameter.upper - parameter.lower
         if parameter.upper < 1e3 and value > parameter.upper - 1e-6 * span:
             yield f'{parameter.name} is at its bound of {parameter.upper:g}: an effect is missing in the law'
         elif value == 0.0 and parameter.lower == 0.0:
             yield f'{parameter.name} is 0: these data show no such effect'
-    for name in selection.rung.fixed:
+    for name in selection.law.fixed:
         yield (
             f'{name} is not fitted but set to that of an elastic contact, 2/3: measure at '
             f'{FEWEST_PRESSURES_FOR_EXPONENT} pressures at least to determine it'
         )
 
 
-def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[Level]) -> Iterator[str]:
+def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]) -> Iterator[str]:
     if quality.is_drift:
         yield (
             'every pressure was measured in one run, so the data do not show run-to-run variation: the drift within '
@@ -177,8 +175,8 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
         yield f'pressure pays: {_gain_text(with_it, without)}'
     if data.ring is None:
         yield 'the geometry of the ring is unknown, so the physics-based law was not tried: name a seal with --seal'
-    if selection.rung.name != selection.best.rung.name:
-        yield f'{selection.rung.name} is saved as asked for with --law; recommended is {selection.best.rung.name}'
+    if selection.law.name != selection.best.law.name:
+        yield f'{selection.law.name} is saved as asked for with --law; recommended is {selection.best.law.name}'
     chambers = data.sources.chambers
     mounting = f'seals: [{", ".join(["FILE"] * len(chambers))}], seal_chambers: [{", ".join(chambers)}]'
     yield f'the law is that of one seal of {len(chambers)}; for the node: {mounting}'
@@ -192,8 +190,8 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
 def summary(found: Identification) -> str:
     """The result for a person: law, numbers at each pressure, ladder, remarks and warnings."""
     selection, quality = found.selection, found.quality
-    lines = [f'law: {selection.rung.name} ({selection.rung.words})']
-    for parameter in selection.rung.parameters:
+    lines = [f'law: {selection.law.name} ({selection.law.formula})']
+    for parameter in selection.law.parameters:
         error = quality.standard_errors[parameter.name]
         value = selection.fit.values[parameter.name]
         lines.append(f'  {parameter.name} = {value:.4g} {parameter.unit}, standard error {error:.2g}')
@@ -213,11 +211,11 @@ def summary(found: Identification) -> str:
 def _ladder_lines(selection: LawSelection) -> Iterator[str]:
     for score in selection.scores:
         if score.validation is None:
-            yield f'{score.rung.name:32} not fitted: {score.why_not}'
+            yield f'{score.law.name:32} not fitted: {score.why_not}'
         else:
             mark = ' <- recommended' if score is selection.best else ''
             validation = score.validation
-            yield f'{score.rung.name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}'
+            yield f'{score.law.name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}'
     if selection.reference is not None:
         reference = selection.reference
         yield f'{"mean of the other readings":32} {reference.rms:9.4g} N RMS  {100.0 * reference.error:5.1f} %'

@@ -105,7 +105,7 @@ def write_page(out: Path, template: str, plots: Iterable[Plot], **values: Any) -
     folder = out.parent / f'{out.stem}_figures'
     files = {folder / f'{name}.{kind}': data for name, kinds in rendered.items() for kind, data in kinds.items()}
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        (folder if files else out.parent).mkdir(parents=True, exist_ok=True)
         for path, content in {**files, out: page.encode('utf-8', 'replace')}.items():
             write_whole(path, content)
     except OSError as error:
