@@ -7,7 +7,6 @@ from typing import Any
 
 from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.identification.fitting import LawScore, is_beaten
-from seal_friction_ros.core.identification.signal_preparation import OffsetLine
 from seal_friction_ros.offline.identification.results import (
     Identification,
     IdentificationData,
@@ -120,7 +119,13 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'condition_number': _finite_or_none(selection.fit.condition_number),
         'correlation': [[_finite_or_none(float(x)) for x in row] for row in selection.fit.correlation],
         'offset_N': [_finite_or_none(level.offset) for level in levels],
-        'offset_line': None if line is None else _offset_numbers(line),
+        'offset_line': None
+        if line is None
+        else {
+            'constant_N': rounded_value(line.constant),
+            'area_error_m2': rounded_value(line.area_error),
+            'rms_N': rounded_value(line.rms),
+        },
         'drift': [_finite_or_none(level.drift) for level in levels],
         'stiction': None if quality.breakaway is None else quality.breakaway._asdict(),
         'changes': [{**c._asdict(), 'is_change': c.is_change} for c in data.changes],
@@ -129,14 +134,6 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'samples_left_out': data.prepared.left_out,
         'data': [file._asdict() for file in data.sources.files],
         'remarks': list(found.remarks),
-    }
-
-
-def _offset_numbers(line: OffsetLine) -> dict[str, float]:
-    return {
-        'constant_N': rounded_value(line.constant),
-        'area_error_m2': rounded_value(line.area_error),
-        'rms_N': rounded_value(line.rms),
     }
 
 

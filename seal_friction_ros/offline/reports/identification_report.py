@@ -23,7 +23,7 @@ from seal_friction_ros.offline.identification.document import worst_left_out
 from seal_friction_ros.offline.identification.pipeline import fitted_readings
 from seal_friction_ros.offline.identification.results import Identification, PressureLevel, Ring
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number
 from seal_friction_ros.offline.reports.page import Table, write_page
 from seal_friction_ros.offline.work.seal_writer import seal_text
@@ -215,9 +215,7 @@ def fitted_law_figure(shown: _FittedReadings) -> Plot:
     if not shown.readings.are_samples:
         x, y = np.array([(level.pressure / BAR, level.measured / size) for level in levels]).T
         ax.plot(x, y, 'D', ms=6.0, color=style.BLACK, mec='white', label='measured')
-    ax.set(ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel=f'friction of all seals [{shown.unit}]')
-    style.legend_above(ax)
-    return Plot('fig24_model_over_pressure', figure)
+    return finished('fig24_model_over_pressure', figure, ax, PRESSURE_LABEL, f'friction of all seals [{shown.unit}]')
 
 
 def agreement_figure(shown: _FittedReadings) -> Plot:
@@ -307,9 +305,7 @@ def static_figure(shown: _FittedReadings, breakaway: FrictionReadings) -> Plot:
             line = np.linspace(float(pressure.min()), float(pressure.max()), 101) / BAR
             curve = np.polyval(np.polyfit(pressure / BAR, friction, 2), line)
             ax.plot(line, curve / size, color=colour, lw=1.8, label=f'{name}, second order')
-    ax.set(ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel=f'friction of all seals [{unit}]')
-    style.legend_above(ax)
-    return Plot('fig16_static_and_dynamic', figure)
+    return finished('fig16_static_and_dynamic', figure, ax, PRESSURE_LABEL, f'friction of all seals [{unit}]')
 
 
 def _normal_forces_of(shown: _FittedReadings) -> FloatArray:
@@ -330,8 +326,7 @@ def fitted_coefficient_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     coulomb = np.array([shown.seal.coulomb_law.coulomb_friction(float(p)) for p in pressure])
     ax.plot(of_one / size, coulomb / of_one, color=style.BLACK, lw=1.8, label='law')
     _draw_readings(ax, shown, total / seals / size, shown.measured / total)
-    style.finish_figure_18(ax, unit)
-    return Plot('fig18_coefficient_of_friction', figure)
+    return style.figure_18(figure, ax, unit)
 
 
 def computed_normal_force_figure(shown: _FittedReadings, ring: Ring) -> Plot:
@@ -351,8 +346,7 @@ def computed_normal_force_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     levels = np.array([level.pressure * area for level in shown.found.levels])
     at_levels = np.interp(levels, x, y)
     ax.plot(levels / size, at_levels / size, 'o', color=style.BLACK, ms=5.0, label='pressures measured')
-    style.finish_figure_19(ax, unit)
-    return Plot('fig19_normal_force', figure)
+    return style.figure_19(figure, ax, unit)
 
 
 def prior_art_readings_figure(shown: _FittedReadings, ring: Ring) -> list[Plot]:
@@ -370,9 +364,7 @@ def prior_art_readings_figure(shown: _FittedReadings, ring: Ring) -> list[Plot]:
     figure, ax = style.new_figure(f'Prior art is {off.min():.0f} to {off.max():.0f} % above the readings', 4.0)
     ax.plot(pressure / BAR, prior / size, color=style.VERMILLION, lw=1.8, label='prior art, from charts')
     _draw_readings(ax, shown, shown.pressure, shown.measured / size)
-    ax.set(ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel=f'friction of all seals [{unit}]')
-    style.legend_above(ax)
-    return [Plot('fig17_prior_art_and_tests', figure)]
+    return [finished('fig17_prior_art_and_tests', figure, ax, PRESSURE_LABEL, f'friction of all seals [{unit}]')]
 
 
 def _same_ring(law: PriorArtChart, ring: Ring) -> bool:

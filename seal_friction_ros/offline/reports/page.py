@@ -1,8 +1,7 @@
 """The page kit: a page from a template, with its figures inside and beside it.
 
-A page stands alone: style and figures are inside, nothing is fetched. The template engine escapes every value. A value
-that a template names and the report does not give is an error. Nothing on a page depends on when or where it was made,
-so the same input gives the same bytes.
+A page is self-contained: it loads neither style nor figures from elsewhere. The template engine escapes every value; a
+missing value is an error. A page contains neither time nor place, so the same input gives the same bytes.
 """
 
 from base64 import b64encode
