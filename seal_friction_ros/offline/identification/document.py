@@ -119,13 +119,8 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'condition_number': _finite_or_none(selection.fit.condition_number),
         'correlation': [[_finite_or_none(float(x)) for x in row] for row in selection.fit.correlation],
         'offset_N': [_finite_or_none(level.offset) for level in levels],
-        'offset_line': None
-        if line is None
-        else {
-            'constant_N': rounded_value(line.constant),
-            'area_error_m2': rounded_value(line.area_error),
-            'rms_N': rounded_value(line.rms),
-        },
+        'offset_line': line
+        and dict(zip(('constant_N', 'area_error_m2', 'rms_N'), map(rounded_value, line), strict=True)),
         'drift': [_finite_or_none(level.drift) for level in levels],
         'stiction': None if quality.breakaway is None else quality.breakaway._asdict(),
         'changes': [{**c._asdict(), 'is_change': c.is_change} for c in data.changes],

@@ -14,7 +14,7 @@ from seal_friction_ros.core.identification.diagnostics import (
     collinear_regressors,
     traded_off,
 )
-from seal_friction_ros.core.identification.fitting import CrossValidation, LawScore, is_beaten
+from seal_friction_ros.core.identification.fitting import is_beaten
 from seal_friction_ros.offline.identification.results import (
     FEWEST_PRESSURES_FOR_EXPONENT,
     Identification,
@@ -23,10 +23,6 @@ from seal_friction_ros.offline.identification.results import (
     LawSelection,
     PressureLevel,
 )
-
-Named = tuple[str, CrossValidation]
-"""Name of a law and its cross-validation."""
-
 
 # -- warnings ---------------------------------------------------------------------------------------------------------
 
@@ -47,7 +43,9 @@ def warnings_of(
     if data.outlier is not None:
         yield _outlier_text(data.outlier, levels)
     yield from _collinearity_texts(data, selection)
-    yield from _no_pressure_gain_text(selection)
+    gain = _pressure_gain(selection)
+    if gain is not None and not gain[1]:
+        yield f'no gain is claimed for pressure: {gain[0]}: the difference is within the noise'
     yield from _parameter_texts(selection)
     yield from _scatter_texts(selection, quality, levels)
     if quality.breakaway is None:
@@ -101,28 +99,23 @@ def _collinearity_texts(data: IdentificationData, selection: LawSelection) -> It
         yield f'the fit is ill-conditioned: condition number {selection.fit.condition_number:.0f} (good below 30)'
 
 
-def _no_pressure_gain_text(selection: LawSelection) -> Iterator[str]:
-    with_it, without = pressure_gain(selection.scores)
-    if with_it is not None and without is not None and not is_beaten(without[1].losses, with_it[1].losses):
-        yield f'no gain is claimed for pressure: {_gain_text(with_it, without)}: the difference is within the noise'
-
-
-def _gain_text(with_it: Named, without: Named) -> str:
-    return (
-        f'out of sample {with_it[1].rms:.3g} N RMS remain with pressure ({with_it[0]}) and {without[1].rms:.3g} N '
-        f'without ({without[0]})'
+def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
+    """Best law with against best law without pressure-dependent Coulomb friction: text, and whether pressure pays."""
+    with_it, without = (
+        min(
+            ((score.validation, score.law.name) for score in selection.scores
+             if score.validation is not None and score.law.depends_on_pressure == side),
+            key=lambda pair: float(pair[0].losses.mean()), default=None,
+        )
+        for side in (True, False)
+    )  # fmt: skip
+    if with_it is None or without is None:
+        return None
+    text = (
+        f'out of sample {with_it[0].rms:.3g} N RMS remain with pressure ({with_it[1]}) and {without[0].rms:.3g} N '
+        f'without ({without[1]})'
     )
-
-
-def pressure_gain(scores: Sequence[LawScore]) -> tuple[Named | None, Named | None]:
-    """The best law with and the best law without a pressure-dependent Coulomb friction; None if there is none."""
-    found: dict[bool, Named] = {}
-    for score in scores:
-        if score.validation is not None:
-            side = score.law.depends_on_pressure
-            if side not in found or score.validation.losses.mean() < found[side][1].losses.mean():
-                found[side] = score.law.name, score.validation
-    return found.get(True), found.get(False)
+    return text, is_beaten(without[0].losses, with_it[0].losses)
 
 
 def _parameter_texts(selection: LawSelection) -> Iterator[str]:
@@ -170,9 +163,9 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
     if prepared.left_out:
         why = ', '.join(f'{name} {100.0 * count / total:.0f} %' for name, count in prepared.left_out.items())
         yield f'{used} of {total} samples used ({100.0 * used / total:.0f} %); not used: {why}'
-    with_it, without = pressure_gain(selection.scores)
-    if with_it is not None and without is not None and is_beaten(without[1].losses, with_it[1].losses):
-        yield f'pressure pays: {_gain_text(with_it, without)}'
+    gain = _pressure_gain(selection)
+    if gain is not None and gain[1]:
+        yield f'pressure pays: {gain[0]}'
     if data.ring is None:
         yield 'the geometry of the ring is unknown, so the physics-based law was not tried: name a seal with --seal'
     if selection.law.name != selection.best.law.name:
@@ -209,13 +202,12 @@ def summary(found: Identification) -> str:
 
 
 def _ladder_lines(selection: LawSelection) -> Iterator[str]:
-    for score in selection.scores:
-        if score.validation is None:
-            yield f'{score.law.name:32} not fitted: {score.why_not}'
-        else:
-            mark = ' <- recommended' if score is selection.best else ''
-            validation = score.validation
-            yield f'{score.law.name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}'
+    rows = [(score.law.name, score.validation, ' <- recommended' if score is selection.best else '', score.why_not)
+            for score in selection.scores]  # fmt: skip
     if selection.reference is not None:
-        reference = selection.reference
-        yield f'{"mean of the other readings":32} {reference.rms:9.4g} N RMS  {100.0 * reference.error:5.1f} %'
+        rows.append(('mean of the other readings', selection.reference, '', ''))
+    for name, validation, mark, why_not in rows:
+        if validation is None:
+            yield f'{name:32} not fitted: {why_not}'
+        else:
+            yield f'{name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}'

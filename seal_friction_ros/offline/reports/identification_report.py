@@ -167,17 +167,15 @@ class _FittedReadings:
 def identification_figures(found: Identification) -> list[Plot]:
     """Every figure that the data allow."""
     shown = _FittedReadings(found)
+    ring, breakaway = found.data.ring, found.data.prepared.breakaway
     plots = [fitted_law_figure(shown), agreement_figure(shown), out_of_sample_figure(found), ladder_figure(found)]
     if shown.readings.are_samples:
         plots.append(velocity_cloud_figure(shown))
-    if found.data.prepared.breakaway is not None:
-        plots.append(static_figure(shown, found.data.prepared.breakaway))
-    if found.data.ring is not None:
-        plots += [
-            fitted_coefficient_figure(shown, found.data.ring),
-            computed_normal_force_figure(shown, found.data.ring),
-        ]
-        plots += prior_art_readings_figure(shown, found.data.ring)
+    if breakaway is not None:
+        plots.append(static_figure(shown, breakaway))
+    if ring is not None:
+        plots += [fitted_coefficient_figure(shown, ring), computed_normal_force_figure(shown, ring)]
+        plots += prior_art_readings_figure(shown, ring)
     return plots
 
 
@@ -308,21 +306,14 @@ def static_figure(shown: _FittedReadings, breakaway: FrictionReadings) -> Plot:
     return finished('fig16_static_and_dynamic', figure, ax, PRESSURE_LABEL, f'friction of all seals [{unit}]')
 
 
-def _normal_forces_of(shown: _FittedReadings) -> FloatArray:
-    """Normal force of each seal at each reading [N], shape (n, seals)."""
-    normal = shown.readings.at.normal_force
-    assert normal is not None  # noqa: S101 the ring is known
-    return normal
-
-
 def fitted_coefficient_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     """Coefficient of friction over normal force (as Figure 18)."""
-    normal = _normal_forces_of(shown)
+    normal = normal_forces(shown.readings.at.pressure, *ring)
     total, seals = normal.sum(axis=1), normal.shape[1]
     unit, size = force_unit(float(total.max()) / seals)
     figure, ax = style.new_figure('Coefficient of friction over normal force', 4.0)
     pressure = np.linspace(float(shown.readings.seal_pressure.min()), float(shown.readings.seal_pressure.max()), 201)
-    of_one = normal_forces(pressure[:, np.newaxis], ring.geometry, ring.normal_force_law)[:, 0]
+    of_one = normal_forces(pressure, *ring)
     coulomb = np.array([shown.seal.coulomb_law.coulomb_friction(float(p)) for p in pressure])
     ax.plot(of_one / size, coulomb / of_one, color=style.BLACK, lw=1.8, label='law')
     _draw_readings(ax, shown, total / seals / size, shown.measured / total)
@@ -331,8 +322,7 @@ def fitted_coefficient_figure(shown: _FittedReadings, ring: Ring) -> Plot:
 
 def computed_normal_force_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     """Normal over axial force (as Figure 19)."""
-    normal = _normal_forces_of(shown)
-    area = projected_area(ring.geometry)
+    normal, area = normal_forces(shown.readings.at.pressure, *ring), projected_area(ring.geometry)
     axial = shown.readings.at.pressure * area
     order = np.argsort(axial.ravel(), kind='stable')
     x, y = axial.ravel()[order], normal.ravel()[order]
