@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 from scipy.fft import next_fast_len
+from scipy.linalg import toeplitz
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 
@@ -62,8 +63,7 @@ class HalfPlane:
 
     def matrix(self) -> FloatArray:
         """Full influence matrix [m/Pa], shape (cells, cells)."""
-        i = np.arange(self.cells)
-        return np.asarray(self.influence[np.abs(i[:, None] - i)])
+        return np.asarray(toeplitz(self.influence))
 
 
 def _influence(distance: FloatArray | IntArray, width: float, modulus: float, depth: float) -> FloatArray:

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lsim
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import check, parameter
@@ -27,28 +28,16 @@ class MeasuringChain:
 
 
 def transducer_force(chain: MeasuringChain, time: FloatArray, friction: FloatArray) -> FloatArray:
-    """Force that the transducer shows [N], for a friction force that is straight between its samples.
+    """Force that the transducer shows [N] for a friction force that is linear between its samples.
 
-    Exact for that course, so no step is too long. The chain starts at rest under the first value.
+    Exact for that force, whatever the step. The chain starts at rest under the first value.
 
     Args:
         chain: The chain.
-        time: Increasing [s], shape (n,).
+        time: Increasing by equal steps [s], shape (n,).
         friction: [N], shape (n,).
     """
-    omega, damping = 2.0 * math.pi * chain.natural_frequency, chain.damping_ratio
-    decay, ring = damping * omega, omega * math.sqrt(1.0 - damping**2)
-    shown = np.empty(len(friction))
-    shown[0] = friction[0]
-    speed = 0.0
-    for i in range(1, len(friction)):
-        step = time[i] - time[i - 1]
-        slope = (friction[i] - friction[i - 1]) / step
-        lag = 2.0 * damping / omega * slope  # the chain trails a ramp by this
-        away = shown[i - 1] - (friction[i - 1] - lag)
-        away_speed = speed - slope
-        fade, cosine, sine = math.exp(-decay * step), math.cos(ring * step), math.sin(ring * step)
-        mixed = (away_speed + decay * away) / ring
-        shown[i] = friction[i] - lag + fade * (away * cosine + mixed * sine)
-        speed = slope + fade * (away_speed * cosine - (decay * mixed + ring * away) * sine)
-    return shown
+    omega = 2.0 * math.pi * chain.natural_frequency
+    oscillator = ([omega**2], [1.0, 2.0 * chain.damping_ratio * omega, omega**2])
+    _, shown, _ = lsim(oscillator, friction - friction[0], time - time[0])
+    return np.atleast_1d(friction[0] + shown)
