@@ -4,17 +4,14 @@ import math
 from dataclasses import dataclass
 
 from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True)
-class Grease:
+class Grease(CheckedParameters):
     """Palacios-Palacios grease: tau = tau_0 + k gamma^n + eta_b gamma. Defaults: Table 1 of the paper.
 
     A yield stress and an index of 0 make a Newtonian fluid of viscosity ``base_viscosity``.
-
-    Raises:
-        ValueError: A value is out of bounds.
 
     Source: J. Palacios, M. Palacios 1984; spool-valve paper, Table 1.
     """
@@ -31,9 +28,6 @@ class Grease:
         description='The grease is never taken as stiffer than at this shear rate (our choice: 0.15 % of the rate at '
         '34 mm/s across 0.5 um, so it acts on films at rest only).',
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     @property
     def numbers(self) -> tuple[float, float, float, float, float]:

@@ -7,24 +7,18 @@ import numpy as np
 from scipy.signal import lsim
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True)
-class MeasuringChain:
+class MeasuringChain(CheckedParameters):
     """Transducer, joint and rod as one oscillator: F'' + 2 D w F' + w^2 F = w^2 F_friction.
-
-    Raises:
-        ValueError: A value is out of bounds.
 
     Source: spool-valve paper, section 6.2 (157 Hz); the damping is our choice.
     """
 
     natural_frequency: float = parameter(157.0, unit='Hz', lower=0.1, upper=1e6, description='w / 2 pi.')
     damping_ratio: float = parameter(0.05, unit='1', lower=0.0, upper=0.99, description='D.')
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def transducer_force(chain: MeasuringChain, time: FloatArray, friction: FloatArray) -> FloatArray:

@@ -4,12 +4,12 @@ import math
 from dataclasses import dataclass
 
 from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.lubrication.flow_factors import flow_factor_coefficients
 
 
 @dataclass(frozen=True)
-class Topography:
+class Topography(CheckedParameters):
     r"""Combined roughness of seal and wall; all values are our choice (the paper's topography is measured, and kept).
 
     Contact pressure falls exponentially with the mean separation of the surfaces, and the real area of contact follows
@@ -48,7 +48,7 @@ class Topography:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         flow_factor_coefficients(self.peklenik_number)
         least = 2.0 * math.pi * self.rms_height / self.roll_off_length
         if self.rms_slope < least:

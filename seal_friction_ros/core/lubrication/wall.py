@@ -5,17 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True)
-class ControlEdge:
+class ControlEdge(CheckedParameters):
     """Chamfer at the right end of the seat: beyond it the wall falls back and the seal hangs free.
 
     All values are our choice; the paper says only that the seat is chamfered.
-
-    Raises:
-        ValueError: A value is out of bounds.
     """
 
     position: float = parameter(
@@ -26,9 +23,6 @@ class ControlEdge:
     rounding: float = parameter(
         20e-6, unit='m', lower=1e-7, upper=1e-3, description='Length over which both corners are rounded.'
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def fall(self, place: FloatArray) -> tuple[FloatArray, FloatArray]:
         """How far the wall has fallen back [m], and its slope, at each ``place`` along it [m].
@@ -44,13 +38,10 @@ class ControlEdge:
 
 
 @dataclass(frozen=True)
-class FilmSupply:
+class FilmSupply(CheckedParameters):
     """Lubricant on the wall outside the seal: nothing but what there was and what the strokes left behind.
 
     Without this part of a case the seal is flooded.
-
-    Raises:
-        ValueError: A value is out of bounds.
 
     Source: spool-valve paper, section 7.4; O. Feuchtmueller et al. 2021 for the film that a stroke leaves.
     """
@@ -58,9 +49,6 @@ class FilmSupply:
     initial_film: float = parameter(
         0.6e-6, unit='m', lower=1e-9, upper=1e-3, description='Film on the wall before the first stroke (our choice).'
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class WallFilm:
