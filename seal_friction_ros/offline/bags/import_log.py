@@ -22,6 +22,7 @@ The rig file describes the columns of the log, their units, signs and areas. The
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
@@ -305,27 +306,14 @@ def _parted(
 ) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     """Names in the header (empty without header), and the rows after it: line number and cells."""
     header: list[str] = []
-    for number, line in numbered_lines:
-        text = line.strip()
-        if text.startswith('#'):
-            header = _split(text.lstrip('#')) if header_kind == 'comment' else header
-        elif text and header_kind == 'row':
-            return _split(text), _rows(numbered_lines)
-        elif text:
-            return header, _with_first((number, _split(text)), _rows(numbered_lines))
-    return header, iter(())
-
-
-def _with_first(first: tuple[int, list[str]], rest: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
-    yield first
-    yield from rest
-
-
-def _rows(numbered_lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, list[str]]]:
-    for number, line in numbered_lines:
-        text = line.strip()
-        if text and not text.startswith('#'):
-            yield number, _split(text)
+    lines = ((number, text) for number, line in numbered_lines if (text := line.strip()))
+    rows = ((number, _split(text)) for number, text in lines if not text.startswith('#'))
+    for number, text in lines:
+        if not text.startswith('#'):
+            return (_split(text), rows) if header_kind == 'row' else (header, chain([(number, _split(text))], rows))
+        if header_kind == 'comment':
+            header = _split(text.lstrip('#'))
+    return header, rows
 
 
 def _split(text: str) -> list[str]:

@@ -17,7 +17,6 @@ from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
     decode,
     decode_text,
     encode_text,
@@ -129,19 +128,13 @@ def replay(
             from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
 
             result = replay_in_bulk(bag, topics, override, advance)
-        if result is None:
-            result = _replay_one_by_one(bag, topics, override, out, advance)
-    return result
-
-
-def _replay_one_by_one(
-    bag: Path, topics: Topics, override: Configuration | None, out: Path | None, advance: Callable[[int], None]
-) -> ReplayResult:
-    replayed = _counted(steps(read_messages(bag), topics, override), advance)
-    if out is None:
-        return _compare(replayed, topics)
-    with BagWriter(out) as writer:
-        return _compare(_written(replayed, topics, writer), topics)
+        if result is not None:
+            return result
+        replayed = _counted(steps(read_messages(bag), topics, override), advance)
+        if out is None:
+            return _compare(replayed, topics)
+        with BagWriter(out) as writer:
+            return _compare(_written(replayed, topics, writer), topics)
 
 
 def count_messages(topics: Mapping[str, TopicInfo]) -> int:
@@ -157,8 +150,7 @@ def _counted(replayed: Iterable[Step], advance: Callable[[int], None]) -> Iterat
 
 
 def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter) -> Iterator[Step]:
-    names = {name: getattr(topics, name) for name in topics._fields}
-    answered = {ESTIMATE_TYPE: names['estimate'], FEEDFORWARD_TYPE: names['feedforward']}
+    answered = topics.answers
     for step in replayed:
         message = step.message
         is_used = message.topic in topics or message.type_name == CONFIGURATION_TYPE
@@ -175,9 +167,7 @@ def _compare(replayed: Iterable[Step], topics: Topics) -> ReplayResult:
     A recorded estimate answers the velocity sample before it; an estimate without one is a difference. A recording may
     stop between a message and its answer, so the answer to its last message may be missing.
     """
-    velocities = 0
-    is_cut = False
-    compared = {ESTIMATE_TYPE: topics.estimate, FEEDFORWARD_TYPE: topics.feedforward}
+    velocities, is_cut, compared = 0, False, topics.answers
     streams = {type_name: AnswerStream(type_name) for type_name, topic in compared.items() if topic}
     for message, answers in replayed:
         velocities += message.topic == topics.velocity
