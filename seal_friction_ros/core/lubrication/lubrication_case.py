@@ -203,20 +203,16 @@ class LubricationCase:
         return dataclasses.replace(self.groove, half_clearance=0.0) if self.air.difference > 0.0 else self.groove
 
 
-_PARTS: dict[str, type] = {
-    'seal': SealBody,
-    'topography': Topography,
-    'grease': Grease,
-    'groove': GrooveSpring,
-    'air': AirPressure,
-    'motion': ConstantAcceleration,
-    'numerics': LubricationNumerics,
-    'study': ShearStressStudy,
-    'map': MapGrid,
+_OPTIONAL: dict[str, type] = {
     'control_edge': ControlEdge,
     'film_supply': FilmSupply,
     'viscoelasticity': Viscoelasticity,
 }
+_PARTS: dict[str, Any] = {
+    part.name: part.default_factory
+    for part in dataclasses.fields(LubricationCase)
+    if part.default_factory is not dataclasses.MISSING
+} | _OPTIONAL
 
 
 @dataclass(frozen=True)

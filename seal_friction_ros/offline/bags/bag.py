@@ -350,7 +350,7 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
         BagError: There is no bag, or it is damaged; raised when the damage is reached.
     """
     with _as_bag_errors(path):
-        found = _storage(path)
+        found = storage(path)
         for file in found.files:
             for message in _read_file(file, found.is_sqlite):
                 if found.are_messages_packed:
@@ -366,16 +366,6 @@ class Storage(NamedTuple):
     files: tuple[Path, ...]
     is_sqlite: bool
     are_messages_packed: bool = False
-
-
-def storage(path: Path) -> Storage:
-    """Find the files of a bag.
-
-    Raises:
-        BagError: There is no bag.
-    """
-    with _as_bag_errors(path):
-        return _storage(path)
 
 
 def _read_file(path: Path, is_sqlite: bool) -> Iterator[BagMessage]:
@@ -402,7 +392,7 @@ def bag_topics(path: Path) -> dict[str, TopicInfo]:
     """
     found: dict[str, TopicInfo] = {}
     with _as_bag_errors(path):
-        stored = _storage(path)
+        stored = storage(path)
         for file in stored.files:
             for topic, type_name, count in _count_file(file, stored.is_sqlite):
                 before = found.get(topic)
@@ -438,32 +428,33 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
         raise BagError(f'{path}: not a readable bag: {reason}') from None
 
 
-def _storage(path: Path) -> Storage:
+def storage(path: Path) -> Storage:
     """Find the files of a bag.
 
     Raises:
-        ValueError: There are none, or they are outside the folder.
+        BagError: There are none, or they are outside the folder.
     """
-    if not path.is_dir():
-        if not path.is_file():
-            raise ValueError('no such file' if not path.exists() else 'neither a file nor a folder')
-        return Storage((path,), path.suffix == '.db3')
-    metadata = path / 'metadata.yaml'
-    if not metadata.is_file():
-        raise BagError(f'{path}: not a rosbag2 bag: no metadata.yaml in it')
-    document = read_yaml(_inside(path, 'metadata.yaml'), _LARGEST_METADATA)
-    information = document.get('rosbag2_bagfile_information') if isinstance(document, Mapping) else None
-    if not isinstance(information, Mapping):
-        raise ValueError('metadata.yaml is not in the format of rosbag2')
-    names, kind = information.get('relative_file_paths'), information.get('storage_identifier')
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ValueError('metadata.yaml: relative_file_paths is not a list of names')
-    if kind not in ('mcap', 'sqlite3'):
-        raise ValueError(f'metadata.yaml: storage_identifier = {kind!r} is neither mcap nor sqlite3')
-    mode = str(information.get('compression_mode') or 'none').lower()
-    if mode not in ('none', 'message'):
-        raise ValueError(f'its files are compressed as a whole (compression_mode = {mode!r}): unpack them first')
-    return Storage(tuple(_inside(path, name) for name in names), kind == 'sqlite3', mode == 'message')
+    with _as_bag_errors(path):
+        if not path.is_dir():
+            if not path.is_file():
+                raise ValueError('no such file' if not path.exists() else 'neither a file nor a folder')
+            return Storage((path,), path.suffix == '.db3')
+        metadata = path / 'metadata.yaml'
+        if not metadata.is_file():
+            raise BagError(f'{path}: not a rosbag2 bag: no metadata.yaml in it')
+        document = read_yaml(_inside(path, 'metadata.yaml'), _LARGEST_METADATA)
+        information = document.get('rosbag2_bagfile_information') if isinstance(document, Mapping) else None
+        if not isinstance(information, Mapping):
+            raise ValueError('metadata.yaml is not in the format of rosbag2')
+        names, kind = information.get('relative_file_paths'), information.get('storage_identifier')
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise ValueError('metadata.yaml: relative_file_paths is not a list of names')
+        if kind not in ('mcap', 'sqlite3'):
+            raise ValueError(f'metadata.yaml: storage_identifier = {kind!r} is neither mcap nor sqlite3')
+        mode = str(information.get('compression_mode') or 'none').lower()
+        if mode not in ('none', 'message'):
+            raise ValueError(f'its files are compressed as a whole (compression_mode = {mode!r}): unpack them first')
+        return Storage(tuple(_inside(path, name) for name in names), kind == 'sqlite3', mode == 'message')
 
 
 def _inside(folder: Path, name: str) -> Path:
