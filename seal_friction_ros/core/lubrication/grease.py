@@ -32,13 +32,7 @@ class Grease(CheckedParameters):
     @property
     def numbers(self) -> tuple[float, float, float, float, float]:
         """The parameters in order of declaration, for compiled functions."""
-        return (
-            self.yield_stress,
-            self.consistency_index,
-            self.flow_index,
-            self.base_viscosity,
-            self.shear_rate_floor,
-        )
+        return (self.yield_stress, self.consistency_index, self.flow_index, self.base_viscosity, self.shear_rate_floor)
 
 
 @compiled

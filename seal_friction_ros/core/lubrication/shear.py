@@ -58,11 +58,7 @@ def fluid_shear(
 
 
 def sliding_velocity(
-    drive: float,
-    solid: float,
-    fluid_at: Callable[[float], float],
-    spring_at: Callable[[float], float],
-    fastest: float,
+    drive: float, solid: float, fluid_at: Callable[[float], float], spring_at: Callable[[float], float], fastest: float
 ) -> float:
     """Velocity at which spring and friction balance, if the seal does not stick.
 

@@ -19,11 +19,7 @@ from seal_friction_ros.core.estimation.compiled_pipeline import (
     receive_all,
 )
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.messages import (
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    decode_text,
-)
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, decode_text
 from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration

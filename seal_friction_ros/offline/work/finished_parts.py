@@ -54,11 +54,7 @@ def _code_digest() -> str:
 
 
 def run_parts(
-    label: str,
-    parts: Sequence[Part],
-    workers: int,
-    folder: Path | None,
-    prepare: Callable[[], None] = lambda: None,
+    label: str, parts: Sequence[Part], workers: int, folder: Path | None, prepare: Callable[[], None] = lambda: None
 ) -> list[Values]:
     """Results of all parts, in their order; parts that are kept in ``folder`` are not computed.
 
