@@ -1,4 +1,4 @@
-"""What holds the seal in the groove of the spool, along the motion: a spring, or two seats with a ridge between."""
+"""Axial force of the groove on the seal: a spring, or two stable positions with an unstable one between them."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Position of the spool over time: the paper's constant acceleration, or any measured signal."""
+"""Position of the spool over time: constant acceleration as in the paper, or a measured signal."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ class SpoolMotion(Protocol):
 
 @dataclass(frozen=True)
 class ConstantAcceleration(CheckedParameters):
-    """Back and forth about ``centre`` without rest: speed up, slide at constant speed, slow down, and return.
+    """Reciprocation about ``centre`` without dwell: acceleration, constant speed, deceleration, and return.
 
     Defaults: Table 1 of the spool-valve paper.
 
@@ -79,7 +79,7 @@ class ConstantAcceleration(CheckedParameters):
 
 
 class MeasuredMotion:
-    """A measured position signal, straight between its samples.
+    """Measured position, linear between its samples.
 
     Args:
         times: Increasing [s], shape (n,), n >= 2; the motion starts at the first.

@@ -1,6 +1,6 @@
-"""Everything a run needs, and the document (a mapping, as YAML gives it) it is made from.
+"""Input of a run: parsed document of a case file (YAML mapping) -> `LubricationCase`.
 
-A case file looks like this; every part and field is in docs/ehl.md::
+Example; docs/ehl.md describes every field::
 
     name: inner_seal
     source: where the numbers are from
@@ -70,7 +70,7 @@ class SealBody(CheckedParameters):
 
 @dataclass(frozen=True)
 class AirPressure(CheckedParameters):
-    """Pressure on both sides of the seal, above that at which the film cavitates (ambient)."""
+    """Air pressure on both sides of the seal, above the cavitation pressure of the film (ambient)."""
 
     pressure_left: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e8, description='Gauge.')
     pressure_right: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e8, description='Gauge.')
@@ -194,12 +194,12 @@ class LubricationCase:
 
     @property
     def interference(self) -> float:
-        """Interference with what the pressure difference adds [m]."""
+        """Interference, including the part that the pressure difference adds [m]."""
         return self.seal.interference + self.air.pressure_interference * self.air.difference
 
     @property
     def seated_groove(self) -> GrooveSpring:
-        """The groove as it acts: a pressure difference holds the seal on one flank (paper, section 7.4)."""
+        """Groove spring in use: a pressure difference holds the seal on one flank (paper, section 7.4)."""
         return dataclasses.replace(self.groove, half_clearance=0.0) if self.air.difference > 0.0 else self.groove
 
 
@@ -222,7 +222,7 @@ class SpoolSeal(CheckedParameters):
     case: str
     """name of its case"""
     mirrored: bool = False
-    """sits the other way round: its case is driven the other way"""
+    """mounted in the opposite direction: its case moves in the opposite direction"""
     shift: float = parameter(
         0.0, unit='m', lower=-1.0, upper=1.0, description='Where the spool stands when the case is at 0.'
     )
@@ -230,7 +230,7 @@ class SpoolSeal(CheckedParameters):
 
 @dataclass(frozen=True)
 class Spool:
-    """Several seals on one spool, moved together; their frictions add up.
+    """Several seals on one spool; the friction of the spool is their sum.
 
     Raises:
         ValueError: There is no seal.
@@ -247,10 +247,10 @@ class Spool:
 
 
 def parse_lubrication_case(document: Any) -> LubricationCase | Spool:
-    """Make a case, or a spool if the document has ``seals``, from the document of a case file.
+    """Parse the document of a case file: a spool if it has ``seals``, else a case.
 
     Raises:
-        ValueError: The document makes no sense; the message names the case, the field, its value and its bound.
+        ValueError: A value is invalid; the message names case, field, value and bound.
     """
     name, source = name_and_source(document, 'case')
     known = ('name', 'source', *(('seals', 'motion') if 'seals' in document else _PARTS))

@@ -1,4 +1,4 @@
-"""What a force transducer on a flexible rod makes of a friction force."""
+"""Reading of a force transducer on a flexible rod for a friction force."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class MeasuringChain(CheckedParameters):
 
 
 def transducer_force(chain: MeasuringChain, time: FloatArray, friction: FloatArray) -> FloatArray:
-    """Force that the transducer shows [N] for a friction force that is linear between its samples.
+    """Reading of the transducer [N] for a friction force that is linear between its samples.
 
     Exact for that force, whatever the step. The chain starts at rest under the first value.
 

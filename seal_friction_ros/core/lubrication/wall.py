@@ -1,4 +1,4 @@
-"""The wall the seal slides on: its control edge, and the film of lubricant it carries."""
+"""Wall on which the seal slides: its control edge, and its film of lubricant."""
 
 from dataclasses import dataclass
 
@@ -25,10 +25,7 @@ class ControlEdge(CheckedParameters):
     )
 
     def fall(self, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How far the wall has fallen back [m], and its slope, at each ``place`` along it [m].
-
-        Two corners, each a hyperbola.
-        """
+        """Depth of the wall below the seat [m] and its slope at each ``place`` [m]; each corner is a hyperbola."""
         length = self.depth / self.slope
         begin, end = place - self.position, place - self.position - length
         root_begin = np.sqrt(begin**2 + self.rounding**2)
@@ -39,7 +36,7 @@ class ControlEdge(CheckedParameters):
 
 @dataclass(frozen=True)
 class FilmSupply(CheckedParameters):
-    """Lubricant on the wall outside the seal: nothing but what there was and what the strokes left behind.
+    """Limited lubricant on the wall outside the seal: the initial film and what the strokes leave.
 
     Without this part of a case the seal is flooded.
 
@@ -52,9 +49,9 @@ class FilmSupply(CheckedParameters):
 
 
 class WallFilm:
-    """Lubricant on cells of the wall: what it holds is moved, never made.
+    """Lubricant on cells of the wall; its total volume is conserved. Immutable: each move returns a new film.
 
-    A cell that the seal covers in part holds what lies outside. Immutable: each move gives a new one.
+    The volume of a cell that the seal covers in part lies in the uncovered part.
 
     Args:
         start: Left end of the first cell [m].
@@ -82,11 +79,11 @@ class WallFilm:
 
         Args:
             taken: Volume taken from each cell [m^2], shape (n,).
-            given_back: Part of it that did not fit under the seal [m^2] and is pushed along.
-            back_at: Where that lies [m].
-            left: Left end of the stretch the seal has left [m].
+            given_back: Part of it that did not fit under the seal and is pushed ahead [m^2].
+            back_at: Position of that part [m].
+            left: Left end of the wall that the seal has uncovered [m].
             right: Right end of it [m].
-            laid: Volume laid down there [m^2].
+            laid: Volume left there [m^2].
         """
         volume = self.volume - taken
         volume[self._cell(back_at)] += given_back
