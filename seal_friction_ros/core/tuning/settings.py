@@ -1,10 +1,12 @@
 """Settings and results of the tuning of a simulated and of a recorded axis."""
 
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
+
+if TYPE_CHECKING:  # loads numpy, which `seal_friction tune --help` does not need
+    from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class RobustnessCase(NamedTuple, Generic[OutcomeType]):
 class TunedFeedForward(Generic[OutcomeType]):
     """A tuned feed-forward and its robustness."""
 
-    feedforward: FeedForwardSettings
+    feedforward: 'FeedForwardSettings'
     without: OutcomeType
     """outcome without feed-forward"""
     cases: tuple[RobustnessCase[OutcomeType], ...]

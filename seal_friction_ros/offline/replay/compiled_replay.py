@@ -19,7 +19,7 @@ from seal_friction_ros.core.estimation.compiled_pipeline import (
     receive_all,
 )
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, decode_text
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE
 from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration
@@ -115,7 +115,7 @@ def _answered(blocks: Iterator[Messages], override: Configuration | None) -> Ite
         for first, end in pairwise([0, *changes, len(block.kinds)]):
             messages = block.taken(first, end)
             if end > first and messages.kinds[0] == Kind.CONFIGURATION:
-                configuration, state = parse_snapshot(decode_text(messages.message(0)))
+                configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))
                 parameters = parameters if override else configuration.parameters()
             state, answers = receive_all(parameters, state, messages)
             yield messages, answers

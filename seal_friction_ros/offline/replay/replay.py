@@ -16,9 +16,8 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
+    DECODERS,
     ESTIMATE_TYPE,
-    decode,
-    decode_text,
     encode_text,
 )
 from seal_friction_ros.core.estimation.pipeline import answered, init
@@ -83,9 +82,9 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
         used = message
         try:
             if message.topic in inputs:
-                state, answers = answered(parameters, state, decode(message.type_name, message.data))
+                state, answers = answered(parameters, state, DECODERS[message.type_name](message.data))
             elif message.topic == topics.configuration:
-                configuration, state = parse_snapshot(decode_text(message.data))
+                configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](message.data))
                 if override:
                     used = message._replace(data=encode_text(snapshot_text(Snapshot(override, state))))
                 else:
@@ -95,17 +94,8 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
         yield Step(used, tuple(answers))
 
 
-BULK_FROM = 500_000
-"""Bags of at least so many messages are replayed compiled: compiling takes as long as replaying them one by one."""
-
-
 def replay(
-    bag: Path,
-    override: Configuration | None = None,
-    out: Path | None = None,
-    namespace: str = '',
-    *,
-    bulk_from: int = BULK_FROM,
+    bag: Path, override: Configuration | None = None, out: Path | None = None, namespace: str = ''
 ) -> ReplayResult:
     """Replay a bag and compare the answers with the recorded ones; with ``out``, write inputs and answers as a new bag.
 
@@ -114,7 +104,6 @@ def replay(
         override: Configuration instead of the recorded one.
         out: Bag to write.
         namespace: Use only topics below it.
-        bulk_from: Without ``out``, a bag of at least so many messages is replayed compiled; the result is the same.
 
     Raises:
         BagError: The bag cannot be read, or ``out`` exists already; then nothing is left at ``out``.
@@ -123,13 +112,6 @@ def replay(
     topics = find_topics(bag, namespace, known)
     total = count_messages(known)
     with progress(f'replay {bag.name}', total) as advance:
-        result = None
-        if out is None and total >= bulk_from:
-            from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
-
-            result = replay_in_bulk(bag, topics, override, advance)
-        if result is not None:
-            return result
         replayed = _counted(steps(read_messages(bag), topics, override), advance)
         if out is None:
             return _compare(replayed, topics)
