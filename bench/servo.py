@@ -1,8 +1,8 @@
-"""Real-time factor of the servo by inner step: seconds of servo per second of computer, friction and all, no ROS graph.
+"""Real-time factor of the servo with seal friction by inner step: simulated time per computing time, without ROS.
 
     python bench/servo.py [--seconds 5] [--json]
 
-``step``: one call a sample, as the simulator node does. ``simulate``: many samples in one call, as the tuning does.
+``step``: one call per sample, as in node and tuning. ``simulate``: many samples in one call, as in the servo charts.
 """
 
 import argparse
@@ -39,7 +39,7 @@ def main() -> None:
     """Print the table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--json', action='store_true', help='print JSON')
-    parser.add_argument('--seconds', type=float, default=5.0, help='of the servo')
+    parser.add_argument('--seconds', type=float, default=5.0, help='simulated time [s]')
     arguments = parser.parse_args()
     seals = default_configuration().parameters().estimator.seals
     rows = []

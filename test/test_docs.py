@@ -24,7 +24,7 @@ from seal_friction_msgs.msg import FrictionFeedForward
 from seal_friction_ros.offline.replay.replay import replay
 
 TIMEOUT = 120.0  # [s] ends a command that hangs
-PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
+PAGES = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').glob('*.md'))]
 README = (ROOT / 'README.md').read_text()
 
 
@@ -178,8 +178,16 @@ def test_tables_are_those_of_the_code(page: Path):
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
 def test_links_and_figures_are_there(page: Path):
-    for target in re.findall(r'\]\((?!http)([^)#]+)\)', page.read_text()):
-        assert (page.parent / target).exists(), target
+    for file, anchor in re.findall(r'\]\((?!http)([^)#]*)#?([^)]*)\)', page.read_text()):
+        target = page.parent / file if file else page
+        assert target.exists(), file
+        assert not anchor or anchor in anchors(target), f'{file}#{anchor}'
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of the headings of a page, as GitHub makes them."""
+    headings = re.findall(r'^#+ (.*)$', page.read_text(), re.MULTILINE)
+    return {re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-') for heading in headings}
 
 
 def test_every_figure_is_made_by_a_command():

@@ -26,7 +26,7 @@ from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.bag import bag_topics
-from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.replay.parallel_replay import verify
 
 RECIPE = (ROOT / 'docs' / 'extending.md').read_text()
 SECOND = 10**9  # [ns]
@@ -96,7 +96,7 @@ def test_the_live_node_runs_it_and_both_replays_give_the_same_bytes(seal_file, t
             if abs(velocity) > 0.01:
                 expected = 2.0 * friction(pressure, abs(velocity)) * np.sign(velocity)
                 assert estimate.friction_force == pytest.approx(expected, rel=1e-12)
-    one_by_one, compiled = (replay(tmp_path / 'bag', bulk_from=count) for count in (10**9, 0))
+    one_by_one, compiled = (verify(tmp_path / 'bag', bulk_from=count) for count in (10**9, 0))
     assert one_by_one == compiled
     assert compiled.identical
     assert '/friction_estimate' in bag_topics(tmp_path / 'bag')

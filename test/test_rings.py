@@ -1,4 +1,7 @@
-"""Who may import whom: core stands alone, offline and nodes do not know each other but for the recorder."""
+"""Who may import whom: core stands alone, offline and nodes do not know each other but for the recorder.
+
+Within core and within offline a room imports only from rooms before it.
+"""
 
 import ast
 import sys
@@ -15,6 +18,24 @@ NOT_PHYSICS = {
     'shutil', 'socket', 'subprocess', 'sys', 'tempfile', 'threading', 'time', 'uuid', 'yaml',
 }  # fmt: skip
 THIRD_PARTY_OF_CORE = {'numpy', 'scipy', 'numba'}
+ROOMS = {  # in order; rooms on one line do not import from each other
+    'core': (
+        ('foundation',),
+        ('friction',),
+        ('estimation', 'identification', 'oring_contact', 'lubrication'),
+        ('servo',),
+        ('tuning',),
+    ),
+    'offline': (
+        ('work',),
+        ('bags',),
+        ('replay',),
+        ('identification', 'tuning', 'contact'),
+        ('reports',),
+        ('commands',),
+    ),
+}
+MOST_ENTRIES = 9  # of core and of offline: what a newcomer reads at a glance
 SHARED_WITH_NODES = {f'{PACKAGE}.offline.bags.recorder', f'{PACKAGE}.offline.bags.bag'}
 
 
@@ -94,6 +115,25 @@ def test_nodes_take_only_the_recorder_and_the_bag_from_offline():
         return is_below(name, f'{PACKAGE}.offline') and not any(is_below(name, module) for module in SHARED_WITH_NODES)
 
     assert not offenders('nodes', surplus)
+
+
+@pytest.mark.parametrize('ring', ROOMS)
+def test_a_room_imports_only_from_rooms_before_it(ring):
+    place = {room: number for number, rooms in enumerate(ROOMS[ring]) for room in rooms}
+    upwards = []
+    for file, name in imports_of(ring):
+        room, _, rest = name.removeprefix(f'{PACKAGE}.{ring}.').partition('.')
+        here = file.split('/')[1]
+        if is_below(name, f'{PACKAGE}.{ring}') and here in place and room != here and rest:
+            upwards += [f'{file} imports {name}'] if place[room] >= place[here] else []
+    assert not upwards
+
+
+@pytest.mark.parametrize('ring', ROOMS)
+def test_the_rooms_fit_on_a_glance(ring):
+    entries = {path.name for path in (SOURCES / ring).iterdir() if path.name != '__pycache__'}
+    assert entries == {'__init__.py', *(room for rooms in ROOMS[ring] for room in rooms)}
+    assert len(entries) <= MOST_ENTRIES
 
 
 def test_nodes_do_no_arithmetic_with_numpy():

@@ -1,4 +1,4 @@
-"""Write the tables of docs/ that follow from the code: ``python tools/make_docs.py``; a test holds them to it.
+"""Write the tables of docs/ that follow from the code: ``python tools/make_docs.py``; a test compares them.
 
 Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
 """
@@ -37,7 +37,7 @@ from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
-from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
+from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test' / 'system'))
 from fault_rows import SIGNAL_ROWS, Row
@@ -49,7 +49,7 @@ DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
     *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
     TuningSettings,
-    MatchSettings,
+    RecordedAxisSettings,
     SealGeometry,
     AreaDeformationGain,
     NormalForceTable,

@@ -16,7 +16,7 @@ from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, INPUTS, REFERENCE_TYPE, decode, encode
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo.controller import Limited
-from seal_friction_ros.core.servo.motions import PullTest, Reference, Wave
+from seal_friction_ros.core.servo.motions import PullTest, Setpoint, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.core.servo.pull_rig import PullRig, init_pull_rig, pull_rig, step_pull_rig
 from seal_friction_ros.core.servo.sensors import Readings, SensorSettings, read
@@ -83,7 +83,7 @@ class ServoSimulator(ManagedNode):
             step_pull_rig(self._rig, init_pull_rig(self._rig), 0.0)  # compiles
         else:
             self._servo = self._servo_parameters()
-            step(self._servo, init(self._servo, self._settings.start_position), Reference(0.0))  # compiles
+            step(self._servo, init(self._servo, self._settings.start_position), Setpoint(0.0))  # compiles
         read(self.settings(SensorSettings), 0, Readings(None, None, None, None))  # loads the random generator
 
     def _servo_parameters(self, changed: dict[type, Any] | None = None) -> ServoParameters:
@@ -246,7 +246,7 @@ class ServoSimulator(ManagedNode):
             self._recent.update(f'limited {bit.name}' for bit in Limited if limited & bit)
         self._index += 1
 
-    def _reference_at(self, stamp: int) -> Reference | None:
+    def _reference_at(self, stamp: int) -> Setpoint | None:
         """Reference at ``stamp`` [ns]; None on the pull rig."""
         if self._wave is not None:
             return self._wave.at((self._index - self._wave_start) * self._period * 1e-9)
@@ -254,11 +254,11 @@ class ServoSimulator(ManagedNode):
             return None
         newest = self._reference
         if newest is None:
-            return Reference(self._settings.start_position)
+            return Setpoint(self._settings.start_position)
         if abs(stamp - newest.stamp) * 1e-9 > self._settings.reference_timeout:
             self._recent['references too old'] += 1
-            return Reference(newest.position)
-        return Reference(newest.position, newest.velocity, newest.acceleration)
+            return Setpoint(newest.position)
+        return Setpoint(newest.position, newest.velocity, newest.acceleration)
 
     def _feedforward_at(self, stamp: int) -> float:
         newest = self._feedforward

@@ -17,13 +17,13 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 
+from harness.hertz import cylinder_between_plates
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
-from seal_friction_ros.core.oring_contact.hertz import cylinder_between_plates
 from seal_friction_ros.core.oring_contact.loading import oring_model, squeeze_ring
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics

@@ -92,6 +92,17 @@ def check(record: Any) -> None:
             _check_number(where, value, meaning)
 
 
+class CheckedParameters:
+    """Base of a dataclass of `parameter` fields: `check` runs at construction, so an invalid record never exists.
+
+    Raises:
+        ValueError: A number is not finite or out of bounds.
+    """
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
 def _check_number(where: str, value: Any, meaning: Meaning) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return

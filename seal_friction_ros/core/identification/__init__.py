@@ -1,1 +1,1 @@
-"""Friction readings, the ladder of laws, fits and what they are worth."""
+"""Friction readings, candidate laws, fits, and their diagnostics."""

@@ -1,4 +1,4 @@
-"""Friction of many readings, compiled."""
+"""Compiled friction of many readings."""
 
 from typing import Any
 

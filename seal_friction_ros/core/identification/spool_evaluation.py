@@ -1,11 +1,11 @@
-"""Friction of a seal on a test rig that drives it to and fro, evaluated as the spool-valve paper does.
+"""Friction of a seal in reciprocating motion on a test rig, evaluated as in the spool-valve paper.
 
-Ten cycles are driven and the ninth is evaluated, so the lubricant film has settled. The measuring chain (force
-transducer, joints, rod) rings at a frequency of its own, 157 Hz in the paper, which no speed moves: it is recognised as
-such, and filtered. The force is normalised by its mean in the middle of the stroke, where the speed is held.
+The rig drives ten cycles; the ninth is evaluated, when the lubricant film has settled. The measuring chain (force
+transducer, joints, rod) has a resonance that does not depend on speed (157 Hz in the paper), which a notch filter
+removes. The force is normalised by its mean in the middle of the stroke, where the speed is constant.
 
-Source: spool-valve paper, chapters 4 (cycles), 6 (resonance, normalisation) and 7.3 (moving average). How the resonance
-is recognised and notched is our choice; the paper does both by eye.
+Source: spool-valve paper, chapters 4 (cycles), 6 (resonance, normalisation) and 7.3 (moving average). Automatic
+detection and notch are our choice; the paper does both by eye.
 """
 
 from dataclasses import dataclass
@@ -71,13 +71,13 @@ class SpoolFriction(NamedTuple):
 
 
 def cycle_starts(displacement: FloatArray) -> IntArray:
-    """Index at which each cycle begins: where the middle of the stroke is crossed on the way up, less a quarter cycle.
+    """Index at which each cycle begins: a quarter cycle before the upward crossing of the middle of the stroke.
 
     Args:
-        displacement: [m], shape (n,), of a motion to and fro with a rest or a turn at each end.
+        displacement: [m], shape (n,), of a reciprocating motion.
 
     Returns:
-        Indices, the end of the last cycle included, shape (cycles + 1,).
+        Indices, including the end of the last cycle, shape (cycles + 1,).
 
     Raises:
         ValueError: There are not two crossings, so no cycle.
@@ -86,7 +86,7 @@ def cycle_starts(displacement: FloatArray) -> IntArray:
     above = displacement > middle
     rising = np.flatnonzero(~above[:-1] & above[1:]) + 1
     if len(rising) < 2:
-        raise ValueError(f'{len(rising)} crossings of the middle of the stroke: no cycle: drive to and fro')
+        raise ValueError(f'{len(rising)} crossings of the middle of the stroke: no cycle: drive in both directions')
     period = round(float(np.median(np.diff(rising))))
     first = np.maximum(rising - period // 4, 0)
     return np.append(first, min(int(first[-1]) + period, len(displacement)))
@@ -102,19 +102,19 @@ def moving_average(values: FloatArray, width: int) -> FloatArray:
 
 
 def resonance_frequency(time: FloatArray, force: FloatArray, law: SpoolEvaluation) -> float | None:
-    """Frequency of the measuring chain [Hz], recognised in a force; None if none stands out.
+    """Resonance frequency of the measuring chain [Hz] in a force; None if there is none.
 
-    A motion to and fro has lines in its spectrum at all multiples of its frequency, which fall steadily; a resonance is
-    a hump among them. So the envelope of the spectrum (the highest line within 10 Hz) is compared with itself at two
-    thirds and at three halves of each frequency: where it is highest above both, by ``resonance_prominence``, is the
-    resonance. Its place is the mean of the lines under the hump, weighted by their power.
+    The spectrum of a reciprocating motion has lines at all multiples of its frequency, which fall steadily; a resonance
+    is a hump among them. The prominence is the ratio of the envelope (highest line within 10 Hz) to the larger of its
+    values at two thirds and three halves of the frequency. The resonance is at the largest prominence, if that exceeds
+    ``resonance_prominence``; its frequency is the mean of the lines under the hump, weighted by their power.
 
     Args:
         time: [s], even steps, shape (n,).
         force: [N], shape (n,).
         law: Lowest frequency and prominence.
 
-    Source: spool-valve paper, section 6.2, for what it is; how it is recognised is our choice.
+    Source: spool-valve paper, section 6.2; the detection is our choice.
     """
     step = float(np.median(np.diff(time)))
     amplitude = np.abs(np.fft.rfft((force - force.mean()) * np.hanning(len(force))))
@@ -148,12 +148,12 @@ def without_resonance(time: FloatArray, force: FloatArray, resonance: float, law
 
 
 def reference_force(displacement: FloatArray, force: FloatArray, half_width: float) -> float:
-    """Mean magnitude of the force [N] within +/- ``half_width`` [m] of the middle of the stroke, to and fro.
+    """Mean magnitude of the force [N] within +/- ``half_width`` [m] of the middle of the stroke, both directions.
 
-    Source: spool-valve paper, chapter 6: the mean between -0.5 mm and 0.5 mm, where the speed is held.
+    Source: spool-valve paper, chapter 6: the mean between -0.5 mm and 0.5 mm, where the speed is constant.
 
     Raises:
-        ValueError: The stroke does not reach as far, or the force there is zero.
+        ValueError: The stroke is shorter, or the force there is zero.
     """
     inside = np.abs(displacement) <= half_width
     if not inside.any() or np.abs(displacement).max() < half_width:
@@ -163,7 +163,7 @@ def reference_force(displacement: FloatArray, force: FloatArray, half_width: flo
         )
     mean = float(np.abs(force[inside]).mean())
     if not mean > 0.0:
-        raise ValueError('the force in the middle of the stroke is zero: nothing to normalise by')
+        raise ValueError('the force in the middle of the stroke is zero: it cannot normalise the friction')
     return mean
 
 
@@ -177,11 +177,11 @@ def evaluate_cycles(
         displacement: [m], shape (n,).
         force: [N], shape (n,), positive with the velocity.
         law: How it is evaluated.
-        reference: Reference force [N] of another measurement, as the paper normalises all seals by the outer one
-            without pressure; None: this cycle's own.
+        reference: Reference force [N] of another measurement (the paper normalises all seals by the outer one without
+            pressure); None: that of this cycle.
 
     Raises:
-        ValueError: A sample is not finite, there are too few cycles or samples, or there is nothing to normalise by.
+        ValueError: A sample is not finite, there are too few cycles or samples, or the reference force is zero.
     """
     if not all(np.isfinite(column).all() for column in (time, displacement, force)):
         raise ValueError('time, displacement or force has samples that are not finite: cut them out')

@@ -1,4 +1,4 @@
-"""Deflection of the seal surface under pressure: a half-plane whose far side is held."""
+"""Deflection of the seal surface under pressure: a half-plane fixed at a depth."""
 
 import math
 from dataclasses import dataclass, field
@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 from scipy.fft import next_fast_len
+from scipy.linalg import toeplitz
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 
@@ -18,8 +19,8 @@ class HalfPlane:
 
     .. math:: u(x) = \frac{2}{\pi E^*} \int p(s) \ln\frac{d}{|x - s|}\,ds
 
-    exact for pressure that is constant in each cell. A half-plane deflects without bound, so a ``depth`` d has to say
-    where it does not: about the height of the seal section (our choice).
+    exact for a pressure that is constant in each cell. The deflection of a half-plane is unbounded, so a ``depth`` d
+    fixes where it is zero: about the height of the seal section (our choice).
 
     Source: K. L. Johnson, Contact Mechanics, 1985, section 2.3 and appendix.
     """
@@ -62,8 +63,7 @@ class HalfPlane:
 
     def matrix(self) -> FloatArray:
         """Full influence matrix [m/Pa], shape (cells, cells)."""
-        i = np.arange(self.cells)
-        return np.asarray(self.influence[np.abs(i[:, None] - i)])
+        return np.asarray(toeplitz(self.influence))
 
 
 def _influence(distance: FloatArray | IntArray, width: float, modulus: float, depth: float) -> FloatArray:
@@ -74,7 +74,7 @@ def _influence(distance: FloatArray | IntArray, width: float, modulus: float, de
 
 
 def _stiffness_band(cells: int, width: float, modulus: float) -> FloatArray:
-    """Inverse of the influence matrix of a long periodic grid, cut to a band; what is cut off goes to the diagonal."""
+    """Inverse of the influence matrix of a long periodic grid, cut to a band; the diagonal keeps the sum of a row."""
     length = 8 * cells
     distance = np.minimum(np.arange(length), length - np.arange(length))
     spectrum = np.fft.rfft(_influence(distance, width, modulus, length * width)).real

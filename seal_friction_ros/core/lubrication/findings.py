@@ -1,4 +1,4 @@
-"""What a run shows, as numbers: those that the spool-valve paper discusses, and how far step and grid blur them."""
+"""Numbers of a run that the spool-valve paper discusses, and their discretisation errors."""
 
 import dataclasses
 import math
@@ -12,13 +12,13 @@ from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
 
 REFERENCE_HALF_WIDTH = 0.5e-3
-"""[m] about the middle: where the paper takes its mean friction (chapter 6)"""
+"""[m] about the middle: range of the mean friction of the paper (chapter 6)"""
 SLOW_SHARE = 0.2
-"""of the highest speed: where the friction near the ends is read (our choice)"""
+"""of the highest speed: at this speed the friction near the ends is read (our choice)"""
 
 
 class Findings(NamedTuple):
-    """Numbers of the last cycle of a run; None where the run has no such thing."""
+    """Numbers of the last cycle of a run; None where they do not apply."""
 
     friction: float
     """[N] mean magnitude within 0.5 mm of the middle"""
@@ -35,17 +35,17 @@ class Findings(NamedTuple):
     rise_on_deceleration: float | None
     """friction at 0.2 of the highest speed, slowing down, over the last at the highest, less 1; mean of strokes"""
     assisted_length: float | None
-    """[m] way of the spool after a reversal over which friction pushes along, mean of those in the last cycle"""
+    """[m] travel of the spool after a reversal over which friction assists the motion, mean of the last cycle"""
     elastic_length: float | None
-    """[m] the same by elasticity alone: friction at the reversal over the stiffness of the groove"""
+    """[m] the same from elasticity alone: friction at the reversal over the stiffness of the groove"""
     second_lobe: float | None
-    """[m] where friction begins to fall again while the seal still sticks; None with one seat"""
+    """[m] position at which friction begins to fall while the seal still sticks; None with one seat"""
     edge_peak: float | None
-    """largest friction on meeting the control edge over the mean in the seat after it"""
+    """largest friction at the control edge over the mean in the seat after it"""
     edge_assist: float | None
-    """[N] largest push of the chamfer along the motion, on leaving the seat"""
+    """[N] largest force of the chamfer along the motion, on leaving the seat"""
     friction_on_leaving: float | None
-    """[N] least of all friction while that push is above half of it; negative pushes along"""
+    """[N] lowest friction while that force is above half of its maximum; negative: it assists the motion"""
     after_edge: float | None
     """[N] mean friction well inside the seat, after the control edge"""
 
@@ -93,17 +93,10 @@ def findings(result: TransientResult) -> Findings:
 def discretisation_errors(
     case: LubricationCase, fine: Findings, run: Callable[[LubricationCase], TransientResult]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """How far each finding moves when the step is doubled, and when the grid is coarsened to half the cells.
+    """Change of each finding with twice the time step, and with half the cells: field -> |difference|.
 
-    Both are of first order or better, so the error of ``fine`` itself is no larger than that (our choice of estimate).
-
-    Args:
-        case: The case.
-        fine: Its findings.
-        run: Runs a case.
-
-    Returns:
-        Field to |difference| for step and grid; fields that are None in either are left out.
+    Step and grid converge with first order or better, so the error of ``fine`` is no larger (our choice of estimate).
+    Fields that are None in either run are left out.
     """
     numerics = case.numerics
     by_step = dataclasses.replace(case, numerics=dataclasses.replace(numerics, time_step=2.0 * numerics.time_step))
@@ -144,7 +137,7 @@ def _slowing(result: TransientResult, stroke: BoolArray) -> tuple[int, int]:
 
 
 def _assisted(result: TransientResult, last: BoolArray) -> tuple[float | None, float | None]:
-    """Mean way after the reversals of the last cycle until friction changes sign, and what elasticity says."""
+    """Mean travel after the reversals of the last cycle until friction changes sign: computed, and from elasticity."""
     reversals = [
         int(i)
         for i in np.flatnonzero(np.diff(np.sign(result.velocity)) != 0)
@@ -166,14 +159,14 @@ def _assisted(result: TransientResult, last: BoolArray) -> tuple[float | None, f
 
 
 def _turning_point(result: TransientResult, i: int) -> float:
-    """The end of the way nearest to the position of step ``i`` [m]."""
+    """End of the stroke nearest to the position of step ``i`` [m]."""
     motion = result.case.motion
     ends = motion.centre - 0.5 * motion.distance, motion.centre + 0.5 * motion.distance
     return min(ends, key=lambda end: abs(end - result.position[i]))
 
 
 def _second_lobe(result: TransientResult, last: BoolArray) -> float | None:
-    """Where on the stroke to the right friction has its first maximum while the seal sticks: vertex of a parabola."""
+    """Position of the first maximum of friction on the stroke to the right, the vertex of a parabola [m]."""
     if result.case.seated_groove.half_clearance == 0.0:
         return None
     steps = np.flatnonzero(last & (result.velocity > 0.0))

@@ -1,4 +1,4 @@
-"""The friction map of a case: steady sliding over speed and pressure, and how far friction lags behind a change."""
+"""The friction map of a case: steady friction over speed and pressure, and its memory length."""
 
 import dataclasses
 import math
@@ -35,7 +35,7 @@ class SteadyFriction(NamedTuple):
 
 
 class MemoryLength(NamedTuple):
-    """How long friction remembers."""
+    """Travel over which friction follows a change of speed."""
 
     length: float
     """[m] of sliding"""
@@ -52,7 +52,7 @@ def map_pressures(grid: MapGrid) -> FloatArray:
     return np.linspace(0.0, grid.pressure_max, grid.pressures)
 
 
-def _plain(case: LubricationCase, pressure: float) -> LubricationCase:
+def _flooded_elastic_case(case: LubricationCase, pressure: float) -> LubricationCase:
     """The case on a plain flooded wall, elastic, with ``pressure`` [Pa] on its left."""
     air = dataclasses.replace(case.air, pressure_left=pressure, pressure_right=0.0)
     return dataclasses.replace(case, air=air, control_edge=None, film_supply=None, viscoelasticity=None)
@@ -117,7 +117,7 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
     Raises:
         NotConvergedError: A film did not converge; the message says at which speed and pressure.
     """
-    model = LubricationModel(_plain(case, pressure))
+    model = LubricationModel(_flooded_elastic_case(case, pressure))
     speeds = map_speeds(case.map)
     values = np.empty((2, 2, len(speeds)))
     begin = initial_state(model, 0.0).state
@@ -144,7 +144,7 @@ def memory_length(case: LubricationCase) -> MemoryLength:
     Raises:
         NotConvergedError: A step did not converge.
     """
-    model = LubricationModel(_plain(case, 0.0))
+    model = LubricationModel(_flooded_elastic_case(case, 0.0))
     fast = case.motion.speed
     slow, first = steady_state(model, initial_state(model, 0.0).state, 0.2 * fast)
     steady, second = steady_state(model, slow, fast)

@@ -4,17 +4,14 @@ import math
 from dataclasses import dataclass
 
 from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True)
-class Grease:
+class Grease(CheckedParameters):
     """Palacios-Palacios grease: tau = tau_0 + k gamma^n + eta_b gamma. Defaults: Table 1 of the paper.
 
     A yield stress and an index of 0 make a Newtonian fluid of viscosity ``base_viscosity``.
-
-    Raises:
-        ValueError: A value is out of bounds.
 
     Source: J. Palacios, M. Palacios 1984; spool-valve paper, Table 1.
     """
@@ -32,19 +29,10 @@ class Grease:
         '34 mm/s across 0.5 um, so it acts on films at rest only).',
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
     @property
     def numbers(self) -> tuple[float, float, float, float, float]:
         """The parameters in order of declaration, for compiled functions."""
-        return (
-            self.yield_stress,
-            self.consistency_index,
-            self.flow_index,
-            self.base_viscosity,
-            self.shear_rate_floor,
-        )
+        return (self.yield_stress, self.consistency_index, self.flow_index, self.base_viscosity, self.shear_rate_floor)
 
 
 @compiled

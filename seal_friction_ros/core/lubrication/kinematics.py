@@ -1,4 +1,4 @@
-"""Position of the spool over time: the paper's constant acceleration, or any measured signal."""
+"""Position of the spool over time: constant acceleration as in the paper, or a measured signal."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 class SpoolMotion(Protocol):
@@ -25,8 +25,8 @@ class SpoolMotion(Protocol):
 
 
 @dataclass(frozen=True)
-class ConstantAcceleration:
-    """Back and forth about ``centre`` without rest: speed up, slide at constant speed, slow down, and return.
+class ConstantAcceleration(CheckedParameters):
+    """Reciprocation about ``centre`` without dwell: acceleration, constant speed, deceleration, and return.
 
     Defaults: Table 1 of the spool-valve paper.
 
@@ -43,7 +43,7 @@ class ConstantAcceleration:
     centre: float = parameter(0.0, unit='m', lower=-10.0, upper=10.0, description='Middle of the way.')
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.speed**2 / self.acceleration > self.distance:
             raise ValueError(
                 f'ConstantAcceleration.speed = {self.speed} m/s is not reached within distance = {self.distance} m '
@@ -79,7 +79,7 @@ class ConstantAcceleration:
 
 
 class MeasuredMotion:
-    """A measured position signal, straight between its samples.
+    """Measured position, linear between its samples.
 
     Args:
         times: Increasing [s], shape (n,), n >= 2; the motion starts at the first.

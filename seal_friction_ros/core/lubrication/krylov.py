@@ -1,15 +1,26 @@
-"""GMRES: a linear system known only by what its matrix does to a vector."""
+"""GMRES for a linear system whose matrix is known only by its product with a vector.
+
+Own code, because `scipy.sparse.linalg.gmres` (SciPy 1.17) makes a whole run 1.26 to 1.45 times slower. Processor time
+of one cycle of ``inner_seal``, best of six, in two series on a busy machine: 1.8 and 2.1 s with this function, 2.6 and
+2.9 s with SciPy's (226 cells); best of two and of four with 1000 cells: 11.0 and 8.9 s, 13.8 and 12.5 s. The number of
+Newton iterations is the same, and the friction agrees to 6e-16 of its maximum. The matrix is dense, so no sparse direct
+solver applies; assembling it and `scipy.linalg.solve` took 12 s (226 cells).
+
+To repeat: put ``gmres(LinearOperator((n, n), product), right, rtol=0.0, atol=tolerance,
+restart=iterations, maxiter=1)`` in place of `contact.gmres` and run ``python bench/ehl.py --cells 226 1000``.
+"""
 
 import math
 from collections.abc import Callable
 
 import numpy as np
+from scipy.linalg.lapack import dgels
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 
 
 class StalledError(ArithmeticError):
-    """The residual did not fall far enough."""
+    """The residual did not fall below the tolerance."""
 
 
 def gmres(
@@ -18,51 +29,35 @@ def gmres(
     """Vector x with |right - A x| <= ``tolerance`` (2-norm), from x = 0, without restart.
 
     Args:
-        product: Gives A x.
+        product: Computes A x.
         right: Right-hand side, shape (n,).
         tolerance: Of the residual, in the unit of ``right``.
-        iterations: Most products to take.
+        iterations: Largest number of products.
 
     Raises:
-        StalledError: The residual is not that small after ``iterations``, or not a number.
+        StalledError: The residual is larger after ``iterations``, or not a number.
 
     Source: Y. Saad, M. H. Schultz 1986.
     """
-    size = float(np.linalg.norm(right))
+    size = left = float(np.linalg.norm(right))
     if size <= tolerance:
         return np.zeros_like(right)
-    basis = np.empty((iterations + 1, len(right)))
-    basis[0] = right / size
-    columns: list[list[float]] = []  # of the triangle that rotations make of the Hessenberg matrix
-    rotations: list[tuple[float, float]] = []
-    rotated = [size]
+    basis, hessenberg = np.empty((iterations + 1, len(right))), np.zeros((iterations + 1, iterations))
+    basis[0], start = right / size, np.eye(iterations + 1)[0] * size
     for k in range(iterations):
-        image = product(basis[k])
-        vectors = basis[: k + 1]
-        shares = vectors @ image
-        image = image - shares @ vectors
-        again = vectors @ image
-        image -= again @ vectors
-        column = (shares + again).tolist()
-        length = float(np.linalg.norm(image))
-        for i, (cosine, sine) in enumerate(rotations):
-            column[i], column[i + 1] = (
-                cosine * column[i] + sine * column[i + 1],
-                cosine * column[i + 1] - sine * column[i],
-            )
-        radius = math.hypot(column[k], length)
-        if not 0.0 < radius < math.inf:
+        vectors, image = basis[: k + 1], product(basis[k])
+        for _ in range(2):  # the second orthogonalisation removes the rounding errors of the first
+            shares = vectors @ image
+            image = image - shares @ vectors
+            hessenberg[: k + 1, k] += shares
+        length = hessenberg[k + 1, k] = float(np.linalg.norm(image))
+        if not math.isfinite(length):
             break
-        rotations.append((column[k] / radius, length / radius))
-        column[k] = radius
-        columns.append(column)
-        rotated.append(-rotations[k][1] * rotated[k])
-        rotated[k] *= rotations[k][0]
-        if abs(rotated[k + 1]) <= tolerance:
-            weights = [0.0] * (k + 1)
-            for i in range(k, -1, -1):
-                above = sum(columns[j][i] * weights[j] for j in range(i + 1, k + 1))
-                weights[i] = (rotated[i] - above) / columns[i][i]
-            return np.asarray(weights @ vectors)
+        _, weights, _ = dgels(hessenberg[: k + 2, : k + 1], start[: k + 2])  # least squares; residual at the end
+        left = abs(float(weights[-1]))
+        if left <= tolerance:
+            return np.asarray(weights[:-1] @ vectors)
+        if length == 0.0:
+            break
         basis[k + 1] = image / length
-    raise StalledError(f'GMRES: {abs(rotated[-1]):.2g} of {size:.2g} left after {len(columns)} iterations')
+    raise StalledError(f'GMRES: {left:.2g} of {size:.2g} left after {k + 1} iterations')

@@ -1,6 +1,6 @@
-"""Everything a run needs, and the document (a mapping, as YAML gives it) it is made from.
+"""Input of a run: parsed document of a case file (YAML mapping) -> `LubricationCase`.
 
-A case file looks like this; every part and field is in docs/ehl.md::
+Example; docs/ehl.md describes every field::
 
     name: inner_seal
     source: where the numbers are from
@@ -14,7 +14,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from seal_friction_ros.core.foundation.parameters import check, check_names, from_mapping, name_and_source, parameter
+from seal_friction_ros.core.foundation.parameters import (
+    CheckedParameters,
+    check_names,
+    from_mapping,
+    name_and_source,
+    parameter,
+)
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
@@ -23,7 +29,7 @@ from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 
 
 @dataclass(frozen=True)
-class SealBody:
+class SealBody(CheckedParameters):
     """Shape and material of the seal. Shape: our choice (the paper's is confidential); material: Table 1.
 
     Raises:
@@ -52,7 +58,7 @@ class SealBody:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.modulus <= 0.0:
             raise ValueError('SealBody.mooney_c10 and mooney_c01 are both 0 Pa: give the seal a stiffness')
 
@@ -63,12 +69,8 @@ class SealBody:
 
 
 @dataclass(frozen=True)
-class AirPressure:
-    """Pressure on both sides of the seal, above that at which the film cavitates (ambient).
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class AirPressure(CheckedParameters):
+    """Air pressure on both sides of the seal, above the cavitation pressure of the film (ambient)."""
 
     pressure_left: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e8, description='Gauge.')
     pressure_right: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e8, description='Gauge.')
@@ -80,9 +82,6 @@ class AirPressure:
         description='Interference that a pressure difference adds through the groove (our choice: 36 um at 6 bar).',
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
     @property
     def difference(self) -> float:
         """Magnitude of the pressure difference [Pa]."""
@@ -90,11 +89,8 @@ class AirPressure:
 
 
 @dataclass(frozen=True)
-class Viscoelasticity:
+class Viscoelasticity(CheckedParameters):
     """Seal that is stiffer when loaded fast: standard linear solid; the Mooney-Rivlin stiffness is the relaxed one.
-
-    Raises:
-        ValueError: A value is out of bounds.
 
     Source: spool-valve paper, section 7.4, for the effect; model and numbers are our choice.
     """
@@ -106,28 +102,18 @@ class Viscoelasticity:
         0.3, unit='s', lower=1e-6, upper=1e6, description='Time constant of creep under constant pressure.'
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
-class LubricationNumerics:
-    """Grid and time step.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class LubricationNumerics(CheckedParameters):
+    """Grid and time step."""
 
     cells: int = parameter(226, unit='1', lower=32, upper=4000, description='Cells of the film (paper: 226 nodes).')
     film_width: float = parameter(0.6e-3, unit='m', lower=1e-5, upper=0.1, description='Length of the film region.')
     time_step: float = parameter(5e-4, unit='s', lower=1e-7, upper=0.1, description='Before any halving.')
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
-class ShearStressStudy:
+class ShearStressStudy(CheckedParameters):
     """Study of section 7.2: the case with other solid shear stresses.
 
     Raises:
@@ -143,13 +129,13 @@ class ShearStressStudy:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if not self.solid_shear_stresses:
             raise ValueError('ShearStressStudy.solid_shear_stresses is empty')
 
 
 @dataclass(frozen=True)
-class MapGrid:
+class MapGrid(CheckedParameters):
     """Velocities and pressures of the friction map.
 
     Raises:
@@ -163,7 +149,7 @@ class MapGrid:
     pressures: int = parameter(6, unit='1', lower=2, upper=100, description='Pressures, in equal steps.')
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.velocity_max <= self.velocity_min:
             raise ValueError(
                 f'MapGrid.velocity_max = {self.velocity_max} m/s is not above velocity_min = {self.velocity_min} m/s'
@@ -208,54 +194,43 @@ class LubricationCase:
 
     @property
     def interference(self) -> float:
-        """Interference with what the pressure difference adds [m]."""
+        """Interference, including the part that the pressure difference adds [m]."""
         return self.seal.interference + self.air.pressure_interference * self.air.difference
 
     @property
     def seated_groove(self) -> GrooveSpring:
-        """The groove as it acts: a pressure difference holds the seal on one flank (paper, section 7.4)."""
+        """Groove spring in use: a pressure difference holds the seal on one flank (paper, section 7.4)."""
         return dataclasses.replace(self.groove, half_clearance=0.0) if self.air.difference > 0.0 else self.groove
 
 
-_PARTS: dict[str, type] = {
-    'seal': SealBody,
-    'topography': Topography,
-    'grease': Grease,
-    'groove': GrooveSpring,
-    'air': AirPressure,
-    'motion': ConstantAcceleration,
-    'numerics': LubricationNumerics,
-    'study': ShearStressStudy,
-    'map': MapGrid,
+_OPTIONAL: dict[str, type] = {
     'control_edge': ControlEdge,
     'film_supply': FilmSupply,
     'viscoelasticity': Viscoelasticity,
 }
+_PARTS: dict[str, Any] = {
+    part.name: part.default_factory
+    for part in dataclasses.fields(LubricationCase)
+    if part.default_factory is not dataclasses.MISSING
+} | _OPTIONAL
 
 
 @dataclass(frozen=True)
-class SpoolSeal:
-    """One seal of a spool with several.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class SpoolSeal(CheckedParameters):
+    """One seal of a spool with several."""
 
     case: str
     """name of its case"""
     mirrored: bool = False
-    """sits the other way round: its case is driven the other way"""
+    """mounted in the opposite direction: its case moves in the opposite direction"""
     shift: float = parameter(
         0.0, unit='m', lower=-1.0, upper=1.0, description='Where the spool stands when the case is at 0.'
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
 class Spool:
-    """Several seals on one spool, moved together; their frictions add up.
+    """Several seals on one spool; the friction of the spool is their sum.
 
     Raises:
         ValueError: There is no seal.
@@ -272,10 +247,10 @@ class Spool:
 
 
 def parse_lubrication_case(document: Any) -> LubricationCase | Spool:
-    """Make a case, or a spool if the document has ``seals``, from the document of a case file.
+    """Parse the document of a case file: a spool if it has ``seals``, else a case.
 
     Raises:
-        ValueError: The document makes no sense; the message names the case, the field, its value and its bound.
+        ValueError: A value is invalid; the message names case, field, value and bound.
     """
     name, source = name_and_source(document, 'case')
     known = ('name', 'source', *(('seals', 'motion') if 'seals' in document else _PARTS))

@@ -24,16 +24,16 @@ from seal_friction_ros.core.foundation.compiled import compiled
 
 
 class FilmEnds(NamedTuple):
-    """What is beyond both ends of the film. Where the pressure is above 0 the saturation is 1."""
+    """Conditions beyond both ends of the film. Where the pressure is above 0 the saturation is 1."""
 
     pressure_left: float = 0.0
     """[Pa] above the cavitation pressure"""
     pressure_right: float = 0.0
     """[Pa] above the cavitation pressure"""
     saturation_left: float = 1.0
-    """of what flows in"""
+    """of the inflow"""
     saturation_right: float = 1.0
-    """of what flows in"""
+    """of the inflow"""
 
 
 @compiled
@@ -48,7 +48,7 @@ def reynolds_rows(
     width: float,
     ends: FilmEnds,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Flow out of each cell less flow in plus what is stored, and its derivatives.
+    """Outflow less inflow plus storage of each cell, and its derivatives.
 
     Args:
         gap: h [m], shape (n,).

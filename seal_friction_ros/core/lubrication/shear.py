@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import erf
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
@@ -57,11 +58,7 @@ def fluid_shear(
 
 
 def sliding_velocity(
-    drive: float,
-    solid: float,
-    fluid_at: Callable[[float], float],
-    spring_at: Callable[[float], float],
-    fastest: float,
+    drive: float, solid: float, fluid_at: Callable[[float], float], spring_at: Callable[[float], float], fastest: float
 ) -> float:
     """Velocity at which spring and friction balance, if the seal does not stick.
 
@@ -77,40 +74,17 @@ def sliding_velocity(
 
     Raises:
         ValueError: There is no balance below a million times ``fastest``.
-
-    The method is that of Illinois, M. Dowell, P. Jarratt 1971.
     """
     direction = math.copysign(1.0, drive)
 
     def surplus(speed: float) -> float:
         return direction * (spring_at(direction * speed) - fluid_at(direction * speed)) - solid
 
-    low, high, at_low = 0.0, fastest, direction * drive - solid
-    at_high = surplus(high)
-    while at_high > 0.0:
-        low, at_low = high, at_high
+    high = fastest
+    while surplus(high) > 0.0:
         high *= 2.0
         if high > 1e6 * fastest:
             raise ValueError(
                 f'no sliding velocity below {high:.3g} m/s balances {drive:.4g} N: is the seal held at all?'
             )
-        at_high = surplus(high)
-    kept = 0
-    for _ in range(100):
-        if high - low <= 1e-9 * fastest:
-            break
-        middle = (low * at_high - high * at_low) / (at_high - at_low)
-        value = surplus(middle)
-        if value == 0.0:
-            return direction * middle
-        if value > 0.0:
-            low, at_low = middle, value
-            at_high = 0.5 * at_high if kept > 0 else at_high
-            kept = 1
-        else:
-            high, at_high = middle, value
-            at_low = 0.5 * at_low if kept < 0 else at_low
-            kept = -1
-        if abs(value) <= 1e-9 * (abs(drive) + solid):
-            return direction * middle
-    return direction * 0.5 * (low + high)
+    return direction * float(brentq(surplus, 0.0, high, xtol=1e-9 * fastest))

@@ -1,4 +1,4 @@
-"""Several seals on one spool: each runs alone, their frictions add up (paper, section 6.4: they overlap)."""
+"""Several seals on one spool: each is computed alone, and their frictions are added (paper, section 6.4)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from seal_friction_ros.core.lubrication.transient import TransientResult, last_c
 
 
 class SpoolSealMotion:
-    """Motion of the spool as one seal sees it: shifted, and the other way round if it is mirrored."""
+    """Motion of the spool in the frame of one seal: shifted, and reversed if the seal is mirrored."""
 
     def __init__(self, motion: SpoolMotion, member: SpoolSeal) -> None:
         self._motion, self._member = motion, member
@@ -44,14 +44,14 @@ class SpoolResult(NamedTuple):
 
 
 def superposed(members: Sequence[SpoolSeal], runs: Sequence[TransientResult]) -> SpoolResult:
-    """Sum of the frictions of the seals of a spool, from the run of each with its `MemberMotion`.
+    """Sum of the frictions of the seals of a spool, from the run of each with its `SpoolSealMotion`.
 
     Raises:
         ValueError: The runs do not share their times.
     """
     first = runs[0]
     if any(len(run.time) != len(first.time) or not np.allclose(run.time, first.time) for run in runs):
-        raise ValueError('superposed: the seals were not run with one time step: give their cases the same')
+        raise ValueError('superposed: the seals have different time steps: give their cases the same')
     frictions = np.array([-run.friction if m.mirrored else run.friction for m, run in zip(members, runs, strict=True)])
     position = (first.position - members[0].shift) * (-1.0 if members[0].mirrored else 1.0)
     return SpoolResult(first.time, position, frictions.sum(axis=0), frictions, last_cycle(first))

@@ -1,4 +1,4 @@
-"""Study of the solid shear stress: how friction and its solid share follow from tau_c (paper, section 7.2)."""
+"""Study of the solid shear stress: friction and its solid share over tau_c (paper, section 7.2)."""
 
 from typing import NamedTuple
 
@@ -17,9 +17,9 @@ class StudyTable(NamedTuple):
     friction: tuple[float, ...]
     """[N] mean magnitude within 0.5 mm of the middle"""
     solid_share: tuple[float, ...]
-    """of solid and fluid friction there"""
+    """solid over solid and fluid friction there"""
     deviation: tuple[float, ...]
-    """friction over tau_c, over the mean of that over all runs, less 1"""
+    """friction over tau_c, relative to the mean of all runs, less 1"""
     curve_deviation: tuple[float, ...]
     """largest of the same, position by position within 0.5 mm of the middle"""
 

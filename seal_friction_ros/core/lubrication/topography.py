@@ -1,16 +1,16 @@
-"""Roughness of seal and wall: how it carries load, and how much of it really touches."""
+"""Roughness of seal and wall: contact pressure and real area of contact."""
 
 import math
 from dataclasses import dataclass
 
 from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.lubrication.flow_factors import flow_factor_coefficients
 
 
 @dataclass(frozen=True)
-class Topography:
-    r"""Combined roughness of seal and wall; all values are our choice (the paper's topography is measured, and kept).
+class Topography(CheckedParameters):
+    r"""Combined roughness of seal and wall; all values are our choice (that of the paper is not public).
 
     Contact pressure falls exponentially with the mean separation of the surfaces, and the real area of contact follows
     from the contact pressure alone:
@@ -19,7 +19,7 @@ class Topography:
         A_{real} = \mathrm{erf}\big(\sqrt 2\,p_c / (E^* h'_{rms})\big)
 
     with q_0 = 2 pi / ``roll_off_length`` and h'_rms the ``rms_slope``. Below zero separation the exponential goes on as
-    its tangent (our choice: never reached in a converged result, but a Newton iteration may pass through).
+    its tangent (our choice: a converged result is never there, but a Newton iteration may be).
 
     Raises:
         ValueError: A value is out of bounds, there are no flow factors for the Peklenik number, or the slope is less
@@ -48,7 +48,7 @@ class Topography:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         flow_factor_coefficients(self.peklenik_number)
         least = 2.0 * math.pi * self.rms_height / self.roll_off_length
         if self.rms_slope < least:

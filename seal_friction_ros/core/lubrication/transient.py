@@ -1,9 +1,9 @@
-r"""A whole motion of one seal, step by step: ``moment = rest(model)``, then ``moment, forces = advance(...)``.
+r"""A whole motion of one seal, step by step: `initial_state`, then `transient_step` repeatedly.
 
 The spool drives the contact through the groove (`groove`): lag e, velocity of the contact v = spool velocity - de/dt.
-One step first finds v from the balance of spring and friction with the film as it is, sticking included, then moves the
-film by one implicit Euler step with that v (our choice: of first order in the step, like the film itself). Forces count
-positive where they resist a motion to the right, so friction has the sign of the velocity.
+A step first computes v from the balance of spring and friction, with the film of the previous step and with sticking,
+then the film by one implicit Euler step with that v (our choice: first order in the step, like the film itself). Forces
+are positive where they resist a motion to the right, so friction has the sign of the velocity.
 """
 
 import dataclasses
@@ -38,10 +38,10 @@ _LARGEST_RECORD = 100_000_000  # numbers along the seal that a run may keep, 0.8
 
 @dataclass(frozen=True, eq=False)
 class LubricationModel:
-    """A case made ready to run.
+    """A case with the quantities that are constant over a run.
 
-    Air presses on the seal from all sides, and rubber passes that on like a fluid; so only what film and asperities
-    press above the air deflects it (our choice: between the sides the air falls over the middle half of the film).
+    The air acts on the seal from all sides, and rubber transmits its pressure like a fluid: only the pressure above
+    that of the air deflects the seal. The air pressure falls linearly over the middle half of the film (our choice).
 
     Raises:
         ValueError: The grid does not fit the seal.
@@ -52,9 +52,9 @@ class LubricationModel:
     place: FloatArray = field(init=False)
     """cells along the seal from its crown [m], shape (n,)"""
     ambient: FloatArray = field(init=False)
-    """pressure of the air, from that on the left to that on the right [Pa], shape (n,)"""
+    """pressure of the air along the seal [Pa], shape (n,)"""
     profile: FloatArray = field(init=False)
-    """gap of the undeformed seal to a plain wall, less what the air deflects [m], shape (n,)"""
+    """gap of the undeformed seal to a plain wall, less the deflection by the air [m], shape (n,)"""
     circumference: float = field(init=False)
     """[m]"""
 
@@ -79,12 +79,12 @@ class LubricationModel:
         return self.profile if edge is None else self.profile + edge.fall(contact_place + self.place)[0]
 
     def ends(self, left: float = 1.0, right: float = 1.0) -> FilmEnds:
-        """What is beyond both ends of the film, with the saturation of what flows in."""
+        """Pressure beyond both ends of the film, and saturation of the inflow."""
         return FilmEnds(self.case.air.pressure_left, self.case.air.pressure_right, left, right)
 
 
 class TransientState(NamedTuple):
-    """What one step leaves for the next."""
+    """State of a seal between two steps."""
 
     time: float
     """[s]"""
@@ -96,7 +96,7 @@ class TransientState(NamedTuple):
     wall_film: WallFilm | None
     """film on the wall outside the seal; None where it is flooded"""
     creep: FloatArray
-    """deflection that creeps after the pressure [m], shape (n,); zeros for an elastic seal"""
+    """viscoelastic part of the deflection [m], shape (n,); zeros for an elastic seal"""
 
     @property
     def contact_place(self) -> float:
@@ -105,10 +105,10 @@ class TransientState(NamedTuple):
 
 
 class SealForces(NamedTuple):
-    """Forces of the wall on the seal at the end of a step [N]; together what the spool feels."""
+    """Forces of the wall on the seal at the end of a step [N]."""
 
     friction: float
-    """all of it: solid + fluid + edge"""
+    """solid + fluid + edge"""
     solid: float
     fluid: float
     edge: float
@@ -150,7 +150,7 @@ class TransientResult(NamedTuple):
     saturation: FloatArray
     """shape (steps, n)"""
     retried_steps: int
-    """steps that failed and were taken again in halves"""
+    """steps that did not converge and were repeated in halves"""
     newton_iterations: int
     mass_defect: float
     """largest difference between lubricant in and out and that in the film, over that in the film, of any step"""
@@ -163,7 +163,7 @@ def last_cycle(result: TransientResult) -> BoolArray:
 
 
 def initial_state(model: LubricationModel, position: float) -> TransientState:
-    """The seal at rest and relaxed on its left seat: dry contact, gap as full of lubricant as the wall makes it.
+    """The seal at rest and relaxed on its left seat: dry contact, gap filled by the film on the wall.
 
     Raises:
         NotConvergedError: The dry contact was not found.
@@ -205,7 +205,7 @@ def transient_step(
         The next moment, forces, iterations of Newton's method, and the share of the lubricant that was not conserved.
 
     Raises:
-        NotConvergedError: The step has no solution within the iterations allowed; a smaller one may.
+        NotConvergedError: The step did not converge; a smaller one may.
     """
     case, contact = model.case, model.contact
     width = contact.half_plane.cell_width
@@ -288,7 +288,7 @@ def _forces(model: LubricationModel, moment: TransientState, velocity: float) ->
     limit = solid_limit(model, moment.state)
     if velocity:
         solid = math.copysign(limit, velocity)
-    else:  # stuck: the asperities hold what the spring asks, up to their limit
+    else:  # stuck: the asperities balance the spring, up to their limit
         asked = model.case.seated_groove.force(moment.lag) - edge - fluid
         solid = min(max(asked, -limit), limit)
     return SealForces(solid + fluid + edge, solid, fluid, edge, velocity)
@@ -321,7 +321,7 @@ def _wall_film_after(
     through: FloatArray,
     contact_place: float,
 ) -> WallFilm:
-    """Film on the wall once the volumes ``through`` the faces [m^2] have moved and the seal is at ``contact_place``."""
+    """Film on the wall after the volumes ``through`` the faces [m^2] have moved; the seal is at ``contact_place``."""
     old_left, old_right = _seal_ends(model, moment.contact_place)
     left, right = _seal_ends(model, contact_place)
     if contact_place == moment.contact_place:
@@ -339,7 +339,7 @@ def run_transient(
 ) -> TransientResult:
     """Run a case through its motion, or through another.
 
-    A step that fails is taken again in two halves, up to 10 times over.
+    A step that does not converge is repeated in two halves, up to 10 times.
 
     Args:
         case: The case.
@@ -347,7 +347,7 @@ def run_transient(
         on_step: Called with 1 after every step, for a progress bar.
 
     Raises:
-        NotConvergedError: A step failed however small; the message says when.
+        NotConvergedError: A step did not converge at the smallest size; the message has its time.
         ValueError: The result would not fit in memory.
     """
     moved = case.motion if motion is None else motion

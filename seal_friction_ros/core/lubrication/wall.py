@@ -1,21 +1,18 @@
-"""The wall the seal slides on: its control edge, and the film of lubricant it carries."""
+"""Wall on which the seal slides: its control edge, and its film of lubricant."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True)
-class ControlEdge:
+class ControlEdge(CheckedParameters):
     """Chamfer at the right end of the seat: beyond it the wall falls back and the seal hangs free.
 
     All values are our choice; the paper says only that the seat is chamfered.
-
-    Raises:
-        ValueError: A value is out of bounds.
     """
 
     position: float = parameter(
@@ -27,14 +24,8 @@ class ControlEdge:
         20e-6, unit='m', lower=1e-7, upper=1e-3, description='Length over which both corners are rounded.'
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
     def fall(self, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How far the wall has fallen back [m], and its slope, at each ``place`` along it [m].
-
-        Two corners, each a hyperbola.
-        """
+        """Depth of the wall below the seat [m] and its slope at each ``place`` [m]; each corner is a hyperbola."""
         length = self.depth / self.slope
         begin, end = place - self.position, place - self.position - length
         root_begin = np.sqrt(begin**2 + self.rounding**2)
@@ -44,13 +35,10 @@ class ControlEdge:
 
 
 @dataclass(frozen=True)
-class FilmSupply:
-    """Lubricant on the wall outside the seal: nothing but what there was and what the strokes left behind.
+class FilmSupply(CheckedParameters):
+    """Limited lubricant on the wall outside the seal: the initial film and what the strokes leave.
 
     Without this part of a case the seal is flooded.
-
-    Raises:
-        ValueError: A value is out of bounds.
 
     Source: spool-valve paper, section 7.4; O. Feuchtmueller et al. 2021 for the film that a stroke leaves.
     """
@@ -59,14 +47,11 @@ class FilmSupply:
         0.6e-6, unit='m', lower=1e-9, upper=1e-3, description='Film on the wall before the first stroke (our choice).'
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 class WallFilm:
-    """Lubricant on cells of the wall: what it holds is moved, never made.
+    """Lubricant on cells of the wall; its total volume is conserved. Immutable: each move returns a new film.
 
-    A cell that the seal covers in part holds what lies outside. Immutable: each move gives a new one.
+    The volume of a cell that the seal covers in part lies in the uncovered part.
 
     Args:
         start: Left end of the first cell [m].
@@ -94,11 +79,11 @@ class WallFilm:
 
         Args:
             taken: Volume taken from each cell [m^2], shape (n,).
-            given_back: Part of it that did not fit under the seal [m^2] and is pushed along.
-            back_at: Where that lies [m].
-            left: Left end of the stretch the seal has left [m].
+            given_back: Part of it that did not fit under the seal and is pushed ahead [m^2].
+            back_at: Position of that part [m].
+            left: Left end of the wall that the seal has uncovered [m].
             right: Right end of it [m].
-            laid: Volume laid down there [m^2].
+            laid: Volume left there [m^2].
         """
         volume = self.volume - taken
         volume[self._cell(back_at)] += given_back

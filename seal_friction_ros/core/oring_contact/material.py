@@ -18,11 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True)
-class Rubber:
+class Rubber(CheckedParameters):
     """Material constants.
 
     Raises:
@@ -38,7 +38,7 @@ class Rubber:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.bulk_modulus < 20.0 * self.elastic_modulus:
             raise ValueError(
                 f'Rubber.bulk_modulus = {self.bulk_modulus} Pa is below 20 times elastic_modulus = '

@@ -4,14 +4,14 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.geometry import SealGeometry, stretch
 from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.material import Rubber
 
 
 @dataclass(frozen=True)
-class Groove:
+class Groove(CheckedParameters):
     """Dimensions of the gland besides its diameters.
 
     Raises:
@@ -23,19 +23,13 @@ class Groove:
         0.0, unit='m', lower=0.0, upper=0.01, description='Diametral clearance behind the downstream wall.'
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
-class OringNumerics:
+class OringNumerics(CheckedParameters):
     """Discretisation. The default ``lines`` and ``penalty`` converge the normal force to 1 %.
 
     ``transition`` is our choice; a sharp one (0.01) raises the normal force under pressure by 3.0 to 3.6 %:
     docs/oring.md.
-
-    Raises:
-        ValueError: A value is out of bounds.
     """
 
     lines: int = parameter(
@@ -63,12 +57,9 @@ class OringNumerics:
         description='Stiffness of the guide against rolling, over 2 pi R E; 0: no guide.',
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True, kw_only=True)
-class OringCase:
+class OringCase(CheckedParameters):
     """A ring in its gland.
 
     ``wall_friction`` opposes the motion of the ring towards the downstream wall, on rod and gland alike; it acts only
@@ -92,7 +83,7 @@ class OringCase:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         gap = (self.geometry.gland_diameter - self.geometry.rod_diameter) / 2.0
         section = stretched_section_diameter(self.geometry)
         if section <= gap:

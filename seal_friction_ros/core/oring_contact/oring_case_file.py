@@ -19,7 +19,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from seal_friction_ros.core.foundation.parameters import check, check_names, from_mapping, name_and_source, parameter
+from seal_friction_ros.core.foundation.parameters import (
+    CheckedParameters,
+    check_names,
+    from_mapping,
+    name_and_source,
+    parameter,
+)
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
@@ -45,7 +51,7 @@ class SealFriction:
 
 
 @dataclass(frozen=True)
-class MeasuredFriction:
+class MeasuredFriction(CheckedParameters):
     """Measured friction, for comparison with the computed one.
 
     Raises:
@@ -62,7 +68,7 @@ class MeasuredFriction:
     source: str = ''
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if len(self.frictions) != len(self.pressures) or not self.pressures:
             raise ValueError(
                 f'MeasuredFriction: {len(self.frictions)} frictions at {len(self.pressures)} pressures: '
@@ -135,13 +141,10 @@ class _Hardness:
 
 
 @dataclass(frozen=True)
-class _Stiction:
+class _Stiction(CheckedParameters):
     stiction: float = parameter(
         0.0, unit='N', lower=0.0, upper=1e6, description='Breakaway friction above Coulomb friction.'
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:

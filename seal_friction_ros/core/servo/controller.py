@@ -5,9 +5,9 @@ r"""Position loop over a load-pressure (force) loop, with a friction feed-forwar
     Q &= A (\alpha v + (1 - \alpha) v_r + \tau a_r) + G (F / A - (p_a - p_b)), \qquad G = \omega_F V_t / (4 \beta) \\
     u &= Q / (K \sqrt{(p_s - p_r - \mathrm{sgn}(Q) p_L) / 2})
 
-Inner loop: at standstill load pressure follows F / A with the bandwidth omega_F; alpha takes out the natural velocity
-feedback of a force-controlled cylinder; what it leaves acts on the velocity error, as damping (1 - alpha) A^2 / G. tau
-is the delay of spool and sampling, 2 zeta / omega + T / 2. The last line inverts the orifice.
+Inner loop: at standstill the load pressure follows F / A with the bandwidth omega_F. alpha compensates the natural
+velocity feedback of a force-controlled cylinder; the remaining share acts on the velocity error as damping,
+(1 - alpha) A^2 / G. tau = 2 zeta / omega + T / 2 is the delay of spool and sampling. The last line inverts the orifice.
 
 Source: [Merritt1967]_ chapter 6 for the orifice and V_t / (4 beta), [Alleyne1999]_ for force loop and velocity
 feedback; their arrangement here is our choice.
@@ -23,35 +23,31 @@ from scipy.linalg import expm
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled
-from seal_friction_ros.core.foundation.parameters import check, parameter
-from seal_friction_ros.core.servo.motions import Reference
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
+from seal_friction_ros.core.servo.motions import Setpoint
 from seal_friction_ros.core.servo.plant import Constants
 
 
 class Limited(IntFlag):
-    """What was wrong with a reference or feed-forward, or at its limit; 0 means nothing."""
+    """Fault or limit of a reference, a feed-forward or a command; 0: none."""
 
     REFERENCE_NOT_FINITE = 1
     """the last good position is held"""
     REFERENCE_OUT_OF_STROKE = 2
     """clamped short of the stops"""
     REFERENCE_TOO_FAST = 4
-    """position follows at the largest speed; velocity or acceleration cut"""
+    """position follows at the largest speed; velocity or acceleration clamped"""
     FEEDFORWARD_NOT_FINITE = 8
     """counts as 0 N"""
     FORCE = 16
-    """force command cut at what the supply can push"""
+    """force command clamped to the force of the supply pressure"""
     SPOOL = 32
-    """spool command cut at full opening"""
+    """spool command clamped to full opening"""
 
 
 @dataclass(frozen=True)
-class ServoController:
-    """Gains and limits of the controller.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class ServoController(CheckedParameters):
+    """Gains and limits of the controller."""
 
     position_gain: float = parameter(1e5, unit='N/m', lower=0.0, upper=1e12, description='K_p.')
     velocity_gain: float = parameter(300.0, unit='N s/m', lower=0.0, upper=1e9, description='K_d.')
@@ -62,24 +58,21 @@ class ServoController:
         500.0, unit='rad/s', lower=1.0, upper=1e5, description='Bandwidth of the load-pressure loop at standstill.'
     )
     velocity_compensation: float = parameter(
-        0.8, unit='1', lower=0.0, upper=1.0, description='alpha, share of the rod flow that the valve is told.'
+        0.8, unit='1', lower=0.0, upper=1.0, description='alpha, share of the rod flow in the valve command.'
     )
     reference_speed_max: float = parameter(
-        0.2, unit='m/s', lower=1e-6, upper=10.0, description='A reference that moves faster is followed at this speed.'
+        0.2, unit='m/s', lower=1e-6, upper=10.0, description='A faster reference is followed at this speed.'
     )
     reference_acceleration_max: float = parameter(
-        50.0, unit='m/s2', lower=1e-3, upper=1e4, description='Largest acceleration taken from a reference.'
+        50.0, unit='m/s2', lower=1e-3, upper=1e4, description='A larger acceleration of the reference is clamped.'
     )
     stop_distance: float = parameter(
-        1e-3, unit='m', lower=0.0, upper=1.0, description='A reference is kept this far from the end stops.'
+        1e-3, unit='m', lower=0.0, upper=1.0, description='Smallest distance of the reference from the end stops.'
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Gains(NamedTuple):
-    """The controller as plain numbers."""
+    """Gains and limits for compiled code, units as in `ServoController`."""
 
     position: float
     velocity: float
@@ -93,34 +86,31 @@ class Gains(NamedTuple):
     speed_max: float
     acceleration_max: float
     reach: float
-    """Largest reference position [m]."""
+    """largest reference position [m]"""
     period: float
+    """sample time [s]"""
 
 
 class Measurement(NamedTuple):
-    """What the controller is told of the cylinder."""
+    """Inputs of the controller from the cylinder, units as in `ServoOutputs`."""
 
     position: float
-    """[m]"""
     velocity: float
-    """[m/s]"""
     pressure_a: float
-    """[Pa, gauge]"""
     pressure_b: float
-    """[Pa, gauge]"""
 
 
 class ControllerState(NamedTuple):
-    """What one sample leaves for the next."""
+    """State of the controller between two samples."""
 
     reference: float
-    """[m] last position asked for, as limited"""
+    """[m] last limited reference position"""
     integral: float
     """[N]"""
 
 
 class Command(NamedTuple):
-    """What the controller wants."""
+    """Outputs of the controller."""
 
     spool: float
     """[-] -1 to 1"""
@@ -131,7 +121,7 @@ class Command(NamedTuple):
 
 
 def gains(controller: ServoController, c: Constants, period: float) -> Gains:
-    """Numbers for the control law."""
+    """Gains and limits for a plant and a sample time [s]."""
     return Gains(
         position=controller.position_gain,
         velocity=controller.velocity_gain,
@@ -148,60 +138,66 @@ def gains(controller: ServoController, c: Constants, period: float) -> Gains:
 
 
 @compiled
-def limit_reference(g: Gains, last: float, wanted: Reference) -> tuple[Reference, int]:
-    """The reference as it may be followed from position ``last`` [m], and bits of `Limited`."""
-    if not (math.isfinite(wanted.position) and math.isfinite(wanted.velocity) and math.isfinite(wanted.acceleration)):
-        return Reference(last, 0.0, 0.0), 1
-    if abs(wanted.position) > g.reach:
-        position, velocity, acceleration, limited = math.copysign(g.reach, wanted.position), 0.0, 0.0, 2
+def limit_reference(g: Gains, last: float, reference: Setpoint) -> tuple[Setpoint, int]:
+    """Reference within the limits, from the last position ``last`` [m], and bits of `Limited`."""
+    if not (
+        math.isfinite(reference.position)
+        and math.isfinite(reference.velocity)
+        and math.isfinite(reference.acceleration)
+    ):
+        return Setpoint(last, 0.0, 0.0), 1
+    if abs(reference.position) > g.reach:
+        position, velocity, acceleration, limited = math.copysign(g.reach, reference.position), 0.0, 0.0, 2
     else:
-        position, limited = wanted.position, 0
-        velocity = min(max(wanted.velocity, -g.speed_max), g.speed_max)
-        acceleration = min(max(wanted.acceleration, -g.acceleration_max), g.acceleration_max)
-        if velocity != wanted.velocity or acceleration != wanted.acceleration:
+        position, limited = reference.position, 0
+        velocity = min(max(reference.velocity, -g.speed_max), g.speed_max)
+        acceleration = min(max(reference.acceleration, -g.acceleration_max), g.acceleration_max)
+        if velocity != reference.velocity or acceleration != reference.acceleration:
             limited = 4
     way = g.speed_max * g.period
     if abs(position - last) > way * (1.0 + 1e-9):
         direction = math.copysign(1.0, position - last)
-        return Reference(last + direction * way, direction * g.speed_max, 0.0), limited | 4
-    return Reference(position, velocity, acceleration), limited
+        return Setpoint(last + direction * way, direction * g.speed_max, 0.0), limited | 4
+    return Setpoint(position, velocity, acceleration), limited
 
 
 @compiled
 def control(
-    g: Gains, c: Constants, state: ControllerState, measured: Measurement, wanted: Reference, feedforward: float
+    g: Gains, c: Constants, state: ControllerState, measured: Measurement, reference: Setpoint, feedforward: float
 ) -> tuple[ControllerState, Command]:
     """One sample of the controller.
 
     Args:
         g: Gains.
-        c: What the controller knows of valve, cylinder and load.
-        state: From the sample before.
-        measured: Position, velocity and pressures, with whatever noise they have; all finite.
-        wanted: Reference, which may be anything.
-        feedforward: Friction feed-forward [N], positive on extension, which may be anything.
+        c: Model of valve, cylinder and load.
+        state: State after the previous sample.
+        measured: Position, velocity and pressures, all finite.
+        reference: Setpoint; any number, also not finite.
+        feedforward: Friction feed-forward [N], positive on extension; any number, also not finite.
 
     Returns:
         The next state and the spool command.
     """
-    reference, limited = limit_reference(g, state.reference, wanted)
+    setpoint, limited = limit_reference(g, state.reference, reference)
     if not math.isfinite(feedforward):
         feedforward, limited = 0.0, limited | 8
-    error = reference.position - measured.position
+    error = setpoint.position - measured.position
     integral = state.integral + g.integral * error * g.period
     load = (
-        c.mass * reference.acceleration
-        + c.damping * reference.velocity
-        + c.stiffness * (reference.position - c.spring_position)
+        c.mass * setpoint.acceleration
+        + c.damping * setpoint.velocity
+        + c.stiffness * (setpoint.position - c.spring_position)
     )
-    wish = g.position * error + g.velocity * (reference.velocity - measured.velocity) + integral + load + feedforward
-    force = min(max(wish, -g.force_max), g.force_max)
-    if force != wish:
+    unlimited = (
+        g.position * error + g.velocity * (setpoint.velocity - measured.velocity) + integral + load + feedforward
+    )
+    force = min(max(unlimited, -g.force_max), g.force_max)
+    if force != unlimited:
         limited |= 16
 
     load_pressure = measured.pressure_a - measured.pressure_b
-    speed = g.compensation * measured.velocity + (1.0 - g.compensation) * reference.velocity
-    speed += g.valve_delay * reference.acceleration
+    speed = g.compensation * measured.velocity + (1.0 - g.compensation) * setpoint.velocity
+    speed += g.valve_delay * setpoint.acceleration
     flow = c.area * speed + g.pressure * (force / c.area - load_pressure)
     drop = c.supply - c.ret - math.copysign(load_pressure, flow * load_pressure)
     drop = max(drop, 2.0 * c.transition)
@@ -209,15 +205,16 @@ def control(
     spool = min(max(opening, -1.0), 1.0)
     if spool != opening:
         limited |= 32
-    if force != wish or spool != opening:
+    if force != unlimited or spool != opening:
         integral = state.integral
-    return ControllerState(reference.position, integral), Command(spool, force, limited)
+    return ControllerState(setpoint.position, integral), Command(spool, force, limited)
 
 
-def closed_loop(g: Gains, c: Constants, held: bool = False) -> FloatArray:
-    r"""Sample-to-sample matrix of the closed loop without friction, in mid-stroke and at null; or rod ``held``.
+def transition_matrix(g: Gains, c: Constants, held: bool = False) -> FloatArray:
+    r"""State transition matrix of the linearised servo over one sample, in mid-stroke, at null, without friction.
 
-    State: x, v, p_L, s, s'/omega, integral. The plant between two samples is exact (matrix exponential).
+    State: x, v, p_L, s, s'/omega, integral. The plant between two samples is exact (matrix exponential). With ``held``
+    the rod does not move.
 
     .. math:: \dot p_L = \frac{4 \beta}{V_t} (K_q s - A v - K_{c} p_L), \quad K_q = K \sqrt{(p_s - p_r)/2}
 
@@ -251,7 +248,7 @@ def closed_loop(g: Gains, c: Constants, held: bool = False) -> FloatArray:
 
 
 def spectral_radius(g: Gains, c: Constants) -> float:
-    """Largest magnitude of an eigenvalue of `closed_loop`, rod free, or held (the force loop alone); stable below 1."""
-    free = np.linalg.eigvals(closed_loop(g, c))
-    held = np.linalg.eigvals(closed_loop(g, c, held=True)[2:5, 2:5])
+    """Largest eigenvalue magnitude of `transition_matrix`, rod free or held (force loop alone); stable below 1."""
+    free = np.linalg.eigvals(transition_matrix(g, c))
+    held = np.linalg.eigvals(transition_matrix(g, c, held=True)[2:5, 2:5])
     return float(np.abs(np.concatenate([free, held])).max())

@@ -1,19 +1,18 @@
-r"""Servo valve, cylinder and load with the seals of the estimator: parameters, equations, one inner step.
+r"""Plant of the servo: valve, cylinder and load with seals; parameters, equations, one inner step.
 
-The equations are the field's [Merritt1967]_ (valve: chapter 5, cylinder: chapter 6), the seals those of `coulomb` and
-`friction_state`. Between events the state follows smooth equations, integrated by a Runge-Kutta step of fourth order.
-Events end a step early: the rod comes to rest, breaks away or meets an end stop, a cavity begins or collapses. They are
-located inside the step, so that a stuck rod has a velocity of exactly 0.0 and a position that does not change by one
-bit [Karnopp1985]_.
+Source: valve [Merritt1967]_ chapter 5, cylinder chapter 6; seals as in `friction.actuator`. A Runge-Kutta step of
+fourth order integrates the smooth equations between events. An event ends a step early: the rod comes to rest, breaks
+away or meets an end stop, a cavity begins or collapses. The time of the event is found inside the step, so a stuck rod
+has a velocity of exactly 0.0 and a constant position, to the bit [Karnopp1985]_.
 
 Our choices, none of them in the sources:
 
-- Stuck is a state of its own, without Karnopp's velocity band, since here the velocity is known and not measured.
-- A rod that slows down ever more without end, as it can against a leaking chamber, is at rest below 1 nm/s.
-- End stops are rigid and take all of the kinetic energy.
+- Stuck is a discrete state, without the velocity band of Karnopp: in a simulation the velocity is exact.
+- A rod that decelerates asymptotically, for example against a leaking chamber, is at rest below 1 nm/s.
+- End stops are rigid and dissipate all of the kinetic energy.
 - A chamber that is emptied faster than it is filled holds a cavity at vapour pressure (see `chamber_pressure`).
 - Below ``transition_pressure`` an orifice is laminar (see `signed_root`).
-- The energy that flowed in and the energy that was dissipated are integrated along, to check the rest.
+- Input energy and dissipated energy are integrated as states, to check the energy balance.
 """
 
 import math
@@ -24,7 +23,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.foundation.units import INCH, PSI
 from seal_friction_ros.core.friction.actuator import (
     NO_SEALS,
@@ -35,13 +34,13 @@ from seal_friction_ros.core.friction.actuator import (
 )
 
 AMBIENT = 101325.0  # [Pa, absolute] zero of gauge pressure
-CREEP_SPEED = 1e-9  # [m/s] a rod that slides slower than this, and ever slower, is at rest
-MAX_EVENTS = 16  # in one inner step; then the rod is held to its end
+CREEP_SPEED = 1e-9  # [m/s] a rod that slides slower than this and decelerates is at rest
+MAX_EVENTS = 16  # in one inner step; then the rod is held until its end
 
 
 @dataclass(frozen=True)
-class ServoValve:
-    """Four-way servo valve with critical lap, and its supply.
+class ServoValve(CheckedParameters):
+    """Four-way servo valve with critical lap, and its supply pressure.
 
     Raises:
         ValueError: A value is out of bounds, or supply is below return pressure.
@@ -49,15 +48,11 @@ class ServoValve:
 
     supply_pressure: float = parameter(1000.0 * PSI, unit='Pa', lower=0.0, upper=1e8, description='Supply, gauge.')
     return_pressure: float = parameter(1e5, unit='Pa', lower=0.0, upper=1e8, description='Return, gauge.')
-    rated_flow: float = parameter(
-        2.5e-5, unit='m3/s', lower=1e-8, upper=0.1, description='Flow at full opening and rated pressure drop.'
-    )
+    rated_flow: float = parameter(2.5e-5, unit='m3/s', lower=1e-8, upper=0.1, description='Fully open, at rated drop.')
     rated_pressure_drop: float = parameter(
         1000.0 * PSI, unit='Pa', lower=1e4, upper=1e8, description='Pressure drop over both lands for the rated flow.'
     )
-    natural_frequency: float = parameter(
-        1257.0, unit='rad/s', lower=1.0, upper=1e5, description='Undamped natural frequency of the spool.'
-    )
+    natural_frequency: float = parameter(1257.0, unit='rad/s', lower=1.0, upper=1e5, description='Spool, undamped.')
     damping_ratio: float = parameter(0.8, unit='1', lower=0.05, upper=10.0, description='Damping ratio of the spool.')
     null_leakage: float = parameter(
         6e-14, unit='m3/(s Pa)', lower=0.0, upper=1e-9, description='Laminar leakage of each of the four lands.'
@@ -67,7 +62,7 @@ class ServoValve:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.supply_pressure < self.return_pressure:
             raise ValueError(
                 f'ServoValve.supply_pressure = {self.supply_pressure} Pa is below '
@@ -76,18 +71,18 @@ class ServoValve:
 
 
 @dataclass(frozen=True)
-class Cylinder:
-    """Balanced cylinder: the rod goes through both ends, so both chambers push on the same area.
+class Cylinder(CheckedParameters):
+    """Balanced cylinder: the rod goes through both ends, so both chambers have the same area.
 
     The stroke runs from -stroke/2 to +stroke/2; chamber a extends the rod (positive).
 
     Raises:
-        ValueError: A value is out of bounds, the bore is not wider than the rod, or there is next to no dead volume.
+        ValueError: A value is out of bounds, the bore is not wider than the rod, or the dead volume is too small.
     """
 
     rod_diameter: float = parameter(0.625 * INCH, unit='m', lower=1e-4, upper=1.0, description='Rod diameter.')
     bore_diameter: float = parameter(0.75 * INCH, unit='m', lower=1e-4, upper=2.0, description='Bore diameter.')
-    stroke: float = parameter(0.05, unit='m', lower=1e-4, upper=10.0, description='Way from stop to stop.')
+    stroke: float = parameter(0.05, unit='m', lower=1e-4, upper=10.0, description='Distance between the stops.')
     dead_volume: float = parameter(
         2e-6, unit='m3', lower=1e-9, upper=1.0, description='Volume of each chamber, with its line, at its stop.'
     )
@@ -97,15 +92,11 @@ class Cylinder:
     external_leakage: float = parameter(
         0.0, unit='m3/(s Pa)', lower=0.0, upper=1e-8, description='Laminar leakage of each chamber to ambient.'
     )
-    bulk_modulus: float = parameter(
-        7e8, unit='Pa', lower=1e7, upper=5e9, description='Effective bulk modulus of oil, lines and walls.'
-    )
-    vapour_pressure: float = parameter(
-        1e3, unit='Pa', lower=1.0, upper=1e5, description='Absolute pressure at which the oil cavitates.'
-    )
+    bulk_modulus: float = parameter(7e8, unit='Pa', lower=1e7, upper=5e9, description='Effective: oil, lines, walls.')
+    vapour_pressure: float = parameter(1e3, unit='Pa', lower=1.0, upper=1e5, description='Of the oil, absolute.')
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.bore_diameter <= self.rod_diameter:
             raise ValueError(
                 f'Cylinder.bore_diameter = {self.bore_diameter} m is not above rod_diameter = {self.rod_diameter} m'
@@ -118,26 +109,17 @@ class Cylinder:
 
 
 @dataclass(frozen=True)
-class Load:
-    """What the rod moves.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class Load(CheckedParameters):
+    """Load of the rod."""
 
     mass: float = parameter(5.0, unit='kg', lower=1e-3, upper=1e6, description='Piston, rod and load.')
     spring_stiffness: float = parameter(0.0, unit='N/m', lower=0.0, upper=1e9, description='Spring to ground.')
-    spring_position: float = parameter(
-        0.0, unit='m', lower=-10.0, upper=10.0, description='Position at which the spring is relaxed.'
-    )
+    spring_position: float = parameter(0.0, unit='m', lower=-10.0, upper=10.0, description='Spring rest position.')
     viscous_damping: float = parameter(20.0, unit='N s/m', lower=0.0, upper=1e7, description='Force per speed.')
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def piston_area(cylinder: Cylinder) -> float:
-    """Area each chamber pushes on [m^2]: A = pi/4 (D_bore^2 - D_rod^2)."""
+    """Piston area of each chamber [m^2]: A = pi/4 (D_bore^2 - D_rod^2)."""
     return math.pi / 4.0 * (cylinder.bore_diameter**2 - cylinder.rod_diameter**2)
 
 
@@ -163,7 +145,7 @@ def orifice_gain(valve: ServoValve) -> float:
 
 
 class Constants(NamedTuple):
-    """Everything the equations need, as plain numbers."""
+    """Parameters of the equations for compiled code, SI units."""
 
     supply: float
     ret: float
@@ -174,14 +156,14 @@ class Constants(NamedTuple):
     spool_damping: float
     area: float
     limit: float
-    """Position of the stops [m]: stroke / 2."""
+    """position of the stops [m]: stroke / 2"""
     mid_volume: float
-    """Volume of one chamber at position 0 [m^3]."""
+    """volume of one chamber at position 0 [m^3]"""
     internal_leakage: float
     external_leakage: float
     bulk_modulus: float
     vapour: float
-    """Vapour pressure [Pa, gauge]."""
+    """vapour pressure [Pa, gauge]"""
     supply_enthalpy: float
     return_enthalpy: float
     mass: float
@@ -189,7 +171,7 @@ class Constants(NamedTuple):
     spring_position: float
     damping: float
     seals: Any
-    """the seals as compiled code takes them"""
+    """from `numbers_of_seals`"""
 
 
 class PlantState(NamedTuple):
@@ -200,24 +182,29 @@ class PlantState(NamedTuple):
     velocity: float
     """[m/s] exactly 0.0 while stuck"""
     charge_a: float
-    """[Pa, gauge] pressure of chamber a; below vapour pressure it counts the cavity, see `chamber_pressure`"""
+    """[Pa, gauge] pressure of chamber a; below vapour pressure a measure of the cavity, see `chamber_pressure`"""
     charge_b: float
+    """[Pa, gauge] the same of chamber b"""
     spool: float
     """[-] -1 to 1; positive opens supply to chamber a"""
     spool_rate: float
     """[1/s]"""
     energy_in: float
-    """[J] taken from supply, return and load force since the start"""
+    """[J] from supply, return and load force since the start"""
     energy_dissipated: float
     """[J] in valve, leakage, viscous load, seals and end stops"""
     direction: int
     """-1 or 1: sliding that way; 0: stuck"""
     transitions: int
-    """How often the rod came to rest or broke away since the start"""
+    """number of times that the rod came to rest or broke away since the start"""
+
+
+Integrated = tuple[float, float, float, float, float, float, float, float]
+"""The integrated part of the state: the first eight numbers of `PlantState`."""
 
 
 def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[MountedSeal, ...]) -> Constants:
-    """Numbers for the equations."""
+    """Parameters of the equations from the parts of the plant."""
     beta = cylinder.bulk_modulus
     return Constants(
         supply=valve.supply_pressure,
@@ -245,7 +232,7 @@ def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[Mo
 
 
 def init_plant(c: Constants, position: float = 0.0) -> PlantState:
-    """At rest at ``position`` [m], valve closed, both chambers half-way between supply and return."""
+    """At rest at ``position`` [m], valve closed, both chambers at the mean of supply and return pressure."""
     half = (c.supply + c.ret) / 2.0
     return PlantState(position, 0.0, half, half, 0.0, 0.0, 0.0, 0.0, 0, 0)
 
@@ -271,19 +258,19 @@ def signed_root(drop: float, transition: float) -> float:
 def chamber_pressure(charge: float, vapour: float) -> float:
     r"""Pressure of a chamber [Pa, gauge]: its charge, but never below vapour pressure.
 
-    The charge is the pressure that the oil would have if it alone had to fill the chamber, beta ln(m / (rho_0 V)).
-    Where that is below vapour pressure, oil at vapour pressure fills V exp((charge - vapour) / beta) and a cavity the
-    rest. So volume is conserved through growth and collapse of a cavity.
+    The charge is the pressure of the oil if it filled the whole chamber, beta ln(m / (rho_0 V)). Below vapour pressure,
+    oil at vapour pressure fills V exp((charge - vapour) / beta) and a cavity fills the rest. This conserves volume
+    through growth and collapse of the cavity.
     """
     return max(charge, vapour)
 
 
 @compiled
 def holding_force(c: Constants, pressure_a: float, pressure_b: float, direction: int) -> float:
-    """Force up to which the seals hold a rod at rest against a push in ``direction`` [N].
+    """Largest force that the seals hold at rest against a push in ``direction`` [N].
 
-    The breakaway force, or the friction of the slowest motion where that is larger (our choice: otherwise the rod would
-    break away and stop at once).
+    The breakaway force, or the friction at velocity 0 where this is larger (our choice: otherwise the rod would break
+    away and stop at once).
     """
     at_rest = friction_of_seals(c.seals, pressure_a, pressure_b, 0.0)
     slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, direction)
@@ -291,7 +278,7 @@ def holding_force(c: Constants, pressure_a: float, pressure_b: float, direction:
 
 
 @compiled
-def active_force(c: Constants, y: tuple[float, ...], load_force: float) -> float:
+def active_force(c: Constants, y: Integrated, load_force: float) -> float:
     r"""Axial forces on the rod except seals and end stops [N].
 
     .. math:: A (p_a - p_b) - k (x - x_k) - b v + F_{load}
@@ -303,8 +290,8 @@ def active_force(c: Constants, y: tuple[float, ...], load_force: float) -> float
 
 
 @compiled
-def force_sum(c: Constants, y: tuple[float, ...], load_force: float) -> float:
-    """Axial forces on the rod except its seals [N]. At a stop the rod presses on, the stop takes all that presses."""
+def force_sum(c: Constants, y: Integrated, load_force: float) -> float:
+    """Axial forces on the rod except its seals [N]; 0 where the rod presses on a stop, which then carries it."""
     force = active_force(c, y, load_force)
     if y[1] == 0.0 and ((y[0] >= c.limit and force > 0.0) or (y[0] <= -c.limit and force < 0.0)):
         return 0.0
@@ -322,7 +309,7 @@ def port_flow(c: Constants, opening: float, outside: float, pressure: float) -> 
 
 
 @compiled
-def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, load_force: float) -> tuple[float, ...]:
+def rates(c: Constants, y: Integrated, direction: int, command: float, load_force: float) -> Integrated:
     r"""Time derivatives of the first eight numbers of `PlantState`.
 
     .. math::
@@ -330,9 +317,9 @@ def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, lo
         \dot p_a &= \beta / V_a\, (Q_a - C_i (p_a - p_b) - C_e p_a - A v), \quad V_a = V_t/2 + A x \\
         \ddot s &= \omega^2 (u - s) - 2 \zeta \omega \dot s
 
-    With constant bulk modulus a chamber's volume V holds V (H - p), H(p) = beta (exp(p / beta) - 1) the enthalpy of a
-    volume at p, and a flow Q carries H Q. What comes through a land came with the enthalpy of its other side; what is
-    missing was dissipated there.
+    With constant bulk modulus a volume V of oil stores the energy V (H - p), with H(p) = beta (exp(p / beta) - 1) the
+    enthalpy per volume at p, and a flow Q carries the power H Q. A flow through a land brings the enthalpy of the other
+    side; the difference to the enthalpy of the chamber is dissipated in the land.
 
     Source: [Merritt1967]_ chapters 5 and 6; the energy is our derivation.
     """
@@ -376,7 +363,7 @@ def rates(c: Constants, y: tuple[float, ...], direction: int, command: float, lo
 
 
 @compiled
-def along(y: tuple[float, ...], k: tuple[float, ...], h: float) -> tuple[float, ...]:
+def along(y: Integrated, k: Integrated, h: float) -> Integrated:
     """State ``y`` a time ``h`` [s] along the rates ``k``."""
     return (
         y[0] + h * k[0],
@@ -391,10 +378,8 @@ def along(y: tuple[float, ...], k: tuple[float, ...], h: float) -> tuple[float, 
 
 
 @compiled
-def smooth_step(
-    c: Constants, y: tuple[float, ...], direction: int, command: float, load_force: float, h: float
-) -> tuple[float, ...]:
-    """Runge-Kutta step of fourth order over ``h`` [s] in one friction state; the spool stops dead at its ends."""
+def smooth_step(c: Constants, y: Integrated, direction: int, command: float, load_force: float, h: float) -> Integrated:
+    """Runge-Kutta step of fourth order over ``h`` [s] in one friction state; the spool stops at its ends."""
     k1 = rates(c, y, direction, command, load_force)
     k2 = rates(c, along(y, k1, 0.5 * h), direction, command, load_force)
     k3 = rates(c, along(y, k2, 0.5 * h), direction, command, load_force)
@@ -406,8 +391,8 @@ def smooth_step(
 
 
 @compiled
-def margin(c: Constants, y: tuple[float, ...], direction: int, load_force: float) -> float:
-    """How far the friction state is from its end. A stuck one has ended below zero, a sliding one at zero already.
+def margin(c: Constants, y: Integrated, direction: int, load_force: float) -> float:
+    """Distance of the friction state from its end: stuck ends below zero, sliding ends at zero.
 
     Stuck: holding force minus force sum [N]. Sliding: the smaller of speed [m/s] and distance to the stop ahead [m].
     """
@@ -419,11 +404,11 @@ def margin(c: Constants, y: tuple[float, ...], direction: int, load_force: float
 
 
 @compiled
-def after_event(c: Constants, y: tuple[float, ...], direction: int, load_force: float) -> tuple[tuple[float, ...], int]:
-    """State and direction once the friction state has ended at ``y``.
+def after_event(c: Constants, y: Integrated, direction: int, load_force: float) -> tuple[Integrated, int]:
+    """State and direction after the friction state ended at ``y``.
 
-    A sliding rod comes to rest, at an end stop with the loss of its kinetic energy, and stays there unless the force
-    sum exceeds the breakaway force; a stuck rod slides where the force sum points.
+    A sliding rod comes to rest, at an end stop with the loss of its kinetic energy, and stays at rest unless the force
+    sum exceeds the breakaway force; a stuck rod slides in the direction of the force sum.
     """
     if direction != 0:
         position, velocity = y[0], y[1]
@@ -437,8 +422,8 @@ def after_event(c: Constants, y: tuple[float, ...], direction: int, load_force: 
 
 
 @compiled
-def cavity_margin(c: Constants, before: tuple[float, ...], after: tuple[float, ...]) -> float:
-    """Way of the charges from vapour pressure [Pa], the smaller of both; negative if one crossed since ``before``."""
+def cavity_margin(c: Constants, before: Integrated, after: Integrated) -> float:
+    """Smaller distance of the charges from vapour pressure [Pa]; negative if one crossed it since ``before``."""
     nearest = 1e12
     for i in (2, 3):
         side = before[i] - c.vapour
@@ -448,12 +433,10 @@ def cavity_margin(c: Constants, before: tuple[float, ...], after: tuple[float, .
 
 
 @compiled
-def time_of_event(
-    c: Constants, y: tuple[float, ...], direction: int, command: float, load_force: float, h: float
-) -> float:
-    """Time within ``h`` [s], at or just after the moment the friction state ends or a cavity begins or collapses.
+def time_of_event(c: Constants, y: Integrated, direction: int, command: float, load_force: float, h: float) -> float:
+    """Time within ``h`` [s] at or just after which the friction state ends or a cavity begins or collapses.
 
-    The smaller of `margin` and `cavity_margin` must be positive at 0 and must not be at ``h``. Illinois method.
+    The smaller of `margin` and `cavity_margin` must be positive at 0 and not positive at ``h``. Illinois method.
     """
     early, late, side = 0.0, h, 0
     margin_early = min(margin(c, y, direction, load_force), cavity_margin(c, y, y))
@@ -478,20 +461,14 @@ def time_of_event(
 
 
 @compiled
-def with_motion(y: tuple[float, ...], direction: int, transitions: int) -> PlantState:
-    """Plant state of the eight integrated numbers and the friction state."""
-    return PlantState(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], direction, transitions)
-
-
-@compiled
-def creeps(before: tuple[float, ...], after: tuple[float, ...], direction: int) -> bool:
-    """Whether a sliding rod has become as slow as nothing, and slower: it would come to rest only in infinite time."""
+def creeps(before: Integrated, after: Integrated, direction: int) -> bool:
+    """Whether a sliding rod decelerates below `CREEP_SPEED`: it would come to rest only after infinite time."""
     return direction != 0 and after[1] * direction < min(CREEP_SPEED, before[1] * direction)
 
 
 @compiled
 def lasts(margin_now: float, direction: int) -> bool:
-    """Whether a friction state goes on: a stuck rod also at the breakaway force, a sliding one only at a speed."""
+    """Whether a friction state goes on: stuck also at a margin of exactly 0, sliding only above 0."""
     return margin_now > 0.0 or (direction == 0 and margin_now == 0.0)
 
 
@@ -499,10 +476,10 @@ def lasts(margin_now: float, direction: int) -> bool:
 def inner_step(c: Constants, state: PlantState, command: float, load_force: float, h: float) -> PlantState:
     """Advance valve, chambers and rod by ``h`` [s] with command [-1 to 1] and load force [N] held.
 
-    A rod that starts to slide but does not get anywhere within the step (no stiction, force at the limit) is held for
-    the rest of the step, and so is one after `MAX_EVENTS` events: no Zeno.
+    A rod that breaks away without motion within the step (no stiction, force at the limit) is held for the rest of the
+    step, and so is a rod after `MAX_EVENTS` events. This excludes Zeno behaviour.
     """
-    y: tuple[float, ...] = state[:8]
+    y = state[:8]
     direction, transitions = state.direction, state.transitions
     rest = h
     for _ in range(MAX_EVENTS):
@@ -511,23 +488,23 @@ def inner_step(c: Constants, state: PlantState, command: float, load_force: floa
         starts_inside = margin(c, y, direction, load_force) > 0.0
         if goes_on and (cavity_margin(c, y, new) > 0.0 or not starts_inside):
             if not creeps(y, new, direction):
-                return with_motion(new, direction, transitions)
+                return PlantState(*new, direction, transitions)
             y, rest = new, 0.0
         elif starts_inside:
             before = time_of_event(c, y, direction, command, load_force, rest)
             y = smooth_step(c, y, direction, command, load_force, before)
             rest = rest - before
             if lasts(margin(c, y, direction, load_force), direction):
-                continue  # a cavity began or collapsed, no more
+                continue  # only a cavity began or collapsed
         elif direction != 0:
             break
         was, (y, direction) = direction, after_event(c, y, direction, load_force)
         transitions += 1 if (was == 0) != (direction == 0) else 0
         if rest <= 0.0:
-            return with_motion(y, direction, transitions)
+            return PlantState(*y, direction, transitions)
     y = (y[0], 0.0, y[2], y[3], y[4], y[5], y[6], y[7])
     transitions += 1 if direction != 0 else 0
-    return with_motion(smooth_step(c, y, 0, command, load_force, rest), 0, transitions)
+    return PlantState(*smooth_step(c, y, 0, command, load_force, rest), 0, transitions)
 
 
 @compiled
@@ -549,10 +526,10 @@ def stored_energy(c: Constants, state: PlantState) -> float:
 def fastest_rate(
     valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[MountedSeal, ...] = ()
 ) -> tuple[float, str]:
-    """Largest rate of the equations [1/s] and which part has it: what the inner step must resolve.
+    """Largest rate of the equations [1/s], which limits the inner step, and the part of the plant with this rate.
 
-    Spool: its natural frequency. Chamber: the slope of a laminar orifice, 5/4 K / sqrt(p_t), and the leakages on the
-    smallest volume, plus the oscillation of the mass on the oil at a stop, plus the damping of load and seals.
+    Spool: its natural frequency. Chamber: slope of a laminar orifice, 5/4 K / sqrt(p_t), and leakages, over the
+    smallest volume; plus oscillation of the mass on the oil at a stop; plus damping of load and seals.
     """
     beta, volume = cylinder.bulk_modulus, cylinder.dead_volume
     slope = 1.25 * orifice_gain(valve) / math.sqrt(valve.transition_pressure)
@@ -572,7 +549,7 @@ def fastest_rate(
 
 
 def steepest_friction(seals: tuple[MountedSeal, ...], highest_pressure: float) -> float:
-    """Largest rise of the friction of the seals with speed [N s/m], on a grid of speeds and pressures (our choice)."""
+    """Largest slope of the seal friction over speed [N s/m], on a grid of speeds and pressures (our choice)."""
     if not any(mounted.seal.depends_on_velocity for mounted in seals):
         return 0.0
     numbers, speeds = numbers_of_seals(seals), np.geomspace(1e-6, 10.0, 141)

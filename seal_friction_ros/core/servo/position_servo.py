@@ -1,8 +1,8 @@
-"""A position servo with seals that rub.
+"""Position servo with seal friction.
 
 ``state = init(parameters)``, then ``state, outputs = step(parameters, state, reference, feedforward)``: one sample of
-the controller, through which valve, cylinder and load advance in inner steps. `control` and `advance` are its
-halves, for who wants sensors (noise, delay) between them, or a rig without a controller.
+the controller, over which valve, cylinder and load advance in inner steps. `control` and `advance` do the two halves of
+a sample, for sensors (noise, delay) between them or for a rig without controller.
 """
 
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled, keep
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal, friction_of_seals
 from seal_friction_ros.core.friction.states import state_friction
 from seal_friction_ros.core.servo.controller import (
@@ -26,7 +26,7 @@ from seal_friction_ros.core.servo.controller import (
     gains,
     spectral_radius,
 )
-from seal_friction_ros.core.servo.motions import Reference
+from seal_friction_ros.core.servo.motions import Setpoint
 from seal_friction_ros.core.servo.plant import (
     Constants,
     Cylinder,
@@ -41,16 +41,16 @@ from seal_friction_ros.core.servo.plant import (
     inner_step,
 )
 
-LARGEST_RATE_TIMES_STEP = 2.5  # [-] Runge-Kutta of fourth order is stable to 2.78 on the real axis
+LARGEST_RATE_TIMES_STEP = 2.5  # [-] the stability limit of Runge-Kutta of fourth order is 2.78 on the real axis
 
 
 @dataclass(frozen=True, kw_only=True)
-class ServoParameters:
-    """Everything about the servo. Without seals it is the same servo without friction.
+class ServoParameters(CheckedParameters):
+    """Parameters of the servo; without seals it has no seal friction.
 
     Raises:
-        ValueError: A value is out of bounds, an inner step does not divide the sample or is too long for the fastest
-            part of the plant, or the closed loop is unstable.
+        ValueError: A value is out of bounds, the inner step does not divide the sample time or is too long for the
+            fastest part of the plant, or the closed loop is unstable.
     """
 
     valve: ServoValve = field(default_factory=ServoValve)
@@ -58,20 +58,16 @@ class ServoParameters:
     load: Load = field(default_factory=Load)
     controller: ServoController = field(default_factory=ServoController)
     seals: tuple[MountedSeal, ...]
-    control_period: float = parameter(
-        5e-4, unit='s', lower=1e-6, upper=0.1, description='Sample time of the controller, and of one step.'
-    )
-    inner_step: float = parameter(
-        1e-4, unit='s', lower=1e-8, upper=0.1, description='Time step of valve, cylinder and load.'
-    )
+    control_period: float = parameter(5e-4, unit='s', lower=1e-6, upper=0.1, description='Controller sample time.')
+    inner_step: float = parameter(1e-4, unit='s', lower=1e-8, upper=0.1, description='Time step of the plant.')
     inner_steps: int = field(init=False, repr=False, compare=False)
     constants: Constants = field(init=False, repr=False, compare=False)
     gains: Gains = field(init=False, repr=False, compare=False)
     kept: Any = field(init=False, repr=False, compare=False)
-    """constants and gains, for compiled code"""
+    """constants and gains for compiled code"""
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         steps = round(self.control_period / self.inner_step)
         if steps < 1 or abs(steps * self.inner_step - self.control_period) > 1e-9 * self.control_period:
             raise ValueError(
@@ -84,11 +80,11 @@ class ServoParameters:
         radius = spectral_radius(g, c)
         if radius > 1.0 + 1e-9:
             raise ValueError(
-                f'ServoParameters: the closed loop is unstable, its largest eigenvalue from sample to sample is '
+                f'ServoParameters: the closed loop is unstable, the largest eigenvalue of its transition matrix is '
                 f'{radius:.4f}: lower position_gain, velocity_compensation or force_bandwidth, or control_period'
             )
         for name, value in (('inner_steps', steps), ('constants', c), ('gains', g), ('kept', keep((c, g)))):
-            object.__setattr__(self, name, value)  # frozen: the only way to keep what was built from the fields
+            object.__setattr__(self, name, value)  # frozen dataclass: derived fields
 
     def _check_inner_step(self) -> None:
         rate, part = fastest_rate(self.valve, self.cylinder, self.load, self.seals)
@@ -100,14 +96,14 @@ class ServoParameters:
 
 
 class ServoState(NamedTuple):
-    """What one step leaves for the next."""
+    """State between two samples."""
 
     plant: PlantState
     controller: ControllerState
 
 
 class ServoOutputs(NamedTuple):
-    """The servo at the end of a step. No noise, no delay."""
+    """True values at the end of a step, without noise or delay."""
 
     position: float
     """[m]"""
@@ -132,11 +128,14 @@ class ServoOutputs(NamedTuple):
     direction: int
     """-1, 0 or 1"""
     command: Command
-    """what the controller wanted at the start of the step"""
+    """outputs of the controller at the start of the step"""
+
+
+NO_COMMAND = Command(0.0, 0.0, 0)
 
 
 def init(parameters: ServoParameters, position: float = 0.0) -> ServoState:
-    """Servo at rest at ``position`` [m], valve closed, chambers half-way between supply and return.
+    """Servo at rest at ``position`` [m], valve closed, chambers at the mean of supply and return pressure.
 
     Raises:
         ValueError: The position is not between the end stops.
@@ -150,7 +149,7 @@ def init(parameters: ServoParameters, position: float = 0.0) -> ServoState:
 def advance_plant(
     kept: Any, state: PlantState, command: float, load_force: float, inner_step_time: float, inner_steps: int
 ) -> PlantState:
-    """``inner_steps`` inner steps with spool command and load force held."""
+    """``inner_steps`` inner steps with constant spool command and load force."""
     c, _gains = kept.value
     for _ in range(inner_steps):
         state = inner_step(c, state, command, load_force, inner_step_time)
@@ -158,24 +157,14 @@ def advance_plant(
 
 
 def advance(parameters: ServoParameters, state: PlantState, spool: float, load_force: float = 0.0) -> PlantState:
-    """Valve, cylinder and load over one sample, with the spool command [-1 to 1] and a force on the rod [N] held."""
+    """Valve, cylinder and load over one sample, with constant spool command [-1 to 1] and force on the rod [N]."""
     command = min(max(spool, -1.0), 1.0)
     return advance_plant(parameters.kept, state, command, load_force, parameters.inner_step, parameters.inner_steps)
 
 
-class RodForces(NamedTuple):
-    """Forces on the rod and of its seals [N]."""
-
-    force_sum: float
-    coulomb_friction: float
-    breakaway_force: float
-    sliding_friction: float
-    """at the velocity of the rod, as a magnitude; at rest the Coulomb friction"""
-
-
 @compiled
 def measure(c: Constants, state: PlantState) -> Measurement:
-    """What perfect sensors read."""
+    """Measurement of ideal sensors."""
     return Measurement(
         state.position,
         state.velocity,
@@ -185,89 +174,76 @@ def measure(c: Constants, state: PlantState) -> Measurement:
 
 
 @compiled
-def rod_forces(kept: Any, plant: PlantState, load_force: float) -> RodForces:
-    """Forces in a state of the plant."""
+def _outputs(kept: Any, plant: PlantState, command: Command, load_force: float) -> ServoOutputs:
+    """Outputs in a state of the plant; friction by `state_friction` of the estimator, at rest where V = 0 exactly."""
     c, _gains = kept.value
-    y = plant[:8]
-    a, b = chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour)
-    friction = friction_of_seals(c.seals, a, b, plant.velocity)
-    coulomb = friction.coulomb_friction
-    sliding = coulomb + friction.velocity_friction
-    return RodForces(force_sum(c, y, load_force), coulomb, coulomb + friction.stiction, sliding)
-
-
-@compiled
-def _step(
-    kept: Any,
-    state: ServoState,
-    reference: Reference,
-    feedforward: float,
-    load_force: float,
-    inner_step_time: float,
-    inner_steps: int,
-) -> tuple[ServoState, Command, RodForces]:
-    c, g = kept.value
-    controller, command = control(g, c, state.controller, measure(c, state.plant), reference, feedforward)
-    plant = advance_plant(kept, state.plant, command.spool, load_force, inner_step_time, inner_steps)
-    return ServoState(plant, controller), command, rod_forces(kept, plant, load_force)
-
-
-def step(
-    parameters: ServoParameters,
-    state: ServoState,
-    reference: Reference,
-    feedforward: float = 0.0,
-    load_force: float = 0.0,
-) -> tuple[ServoState, ServoOutputs]:
-    """One sample: the controller sees the rod as it is, the plant follows to the next sample.
-
-    Args:
-        parameters: The servo.
-        state: From `init` or the step before.
-        reference: What the rod shall do; a bad one is limited and flagged in ``outputs.command.limited``.
-        feedforward: Friction feed-forward [N], positive on extension; likewise.
-        load_force: Force from outside on the rod [N], positive on extension, held through the step.
-    """
-    state, command, forces = _step(
-        parameters.kept, state, reference, feedforward, load_force, parameters.inner_step, parameters.inner_steps
-    )
-    return state, _outputs(parameters.constants, state.plant, command, forces)
-
-
-NO_COMMAND = Command(0.0, 0.0, 0)
-
-
-def outputs(
-    parameters: ServoParameters, plant: PlantState, command: Command = NO_COMMAND, load_force: float = 0.0
-) -> ServoOutputs:
-    """What the servo does in a state of its plant."""
-    c = parameters.constants
-    return _outputs(c, plant, command, rod_forces(parameters.kept, plant, load_force))
-
-
-def _outputs(c: Constants, plant: PlantState, command: Command, forces: RodForces) -> ServoOutputs:
-    """Friction by the equation of the estimator, at rest where V = 0 exactly."""
-    acting = state_friction(
-        plant.velocity, forces.force_sum, plant.velocity == 0.0, forces.sliding_friction, forces.breakaway_force
-    )
+    measured = measure(c, plant)
+    force = force_sum(c, plant[:8], load_force)
+    seals = friction_of_seals(c.seals, measured.pressure_a, measured.pressure_b, plant.velocity)
+    coulomb = seals.coulomb_friction
+    sliding, breakaway = coulomb + seals.velocity_friction, coulomb + seals.stiction
+    acting = state_friction(plant.velocity, force, plant.velocity == 0.0, sliding, breakaway)
     return ServoOutputs(
-        plant.position,
-        plant.velocity,
-        max(plant.charge_a, c.vapour),
-        max(plant.charge_b, c.vapour),
+        measured.position,
+        measured.velocity,
+        measured.pressure_a,
+        measured.pressure_b,
         plant.spool,
-        forces.force_sum,
+        force,
         acting.friction_force,
-        forces.coulomb_friction,
-        forces.breakaway_force,
+        coulomb,
+        breakaway,
         acting.state,
         acting.direction,
         command,
     )
 
 
+def outputs(
+    parameters: ServoParameters, plant: PlantState, command: Command = NO_COMMAND, load_force: float = 0.0
+) -> ServoOutputs:
+    """Outputs of the servo in a state of its plant, with a force from outside on the rod [N]."""
+    return _outputs(parameters.kept, plant, command, load_force)
+
+
+@compiled
+def _step(
+    kept: Any,
+    state: ServoState,
+    reference: Setpoint,
+    feedforward: float,
+    load_force: float,
+    inner_step_time: float,
+    inner_steps: int,
+) -> tuple[ServoState, ServoOutputs]:
+    c, g = kept.value
+    controller, command = control(g, c, state.controller, measure(c, state.plant), reference, feedforward)
+    plant = advance_plant(kept, state.plant, command.spool, load_force, inner_step_time, inner_steps)
+    return ServoState(plant, controller), _outputs(kept, plant, command, load_force)
+
+
+def step(
+    parameters: ServoParameters,
+    state: ServoState,
+    reference: Setpoint,
+    feedforward: float = 0.0,
+    load_force: float = 0.0,
+) -> tuple[ServoState, ServoOutputs]:
+    """One sample: the controller measures the rod without error, then the plant advances to the next sample.
+
+    Args:
+        parameters: The servo.
+        state: From `init` or the previous step.
+        reference: Setpoint; an invalid one is limited and flagged in ``outputs.command.limited``.
+        feedforward: Friction feed-forward [N], positive on extension; likewise.
+        load_force: Force from outside on the rod [N], positive on extension, constant over the step.
+    """
+    p = parameters
+    return _step(p.kept, state, reference, feedforward, load_force, p.inner_step, p.inner_steps)
+
+
 class Trajectory(NamedTuple):
-    """The servo after each of n steps; every array of shape (n,), units as in `ServoOutputs`."""
+    """The servo after each of n steps; arrays of shape (n,), units as in `ServoOutputs`."""
 
     position: FloatArray
     velocity: FloatArray
@@ -275,6 +251,7 @@ class Trajectory(NamedTuple):
     pressure_b: FloatArray
     spool: FloatArray
     force_sum: FloatArray
+    friction_force: FloatArray
     coulomb_friction: FloatArray
     breakaway_force: FloatArray
     limited: FloatArray
@@ -282,45 +259,36 @@ class Trajectory(NamedTuple):
 
 @compiled
 def _simulate(
-    kept: Any,
-    state: ServoState,
-    inputs: Any,
-    inner_step_time: float,
-    inner_steps: int,
-    rows: Any,
+    kept: Any, state: ServoState, inputs: Any, inner_step_time: float, inner_steps: int, rows: Any
 ) -> ServoState:
     for i in range(len(inputs)):
-        row = inputs[i]
-        wanted = Reference(row[0], row[1], row[2])
-        state, command, forces = _step(kept, state, wanted, row[3], row[4], inner_step_time, inner_steps)
-        measured = measure(kept.value[0], state.plant)
-        rows[i, 0], rows[i, 1] = measured.position, measured.velocity
-        rows[i, 2], rows[i, 3] = measured.pressure_a, measured.pressure_b
-        rows[i, 4] = state.plant.spool
-        rows[i, 5], rows[i, 6], rows[i, 7] = forces.force_sum, forces.coulomb_friction, forces.breakaway_force
-        rows[i, 8] = command.limited
+        x, v, a, feedforward, load_force = [float(inputs[i, j]) for j in range(5)]
+        state, out = _step(kept, state, Setpoint(x, v, a), feedforward, load_force, inner_step_time, inner_steps)
+        for column, value in enumerate(out[:9]):
+            rows[i, column] = value
+        rows[i, 9] = out.command.limited
     return state
 
 
 def simulate(
     parameters: ServoParameters,
     state: ServoState,
-    references: Iterable[Reference],
+    references: Iterable[Setpoint],
     feedforward: float | FloatArray = 0.0,
     load_force: float | FloatArray = 0.0,
 ) -> tuple[ServoState, Trajectory]:
-    """As many `step` as there are references, in one compiled go.
+    """One `step` for each reference, in one compiled loop.
 
     Args:
         parameters: The servo.
-        state: From `init` or a step before.
-        references: Reference of each step, n of them.
-        feedforward: Friction feed-forward [N], one for all or shape (n,).
-        load_force: Force from outside on the rod [N], one for all or shape (n,).
+        state: From `init` or the previous step.
+        references: Setpoints of the n steps.
+        feedforward: Friction feed-forward [N], scalar or shape (n,).
+        load_force: Force from outside on the rod [N], scalar or shape (n,).
     """
-    wanted = np.array([*references], dtype=float).reshape(-1, 3)
-    inputs = np.empty((len(wanted), 5))
-    inputs[:, :3], inputs[:, 3], inputs[:, 4] = wanted, feedforward, load_force
-    rows = np.empty((len(wanted), len(Trajectory._fields)))
+    setpoints = np.array([*references], dtype=float).reshape(-1, 3)
+    inputs = np.empty((len(setpoints), 5))
+    inputs[:, :3], inputs[:, 3], inputs[:, 4] = setpoints, feedforward, load_force
+    rows = np.empty((len(setpoints), len(Trajectory._fields)))
     state = _simulate(parameters.kept, state, inputs, parameters.inner_step, parameters.inner_steps, rows)
     return state, Trajectory(*rows.T)

@@ -1,4 +1,4 @@
-"""The rig of the thesis's friction test as a simulation: both ports on one pressure, a spring scale on the rod."""
+"""Simulated rig of the friction test of the thesis: both ports at one pressure, a spring scale on the rod."""
 
 from typing import NamedTuple
 
@@ -10,45 +10,42 @@ from seal_friction_ros.core.servo.position_servo import ServoOutputs, ServoParam
 
 
 class PullRig(NamedTuple):
-    """The rig, once for each pressure of the plan."""
+    """Plan of the test, and one plant for each pressure of the plan."""
 
     plan: PullTest
     servos: tuple[ServoParameters, ...]
 
 
 class PullRigState(NamedTuple):
-    """What one step leaves for the next."""
+    """State between two samples."""
 
     test: int
-    """number of the test, counted from 0"""
+    """index of the test, from 0"""
     plant: PlantState
 
 
 def pull_rig(plan: PullTest, seals: tuple[MountedSeal, ...], period: float) -> PullRig:
-    """The rig for a plan, stepped with ``period`` [s].
+    """Rig for a plan, with the sample time ``period`` [s].
 
-    Supply and return are one line, and the valve stands open and is wide, so that it holds the rod back by little.
-    Sizes of valve and hoses are our choice.
+    Supply and return are one line. The valve is wide and fully open, so it hardly brakes the rod. Sizes of valve and
+    hoses are our choice.
 
     Raises:
-        ValueError: The period does not suit the plant.
+        ValueError: The period is too long for the plant.
     """
+
+    def servo(pressure: float) -> ServoParameters:
+        return ServoParameters(
+            valve=ServoValve(supply_pressure=pressure, return_pressure=pressure, rated_flow=2.5e-4),
+            cylinder=Cylinder(dead_volume=2e-5),
+            controller=ServoController(force_bandwidth=50.0, position_gain=1e3),  # not used: the spool stands open
+            seals=seals,
+            control_period=period,
+            inner_step=period / max(round(period / 2e-4), 1),
+        )
+
     pressures = [plan.pressure_max * i / plan.intervals for i in range(plan.intervals + 1)]
-    idle = ServoController(force_bandwidth=50.0, position_gain=1e3)  # not used: the spool stands open
-    return PullRig(
-        plan,
-        tuple(
-            ServoParameters(
-                valve=ServoValve(supply_pressure=pressure, return_pressure=pressure, rated_flow=2.5e-4),
-                cylinder=Cylinder(dead_volume=2e-5),
-                controller=idle,
-                seals=seals,
-                control_period=period,
-                inner_step=period / max(round(period / 2e-4), 1),
-            )
-            for pressure in pressures
-        ),
-    )
+    return PullRig(plan, tuple(servo(pressure) for pressure in pressures))
 
 
 def init_pull_rig(rig: PullRig) -> PullRigState:
@@ -57,10 +54,9 @@ def init_pull_rig(rig: PullRig) -> PullRigState:
 
 
 def step_pull_rig(rig: PullRig, state: PullRigState, time: float) -> tuple[PullRigState, ServoOutputs]:
-    """One sample of the test at ``time`` [s]: where the rod rests, the next pressure is there at once."""
+    """One sample of the test at ``time`` [s]; a new test starts at rest, with its pressure in both chambers."""
     command = rig.plan.at(time)
-    servo = rig.servos[command.test % len(rig.servos)]
-    plant = state.plant
+    servo, plant = rig.servos[command.test % len(rig.servos)], state.plant
     if command.test != state.test:
         plant = init(servo, plant.position).plant
     force = rig.plan.force(command, plant.position)

@@ -1,4 +1,4 @@
-"""What the sensors of a simulated servo say: noise, resolution, drop-outs; seeded, so that a run can be had again."""
+"""Sensors of the simulated servo: noise, resolution, drop-outs. Seeded, so a run is reproducible."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -6,45 +6,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
-_BLOCK = 64  # samples whose random numbers are drawn at once: long enough to be cheap, short enough for a tick
+_BLOCK = 64  # samples whose random numbers are drawn at once: the cost of a block fits into one tick of the node
 
 
 @dataclass(frozen=True)
-class SensorSettings:
-    """What is wrong with the sensors; nothing by default.
+class SensorSettings(CheckedParameters):
+    """Errors of the sensors; the default is none."""
 
-    Raises:
-        ValueError: A value is out of bounds.
-    """
-
-    pressure_noise: float = parameter(
-        0.0, unit='Pa', lower=0.0, upper=1e7, description='Standard deviation of the noise of each pressure.'
-    )
-    velocity_noise: float = parameter(0.0, unit='m/s', lower=0.0, upper=1.0, description='Likewise.')
-    force_noise: float = parameter(0.0, unit='N', lower=0.0, upper=1e5, description='Likewise.')
-    position_noise: float = parameter(0.0, unit='m', lower=0.0, upper=0.1, description='Likewise.')
-    pressure_resolution: float = parameter(
-        0.0, unit='Pa', lower=0.0, upper=1e7, description='Pressure comes in steps of this size; 0: any value.'
-    )
+    pressure_noise: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e7, description='Standard deviation, each.')
+    velocity_noise: float = parameter(0.0, unit='m/s', lower=0.0, upper=1.0, description='Standard deviation.')
+    force_noise: float = parameter(0.0, unit='N', lower=0.0, upper=1e5, description='Standard deviation.')
+    position_noise: float = parameter(0.0, unit='m', lower=0.0, upper=0.1, description='Standard deviation.')
+    pressure_resolution: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e7, description='Step; 0: continuous.')
     velocity_resolution: float = parameter(0.0, unit='m/s', lower=0.0, upper=1.0, description='Likewise.')
     force_resolution: float = parameter(0.0, unit='N', lower=0.0, upper=1e5, description='Likewise.')
     position_resolution: float = parameter(0.0, unit='m', lower=0.0, upper=0.1, description='Likewise.')
-    delay: float = parameter(
-        0.0, unit='s', lower=0.0, upper=1.0, description='A sample is sent so long after it was measured.'
-    )
-    drop_out: float = parameter(
-        0.0, unit='1', lower=0.0, upper=1.0, description='Share of the samples of each sensor that are never sent.'
-    )
+    delay: float = parameter(0.0, unit='s', lower=0.0, upper=1.0, description='From the measurement to publication.')
+    drop_out: float = parameter(0.0, unit='1', lower=0.0, upper=1.0, description='Share of lost samples, each sensor.')
     seed: int = parameter(0, unit='', lower=0, upper=2**31 - 1, description='Of the random numbers.')
 
-    def __post_init__(self) -> None:
-        check(self)
+    def reading(self, quantity: str, true: float, random: float) -> float:
+        """Value of a sensor for a true value and a standard normal random number."""
+        value = true + float(getattr(self, f'{quantity}_noise')) * random
+        step = float(getattr(self, f'{quantity}_resolution'))
+        return step * round(value / step) if step else value
 
 
 class Readings(NamedTuple):
-    """One sample of each sensor; None for one that is never sent."""
+    """One sample of each sensor; None for a lost sample."""
 
     pressure: tuple[float, float] | None
     """[Pa, gauge] chamber a and b"""
@@ -57,39 +48,29 @@ class Readings(NamedTuple):
 
 
 def read(settings: SensorSettings, index: int, truth: Readings) -> Readings:
-    r"""What the sensors say of sample ``index``: the same for the same settings, index and truth.
+    r"""Readings of sample ``index``: the same for the same settings, index and truth.
 
     .. math:: y = r \, \mathrm{round}((x + \sigma n) / r)
 
-    with n from a standard normal distribution. White noise and a drop-out of each sensor by itself are our choice.
+    with n from a standard normal distribution. White noise and independent drop-outs are our choice.
     """
-    row, drops = _random(settings.seed, index // _BLOCK)
-    n, lost = row[index % _BLOCK], drops[index % _BLOCK]
+    normal, uniform = _random(settings.seed, index // _BLOCK)
+    n, drops = normal[index % _BLOCK], uniform[index % _BLOCK]
+    lost = [drop < settings.drop_out for drop in drops]
     pressure, velocity, force_sum, position = truth
-    share = settings.drop_out
-    sigma, step = settings.pressure_noise, settings.pressure_resolution
+    reading = settings.reading
     return Readings(
         None
-        if pressure is None or lost[0] < share
-        else (_rounded(pressure[0] + sigma * n[0], step), _rounded(pressure[1] + sigma * n[1], step)),
-        None
-        if velocity is None or lost[1] < share
-        else _rounded(velocity + settings.velocity_noise * n[2], settings.velocity_resolution),
-        None
-        if force_sum is None or lost[2] < share
-        else _rounded(force_sum + settings.force_noise * n[3], settings.force_resolution),
-        None
-        if position is None or lost[3] < share
-        else _rounded(position + settings.position_noise * n[4], settings.position_resolution),
+        if pressure is None or lost[0]
+        else (reading('pressure', pressure[0], n[0]), reading('pressure', pressure[1], n[1])),
+        None if velocity is None or lost[1] else reading('velocity', velocity, n[2]),
+        None if force_sum is None or lost[2] else reading('force', force_sum, n[3]),
+        None if position is None or lost[3] else reading('position', position, n[4]),
     )
-
-
-def _rounded(value: float, step: float) -> float:
-    return step * round(value / step) if step else value
 
 
 @lru_cache(maxsize=4)
 def _random(seed: int, block: int) -> tuple[list[list[float]], list[list[float]]]:
-    """Noise and drop-outs of the samples of a block, as lists: ten times faster to read one by one than arrays."""
+    """Normal and uniform random numbers of a block, as lists: ten times faster to read one by one than arrays."""
     generator = np.random.default_rng([seed, block])
     return generator.standard_normal((_BLOCK, 5)).tolist(), generator.random((_BLOCK, 4)).tolist()

@@ -1,11 +1,11 @@
-"""ROS parameters of the servo simulator: the table of their groups, and the options of the node itself."""
+"""ROS parameters of the node servo_simulator."""
 
 from dataclasses import dataclass
 from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.node_options import StartOptions
-from seal_friction_ros.core.foundation.parameters import ParameterGroup, check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, ParameterGroup, parameter
 from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.motions import Chirp, PullTest, Sine, Step, Trapezoid
 from seal_friction_ros.core.servo.plant import Cylinder, Load, ServoValve
@@ -19,7 +19,7 @@ PLANT: dict[str, type[Any]] = {'valve': ServoValve, 'cylinder': Cylinder, 'load'
 
 
 @dataclass(frozen=True)
-class SimulatorSettings:
+class SimulatorSettings(CheckedParameters):
     """Settings of the simulation, one ROS parameter per field.
 
     Raises:
@@ -36,7 +36,7 @@ class SimulatorSettings:
         0.05, unit='s', lower=1e-3, upper=10.0, description='An older feed-forward counts as 0 N.'
     )
     reference_timeout: float = parameter(
-        0.5, unit='s', lower=1e-3, upper=60.0, description='wave: topic. Without a newer reference the rod is held.'
+        0.5, unit='s', lower=1e-3, upper=60.0, description='wave: topic. The position of an older reference is held.'
     )
     rate: float = parameter(
         1000.0, unit='Hz', lower=10.0, upper=10000.0, live=False, description='Samples and control steps per second.'
@@ -51,16 +51,12 @@ class SimulatorSettings:
         False, unit='', live=False, description='Publish /clock, from 0 s, for nodes with use_sim_time.'
     )
     time_factor: float = parameter(
-        1.0,
-        unit='1',
-        lower=0.01,
-        upper=1000.0,
-        live=False,
-        description='Simulated time per real time; needs publish_clock if not 1.',
-    )
+        1.0, unit='1', lower=0.01, upper=1000.0, live=False,
+        description='Simulated time per real time; a value other than 1 needs publish_clock.'
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         names = (*WAVES, 'topic', 'pull_test')
         if self.wave not in names:
             raise ValueError(f'SimulatorSettings.wave = {self.wave!r} is none of {", ".join(names)}')

@@ -1,4 +1,4 @@
-"""How well a servo tracks: error, dwell at reversal, limit cycle."""
+"""Tracking quality of a servo: error, dwell at reversal, limit cycle."""
 
 import math
 
@@ -18,18 +18,15 @@ def tracking_peak(reference: FloatArray, position: FloatArray) -> float:
 
 
 def dwell_per_reversal(velocity: FloatArray, period: float, standstill: float = 0.0) -> float:
-    """Mean time at rest per reversal of direction [s].
+    """Mean rest per reversal of direction [s]; 0.0 without a reversal.
 
-    A stretch at rest between motion one way and the other is a reversal; so is a change of sign without a sample at
-    rest, with a dwell of zero. Rest within a motion one way, and at both ends of the record, is left out.
+    A rest between motions in opposite directions is a reversal; so is a change of sign without a sample at rest, with a
+    dwell of zero. A rest between motions in one direction and a rest at either end of the record do not count.
 
     Args:
         velocity: Rod velocity [m/s], shape (n,).
-        period: Time between two samples [s].
-        standstill: Speed at and below which the rod rests [m/s]; 0.0 for a simulated rod, which rests exactly.
-
-    Returns:
-        0.0 if there is no reversal.
+        period: Sample time [s].
+        standstill: Speed at and below which the rod rests [m/s]; 0.0 for a simulated rod, whose rest is exact.
     """
     direction = np.where(np.abs(velocity) > standstill, np.sign(velocity), 0.0)
     moving = np.flatnonzero(direction)
@@ -41,6 +38,6 @@ def dwell_per_reversal(velocity: FloatArray, period: float, standstill: float = 
 
 
 def reversals(velocity: FloatArray, standstill: float = 0.0) -> int:
-    """How often the direction of motion changes; at a constant reference every one is part of a limit cycle."""
+    """Number of changes of direction; at a constant reference each of them is part of a limit cycle."""
     direction = np.sign(velocity[np.abs(velocity) > standstill])
     return int(np.count_nonzero(direction[1:] != direction[:-1]))

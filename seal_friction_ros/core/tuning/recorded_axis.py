@@ -1,21 +1,21 @@
-r"""How well a feed-forward would have matched the friction that a real axis showed.
+r"""Feed-forward that matches the friction of a recorded axis.
 
 .. math:: F_S - m a - F_0 = s f_c\,\mathrm{sgn}(v)
 
-The left side is the friction: force sum less what accelerates the mass, less a constant offset of the force sum. While
-the rod slides, s, m and F_0 follow by least squares from force sum, acceleration and the Coulomb friction f_c of the
-estimator. s is the scale that a feed-forward needs, wrong model and all.
+The left side is the friction: force sum less inertia, less a constant offset of the force sum. While the rod slides,
+least squares give s, m and F_0 from force sum, acceleration and the Coulomb friction f_c of the estimator. s is the
+scale of the feed-forward; it includes the error of the model.
 
-The smoothing is the widest with which the law, along the rod's own motion, is nearly as good as with the best; the
-slew limit the lowest with which the force that the recorded reference asks for is nearly the same. Along the reference
-the smoothing would be far too wide, since a rod without compensation reverses late. How late the force of an axis comes
-after its command cannot be seen in a recording of it. All of it is our choice.
+The smoothing is the widest with which the law, along the motion of the rod, is nearly as good as with the best
+smoothing. The slew limit is the lowest with which the force along the recorded reference is nearly the same. Along the
+reference the smoothing would be much too wide, since a rod without compensation reverses late. A recording does not
+show the delay from command to force. All of it is our choice.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -25,21 +25,21 @@ from seal_friction_ros.core.estimation.feedforward import UNUSABLE, FeedForwardS
 from seal_friction_ros.core.estimation.records import FrictionEstimate
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.tuning.settings import MatchSettings
+from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, RobustnessCase, TunedFeedForward
 from seal_friction_ros.core.tuning.simulated_axis import bounded, nearest_preferred, preferred
 
-ACCELERATION_WINDOW = 11  # samples of velocity to whose parabola an acceleration belongs
-MOST_UNEVEN = 0.5  # of the median period; a sample further off the beat has no acceleration
-FEWEST_SLIDING = 100  # samples, to fit anything to
-BOTH_DIRECTIONS = 0.1  # of the sliding samples at least in each direction, or the offset is not told from the friction
+ACCELERATION_WINDOW = 11  # samples of the parabola whose slope is the acceleration
+MOST_UNEVEN = 0.5  # of the median period: a sample with a larger deviation has no acceleration
+FEWEST_SLIDING = 100  # samples of a fit
+BOTH_DIRECTIONS = 0.1  # smallest share of the sliding samples in each direction, to separate offset and friction
 NEAR_REVERSAL = 0.1  # of the time between two reversals of the reference, before and after each
-NEARLY = 0.05  # of the friction: an RMS difference as large is nearly none
-TOLD = 0.05  # a relative standard deviation above it is no knowledge
+NEARLY = 0.05  # of the friction: a smaller RMS difference counts as none
+IDENTIFIED = 0.05  # largest relative standard deviation of an identified parameter
 SHARPEST_SMOOTHING = 1e-5  # [m/s]
 
 
 class Recording(NamedTuple):
-    """What an axis did, one entry per velocity sample."""
+    """Recorded motion of an axis, one entry per velocity sample."""
 
     estimates: Sequence[FrictionEstimate]
     motions: Sequence[Motion]
@@ -49,28 +49,28 @@ class Recording(NamedTuple):
 
     @property
     def time(self) -> FloatArray:
-        """Since the first sample [s], shape (n,)."""
+        """Time since the first sample [s], shape (n,)."""
         first = self.estimates[0].stamp
         return np.array([(estimate.stamp - first) * 1e-9 for estimate in self.estimates])
 
     @property
     def velocity(self) -> FloatArray:
-        """Of the rod [m/s], shape (n,)."""
+        """Rod velocity [m/s], shape (n,)."""
         return np.array([motion.measured_velocity for motion in self.motions])
 
     @property
     def reference_velocity(self) -> FloatArray:
-        """[m/s], shape (n,)."""
+        """Reference velocity [m/s], shape (n,)."""
         return np.array([motion.reference_velocity for motion in self.motions])
 
     @property
     def coulomb_friction(self) -> FloatArray:
-        """[N], shape (n,)."""
+        """Estimated Coulomb friction [N], shape (n,)."""
         return np.array([estimate.coulomb_friction for estimate in self.estimates])
 
 
-class Law(NamedTuple):
-    """What the axis says about its friction."""
+class RecordedLaw(NamedTuple):
+    """Friction law of a recorded axis."""
 
     scale: float
     """[-] s"""
@@ -80,63 +80,41 @@ class Law(NamedTuple):
     """[kg] m"""
     mass_is_fitted: bool
     offset: float
-    """[N] F_0; 0 where only one direction was driven"""
+    """[N] F_0; 0 where the rod moves in one direction only"""
     friction: FloatArray
-    """[N] force sum less mass times acceleration less offset; NaN where it is not known"""
+    """[N] force sum less inertia less offset; NaN where it is unknown"""
     sliding: BoolArray
-    """samples that the law was fitted to"""
+    """samples of the fit"""
 
 
 class Residual(NamedTuple):
-    """RMS [N] of the friction that a feed-forward leaves to the controller while the rod slides.
-
-    At rest friction is whatever the rod is pushed with, so there is nothing to match.
-    """
+    """RMS friction [N] that remains for the controller while the rod slides; at rest friction is the applied force."""
 
     sliding: float
-    """all of the time"""
+    """all sliding samples"""
     reversal: float
-    """near a reversal of the reference; 0 where the rod never slides there"""
+    """sliding samples near a reversal of the reference; 0 where there are none"""
+
+    def better_than(self, other: 'Residual') -> bool:
+        """Whether less friction remains while the rod slides."""
+        return self.sliding < other.sliding
 
 
-class MatchCase(NamedTuple):
-    """What is left with a model or a delay that is wrong."""
+@dataclass(frozen=True)
+class RecordedTuning(TunedFeedForward[Residual]):
+    """Feed-forward of a recorded axis."""
 
-    friction_error: float
-    """[-] share that the model gives too much"""
-    delay_error: float
-    """[-] share of the delay that comes on top"""
-    residual: Residual
-
-
-class Match(NamedTuple):
-    """What a recording says about the feed-forward."""
-
-    feedforward: FeedForwardSettings
-    told: dict[str, bool]
-    """parameter -> whether it follows from the recording; else it is what it was"""
-    law: Law
+    identified: dict[str, bool]
+    """parameter -> whether the recording identifies it; otherwise it is unchanged"""
+    law: RecordedLaw
     reversal: BoolArray
     """samples near a reversal of the reference"""
-    without: Residual
-    cases: tuple[MatchCase, ...]
-    """nine, by friction error, then by delay error"""
     force: FloatArray
-    """[N] of the feed-forward when it acts, nothing wrong"""
-
-    @property
-    def nominal(self) -> Residual:
-        """What is left with nothing wrong."""
-        return next(case.residual for case in self.cases if not (case.friction_error or case.delay_error))
-
-    @property
-    def better_in_every_case(self) -> bool:
-        """Whether the feed-forward leaves less friction than there is, whatever is wrong, while the rod slides."""
-        return all(case.residual.sliding < self.without.sliding for case in self.cases)
+    """[N] of the feed-forward after its delay, in the nominal case"""
 
 
 def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
-    """Slope of the parabola through `ACCELERATION_WINDOW` samples [m/s^2]; NaN where they are not evenly in time.
+    """Slope of the parabola through `ACCELERATION_WINDOW` samples [m/s^2]; NaN where the samples are uneven in time.
 
     Args:
         time: [s], shape (n,).
@@ -150,44 +128,42 @@ def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
     period = float(np.median(steps))
     if period <= 0.0:
         return slope
-    # What is not finite spreads through the whole window, as it must.
+    # A value that is not finite makes its whole window not finite.
     slope[half:-half] = savgol_filter(velocity, ACCELERATION_WINDOW, 2, deriv=1, delta=period)[half:-half]
     for place in np.flatnonzero(~(np.abs(steps - period) <= MOST_UNEVEN * period)):
         slope[max(place + 1 - half, 0) : place + 1 + half] = math.nan
     return slope
 
 
-def fit_law(recording: Recording, mass: float | None = None) -> Law:
-    """Scale, mass and offset by least squares over the samples that slide.
+def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
+    """Scale, mass and offset by least squares over the sliding samples.
 
     Args:
-        recording: What the axis did.
-        mass: [kg] if it is known; else it is fitted.
+        recording: Motion of the axis.
+        mass: [kg] if known; None: fitted.
 
     Raises:
-        ValueError: It slides too little, or with too little variety to tell the terms apart.
+        ValueError: The rod slides too little, or with too little variety to separate the terms.
     """
     velocity = recording.velocity
     slope = acceleration(recording.time, velocity)
-    coulomb = recording.coulomb_friction
     state = np.array([estimate.state for estimate in recording.estimates])
     usable = np.array([not estimate.status & UNUSABLE for estimate in recording.estimates])
     sliding = (state == FrictionState.SLIDING) & usable & np.isfinite(slope) & np.isfinite(recording.force_sum)
     count = int(np.count_nonzero(sliding))
     if count < FEWEST_SLIDING:
         raise ValueError(
-            f'the rod slides in {count} usable samples, and {FEWEST_SLIDING} are needed to see its friction: '
-            'record it while it moves to and fro'
+            f'the rod slides in {count} usable samples, the friction needs {FEWEST_SLIDING}: record a motion to and fro'
         )
     forward = np.count_nonzero(velocity[sliding] > 0.0) / count
     both = BOTH_DIRECTIONS <= forward <= 1.0 - BOTH_DIRECTIONS
-    columns = [coulomb * np.sign(velocity), slope, np.ones(len(velocity))]
+    columns = [recording.coulomb_friction * np.sign(velocity), slope, np.ones(len(velocity))]
     used = [0] + ([1] if mass is None else []) + ([2] if both else [])
     matrix = np.column_stack([columns[i][sliding] for i in used])
     known = recording.force_sum[sliding] - (slope[sliding] * mass if mass is not None else 0.0)
     size = np.linalg.norm(matrix, axis=0)
     if not size.all() or np.linalg.matrix_rank(matrix / size, tol=1e-6) < len(used):
-        raise ValueError('friction, acceleration and offset cannot be told apart in it: record several speeds')
+        raise ValueError('friction, acceleration and offset cannot be separated: record several speeds')
     found, *_ = np.linalg.lstsq(matrix, known, rcond=None)
     left = known - matrix @ found
     variance = float(left @ left) / (count - len(used)) * np.linalg.inv(matrix.T @ matrix)[0, 0]
@@ -195,7 +171,7 @@ def fit_law(recording: Recording, mass: float | None = None) -> Law:
     moved = values[1] if mass is None else mass
     offset = values.get(2, 0.0)
     friction = recording.force_sum - moved * slope - offset
-    return Law(values[0], math.sqrt(variance), moved, mass is None, offset, friction, sliding)
+    return RecordedLaw(values[0], math.sqrt(variance), moved, mass is None, offset, friction, sliding)
 
 
 def near_reversals(time: FloatArray, reference_velocity: FloatArray) -> BoolArray:
@@ -220,7 +196,7 @@ def near_reversals(time: FloatArray, reference_velocity: FloatArray) -> BoolArra
 
 
 def feedforward_force(settings: FeedForwardSettings, recording: Recording, friction_error: float = 0.0) -> FloatArray:
-    """Force that the feed-forward would have commanded [N], shape (n,), with a model wrong by a share of it."""
+    """Feed-forward force along a recording [N], shape (n,), with a relative error of the friction model."""
     state, factor = feedforward.init(settings), 1.0 + friction_error
     forces = []
     for estimate, motion in zip(recording.estimates, recording.motions, strict=True):
@@ -233,46 +209,40 @@ def feedforward_force(settings: FeedForwardSettings, recording: Recording, frict
 
 
 def delayed(time: FloatArray, force: FloatArray, delay: float) -> FloatArray:
-    """What acts ``delay`` [s] after it was commanded; nothing before the first command. Shapes (n,)."""
+    """Force that acts ``delay`` [s] after its command; 0 before the first command. Shapes (n,)."""
     return np.interp(time - delay, time, force, left=0.0)
 
 
-def residual(law: Law, reversal: BoolArray, force: FloatArray) -> Residual:
-    """Friction that ``force`` [N], shape (n,), leaves."""
+def residual(law: RecordedLaw, reversal: BoolArray, force: FloatArray) -> Residual:
+    """Friction that remains with a feed-forward of ``force`` [N], shape (n,)."""
     left = law.friction - force
     return Residual(_rms(left[law.sliding]), _rms(left[law.sliding & reversal]))
 
 
-def match(recording: Recording, settings: FeedForwardSettings, known: MatchSettings) -> Match:
-    """Parameters of the feed-forward from what an axis did.
+def tune_recorded_axis(
+    recording: Recording, settings: FeedForwardSettings, known: RecordedAxisSettings
+) -> RecordedTuning:
+    """Parameters of the feed-forward from a recording.
 
     Args:
-        recording: What it did.
-        settings: Settings of the feed-forward until now: what the recording does not tell stays as it is.
-        known: What else is known, and how wrong model and delay may be.
+        recording: Motion of the axis.
+        settings: Settings before the tuning; those that the recording does not identify are unchanged.
+        known: Known properties of the axis, and the errors of model and delay.
 
     Raises:
-        ValueError: The recording has not what is needed; one line that says what to record.
+        ValueError: The recording lacks something; the message says what to record.
     """
     time = recording.time
     reversal = near_reversals(time, recording.reference_velocity)
     law = fit_law(recording, known.mass or None)
-    told = {
-        'coulomb_scale': law.scale > 0.0 and law.scale_std <= TOLD * law.scale,
-        'lead_time': known.whole_delay > 0.0,
+    identified: dict[str, float | None] = {
+        'coulomb_scale': round(law.scale, 2) if law.scale > 0.0 and law.scale_std <= IDENTIFIED * law.scale else None,
+        'lead_time': known.whole_delay or None,
+        'smoothing_velocity': _smoothing(recording, law),
     }
-    if told['coulomb_scale']:
-        settings = replace(settings, coulomb_scale=bounded('coulomb_scale', round(law.scale, 2)))
-    if told['lead_time']:
-        settings = replace(settings, lead_time=known.whole_delay)
-    smoothing = _smoothing(recording, law)
-    slew = None
-    if smoothing is not None:
-        settings = replace(settings, smoothing_velocity=bounded('smoothing_velocity', smoothing))
-        slew = _slew(recording, settings)
-    if slew is not None:
-        settings = replace(settings, slew_limit=bounded('slew_limit', slew))
-    told |= {'smoothing_velocity': smoothing is not None, 'slew_limit': slew is not None}
+    settings = _with_values(settings, identified)
+    identified['slew_limit'] = None if identified['smoothing_velocity'] is None else _slew(recording, settings)
+    settings = _with_values(settings, identified)
 
     cases = []
     late = settings.lead_time
@@ -280,14 +250,21 @@ def match(recording: Recording, settings: FeedForwardSettings, known: MatchSetti
         force = feedforward_force(settings, recording, friction)
         for lateness in dict.fromkeys((-known.delay_error, 0.0, known.delay_error)):
             left = residual(law, reversal, delayed(time, force, (1.0 + lateness) * late))
-            cases.append(MatchCase(friction, lateness, left))
+            cases.append(RobustnessCase(friction, lateness, left))
     acting = delayed(time, feedforward_force(settings, recording), late)
     without = residual(law, reversal, np.zeros(len(time)))
-    return Match(settings, told, law, reversal, without, tuple(cases), acting)
+    known_names = {name: value is not None for name, value in identified.items()}
+    return RecordedTuning(settings, without, tuple(cases), known_names, law, reversal, acting)
 
 
-def _smoothing(recording: Recording, law: Law) -> float | None:
-    """Widest smoothing that is nearly as good as the best [m/s]; None if any is: the rod was never slow."""
+def _with_values(settings: FeedForwardSettings, values: dict[str, float | None]) -> FeedForwardSettings:
+    """Settings with the identified values, clamped to their bounds."""
+    known: dict[str, Any] = {name: bounded(name, value) for name, value in values.items() if value is not None}
+    return replace(settings, **known)
+
+
+def _smoothing(recording: Recording, law: RecordedLaw) -> float | None:
+    """Widest smoothing that is nearly as good as the best [m/s]; None if all are: the rod was never slow."""
     velocity = recording.velocity[law.sliding]
     friction = law.friction[law.sliding]
     coulomb = law.scale * recording.coulomb_friction[law.sliding]
@@ -300,7 +277,7 @@ def _smoothing(recording: Recording, law: Law) -> float | None:
 
 
 def _slew(recording: Recording, settings: FeedForwardSettings) -> float | None:
-    """Lowest slew limit with which the force along the reference is nearly the same [N/s]; None if there is none."""
+    """Lowest slew limit with nearly the same force along the reference [N/s]; None if the force never changes."""
     highest = bounded('slew_limit', math.inf)
     free = feedforward_force(replace(settings, slew_limit=highest), recording)
     steps = np.diff(recording.time)

@@ -1,76 +1,97 @@
-"""What a tuning is told: of an axis that is simulated, and of one that was recorded."""
+"""Settings and results of the tuning of a simulated and of a recorded axis."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
+
+if TYPE_CHECKING:  # loads numpy, which `seal_friction tune --help` does not need
+    from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 
 
 @dataclass(frozen=True)
-class TuningSettings:
-    """What the axis shall do, and how well it is known.
+class TuningSettings(CheckedParameters):
+    """Task of a simulated axis, and the errors of its model."""
 
-    Raises:
-        ValueError: A value is out of bounds.
-    """
-
-    amplitude: float = parameter(0.001, unit='m', lower=1e-6, upper=1.0, description='Half the way of the sine.')
+    amplitude: float = parameter(0.001, unit='m', lower=1e-6, upper=1.0, description='Of the sine, half peak to peak.')
     frequency: float = parameter(5.0, unit='Hz', lower=0.05, upper=50.0, description='Of the sine.')
     delay: float = parameter(
-        0.001,
-        unit='s',
-        lower=0.0,
-        upper=0.1,
-        description='From a velocity sample until its feed-forward is in the controller.',
+        0.001, unit='s', lower=0.0, upper=0.1, description='From velocity sample to its feed-forward in the controller.'
     )
-    friction_error: float = parameter(
-        0.3, unit='1', lower=0.0, upper=0.9, description='The model of the friction may be wrong by this share.'
-    )
+    friction_error: float = parameter(0.3, unit='1', lower=0.0, upper=0.9, description='Largest relative model error.')
     delay_error: float = parameter(
-        0.2,
-        unit='1',
-        lower=0.0,
-        upper=1.0,
-        description='Likewise the whole delay from velocity sample to force on the rod.',
+        0.2, unit='1', lower=0.0, upper=1.0, description='Largest relative error of the delay to force on the rod.'
     )
     overshoot_limit: float = parameter(
-        0.05, unit='1', lower=0.0, upper=1.0, description='Largest overshoot of a move in any case, share of its way.'
+        0.05, unit='1', lower=0.0, upper=1.0, description='Largest overshoot of a move in any case, over its distance.'
     )
     hold_time: float = parameter(
-        2.0, unit='s', lower=0.05, upper=60.0, description='Rest after each motion that is watched for a limit cycle.'
+        2.0, unit='s', lower=0.05, upper=60.0, description='Rest after each motion, watched for a limit cycle.'
     )
     pressure_noise: float = parameter(
         2e3, unit='Pa', lower=0.0, upper=1e6, description='Standard deviation of the noise of each pressure.'
     )
     force_noise: float = parameter(1.0, unit='N', lower=0.0, upper=1e4, description='Likewise of the force sum.')
     velocity_noise: float = parameter(
-        2e-4, unit='m/s', lower=0.0, upper=1.0, description='Likewise of the velocity; all before the estimator.'
+        2e-4, unit='m/s', lower=0.0, upper=1.0, description='Likewise of the velocity; only the estimator sees it.'
     )
     seed: int = parameter(1, unit='', lower=0, upper=2**31 - 1, description='Of the noise.')
 
-    def __post_init__(self) -> None:
-        check(self)
+
+@dataclass(frozen=True)
+class RecordedAxisSettings(CheckedParameters):
+    """Known properties of a recorded axis, besides its recording."""
+
+    mass: float = parameter(0.0, unit='kg', lower=0.0, upper=1e6, description='Moving mass; 0: fitted.')
+    whole_delay: float = parameter(
+        0.0, unit='s', lower=0.0, upper=0.5, description='From a velocity sample to force on the rod; 0: unknown.'
+    )
+    friction_error: float = parameter(0.3, unit='1', lower=0.0, upper=0.9, description='Largest relative model error.')
+    delay_error: float = parameter(0.2, unit='1', lower=0.0, upper=1.0, description='Likewise of the whole delay.')
+
+
+class Outcome(Protocol):
+    """Quality of the feed-forward in one case: `Performance` or `Residual`."""
+
+    def better_than(self, other: Any) -> bool:
+        """Whether this outcome is better than another one."""
+        ...
+
+
+OutcomeType = TypeVar('OutcomeType', bound=Outcome)
+
+
+class RobustnessCase(NamedTuple, Generic[OutcomeType]):
+    """Outcome with an error of the friction model and of the delay."""
+
+    friction_error: float
+    """[-] the model gives ``1 + friction_error`` times the friction"""
+    delay_error: float
+    """[-] the whole delay is ``1 + delay_error`` times as long"""
+    outcome: OutcomeType
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether both errors are 0."""
+        return not (self.friction_error or self.delay_error)
 
 
 @dataclass(frozen=True)
-class MatchSettings:
-    """What is known of a recorded axis besides its recording.
+class TunedFeedForward(Generic[OutcomeType]):
+    """A tuned feed-forward and its robustness."""
 
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+    feedforward: 'FeedForwardSettings'
+    without: OutcomeType
+    """outcome without feed-forward"""
+    cases: tuple[RobustnessCase[OutcomeType], ...]
+    """nine, by friction error, then by delay error"""
 
-    mass: float = parameter(0.0, unit='kg', lower=0.0, upper=1e6, description='Moving mass; 0: it is fitted.')
-    whole_delay: float = parameter(
-        0.0,
-        unit='s',
-        lower=0.0,
-        upper=0.5,
-        description='From a velocity sample until its feed-forward is force on the rod; 0: not known.',
-    )
-    friction_error: float = parameter(
-        0.3, unit='1', lower=0.0, upper=0.9, description='The model of the friction may be wrong by this share.'
-    )
-    delay_error: float = parameter(0.2, unit='1', lower=0.0, upper=1.0, description='Likewise the whole delay.')
+    @property
+    def nominal(self) -> OutcomeType:
+        """Outcome without errors of model and delay."""
+        return next(case.outcome for case in self.cases if case.is_nominal)
 
-    def __post_init__(self) -> None:
-        check(self)
+    @property
+    def better_in_every_case(self) -> bool:
+        """Whether every case is better than without feed-forward."""
+        return all(case.outcome.better_than(self.without) for case in self.cases)

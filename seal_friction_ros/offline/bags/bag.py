@@ -9,9 +9,9 @@ import errno
 import shutil
 import sqlite3
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from types import TracebackType
@@ -350,41 +350,32 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
         BagError: There is no bag, or it is damaged; raised when the damage is reached.
     """
     with _as_bag_errors(path):
-        found = _storage(path)
+        found = storage(path)
         for file in found.files:
-            for message in _read_file(file, found.is_sqlite):
-                if found.are_messages_packed:
-                    data = mcap_reader.unpack_zstd(message.data, mcap_reader.LARGEST_CHUNK)
-                    yield message._replace(data=data)
-                else:
-                    yield message
+            for message in found.read(file):
+                yield BagMessage(*message)
 
 
 class Storage(NamedTuple):
-    """Files of a bag, and their format."""
+    """Files of a bag, and the functions that read one of them."""
 
     files: tuple[Path, ...]
-    is_sqlite: bool
-    are_messages_packed: bool = False
+    read: Callable[[Path], Iterator[tuple[str, str, int, bytes]]]
+    """topic, message type, log time [ns] and bytes of each message, in order of log time"""
+    list_topics: Callable[[Path], Iterable[tuple[str, str, int]]]
+    """name, message type and number of messages of each topic; a name may come several times"""
+
+    @property
+    def is_plain_mcap(self) -> bool:
+        """Whether the files are MCAP with messages that are not packed."""
+        return self.read is mcap_reader.file_messages
 
 
-def storage(path: Path) -> Storage:
-    """Find the files of a bag.
-
-    Raises:
-        BagError: There is no bag.
-    """
-    with _as_bag_errors(path):
-        return _storage(path)
-
-
-def _read_file(path: Path, is_sqlite: bool) -> Iterator[BagMessage]:
-    if is_sqlite:
-        yield from (BagMessage(*message) for message in sqlite_reader.messages(path))
-        return
-    with path.open('rb') as file:
-        for channel, log_time, data in mcap_reader.messages(file, mcap_reader.scan_finished(file)):
-            yield BagMessage(channel.topic, channel.type_name, log_time, data)
+_READERS = {
+    'mcap': (mcap_reader.file_messages, mcap_reader.file_topics),
+    'sqlite3': (sqlite_reader.file_messages, sqlite_reader.file_topics),
+}
+"""Storage identifier of rosbag2 -> functions of `Storage`."""
 
 
 class TopicInfo(NamedTuple):
@@ -402,28 +393,14 @@ def bag_topics(path: Path) -> dict[str, TopicInfo]:
     """
     found: dict[str, TopicInfo] = {}
     with _as_bag_errors(path):
-        stored = _storage(path)
+        stored = storage(path)
         for file in stored.files:
-            for topic, type_name, count in _count_file(file, stored.is_sqlite):
+            for topic, type_name, count in stored.list_topics(file):
                 before = found.get(topic)
                 if before is not None and before.type_name != type_name:
                     raise ValueError(f'{topic} has messages of {before.type_name} and of {type_name}')
                 found[topic] = TopicInfo(type_name, count + (before.message_count if before else 0))
     return found
-
-
-def _count_file(path: Path, is_sqlite: bool) -> Iterator[tuple[str, str, int]]:
-    if is_sqlite:
-        yield from sqlite_reader.topics(path)
-        return
-    with path.open('rb') as file:
-        layout = mcap_reader.scan_finished(file)
-        if layout.channels and layout.counts:
-            for number, channel in layout.channels.items():
-                yield channel.topic, channel.type_name, layout.counts.get(number, 0)
-        else:
-            for channel, _, _ in mcap_reader.messages(file, layout):
-                yield channel.topic, channel.type_name, 1
 
 
 @contextmanager
@@ -438,32 +415,43 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
         raise BagError(f'{path}: not a readable bag: {reason}') from None
 
 
-def _storage(path: Path) -> Storage:
+def storage(path: Path) -> Storage:
     """Find the files of a bag.
 
     Raises:
-        ValueError: There are none, or they are outside the folder.
+        BagError: There are none, or they are outside the folder.
     """
-    if not path.is_dir():
-        if not path.is_file():
-            raise ValueError('no such file' if not path.exists() else 'neither a file nor a folder')
-        return Storage((path,), path.suffix == '.db3')
-    metadata = path / 'metadata.yaml'
-    if not metadata.is_file():
-        raise BagError(f'{path}: not a rosbag2 bag: no metadata.yaml in it')
-    document = read_yaml(_inside(path, 'metadata.yaml'), _LARGEST_METADATA)
-    information = document.get('rosbag2_bagfile_information') if isinstance(document, Mapping) else None
-    if not isinstance(information, Mapping):
-        raise ValueError('metadata.yaml is not in the format of rosbag2')
-    names, kind = information.get('relative_file_paths'), information.get('storage_identifier')
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ValueError('metadata.yaml: relative_file_paths is not a list of names')
-    if kind not in ('mcap', 'sqlite3'):
-        raise ValueError(f'metadata.yaml: storage_identifier = {kind!r} is neither mcap nor sqlite3')
-    mode = str(information.get('compression_mode') or 'none').lower()
-    if mode not in ('none', 'message'):
-        raise ValueError(f'its files are compressed as a whole (compression_mode = {mode!r}): unpack them first')
-    return Storage(tuple(_inside(path, name) for name in names), kind == 'sqlite3', mode == 'message')
+    with _as_bag_errors(path):
+        if not path.is_dir():
+            if not path.is_file():
+                raise ValueError('no such file' if not path.exists() else 'neither a file nor a folder')
+            return Storage((path,), *_READERS['sqlite3' if path.suffix == '.db3' else 'mcap'])
+        metadata = path / 'metadata.yaml'
+        if not metadata.is_file():
+            raise BagError(f'{path}: not a rosbag2 bag: no metadata.yaml in it')
+        document = read_yaml(_inside(path, 'metadata.yaml'), _LARGEST_METADATA)
+        information = document.get('rosbag2_bagfile_information') if isinstance(document, Mapping) else None
+        if not isinstance(information, Mapping):
+            raise ValueError('metadata.yaml is not in the format of rosbag2')
+        names, kind = information.get('relative_file_paths'), information.get('storage_identifier')
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise ValueError('metadata.yaml: relative_file_paths is not a list of names')
+        if kind not in _READERS:
+            raise ValueError(f'metadata.yaml: storage_identifier = {kind!r} is neither mcap nor sqlite3')
+        mode = str(information.get('compression_mode') or 'none').lower()
+        if mode not in ('none', 'message'):
+            raise ValueError(f'its files are compressed as a whole (compression_mode = {mode!r}): unpack them first')
+        messages, topics = _READERS[kind]
+        if mode == 'message':
+            messages = partial(_unpacked_messages, messages)
+        return Storage(tuple(_inside(path, name) for name in names), messages, topics)
+
+
+def _unpacked_messages(
+    read: Callable[[Path], Iterator[tuple[str, str, int, bytes]]], file: Path
+) -> Iterator[tuple[str, str, int, bytes]]:
+    for topic, type_name, log_time, data in read(file):
+        yield topic, type_name, log_time, mcap_reader.unpack_zstd(data, mcap_reader.LARGEST_CHUNK)
 
 
 def _inside(folder: Path, name: str) -> Path:

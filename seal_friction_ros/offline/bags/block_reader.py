@@ -45,7 +45,7 @@ def read_in_bulk(path: Path, kind_of: KindOf) -> Iterator[Messages]:
         BagError: It cannot be read.
     """
     files = storage(path)
-    if files.is_sqlite or files.are_messages_packed:
+    if not files.is_plain_mcap:
         yield from _gathered(read_messages(path), kind_of)
         return
     for file_path in files.files:

@@ -22,6 +22,7 @@ The rig file describes the columns of the log, their units, signs and areas. The
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
@@ -31,7 +32,7 @@ from numpy.typing import NDArray
 from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
 from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import check, from_mapping, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, from_mapping, parameter
 from seal_friction_ros.core.foundation.units import unit_size
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding, slope
 from seal_friction_ros.files import read_yaml
@@ -56,7 +57,7 @@ _QUANTITY_OF = {unit: quantity for quantity, units in _QUANTITIES.items() for un
 
 
 @dataclass(frozen=True, kw_only=True)
-class Term:
+class Term(CheckedParameters):
     """One column of the log with its unit, times a gain with a unit (for example an area, or a sensor scale).
 
     Raises:
@@ -70,7 +71,7 @@ class Term:
     gain_unit: str = parameter('1', unit='', description='Unit of the gain.')
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if (self.column < 0) == (not self.column_name):
             raise ValueError(
                 f'Term.column = {self.column}, Term.column_name = {self.column_name!r}: '
@@ -92,7 +93,7 @@ class Term:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Combination:
+class Combination(CheckedParameters):
     """Linear combination of columns: constant + sum of gain times column, in SI.
 
     Raises:
@@ -102,12 +103,9 @@ class Combination:
     terms: tuple[Term, ...] = ()
     constant: float = parameter(0.0, unit='SI', description='Constant part.')
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Rig:
+class Rig(CheckedParameters):
     """Format of the logs of one rig.
 
     Raises:
@@ -129,7 +127,7 @@ class Rig:
     sliding: Sliding
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.header not in _HEADERS:
             raise ValueError(f'Rig.header = {self.header!r} is not one of {", ".join(_HEADERS)}')
         if not self.frame_id.isprintable() or len(self.frame_id) > 255:
@@ -308,27 +306,14 @@ def _parted(
 ) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     """Names in the header (empty without header), and the rows after it: line number and cells."""
     header: list[str] = []
-    for number, line in numbered_lines:
-        text = line.strip()
-        if text.startswith('#'):
-            header = _split(text.lstrip('#')) if header_kind == 'comment' else header
-        elif text and header_kind == 'row':
-            return _split(text), _rows(numbered_lines)
-        elif text:
-            return header, _with_first((number, _split(text)), _rows(numbered_lines))
-    return header, iter(())
-
-
-def _with_first(first: tuple[int, list[str]], rest: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
-    yield first
-    yield from rest
-
-
-def _rows(numbered_lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, list[str]]]:
-    for number, line in numbered_lines:
-        text = line.strip()
-        if text and not text.startswith('#'):
-            yield number, _split(text)
+    lines = ((number, text) for number, line in numbered_lines if (text := line.strip()))
+    rows = ((number, _split(text)) for number, text in lines if not text.startswith('#'))
+    for number, text in lines:
+        if not text.startswith('#'):
+            return (_split(text), rows) if header_kind == 'row' else (header, chain([(number, _split(text))], rows))
+        if header_kind == 'comment':
+            header = _split(text.lstrip('#'))
+    return header, rows
 
 
 def _split(text: str) -> list[str]:

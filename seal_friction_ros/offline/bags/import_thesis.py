@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import LBF, PSI
 from seal_friction_ros.files import share_directory
 from seal_friction_ros.offline.bags.import_log import ImportSummary, Samples, write_samples
@@ -78,22 +79,14 @@ def import_thesis(out: Path) -> ImportSummary:
     return write_samples(out, Samples(stamp, pressure, pressure, force, velocity), 'rod')
 
 
-def _force(pull: Pull) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _force(pull: Pull) -> FloatArray:
     """Force on the rod over one pull [N], positive on extension, shape (CYCLE_SAMPLES,)."""
-    magnitude = np.concatenate(
-        [
-            np.zeros(DWELL_SAMPLES),
-            np.linspace(0.0, pull.static_friction, RAMP_SAMPLES),
-            np.full(RUNNING_SAMPLES, pull.dynamic_friction),
-            np.zeros(REST_SAMPLES),
-        ]
-    )
-    return pull.direction * magnitude
+    ramp = np.linspace(0.0, pull.static_friction, RAMP_SAMPLES)
+    running = np.full(RUNNING_SAMPLES, pull.dynamic_friction)
+    return pull.direction * np.concatenate((np.zeros(DWELL_SAMPLES), ramp, running, np.zeros(REST_SAMPLES)))
 
 
-def _velocity(pull: Pull) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _velocity(pull: Pull) -> FloatArray:
     """Velocity of the rod over one pull [m/s], positive on extension, shape (CYCLE_SAMPLES,)."""
-    velocity = np.zeros(CYCLE_SAMPLES)
-    first = DWELL_SAMPLES + RAMP_SAMPLES
-    velocity[first : first + RUNNING_SAMPLES] = pull.direction * RUNNING_VELOCITY
-    return velocity
+    parts = (DWELL_SAMPLES + RAMP_SAMPLES, RUNNING_SAMPLES, REST_SAMPLES)
+    return np.repeat((0.0, pull.direction * RUNNING_VELOCITY, 0.0), parts)

@@ -13,6 +13,7 @@ import zlib
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
+from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import lz4.frame
@@ -274,6 +275,33 @@ class Names:
 def _check_name(kind: str, name: str) -> None:
     if not name.isprintable() or len(name) > _LONGEST_NAME:
         raise ValueError(f'{name[:40]!r} is not a valid name of a {kind}')
+
+
+def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
+    """Topic, message type, log time [ns] and bytes of each message of a finished file, in order of log time.
+
+    Raises:
+        ValueError: The file is not finished, or a block cannot be read.
+    """
+    with path.open('rb') as file:
+        for channel, log_time, data in messages(file, scan_finished(file)):
+            yield channel.topic, channel.type_name, log_time, data
+
+
+def file_topics(path: Path) -> Iterator[tuple[str, str, int]]:
+    """Name, message type and number of messages of each topic, from the index of the file if it has one.
+
+    Raises:
+        ValueError: As `file_messages`.
+    """
+    with path.open('rb') as file:
+        layout = scan_finished(file)
+        if layout.channels and layout.counts:
+            for number, channel in layout.channels.items():
+                yield channel.topic, channel.type_name, layout.counts.get(number, 0)
+        else:
+            for channel, _, _ in messages(file, layout):
+                yield channel.topic, channel.type_name, 1
 
 
 def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], None] | None = None) -> Iterator[Message]:

@@ -1,9 +1,8 @@
 """Recovery of the readable part of a damaged or unfinished bag into a valid bag."""
 
 import re
-from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,25 +16,25 @@ _CHUNKS_NAMED = 20
 _QOS, _HASH = 'offered_qos_profiles', 'topic_type_hash'
 
 
-@dataclass(frozen=True)
+@dataclass
 class Recovery:
     """Result of a recovery."""
 
     bag: str
     out: str
-    messages: int
+    messages: int = 0
     """number saved"""
-    topics: dict[str, int]
+    topics: dict[str, int] = field(default_factory=dict)
     """topic -> messages saved"""
-    first_ns: int
+    first_ns: int = -1
     """log time of the first message [ns]"""
-    last_ns: int
+    last_ns: int = -1
     """log time of the last message [ns]"""
-    lost_bytes: int
+    lost_bytes: int = 0
     """at the ends of files, after the last complete record"""
-    lost_chunks: int
+    lost_chunks: int = 0
     """complete chunks with invalid contents"""
-    damage: list[str]
+    damage: list[str] = field(default_factory=list)
     """one line for each fault; empty for a finished and undamaged bag"""
 
     def summary(self) -> str:
@@ -60,25 +59,15 @@ def recover(bag: Path, out: Path | None = None) -> Recovery:
     """
     files = _files(bag)
     out = out or bag.resolve().with_name(f'{bag.resolve().stem if bag.is_file() else bag.resolve().name}_recovered')
-    copy = _Copy()
+    found = Recovery(str(bag), str(out))
     with BagWriter(out) as writer:
         for file in files:
-            copy.take(file, writer)
-        if not copy.counts:
-            reason = '; '.join(copy.damage) or 'no message in it'
+            _copy(file, writer, found)
+        if not found.messages:
+            reason = '; '.join(found.damage) or 'no message in it'
             raise BagError(f'{bag}: nothing to recover: {reason}')
-    counts = copy.counts
-    return Recovery(
-        str(bag),
-        str(out),
-        counts.total(),
-        dict(sorted(counts.items())),
-        copy.first,
-        copy.last,
-        copy.lost_bytes,
-        copy.lost_chunks,
-        copy.damage,
-    )
+    found.topics = dict(sorted(found.topics.items()))
+    return found
 
 
 def _files(bag: Path) -> list[Path]:
@@ -99,47 +88,36 @@ def _parts(name: str) -> list[str | int]:
     return [int(part) if place % 2 else part for place, part in enumerate(parts)]
 
 
-class _Copy:
-    """State of `recover`."""
+def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
+    """Copy the readable messages of one file."""
+    descriptions: dict[tuple[str, str], Description] = {}
 
-    def __init__(self) -> None:
-        self.counts: Counter[str] = Counter()
-        self.first, self.last = -1, -1
-        self.lost_bytes = self.lost_chunks = 0
-        self.damage: list[str] = []
-        self._descriptions: dict[tuple[str, str], Description] = {}
+    def on_fault(block: Block, reason: str) -> None:
+        found.lost_chunks += 1
+        if found.lost_chunks <= _CHUNKS_NAMED:
+            found.damage.append(f'{path.name}: chunk at byte {block.offset}: {reason}')
 
-    def take(self, path: Path, writer: BagWriter) -> None:
-        """Copy the readable messages of one file."""
-
-        def on_fault(block: Block, reason: str) -> None:
-            self.lost_chunks += 1
-            if self.lost_chunks <= _CHUNKS_NAMED:
-                self.damage.append(f'{path.name}: chunk at byte {block.offset}: {reason}')
-
-        try:
-            with path.open('rb') as file:
-                layout = mcap_reader.scan(file)
-                if layout.damage:
-                    self.lost_bytes += path.stat().st_size - layout.sound_size
-                    self.damage.append(f'{path.name}: {layout.damage}')
-                for channel, log_time, data in mcap_reader.messages(file, layout, on_fault):
-                    description = self._description(channel, path)
-                    self.last = writer.write(channel.topic, channel.type_name, log_time, data, description)
-                    self.first = self.last if self.first < 0 else self.first
-                    self.counts[channel.topic] += 1
-        except BagError:
-            raise
-        except ValueError as error:
-            self.damage.append(f'{path.name}: {error}')
-
-    def _description(self, channel: Channel, path: Path) -> Description:
-        key = (channel.topic, channel.type_name)
-        if key not in self._descriptions:
-            if channel.encoding != 'cdr':
-                raise BagError(f'{path}: {channel.topic} is encoded as {channel.encoding[:40]!r}, not as CDR')
-            self._descriptions[key] = _described(channel)
-        return self._descriptions[key]
+    try:
+        with path.open('rb') as file:
+            layout = mcap_reader.scan(file)
+            if layout.damage:
+                found.lost_bytes += path.stat().st_size - layout.sound_size
+                found.damage.append(f'{path.name}: {layout.damage}')
+            for channel, log_time, data in mcap_reader.messages(file, layout, on_fault):
+                topic, type_name, encoding = channel[:3]
+                if encoding != 'cdr':
+                    raise BagError(f'{path}: {topic} is encoded as {encoding[:40]!r}, not as CDR')
+                key = topic, type_name
+                if key not in descriptions:
+                    descriptions[key] = _described(channel)
+                found.last_ns = writer.write(topic, type_name, log_time, data, descriptions[key])
+                found.first_ns = found.last_ns if found.first_ns < 0 else found.first_ns
+                found.messages += 1
+                found.topics[topic] = found.topics.get(topic, 0) + 1
+    except BagError:
+        raise
+    except ValueError as error:
+        found.damage.append(f'{path.name}: {error}')
 
 
 def _described(channel: Channel) -> Description:

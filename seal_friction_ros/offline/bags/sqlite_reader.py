@@ -13,7 +13,7 @@ _MESSAGES = 'SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, 
 _LONGEST_NAME = 1024  # characters of a topic or a type
 
 
-def topics(path: Path) -> list[tuple[str, str, int]]:
+def file_topics(path: Path) -> list[tuple[str, str, int]]:
     """Name, message type and number of messages of each topic.
 
     Raises:
@@ -25,7 +25,7 @@ def topics(path: Path) -> list[tuple[str, str, int]]:
         return [(name, type_name, counts.get(number, 0)) for number, name, type_name in _names(database)]
 
 
-def messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
+def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
     """Topic, message type, log time [ns] and bytes of each message, in order of log time.
 
     Raises:

@@ -4,19 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    FORCE_TYPE,
-    POSITION_TYPE,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-    VELOCITY_TYPE,
-)
+from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.offline.bags.bag import ESTIMATE_TOPIC, FEEDFORWARD_TOPIC, BagError, TopicInfo, bag_topics
 
-ANSWER_TOPICS = {ESTIMATE_TYPE: ESTIMATE_TOPIC, FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
+ANSWER_TOPICS = {messages.ESTIMATE_TYPE: ESTIMATE_TOPIC, messages.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
 """Message type of an answer -> topic, if the bag has no topic of that type."""
 
 
@@ -32,17 +23,23 @@ class Topics(NamedTuple):
     feedforward: str
     configuration: str
 
+    @property
+    def answers(self) -> dict[str, str]:
+        """Message type of an answer -> its topic; empty if there is no such topic."""
+        return {messages.ESTIMATE_TYPE: self.estimate, messages.FEEDFORWARD_TYPE: self.feedforward}
 
-_TYPES = Topics(
-    PRESSURE_TYPE,
-    VELOCITY_TYPE,
-    FORCE_TYPE,
-    REFERENCE_TYPE,
-    POSITION_TYPE,
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    CONFIGURATION_TYPE,
+
+TYPES = Topics(
+    pressure=messages.PRESSURE_TYPE,
+    velocity=messages.VELOCITY_TYPE,
+    force=messages.FORCE_TYPE,
+    reference=messages.REFERENCE_TYPE,
+    position=messages.POSITION_TYPE,
+    estimate=messages.ESTIMATE_TYPE,
+    feedforward=messages.FEEDFORWARD_TYPE,
+    configuration=messages.CONFIGURATION_TYPE,
 )
+"""Message type of each topic."""
 
 
 def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] | None = None) -> Topics:
@@ -60,12 +57,12 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
     below = f'/{namespace.strip("/")}/'.replace('//', '/')
     known = bag_topics(bag) if known is None else known
     topics = {topic: info for topic, info in known.items() if topic.startswith(below)}
-    for wanted in _TYPES:
+    for wanted in TYPES:
         found = sorted(topic for topic, info in topics.items() if info.type_name == wanted and info.message_count)
         if len(found) > 1:
             raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
         names.append(found[0] if found else '')
     result = Topics(*names)
     if not result.velocity:
-        raise BagError(f'{bag}: no message of {VELOCITY_TYPE} in it, so nothing to estimate from')
+        raise BagError(f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from')
     return result

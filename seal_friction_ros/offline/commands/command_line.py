@@ -17,11 +17,7 @@ SUCCESS, DIFFERENT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
 
 def add_command(
-    commands: Any,
-    name: str,
-    run: Callable[[argparse.Namespace], int],
-    description: str,
-    *examples: str,
+    commands: Any, name: str, run: Callable[[argparse.Namespace], int], description: str, *examples: str
 ) -> argparse.ArgumentParser:
     """Add a command with the option ``--json``.
 

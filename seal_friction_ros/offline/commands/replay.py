@@ -24,12 +24,14 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay one bag, or several in parallel."""
+    from seal_friction_ros.offline.replay.parallel_replay import verify
     from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
     override = chosen_configuration(arguments.params, arguments.seal)
     if len(arguments.bags) > 1:
         return _run_many(arguments, override)
-    result = replay(arguments.bags[0], override, arguments.out, arguments.namespace)
+    bag, namespace = arguments.bags[0], arguments.namespace
+    result = replay(bag, override, arguments.out, namespace) if arguments.out else verify(bag, override, namespace)
     code = cli.DIFFERENT if arguments.verify and not result.identical else cli.SUCCESS
     return cli.print_result(arguments, result.numbers(), result.summary(verified=arguments.verify), code)
 

@@ -33,10 +33,15 @@ def _pressures(text: str) -> tuple[float, float, int]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the sheet."""
-    from seal_friction_ros.offline.identification.data_sheet import geometry_of_seal_file, make_plan, write_sheet
+    from seal_friction_ros.offline.identification.data_sheet import (
+        FrictionTestPlan,
+        geometry_of_seal_file,
+        write_sheet,
+    )
+    from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
 
     low, high, steps = arguments.pressures
-    plan = make_plan(
+    plan = FrictionTestPlan(
         arguments.name,
         low,
         high,
@@ -48,5 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         length_unit=arguments.length_unit,
         geometry=geometry_of_seal_file(arguments.seal) if arguments.seal else None,
     )
-    sheet, page = write_sheet(plan, arguments.out)
+    sheet, page = arguments.out, arguments.out.with_suffix('.html')
+    write_sheet(plan, sheet)
+    write_data_sheet_page(plan, page)
     return cli.print_result(arguments, {'sheet': sheet, 'page': page}, f'{sheet}, {page}: written')

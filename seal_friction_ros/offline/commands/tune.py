@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
-from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
+from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 from seal_friction_ros.offline.commands import command_line as cli
 
 
@@ -31,7 +31,7 @@ def add_parser(commands: Any) -> None:
 
 def _settings() -> dict[str, Meaning]:
     """Settings of both kinds of tuning by name."""
-    return meanings(TuningSettings) | meanings(MatchSettings)
+    return meanings(TuningSettings) | meanings(RecordedAxisSettings)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -44,14 +44,14 @@ def run(arguments: argparse.Namespace) -> int:
     configuration = chosen_configuration(arguments.params, arguments.seal)
     check_target(arguments.out)
     if arguments.bag:
-        tuning: Any = tune_bag(arguments.bag, MatchSettings(**given), configuration, arguments.namespace)
+        tuning: Any = tune_bag(arguments.bag, RecordedAxisSettings(**given), configuration, arguments.namespace)
     else:
         tuning = tune_simulator(TuningSettings(**given), configuration)
     page = page_of(arguments.out)
     numbers = {**tuning.numbers, 'file': arguments.out, 'page': page, 'figures': write_tuning_page(tuning, page)}
     write_parameters(arguments.out, tuning)
     code = cli.SUCCESS if tuning.found.better_in_every_case else cli.DIFFERENT
-    return cli.print_result(arguments, numbers, f'{tuning.verdict}\n{arguments.out} and {page}: written', code)
+    return cli.print_result(arguments, numbers, f'{tuning.summary}\n{arguments.out} and {page}: written', code)
 
 
 def _given(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def _given(arguments: argparse.Namespace) -> dict[str, Any]:
     Raises:
         ValueError: One of them belongs to the other kind of tuning.
     """
-    kind, other = (MatchSettings, TuningSettings) if arguments.bag else (TuningSettings, MatchSettings)
+    kind, other = (RecordedAxisSettings, TuningSettings) if arguments.bag else (TuningSettings, RecordedAxisSettings)
     given = {name: value for name in _settings() if (value := getattr(arguments, name)) is not None}
     foreign = [name for name in given if name in meanings(other) and name not in meanings(kind)]
     if foreign or (arguments.namespace and not arguments.bag):

@@ -287,22 +287,14 @@ def run_map(case: LubricationCase, workers: int, work: Path | None = None) -> Ma
     pressures = map_pressures(case.map).tolist()
     settings = asdict(case)
     parts = [
-        Part(part_key(f'map {pressure!r}', settings), SteadyFriction._fields, partial(_map_row, case, pressure))
+        Part(part_key(f'map {pressure!r}', settings), SteadyFriction._fields, partial(steady_friction, case, pressure))
         for pressure in pressures
     ]
-    parts.append(Part(part_key('memory', settings), MemoryLength._fields, partial(_memory, case)))
+    parts.append(Part(part_key('memory', settings), MemoryLength._fields, partial(memory_length, case)))
     *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for, case))
     rows, memory = [SteadyFriction(**row) for row in found], MemoryLength(**kept_memory)
     retried = memory.retried_steps + sum(row.retried_steps for row in rows)
     return MapRuns(case, friction_map(case, rows, memory.length), rows, retried)
-
-
-def _map_row(case: LubricationCase, pressure: float) -> Mapping[str, Any]:
-    return steady_friction(case, pressure)._asdict()
-
-
-def _memory(case: LubricationCase) -> Mapping[str, Any]:
-    return memory_length(case)._asdict()
 
 
 def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
-from seal_friction_ros.core.identification.fitting import Score, is_beaten
-from seal_friction_ros.core.identification.signal_preparation import OffsetLine
+from seal_friction_ros.core.identification.fitting import LawScore, is_beaten
 from seal_friction_ros.offline.identification.results import (
     Identification,
     IdentificationData,
     LawQuality,
     LawSelection,
-    Level,
+    PressureLevel,
 )
 from seal_friction_ros.offline.work.seal_writer import rounded
 
@@ -44,18 +43,18 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
     document: dict[str, Any] = {'name': name, 'source': _source_text(data, selection)}
     if data.ring is not None:
         document['geometry'] = dataclasses.asdict(data.ring.geometry)
-    document |= law_document(selection.rung.law(values))
-    stiction, ratio = (0.0, 0.0) if quality.stiction is None else quality.stiction[1:3]
-    terms = {key: values[key] for key in selection.rung.velocity_terms}
+    document |= law_document(selection.law.friction_law(values))
+    stiction, ratio = (0.0, 0.0) if quality.breakaway is None else quality.breakaway[1:3]
+    terms = {key: values[key] for key in selection.law.velocity_terms}
     if terms:
         document['velocity_terms'] = terms
-        if quality.stiction is None:
+        if quality.breakaway is None:
             stiction = terms.get('stribeck_friction', 0.0)
     document['stiction'] = rounded_value(stiction)
     document['stiction_ratio'] = rounded_value(ratio)
     document['uncertainty'] = {
-        'relative_std': rounded_value(quality.spread.relative),
-        'absolute_std': rounded_value(quality.spread.absolute / seals),
+        'relative_std': rounded_value(quality.uncertainty.relative),
+        'absolute_std': rounded_value(quality.uncertainty.absolute / seals),
     }
     document['identified_pressure'] = [rounded_value(float(pressure.min())), rounded_value(float(pressure.max()))]
     parse_seal(document)
@@ -65,7 +64,7 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
 def _source_text(data: IdentificationData, selection: LawSelection) -> str:
     files = ', '.join(data.sources.files[i].name for i in data.kept)
     return (
-        f'Made by seal_friction identify from {files}: law {selection.rung.name} ({selection.rung.words}), parameters '
+        f'Made by seal_friction identify from {files}: law {selection.law.name} ({selection.law.formula}), parameters '
         f'by least squares over {data.used.count} readings, uncertainty from readings left out.'
     )
 
@@ -74,13 +73,13 @@ def identification_section(
     data: IdentificationData,
     selection: LawSelection,
     quality: LawQuality,
-    levels: Sequence[Level],
+    levels: Sequence[PressureLevel],
     warnings: Sequence[str],
 ) -> dict[str, Any]:
     """Section ``identification`` of the seal file, which records how it was made; the node ignores it."""
     return {
-        'law': selection.rung.name,
-        'recommended_law': selection.best.rung.name,
+        'law': selection.law.name,
+        'recommended_law': selection.best.law.name,
         'parameters': {key: rounded_value(value) for key, value in selection.fit.values.items()},
         'standard_errors': {key: rounded_value(value) for key, value in quality.standard_errors.items()},
         'seal_chambers': list(data.sources.chambers),
@@ -115,14 +114,15 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'cross_validation_mean_deviation_N': rounded_value(selection.validation.mean_deviation),
         'ladder': [_ladder_row(score, selection) for score in selection.scores],
         'plain_mean_deviation_N': None if reference is None else rounded_value(reference.mean_deviation),
-        'relative_std': rounded_value(quality.spread.relative),
-        'absolute_std_N': rounded_value(quality.spread.absolute),
+        'relative_std': rounded_value(quality.uncertainty.relative),
+        'absolute_std_N': rounded_value(quality.uncertainty.absolute),
         'condition_number': _finite_or_none(selection.fit.condition_number),
         'correlation': [[_finite_or_none(float(x)) for x in row] for row in selection.fit.correlation],
         'offset_N': [_finite_or_none(level.offset) for level in levels],
-        'offset_line': None if line is None else _offset_numbers(line),
+        'offset_line': line
+        and dict(zip(('constant_N', 'area_error_m2', 'rms_N'), map(rounded_value, line), strict=True)),
         'drift': [_finite_or_none(level.drift) for level in levels],
-        'stiction': None if quality.stiction is None else quality.stiction._asdict(),
+        'stiction': None if quality.breakaway is None else quality.breakaway._asdict(),
         'changes': [{**c._asdict(), 'is_change': c.is_change} for c in data.changes],
         'samples_used': data.prepared.used,
         'samples_total': data.prepared.total,
@@ -132,21 +132,13 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
     }
 
 
-def _offset_numbers(line: OffsetLine) -> dict[str, float]:
-    return {
-        'constant_N': rounded_value(line.constant),
-        'area_error_m2': rounded_value(line.area_error),
-        'rms_N': rounded_value(line.rms),
-    }
-
-
-def worst_left_out(levels: Sequence[Level]) -> float:
+def worst_left_out(levels: Sequence[PressureLevel]) -> float:
     """Largest relative deviation of a left-out prediction from the measured friction, over the levels in use [-]."""
     return max(abs(level.left_out / level.measured - 1.0) for level in levels if level.is_used)
 
 
-def _ladder_row(score: Score, selection: LawSelection) -> dict[str, Any]:
-    row: dict[str, Any] = {'law': score.rung.name, 'parameters': len(score.rung.parameters)}
+def _ladder_row(score: LawScore, selection: LawSelection) -> dict[str, Any]:
+    row: dict[str, Any] = {'law': score.law.name, 'parameters': len(score.law.parameters)}
     if score.validation is None or score.fit is None:
         return row | {'why_not': score.why_not}
     best = min((s.validation for s in selection.scores if s.validation), key=lambda v: float(v.losses.mean()))

@@ -1,7 +1,7 @@
 """Identification pipeline: sources -> readings -> fitted laws -> selected law -> seal file.
 
-A fit that fails or predicts nothing is an error and never a file. Nothing is random, and every number is rounded to six
-digits before another number is computed from it, so the same sources give the same bytes.
+A fit that fails or predicts nothing is an error and gives no file. The computation uses no random numbers, and every
+number is rounded to six digits before another number is computed from it: the same sources give the same bytes.
 """
 
 import dataclasses
@@ -18,33 +18,34 @@ from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
+from seal_friction_ros.core.friction.laws.normal_force import squeeze_force
 from seal_friction_ros.core.friction.seal_file import parse_normal_force, parse_seal
-from seal_friction_ros.core.identification.fitting import (
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, candidate_laws, normal_forces
+from seal_friction_ros.core.identification.diagnostics import (
     CHANGED,
-    Change,
-    Fit,
+    FrictionChange,
     Outlier,
-    Score,
-    Stiction,
-    band_coverage,
     between_runs,
     changed_levels,
-    climb,
     compare_with_law,
-    fit,
-    identify_stiction,
-    offsets_of,
     outlying_level,
-    plain_mean,
-    recommended,
     repeatability,
     run_drift,
-    spread_of,
-    standard_errors,
 )
-from seal_friction_ros.core.identification.ladder import Rung, ladder, normal_forces
-from seal_friction_ros.core.identification.readings import Prepared, Readings, level_friction
+from seal_friction_ros.core.identification.fitting import (
+    BreakawayFit,
+    LawFit,
+    band_coverage,
+    fit,
+    fit_breakaway,
+    jackknife_errors,
+    offsets_of,
+    plain_mean,
+    prediction_uncertainty,
+    recommended,
+    score_laws,
+)
+from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.signal_preparation import OffsetLine, offset_line
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.document import identification_section, rounded_value, seal_document
@@ -54,16 +55,16 @@ from seal_friction_ros.offline.identification.results import (
     IdentificationData,
     LawQuality,
     LawSelection,
-    Level,
+    PressureLevel,
     Ring,
 )
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
 from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
 from seal_friction_ros.offline.work.progress import progress
 
-SPEEDS_DIFFER = 1.5  # fastest over slowest reading from which on velocity terms are tried (our choice)
-LARGEST_ERROR = 0.5  # out-of-sample error beyond which a law is not saved (our choice)
-REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is used where no other is known
+SPEEDS_DIFFER = 1.5  # fastest over slowest reading above which velocity terms are tried (our choice)
+LARGEST_ERROR = 0.5  # out-of-sample error above which a law is not saved (our choice)
+REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is used if no other is known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,8 +93,8 @@ def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Iden
         name: Of the seal, unless the options name it.
 
     Raises:
-        ValueError: The data are unfit for identification, or no law predicts them; one line that says what is wrong and
-            what to measure instead.
+        ValueError: The data are unfit for identification, or no law predicts them; one line with the reason and what to
+            measure instead.
     """
     data = gather(paths, options)
     selection = select_law(data, options.law)
@@ -118,50 +119,44 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
     sources = read_sources(paths, options.sources)
     ring = _ring(sources, options)
     prepared, changes, kept = _one_state(sources)
-    prepared = prepared._replace(readings=_with_normal_force(prepared.readings, ring))
-    readings = prepared.readings
+    readings = _with_normal_force(prepared.readings, ring)
     outlier = _outlier(readings)
-    used = readings if outlier is None else _renumbered(readings.taken(readings.level != outlier.level))
-    return IdentificationData(sources, prepared, used, ring, outlier, changes, kept)
+    used = readings
+    if outlier is not None:  # number the levels, and the groups that are levels, without a gap
+        used = readings.taken(readings.level != outlier.level)
+        level = np.unique(used.level, return_inverse=True)[1]
+        group = level if used.left_out_by == 'pressure' else used.group
+        used = dataclasses.replace(used, level=level, group=group)
+    return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, changes, kept)
 
 
 def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
-    """Geometry and normal force of the ring: from the seal of the options, else from a bag or sheet that has one."""
+    """Geometry and normal force of the ring: from the seal of the options, else from a bag or data sheet."""
     document, where = sources.seal_document, 'seal of the source'
     if options.seal is not None:
         path = config_path('seals', options.seal)
         document, where = read_yaml(path), str(path)
         if not isinstance(document, Mapping) or 'geometry' not in document:
-            raise ValueError(f'{where}: it has no geometry: measure ring and groove and add them there')
+            raise ValueError(f'{where}: no geometry: measure ring and groove and add them to the file')
     if document is None or 'geometry' not in document:
         return None
     geometry = from_mapping(SealGeometry, document['geometry'], f'{where}: geometry')
-    given = document.get('normal_force')
-    if isinstance(given, Mapping) and not options.squeeze_force:
-        return Ring(geometry, dict(given))
-    reference = read_yaml(config_path('seals', REFERENCE_SEAL))['normal_force']['area_deformation_gain']
-    force = rounded_value(squeeze_force(geometry))
-    law = {'law': 'area_deformation_gain', 'area_deformation_gain': reference, 'radial_force': force}
-    return Ring(geometry, law)
+    normal_force = document.get('normal_force')
+    if not isinstance(normal_force, Mapping) or options.squeeze_force:
+        gain = read_yaml(config_path('seals', REFERENCE_SEAL))['normal_force']['area_deformation_gain']
+        force = rounded_value(squeeze_force(geometry))
+        normal_force = {'law': 'area_deformation_gain', 'area_deformation_gain': gain, 'radial_force': force}
+    return Ring(geometry, parse_normal_force({'normal_force': normal_force}, 'seal'))
 
 
-def normal_force_law(document: Mapping[str, Any]) -> NormalForceLaw:
-    """Law of the section ``normal_force`` of a seal file.
-
-    Raises:
-        ValueError: A name or value is invalid.
-    """
-    return parse_normal_force({'normal_force': document}, 'seal')
-
-
-def _with_normal_force(readings: Readings, ring: Ring | None) -> Readings:
+def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> FrictionReadings:
     if ring is None:
         return readings
-    forces = normal_forces(readings.at.pressure, ring.geometry, normal_force_law(ring.normal_force))
+    forces = normal_forces(readings.at.pressure, *ring)
     return dataclasses.replace(readings, at=readings.at._replace(normal_force=forces))
 
 
-def _one_state(sources: Sources) -> tuple[Prepared, tuple[Change, ...], tuple[int, ...]]:
+def _one_state(sources: Sources) -> tuple[PreparedReadings, tuple[FrictionChange, ...], tuple[int, ...]]:
     """Readings of the sources that agree, comparison of each further swept log with the first, and the sources kept.
 
     Sources with readings at held pressures form one law together, so a disagreement between them is an error. A swept
@@ -174,14 +169,14 @@ def _one_state(sources: Sources) -> tuple[Prepared, tuple[Change, ...], tuple[in
         together = sources.prepare()
         _check_unchanged(together.readings)
         return together, (), numbers
-    rungs = {rung.name: rung for rung in _rungs(first.readings)}
-    law = fit(rungs.get('pressure_power_law_viscous', rungs['pressure_power_law']), first.readings)
-    changes = tuple(compare_with_law(law, first.readings, sources.prepare([i]).readings) for i in numbers[1:])
+    laws = {law.name: law for law in _candidates(first.readings)}
+    found = fit(laws.get('pressure_power_law_viscous', laws['pressure_power_law']), first.readings)
+    changes = tuple(compare_with_law(found, first.readings, sources.prepare([i]).readings) for i in numbers[1:])
     kept = (0, *(i for i, change in zip(numbers[1:], changes, strict=True) if not change.is_change))
     return (sources.prepare(kept) if len(kept) > 1 else first), changes, kept
 
 
-def _if_swept(sources: Sources) -> Prepared | None:
+def _if_swept(sources: Sources) -> PreparedReadings | None:
     """The first source if it is a swept log; None if it has readings at held pressures, possibly too few by itself."""
     try:
         first = sources.prepare([0])
@@ -190,7 +185,7 @@ def _if_swept(sources: Sources) -> Prepared | None:
     return first if first.readings.are_samples else None
 
 
-def _check_unchanged(readings: Readings) -> None:
+def _check_unchanged(readings: FrictionReadings) -> None:
     changes = changed_levels(readings)
     if changes:
         worst = max(changes, key=lambda c: abs(c.other_friction / c.friction - 1.0))
@@ -202,67 +197,51 @@ def _check_unchanged(readings: Readings) -> None:
         )
 
 
-def _rungs(readings: Readings, ring: Ring | None = None) -> tuple[Rung, ...]:
+def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[CandidateLaw, ...]:
     speed = np.abs(readings.at.velocity)
-    with_speeds = bool(np.isfinite(speed).all()) and float(speed.max()) > SPEEDS_DIFFER * float(speed.min())
-    with_exponent = readings.are_samples or len(np.unique(readings.level)) >= FEWEST_PRESSURES_FOR_EXPONENT
-    return ladder(
+    return candidate_laws(
         geometry=ring.geometry if ring else None,
-        normal_force_law=normal_force_law(ring.normal_force) if ring else None,
-        with_speeds=with_speeds,
-        with_exponent=with_exponent,
+        normal_force_law=ring.normal_force_law if ring else None,
+        with_speeds=bool(np.isfinite(speed).all()) and float(speed.max()) > SPEEDS_DIFFER * float(speed.min()),
+        with_exponent=readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
 
 
-def _outlier(readings: Readings) -> Outlier | None:
+def _outlier(readings: FrictionReadings) -> Outlier | None:
     """Pressure that disagrees with the law of all others; None if there are too few pressures to tell."""
-    if readings.are_samples or len(np.unique(readings.level)) < 4:
+    if readings.are_samples or len(readings.levels) < 4:
         return None
-    rung = next(rung for rung in _rungs(readings) if rung.name == 'pressure_power_law')
-    found = fit(rung, readings)
+    law = next(law for law in _candidates(readings) if law.name == 'pressure_power_law')
+    found = fit(law, readings)
     floor = repeatability(readings, found.offsets)
-    return outlying_level(rung, readings, found.values, floor if math.isfinite(floor) else 0.0)
-
-
-def _renumbered(readings: Readings) -> Readings:
-    """Readings with levels, and groups that are levels, numbered from 0 without gaps."""
-    level = np.unique(readings.level, return_inverse=True)[1]
-    group = level if readings.left_out_by == 'pressure' else readings.group
-    return dataclasses.replace(readings, level=level, group=group)
+    return outlying_level(law, readings, found.values, floor if math.isfinite(floor) else 0.0)
 
 
 # -- law --------------------------------------------------------------------------------------------------------------
 
 
-def select_law(data: IdentificationData, law: str | None) -> LawSelection:
-    """Fit and score every law of the ladder; select the recommended one, or the one called ``law``.
+def select_law(data: IdentificationData, name: str | None) -> LawSelection:
+    """Fit and score every candidate law; select the recommended one, or the one called ``name``.
 
     Raises:
         ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
-    rungs = _rungs(data.used, data.ring)
-    with progress('fit and leave out', len(rungs) * (len(np.unique(data.used.group)) + 1)) as advance:
-        scores = climb(rungs, data.used, advance)
+    laws = _candidates(data.used, data.ring)
+    with progress('fit and leave out', len(laws) * (len(data.used.groups) + 1)) as advance:
+        scores = score_laws(laws, data.used, advance)
     best = recommended(scores)
-    selected = best if law is None else _score_of(scores, law)
-    assert selected.fit is not None  # noqa: S101
-    assert selected.validation is not None  # noqa: S101
+    selected = next((score for score in scores if score.law.name == name), None) if name is not None else best
+    if selected is None:
+        raise ValueError(f'law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
+    if selected.fit is None or selected.validation is None:
+        raise ValueError(f'law {name} was not fitted: {selected.why_not}')
     if not selected.validation.error <= LARGEST_ERROR:
         raise ValueError(
-            f'{", ".join(data.used.names)}: no law predicts these readings: {selected.rung.name} is off by '
+            f'{", ".join(data.used.names)}: no law predicts these readings: {selected.law.name} is off by '
             f'{100.0 * selected.validation.error:.0f} % on left-out readings: measure more strokes at each pressure, '
             'in both directions, with a settled seal'
         )
     return LawSelection(scores, best, selected.fit, selected.validation, plain_mean(data.used))
-
-
-def _score_of(scores: tuple[Score, ...], law: str) -> Score:
-    found = next((score for score in scores if score.rung.name == law), None)
-    if found is None:
-        raise ValueError(f'law {law!r} is not one of {", ".join(score.rung.name for score in scores)}')
-    if not found.is_scored:
-        raise ValueError(f'law {law} was not fitted: {found.why_not}')
-    return found
 
 
 # -- quality ----------------------------------------------------------------------------------------------------------
@@ -271,24 +250,24 @@ def _score_of(scores: tuple[Score, ...], law: str) -> Score:
 def assess(data: IdentificationData, selection: LawSelection, run_to_run: float | None) -> LawQuality:
     """Uncertainty of the selected law for new readings."""
     used, found, validation = data.used, selection.fit, selection.validation
-    groups = len(np.unique(used.group))
+    groups = len(used.groups)
     everything = data.prepared.readings
     offsets = offsets_of(everything, found.friction(everything.at))
     drift = {} if used.are_samples else run_drift(everything, offsets)
     between, is_drift = _run_to_run(data, drift) if run_to_run is None else (run_to_run, False)
     with progress('test the band', groups * (groups - 1)) as advance:
-        coverage = band_coverage(selection.rung, used, found.values, between, advance)
-    names = [parameter.name for parameter in selection.rung.parameters]
+        coverage = band_coverage(selection.law, used, found.values, between, advance)
+    names = [parameter.name for parameter in selection.law.parameters]
     return LawQuality(
-        spread=spread_of(validation.predicted, validation.deviation, groups, between),
+        uncertainty=prediction_uncertainty(validation.predicted, validation.deviation, groups, between),
         run_to_run=between,
         is_drift=is_drift,
         coverage=coverage,
         repeatability=repeatability(used, found.offsets),
         drift=drift,
-        stiction=_stiction(data, found),
+        breakaway=_breakaway(data, found),
         offset_line=_offset_line(everything),
-        standard_errors=dict(zip(names, (float(e) for e in standard_errors(validation)), strict=True)),
+        standard_errors=dict(zip(names, jackknife_errors(validation.parameters).tolist(), strict=True)),
     )
 
 
@@ -308,25 +287,22 @@ def _run_to_run(data: IdentificationData, drift: Mapping[int, float]) -> tuple[f
     return (math.sqrt(sum(change**2 for change in kept) / len(kept)), True) if kept else (0.0, False)
 
 
-def _stiction(data: IdentificationData, found: Fit) -> Stiction | None:
-    breakaway = data.prepared.breakaway
-    if breakaway is None:
+def _breakaway(data: IdentificationData, found: LawFit) -> BreakawayFit | None:
+    if data.prepared.breakaway is None:
         return None
-    breakaway = _with_normal_force(breakaway, data.ring)
+    readings = _with_normal_force(data.prepared.breakaway, data.ring)
     if data.outlier is not None:
-        breakaway = breakaway.taken(breakaway.level != data.outlier.level)
-    if len(np.unique(breakaway.group)) < 2:
+        readings = readings.taken(readings.level != data.outlier.level)
+    if len(readings.groups) < 2:
         return None
-    return identify_stiction(breakaway, found.rung.coulomb_friction(breakaway.at, found.values), found.offsets)
+    return fit_breakaway(readings, found.law.coulomb_friction(readings.at, found.values), found.offsets)
 
 
-def _offset_line(readings: Readings) -> OffsetLine | None:
+def _offset_line(readings: FrictionReadings) -> OffsetLine | None:
     if readings.are_samples or not readings.samples:
         return None
-    levels = np.unique(readings.level)
-    pressures = np.array([readings.seal_pressure[readings.level == level].mean() for level in levels])
-    offsets = np.array([level_friction(readings, readings.level == level).offset for level in levels])
-    return offset_line(pressures, offsets)
+    offsets = np.array([readings.half_range(inside).offset for inside in readings.levels.values()])
+    return offset_line(readings.level_pressures, offsets)
 
 
 # -- levels -----------------------------------------------------------------------------------------------------------
@@ -334,41 +310,34 @@ def _offset_line(readings: Readings) -> OffsetLine | None:
 
 def _levels(
     data: IdentificationData, selection: LawSelection, quality: LawQuality, document: Mapping[str, Any]
-) -> tuple[Level, ...]:
+) -> tuple[PressureLevel, ...]:
     """Measured and fitted friction at each pressure level, by the law as the seal file has it."""
     readings = data.prepared.readings
     seal = parse_seal(document)
     mounted = tuple(MountedSeal(seal, chamber) for chamber in data.sources.chambers)
     fitted, std = fitted_readings(mounted, data.prepared.chamber_pressures, readings.at.velocity)
-    offsets = offsets_of(readings, fitted)
-    measured = readings.at.direction * (readings.force - offsets[readings.source])
-    found: list[Level] = []
-    for level in np.unique(readings.level):
-        inside = readings.level == level
-        half_range = level_friction(readings, inside)
-        is_used = not data.is_outlier(int(level))
-        number = sum(other.is_used for other in found)  # of the level among those in use
-        left_out = selection.validation.predicted[data.used.level == number].mean() if is_used else _expected(data)
+    measured = readings.magnitudes(offsets_of(readings, fitted))
+    predicted = iter([selection.validation.predicted[inside].mean() for inside in data.used.levels.values()])
+    expected = math.nan if data.outlier is None else data.outlier.expected
+    found: list[PressureLevel] = []
+    for level, inside in readings.levels.items():
+        half_range = readings.half_range(inside)
+        is_used = not data.is_outlier(level)
         found.append(
-            Level(
+            PressureLevel(
                 pressure=float(readings.seal_pressure[inside].mean()),
                 speed=float(np.abs(readings.at.velocity[inside]).mean()),
                 measured=float(measured[inside].mean() if readings.are_samples else half_range.friction),
                 fitted=float(fitted[inside].mean()),
                 std=float(std[inside].mean()),
-                left_out=float(left_out),
+                left_out=float(next(predicted) if is_used else expected),
                 offset=math.nan if readings.are_samples else half_range.offset,
                 readings=int(inside.sum()),
-                drift=quality.drift.get(int(level), math.nan),
+                drift=quality.drift.get(level, math.nan),
                 is_used=is_used,
             )
         )
     return tuple(found)
-
-
-def _expected(data: IdentificationData) -> float:
-    """Friction at the outlier by the law of the other pressures [N]."""
-    return math.nan if data.outlier is None else data.outlier.expected
 
 
 def fitted_readings(
@@ -381,9 +350,7 @@ def fitted_readings(
         chambers: Pressure of chambers a and b [Pa], shape (n, 2).
         velocity: [m/s] shape (n,); NaN counts as 0, where velocity terms vanish.
     """
-    found = [
-        actuator_friction(mounted, float(a), float(b), float(v))
-        for (a, b), v in zip(chambers, np.nan_to_num(velocity), strict=True)
-    ]
+    rows = np.column_stack((chambers, np.nan_to_num(velocity))).tolist()
+    found = [actuator_friction(mounted, *row) for row in rows]
     friction = np.array([f.coulomb_friction + f.velocity_friction for f in found])
     return friction, np.array([f.coulomb_friction_std for f in found])

@@ -4,17 +4,17 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
+from seal_friction_ros.core.identification.diagnostics import FrictionChange, Outlier
 from seal_friction_ros.core.identification.fitting import (
-    Change,
+    BreakawayFit,
     CrossValidation,
-    Fit,
-    Outlier,
-    Score,
-    Spread,
-    Stiction,
+    LawFit,
+    LawScore,
+    PredictionUncertainty,
 )
-from seal_friction_ros.core.identification.ladder import Rung
-from seal_friction_ros.core.identification.readings import Prepared, Readings
+from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.signal_preparation import OffsetLine
 from seal_friction_ros.offline.identification.sources import Sources
 
@@ -25,8 +25,7 @@ class Ring(NamedTuple):
     """Ring of known geometry."""
 
     geometry: SealGeometry
-    normal_force: dict[str, Any]
-    """section ``normal_force`` of a seal file"""
+    normal_force_law: NormalForceLaw
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +33,13 @@ class IdentificationData:
     """Readings that the law is fitted to, and those that are excluded."""
 
     sources: Sources
-    prepared: Prepared
+    prepared: PreparedReadings
     """every reading of the sources that agree, including outliers"""
-    used: Readings
+    used: FrictionReadings
     """without outliers"""
     ring: Ring | None
     outlier: Outlier | None
-    changes: tuple[Change, ...]
+    changes: tuple[FrictionChange, ...]
     """each further swept log against the law of the first one"""
     kept: tuple[int, ...]
     """numbers of the sources behind ``prepared``"""
@@ -52,27 +51,27 @@ class IdentificationData:
 
 @dataclass(frozen=True, eq=False)
 class LawSelection:
-    """All laws of the ladder with their scores, and the law that is saved."""
+    """All candidate laws with their scores, and the law that is saved."""
 
-    scores: tuple[Score, ...]
-    best: Score
-    """recommended: the lowest rung that no other beats beyond the noise"""
-    fit: Fit
+    scores: tuple[LawScore, ...]
+    best: LawScore
+    """recommended: the simplest law that no other law beats beyond the noise"""
+    fit: LawFit
     validation: CrossValidation
     reference: CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
 
     @property
-    def rung(self) -> Rung:
+    def law(self) -> CandidateLaw:
         """The law that is saved."""
-        return self.fit.rung
+        return self.fit.law
 
 
 @dataclass(frozen=True, eq=False)
 class LawQuality:
     """Uncertainty of the selected law."""
 
-    spread: Spread
+    uncertainty: PredictionUncertainty
     """standard deviation of a new reading, all seals"""
     run_to_run: float
     """[-] relative standard deviation between runs, the part that deviations within runs do not contain"""
@@ -84,7 +83,7 @@ class LawQuality:
     """[-] scatter of repeated readings"""
     drift: dict[int, float]
     """pressure level -> relative change of the friction over its run"""
-    stiction: Stiction | None
+    breakaway: BreakawayFit | None
     """None if no stroke starts from rest"""
     offset_line: OffsetLine | None
     """offset of the force sum over pressure; None for swept logs and tables"""
@@ -92,7 +91,7 @@ class LawQuality:
     """of the parameters, by name"""
 
 
-class Level(NamedTuple):
+class PressureLevel(NamedTuple):
     """Measured and fitted friction at one pressure."""
 
     pressure: float
@@ -123,7 +122,7 @@ class Identification:
     data: IdentificationData
     selection: LawSelection
     quality: LawQuality
-    levels: tuple[Level, ...]
+    levels: tuple[PressureLevel, ...]
     document: dict[str, Any]
     """seal file"""
     warnings: tuple[str, ...]

@@ -6,35 +6,29 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.identification.fitting import (
+from seal_friction_ros.core.identification.diagnostics import (
     ILL_CONDITIONED,
     SETTLED,
-    Change,
-    CrossValidation,
+    FrictionChange,
     Outlier,
-    Score,
     collinear_regressors,
-    is_beaten,
     traded_off,
 )
+from seal_friction_ros.core.identification.fitting import is_beaten
 from seal_friction_ros.offline.identification.results import (
     FEWEST_PRESSURES_FOR_EXPONENT,
     Identification,
     IdentificationData,
     LawQuality,
     LawSelection,
-    Level,
+    PressureLevel,
 )
-
-Named = tuple[str, CrossValidation]
-"""Name of a law and its cross-validation."""
-
 
 # -- warnings ---------------------------------------------------------------------------------------------------------
 
 
 def warnings_of(
-    data: IdentificationData, selection: LawSelection, quality: LawQuality, levels: Sequence[Level]
+    data: IdentificationData, selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]
 ) -> Iterator[str]:
     """Limits of the law that its user has to know, one line each."""
     first = data.sources.files[0].name
@@ -49,14 +43,16 @@ def warnings_of(
     if data.outlier is not None:
         yield _outlier_text(data.outlier, levels)
     yield from _collinearity_texts(data, selection)
-    yield from _no_pressure_gain_text(selection)
+    gain = _pressure_gain(selection)
+    if gain is not None and not gain[1]:
+        yield f'no gain is claimed for pressure: {gain[0]}: the difference is within the noise'
     yield from _parameter_texts(selection)
     yield from _scatter_texts(selection, quality, levels)
-    if quality.stiction is None:
+    if quality.breakaway is None:
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
 
 
-def _change_text(first: str, change: Change) -> str:
+def _change_text(first: str, change: FrictionChange) -> str:
     percent = f'{100.0 * (change.ratio - 1.0):+.0f} % (standard error {100.0 * change.standard_error:.0f} %)'
     left = f'the law of {first} leaves an RMS of {change.rms:.3g} N there, one fitted there {change.own_rms:.3g} N'
     if change.is_change:
@@ -67,7 +63,7 @@ def _change_text(first: str, change: Change) -> str:
     return f'{change.name} agrees with {first}: friction {percent}; {left}; both are fitted together'
 
 
-def _outlier_text(outlier: Outlier, levels: Sequence[Level]) -> str:
+def _outlier_text(outlier: Outlier, levels: Sequence[PressureLevel]) -> str:
     level = next(level for level in levels if not level.is_used)
     others = [abs(other.drift) for other in levels if other.is_used and math.isfinite(other.drift)]
     largest = max(others, default=0.0)
@@ -103,46 +99,41 @@ def _collinearity_texts(data: IdentificationData, selection: LawSelection) -> It
         yield f'the fit is ill-conditioned: condition number {selection.fit.condition_number:.0f} (good below 30)'
 
 
-def _no_pressure_gain_text(selection: LawSelection) -> Iterator[str]:
-    with_it, without = pressure_gain(selection.scores)
-    if with_it is not None and without is not None and not is_beaten(without[1].losses, with_it[1].losses):
-        yield f'no gain is claimed for pressure: {_gain_text(with_it, without)}: the difference is within the noise'
-
-
-def _gain_text(with_it: Named, without: Named) -> str:
-    return (
-        f'out of sample {with_it[1].rms:.3g} N RMS remain with pressure ({with_it[0]}) and {without[1].rms:.3g} N '
-        f'without ({without[0]})'
+def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
+    """Best law with against best law without pressure-dependent Coulomb friction: text, and whether pressure pays."""
+    with_it, without = (
+        min(
+            ((score.validation, score.law.name) for score in selection.scores
+             if score.validation is not None and score.law.depends_on_pressure == side),
+            key=lambda pair: float(pair[0].losses.mean()), default=None,
+        )
+        for side in (True, False)
+    )  # fmt: skip
+    if with_it is None or without is None:
+        return None
+    text = (
+        f'out of sample {with_it[0].rms:.3g} N RMS remain with pressure ({with_it[1]}) and {without[0].rms:.3g} N '
+        f'without ({without[1]})'
     )
-
-
-def pressure_gain(scores: Sequence[Score]) -> tuple[Named | None, Named | None]:
-    """The best law with and the best law without a pressure-dependent Coulomb friction; None if there is none."""
-    found: dict[bool, Named] = {}
-    for score in scores:
-        if score.validation is not None:
-            side = score.rung.depends_on_pressure
-            if side not in found or score.validation.losses.mean() < found[side][1].losses.mean():
-                found[side] = score.rung.name, score.validation
-    return found.get(True), found.get(False)
+    return text, is_beaten(without[0].losses, with_it[0].losses)
 
 
 def _parameter_texts(selection: LawSelection) -> Iterator[str]:
-    for parameter in selection.rung.parameters:
+    for parameter in selection.law.parameters:
         value = selection.fit.values[parameter.name]
         span = parameter.upper - parameter.lower
         if parameter.upper < 1e3 and value > parameter.upper - 1e-6 * span:
             yield f'{parameter.name} is at its bound of {parameter.upper:g}: an effect is missing in the law'
         elif value == 0.0 and parameter.lower == 0.0:
             yield f'{parameter.name} is 0: these data show no such effect'
-    for name in selection.rung.fixed:
+    for name in selection.law.fixed:
         yield (
             f'{name} is not fitted but set to that of an elastic contact, 2/3: measure at '
             f'{FEWEST_PRESSURES_FOR_EXPONENT} pressures at least to determine it'
         )
 
 
-def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[Level]) -> Iterator[str]:
+def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]) -> Iterator[str]:
     if quality.is_drift:
         yield (
             'every pressure was measured in one run, so the data do not show run-to-run variation: the drift within '
@@ -172,13 +163,13 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
     if prepared.left_out:
         why = ', '.join(f'{name} {100.0 * count / total:.0f} %' for name, count in prepared.left_out.items())
         yield f'{used} of {total} samples used ({100.0 * used / total:.0f} %); not used: {why}'
-    with_it, without = pressure_gain(selection.scores)
-    if with_it is not None and without is not None and is_beaten(without[1].losses, with_it[1].losses):
-        yield f'pressure pays: {_gain_text(with_it, without)}'
+    gain = _pressure_gain(selection)
+    if gain is not None and gain[1]:
+        yield f'pressure pays: {gain[0]}'
     if data.ring is None:
         yield 'the geometry of the ring is unknown, so the physics-based law was not tried: name a seal with --seal'
-    if selection.rung.name != selection.best.rung.name:
-        yield f'{selection.rung.name} is saved as asked for with --law; recommended is {selection.best.rung.name}'
+    if selection.law.name != selection.best.law.name:
+        yield f'{selection.law.name} is saved as asked for with --law; recommended is {selection.best.law.name}'
     chambers = data.sources.chambers
     mounting = f'seals: [{", ".join(["FILE"] * len(chambers))}], seal_chambers: [{", ".join(chambers)}]'
     yield f'the law is that of one seal of {len(chambers)}; for the node: {mounting}'
@@ -192,8 +183,8 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
 def summary(found: Identification) -> str:
     """The result for a person: law, numbers at each pressure, ladder, remarks and warnings."""
     selection, quality = found.selection, found.quality
-    lines = [f'law: {selection.rung.name} ({selection.rung.words})']
-    for parameter in selection.rung.parameters:
+    lines = [f'law: {selection.law.name} ({selection.law.formula})']
+    for parameter in selection.law.parameters:
         error = quality.standard_errors[parameter.name]
         value = selection.fit.values[parameter.name]
         lines.append(f'  {parameter.name} = {value:.4g} {parameter.unit}, standard error {error:.2g}')
@@ -211,13 +202,12 @@ def summary(found: Identification) -> str:
 
 
 def _ladder_lines(selection: LawSelection) -> Iterator[str]:
-    for score in selection.scores:
-        if score.validation is None:
-            yield f'{score.rung.name:32} not fitted: {score.why_not}'
-        else:
-            mark = ' <- recommended' if score is selection.best else ''
-            validation = score.validation
-            yield f'{score.rung.name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}'
+    rows = [(score.law.name, score.validation, ' <- recommended' if score is selection.best else '', score.why_not)
+            for score in selection.scores]  # fmt: skip
     if selection.reference is not None:
-        reference = selection.reference
-        yield f'{"mean of the other readings":32} {reference.rms:9.4g} N RMS  {100.0 * reference.error:5.1f} %'
+        rows.append(('mean of the other readings', selection.reference, '', ''))
+    for name, validation, mark, why_not in rows:
+        if validation is None:
+            yield f'{name:32} not fitted: {why_not}'
+        else:
+            yield f'{name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}'

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,9 @@ class FieldDifference:
     rms: float
     outside: int
     """number of messages with a difference outside the tolerance"""
+
+
+_NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
 
 
 @dataclass(frozen=True)
@@ -71,12 +74,27 @@ def compare(bag_a: Path, bag_b: Path, topic: str = '', atol: float = 0.0, rtol: 
         BagError: A bag cannot be read or has no such topic, or a message on it is of an unknown type.
     """
     topic_a, topic_b = (topic or _estimate_topic(bag) for bag in (bag_a, bag_b))
-    tally = _Tally(atol, rtol)
-    for a, b in zip_longest(_decoded(bag_a, topic_a), _decoded(bag_b, topic_b)):
-        tally.add(a, b)
-    if not tally.messages_a or not tally.messages_b:
-        raise BagError(f'{bag_a if not tally.messages_a else bag_b}: no message on {topic_a}')
-    return tally.comparison(topic_a if topic_a == topic_b else f'{topic_a} and {topic_b}')
+    messages_a, messages_b, identical, first = 0, 0, True, ''
+    totals: dict[str, FieldDifference] = {}  # with the sum of squares instead of the RMS
+    for number, (a, b) in enumerate(zip_longest(_decoded(bag_a, topic_a), _decoded(bag_b, topic_b)), start=1):
+        messages_a, messages_b = messages_a + (a is not None), messages_b + (b is not None)
+        if a is None or b is None:
+            identical, first = False, first or f'message {number}: only one bag has it'
+            continue
+        identical = identical and a[0] == b[0]
+        for name, value in a[1].items():
+            other = b[1].get(name)
+            difference, within = _difference(value, other, atol, rtol)
+            largest, squares, outside = astuple(totals.get(name, _NO_DIFFERENCE))
+            totals[name] = FieldDifference(max(largest, difference), squares + difference**2, outside + (not within))
+            if not within and not first:
+                first = f'message {number} at {a[1].get("stamp")} ns: {name} {value!r} -> {other!r}'
+    pairs = min(messages_a, messages_b)
+    if not pairs:
+        raise BagError(f'{bag_b if messages_a else bag_a}: no message on {topic_a}')
+    fields = {name: replace(total, rms=math.sqrt(total.rms / pairs)) for name, total in totals.items()}
+    topics = topic_a if topic_a == topic_b else f'{topic_a} and {topic_b}'
+    return BagComparison(topics, messages_a, messages_b, identical, first, fields)
 
 
 def _estimate_topic(bag: Path) -> str:
@@ -100,48 +118,6 @@ def _fields(bag: Path, message: BagMessage) -> dict[str, Any]:
     except ValueError as error:
         raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
     return record._asdict() if hasattr(record, '_asdict') else {'text': record}
-
-
-class _Tally:
-    """Running differences."""
-
-    def __init__(self, atol: float, rtol: float) -> None:
-        self.messages_a = self.messages_b = 0
-        self._atol, self._rtol = atol, rtol
-        self._identical = True
-        self._first = ''
-        self._largest: dict[str, float] = {}
-        self._squares: dict[str, float] = {}
-        self._outside: dict[str, int] = {}
-
-    def add(self, a: tuple[bytes, dict[str, Any]] | None, b: tuple[bytes, dict[str, Any]] | None) -> None:
-        """Add one pair of messages; None where one bag has ended."""
-        self.messages_a += a is not None
-        self.messages_b += b is not None
-        if a is None or b is None:
-            self._identical = False
-            self._first = self._first or f'message {max(self.messages_a, self.messages_b)}: only one bag has it'
-            return
-        self._identical = self._identical and a[0] == b[0]
-        for name, value in a[1].items():
-            self._add_field(name, value, b[1].get(name), a[1].get('stamp'))
-
-    def _add_field(self, name: str, a: Any, b: Any, stamp: int | None) -> None:
-        difference, within = _difference(a, b, self._atol, self._rtol)
-        self._largest[name] = max(self._largest.get(name, 0.0), difference)
-        self._squares[name] = self._squares.get(name, 0.0) + difference**2
-        self._outside[name] = self._outside.get(name, 0) + (not within)
-        if not within and not self._first:
-            self._first = f'message {self.messages_a} at {stamp} ns: {name} {a!r} -> {b!r}'
-
-    def comparison(self, topic: str) -> BagComparison:
-        """Result over all pairs."""
-        pairs = max(min(self.messages_a, self.messages_b), 1)
-        fields = {
-            name: FieldDifference(self._largest[name], math.sqrt(self._squares[name] / pairs), self._outside[name])
-            for name in self._largest
-        }
-        return BagComparison(topic, self.messages_a, self.messages_b, self._identical, self._first, fields)
 
 
 def _difference(a: Any, b: Any, atol: float, rtol: float) -> tuple[float, bool]:

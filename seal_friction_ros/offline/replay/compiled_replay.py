@@ -19,23 +19,14 @@ from seal_friction_ros.core.estimation.compiled_pipeline import (
     receive_all,
 )
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    FORCE_TYPE,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-    VELOCITY_TYPE,
-    decode_text,
-)
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE
 from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import block_reader
 from seal_friction_ros.offline.bags.block_reader import KindOf, read_in_bulk
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
-from seal_friction_ros.offline.bags.topics import Topics
+from seal_friction_ros.offline.bags.topics import TYPES, Topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 
 _RECORDED = {ESTIMATE_TYPE: Kind.ESTIMATE, FEEDFORWARD_TYPE: Kind.FEEDFORWARD}
@@ -71,8 +62,7 @@ def replay_in_bulk(
 
 def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]) -> ReplayResult:
     velocities, is_cut = 0, False
-    compared = {ESTIMATE_TYPE: topics.estimate, FEEDFORWARD_TYPE: topics.feedforward}
-    streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in compared.items() if topic}
+    streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in topics.answers.items() if topic}
     for messages, answers in _answered(read_in_bulk(bag, _kind_of(topics)), override):
         kinds = messages.kinds
         velocities += int(np.count_nonzero(kinds == Kind.VELOCITY))
@@ -100,15 +90,10 @@ def _kind_of(topics: Topics) -> KindOf:
     It raises `UnsuitedError` for a topic with messages of two types.
     """
     known = {
-        topics.pressure: (PRESSURE_TYPE, Kind.PRESSURE),
-        topics.force: (FORCE_TYPE, Kind.FORCE),
-        topics.reference: (REFERENCE_TYPE, Kind.REFERENCE),
-        topics.velocity: (VELOCITY_TYPE, Kind.VELOCITY),
-        topics.estimate: (ESTIMATE_TYPE, Kind.ESTIMATE),
-        topics.feedforward: (FEEDFORWARD_TYPE, Kind.FEEDFORWARD),
-        topics.configuration: (CONFIGURATION_TYPE, Kind.CONFIGURATION),
+        topic: (type_name, Kind[name.upper()])
+        for name, topic, type_name in zip(Topics._fields, topics, TYPES, strict=True)
+        if topic and name != 'position'
     }
-    known.pop('', None)
 
     def kind_of(topic: str, type_name: str) -> Kind:
         """Kind of the messages on a topic."""
@@ -130,7 +115,7 @@ def _answered(blocks: Iterator[Messages], override: Configuration | None) -> Ite
         for first, end in pairwise([0, *changes, len(block.kinds)]):
             messages = block.taken(first, end)
             if end > first and messages.kinds[0] == Kind.CONFIGURATION:
-                configuration, state = parse_snapshot(decode_text(messages.message(0)))
+                configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))
                 parameters = parameters if override else configuration.parameters()
             state, answers = receive_all(parameters, state, messages)
             yield messages, answers

@@ -16,10 +16,8 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
+    DECODERS,
     ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
-    decode,
-    decode_text,
     encode_text,
 )
 from seal_friction_ros.core.estimation.pipeline import answered, init
@@ -84,9 +82,9 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
         used = message
         try:
             if message.topic in inputs:
-                state, answers = answered(parameters, state, decode(message.type_name, message.data))
+                state, answers = answered(parameters, state, DECODERS[message.type_name](message.data))
             elif message.topic == topics.configuration:
-                configuration, state = parse_snapshot(decode_text(message.data))
+                configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](message.data))
                 if override:
                     used = message._replace(data=encode_text(snapshot_text(Snapshot(override, state))))
                 else:
@@ -96,17 +94,8 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
         yield Step(used, tuple(answers))
 
 
-BULK_FROM = 500_000
-"""Bags of at least so many messages are replayed compiled: compiling takes as long as replaying them one by one."""
-
-
 def replay(
-    bag: Path,
-    override: Configuration | None = None,
-    out: Path | None = None,
-    namespace: str = '',
-    *,
-    bulk_from: int = BULK_FROM,
+    bag: Path, override: Configuration | None = None, out: Path | None = None, namespace: str = ''
 ) -> ReplayResult:
     """Replay a bag and compare the answers with the recorded ones; with ``out``, write inputs and answers as a new bag.
 
@@ -115,7 +104,6 @@ def replay(
         override: Configuration instead of the recorded one.
         out: Bag to write.
         namespace: Use only topics below it.
-        bulk_from: Without ``out``, a bag of at least so many messages is replayed compiled; the result is the same.
 
     Raises:
         BagError: The bag cannot be read, or ``out`` exists already; then nothing is left at ``out``.
@@ -124,24 +112,11 @@ def replay(
     topics = find_topics(bag, namespace, known)
     total = count_messages(known)
     with progress(f'replay {bag.name}', total) as advance:
-        result = None
-        if out is None and total >= bulk_from:
-            from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
-
-            result = replay_in_bulk(bag, topics, override, advance)
-        if result is None:
-            result = _replay_one_by_one(bag, topics, override, out, advance)
-    return result
-
-
-def _replay_one_by_one(
-    bag: Path, topics: Topics, override: Configuration | None, out: Path | None, advance: Callable[[int], None]
-) -> ReplayResult:
-    replayed = _counted(steps(read_messages(bag), topics, override), advance)
-    if out is None:
-        return _compare(replayed, topics)
-    with BagWriter(out) as writer:
-        return _compare(_written(replayed, topics, writer), topics)
+        replayed = _counted(steps(read_messages(bag), topics, override), advance)
+        if out is None:
+            return _compare(replayed, topics)
+        with BagWriter(out) as writer:
+            return _compare(_written(replayed, topics, writer), topics)
 
 
 def count_messages(topics: Mapping[str, TopicInfo]) -> int:
@@ -157,8 +132,7 @@ def _counted(replayed: Iterable[Step], advance: Callable[[int], None]) -> Iterat
 
 
 def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter) -> Iterator[Step]:
-    names = {name: getattr(topics, name) for name in topics._fields}
-    answered = {ESTIMATE_TYPE: names['estimate'], FEEDFORWARD_TYPE: names['feedforward']}
+    answered = topics.answers
     for step in replayed:
         message = step.message
         is_used = message.topic in topics or message.type_name == CONFIGURATION_TYPE
@@ -175,9 +149,7 @@ def _compare(replayed: Iterable[Step], topics: Topics) -> ReplayResult:
     A recorded estimate answers the velocity sample before it; an estimate without one is a difference. A recording may
     stop between a message and its answer, so the answer to its last message may be missing.
     """
-    velocities = 0
-    is_cut = False
-    compared = {ESTIMATE_TYPE: topics.estimate, FEEDFORWARD_TYPE: topics.feedforward}
+    velocities, is_cut, compared = 0, False, topics.answers
     streams = {type_name: AnswerStream(type_name) for type_name, topic in compared.items() if topic}
     for message, answers in replayed:
         velocities += message.topic == topics.velocity

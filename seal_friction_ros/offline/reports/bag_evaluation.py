@@ -133,20 +133,17 @@ def evaluate_run(run: RecordedRun) -> BagEvaluation:
     if len(known):
         quantiles = np.quantile(known, (0.5, 0.99, 1.0))
         ages = dict(zip(('p50', 'p99', 'max'), (float(q) for q in quantiles), strict=True))
+    counts = {topic: count for topic, (kind, count) in run.topics.items() if kind in DECODERS}
     return BagEvaluation(
-        friction_by_pressure(run),
-        len(run.time),
-        run.start,
-        duration,
-        {
-            topic: count / duration if duration else 0.0
-            for topic, (kind, count) in run.topics.items()
-            if kind in DECODERS
-        },
-        _state_shares(run),
-        _status_counts(run.status),
-        int(np.count_nonzero(run.status)),
-        ages,
+        friction=friction_by_pressure(run),
+        estimates=len(run.time),
+        start=run.start,
+        duration=duration,
+        rates={topic: count / duration if duration else 0.0 for topic, count in counts.items()},
+        state_shares=_state_shares(run),
+        status_counts=_status_counts(run.status),
+        flagged=int(np.count_nonzero(run.status)),
+        input_age=ages,
     )
 
 
@@ -182,7 +179,7 @@ def friction_by_pressure(run: RecordedRun) -> FrictionByPressure:
     for column in (*columns, run.breakaway_force):
         usable &= np.abs(column) < LARGEST_INPUT
     runs = _runs(run)
-    strokes = [event for first_last in runs if (event := _steady_stroke(run, usable, *first_last))]
+    strokes = [event for motion in runs if (event := _steady_stroke(run, usable, *motion))]
     starts = [event for rest, motion in pairwise(runs) if (event := _start(run, usable, rest, motion))]
     sliding, breakaway = _levels(strokes), _levels(starts)
     return FrictionByPressure(sliding, breakaway, _notes(run, usable, sliding, breakaway))
@@ -213,18 +210,8 @@ def _steady_stroke(run: RecordedRun, usable: BoolArray, direction: int, index: I
     steady = middle[np.abs(speed - median) <= SPEED_TOLERANCE * median]
     if len(steady) < max(MIN_STEADY_SAMPLES, STEADY_SHARE * len(middle)):
         return None
-    return Event(
-        direction,
-        pressure=float(run.pressure[steady].mean()),
-        force_sum=float(run.force_sum[steady].mean()),
-        estimated=float(
-            (direction * run.friction_force[steady]).mean()
-        ),  # Coulomb friction with the share of the velocity
-        std=float(run.coulomb_friction_std[steady].mean()),
-        samples=len(steady),
-        first=int(index[0]),
-        last=int(index[-1]),
-    )
+    estimated = direction * run.friction_force[steady]  # Coulomb friction and velocity friction
+    return _event(run, direction, steady, estimated, len(steady), index)
 
 
 def _start(
@@ -239,20 +226,20 @@ def _start(
     index = index[usable[index]]
     if not len(index):
         return None
-    peak = int(index[np.argmax(direction * run.force_sum[index])])
-    force = float(run.force_sum[peak])
-    if direction * force <= 0.0:  # a force outside the force sum moved the rod, or the sign is wrong
+    peak = index[[np.argmax(direction * run.force_sum[index])]]
+    if direction * run.force_sum[peak[0]] <= 0.0:  # a force outside the force sum moved the rod, or the sign is wrong
         return None
-    return Event(
-        direction,
-        pressure=float(run.pressure[peak]),
-        force_sum=force,
-        estimated=float(run.breakaway_force[peak]),
-        std=float(run.coulomb_friction_std[peak]),
-        samples=len(index),
-        first=int(rest[1][0]),
-        last=int(rest[1][-1]),
+    return _event(run, direction, peak, run.breakaway_force[peak], len(index), rest[1])
+
+
+def _event(
+    run: RecordedRun, direction: int, read: IntArray, estimated: FloatArray, samples: int, index: IntArray
+) -> Event:
+    """Event over ``index`` from the means at the indices ``read``."""
+    pressure, force, std = (
+        float(column[read].mean()) for column in (run.pressure, run.force_sum, run.coulomb_friction_std)
     )
+    return Event(direction, pressure, force, float(estimated.mean()), std, samples, int(index[0]), int(index[-1]))
 
 
 def _levels(events: Sequence[Event]) -> tuple[PressureLevel, ...]:
@@ -261,8 +248,7 @@ def _levels(events: Sequence[Event]) -> tuple[PressureLevel, ...]:
     ordered = sorted(events, key=lambda event: event.pressure)
     labels = pressure_labels(np.array([event.pressure for event in ordered]))
     ends = np.flatnonzero(np.diff(labels)) + 1
-    bounds = [0, *(int(end) for end in ends), len(ordered)]
-    return tuple(_level(ordered[first:last]) for first, last in pairwise(bounds))
+    return tuple(_level(ordered[first:last]) for first, last in pairwise([0, *ends.tolist(), len(ordered)]))
 
 
 def pressure_labels(pressures: FloatArray) -> IntArray:
@@ -324,21 +310,18 @@ def _notes(
             f'stroke needs {MIN_STEADY_SAMPLES} usable samples at nearly constant speed.'
         )
     for name, levels in (('sliding', sliding), ('breakaway', breakaway)):
-        for chosen, finding in (
-            (
-                [level for level in levels if not level.both_directions],
-                (
-                    f'the {name} friction was measured in one direction only: the measured value is the mean '
-                    'magnitude, and an offset of the force sum remains in it.'
-                ),
-            ),
-            (
-                [level for level in levels if level.measured <= 0.0],
-                f'the force sum of {name} is against the motion: check the signs of force sum and velocity.',
-            ),
-        ):
-            if chosen:
-                notes.append(f'At {", ".join(f"{level.pressure / BAR:.2f} bar" for level in chosen)} {finding}')
+        one_sided = [f'{level.pressure / BAR:.2f} bar' for level in levels if not level.both_directions]
+        if one_sided:
+            notes.append(
+                f'At {", ".join(one_sided)} the {name} friction was measured in one direction only: the measured value '
+                'is the mean magnitude, and an offset of the force sum remains in it.'
+            )
+        reversed_sign = [f'{level.pressure / BAR:.2f} bar' for level in levels if level.measured <= 0.0]
+        if reversed_sign:
+            notes.append(
+                f'At {", ".join(reversed_sign)} the force sum of {name} is against the motion: check the signs of '
+                'force sum and velocity.'
+            )
     left_out = len(usable) - int(np.count_nonzero(usable))
     if left_out:
         notes.append(

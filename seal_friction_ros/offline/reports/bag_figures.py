@@ -45,7 +45,7 @@ def run_figures(run: RecordedRun, evaluation: BagEvaluation) -> list[Plot]:
     return plots
 
 
-def bag_verdict(levels: Sequence[PressureLevel]) -> str:
+def friction_summary(levels: Sequence[PressureLevel]) -> str:
     """Result of the comparison, in one line."""
     level = worst_level(levels)
     if level is None:
@@ -65,7 +65,7 @@ def live_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
     """Live estimate against measured friction: the whole bag, and a part with strokes."""
     first, last, level = detail_window(run, levels)
     figure, axes = style.new_figure(
-        bag_verdict(levels), 6.6, nrows=4, gridspec_kw={'height_ratios': [5.0, 0.35, 6.0, 0.35], 'hspace': 0.02}
+        friction_summary(levels), 6.6, nrows=4, gridspec_kw={'height_ratios': [5.0, 0.35, 6.0, 0.35], 'hspace': 0.02}
     )
     whole, part = slice(0, len(run.time)), slice(first, last + 1)
     _draw_friction(axes[0], run, whole, None)
@@ -267,7 +267,7 @@ def _draw_band(ax: Axes, pressure: FloatArray, middle: FloatArray, half: FloatAr
 
 def deviation_figure(levels: Sequence[PressureLevel]) -> Plot:
     """Deviation of the estimate at each pressure level."""
-    figure, ax = style.new_figure(bag_verdict(levels), 3.4)
+    figure, ax = style.new_figure(friction_summary(levels), 3.4)
     shown = [level for level in levels if level.deviation_percent is not None]
     place = np.arange(len(shown))
     band = np.array([100.0 * BAND_95 * level.estimated_std / level.measured for level in shown])

@@ -12,12 +12,12 @@ from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation
 from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel
-from seal_friction_ros.offline.reports.bag_figures import bag_verdict, run_figures
+from seal_friction_ros.offline.reports.bag_figures import friction_summary, run_figures
 from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, number
 from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, ReportSummary, Table, write_page
 from seal_friction_ros.offline.reports.tracking_evaluation import TrackingStretch
-from seal_friction_ros.offline.reports.tracking_figures import stretch_name, tracking_plots, tracking_verdict
+from seal_friction_ros.offline.reports.tracking_figures import stretch_name, tracking_plots, tracking_summary
 
 _SHOWN_CONFIGURATIONS = 2  # so many of the first and of the last, in a bag with more
 
@@ -48,7 +48,7 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         run=run,
         evaluation=evaluation,
         limits=bag_evaluation,
-        verdict=bag_verdict(evaluation.friction.sliding),
+        summary=friction_summary(evaluation.friction.sliding),
         start=datetime.fromtimestamp(evaluation.start // 1_000_000_000, UTC),
         sliding_table=_level_table(evaluation.friction.sliding, 'strokes'),
         breakaway_table=_level_table(evaluation.friction.breakaway, 'starts'),
@@ -59,14 +59,12 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         configurations=list(_shown_configurations(run)),
         tracking=tracking,
         tracking_limits=tracking_evaluation,
-        tracking_verdict=tracking_verdict(tracking) if tracking else '',
+        tracking_summary=tracking_summary(tracking) if tracking else '',
         tracking_table=_tracking_table(stretches),
         feedforward_table=_feedforward_table(stretches),
     )
-    numbers = bag_evaluation.evaluation_numbers(evaluation) | {
-        'tracking': tracking_evaluation.tracking_numbers(tracking)
-    }
-    return ReportSummary(out, figures, numbers)
+    numbers = bag_evaluation.evaluation_numbers(evaluation)
+    return ReportSummary(out, figures, numbers | {'tracking': tracking_evaluation.tracking_numbers(tracking)})
 
 
 def _level_table(levels: Sequence[PressureLevel], events: str) -> Table:
@@ -145,10 +143,8 @@ def _feedforward_table(stretches: Sequence[TrackingStretch]) -> Table:
 
 
 def _topic_table(run: RecordedRun, evaluation: BagEvaluation) -> Table:
-    rows = [
-        (topic, kind, count, number(evaluation.rates.get(topic), 1))
-        for topic, (kind, count) in sorted(run.topics.items())
-    ]
+    topics = sorted(run.topics.items())
+    rows = [(topic, kind, count, number(evaluation.rates.get(topic), 1)) for topic, (kind, count) in topics]
     return Table(('topic', 'type', 'messages', 'rate [1/s]'), rows, (0, 1))
 
 

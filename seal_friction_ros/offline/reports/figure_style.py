@@ -1,8 +1,8 @@
-"""The common look of all figures, and the parts that several figures share.
+"""Style of all figures, and parts that several figures share.
 
-Figures are made without pyplot, so no state is kept between calls, and the same numbers give the same bytes. The
-colours are those of Okabe and Ito, which are distinct for all colour vision. A long recording is drawn through the
-lowest and the highest value in each column of pixels, so the size of a figure does not grow with the recording.
+Figures are made without pyplot, so there is no global state, and the same numbers give the same bytes. The colours are
+those of Okabe and Ito, which are distinct for all types of colour vision. A long recording is drawn through the lowest
+and the highest value in each column of pixels, so the size of a figure does not grow with the recording.
 """
 
 import io
@@ -59,7 +59,7 @@ class Plot(NamedTuple):
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """The common look, independent of the user's matplotlibrc; a figure is made and rendered inside this context."""
+    """The common style, independent of the user's matplotlibrc; make and render figures inside this context."""
     with matplotlib.style.context(['default', _STYLE], after_reset=True):
         yield
 
@@ -78,8 +78,8 @@ def render(figure: Figure) -> dict[str, bytes]:
 def _fix_layout(figure: Figure) -> None:
     """Lay the figure out once, with rounded positions.
 
-    The layout solver takes its constraints in the order of their memory addresses, so the last bits of the positions
-    differ from run to run, and with them the names of the clip paths in an SVG. Rounding removes the difference.
+    The layout solver orders its constraints by memory address, so the last bits of the positions, and with them the
+    names of the clip paths in an SVG, differ from run to run. Rounding removes the difference.
     """
     figure.draw_without_rendering()
     figure.set_layout_engine('none')
@@ -134,18 +134,24 @@ def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:
             handle.set_alpha(1.0)
 
 
-def finish_figure_18(ax: Axes, unit: str) -> None:
-    """Axes and legend of the coefficient of friction over normal force, as Figure 18 of the thesis."""
-    ax.set(xlim=(0.0, None), xlabel=f'normal force of one seal [{unit}]')
-    ax.set(ylim=(0.0, None), ylabel='coefficient of dynamic friction [-]')
+def finished(name: str, figure: Figure, ax: Axes, xlabel: str, ylabel: str) -> Plot:
+    """The figure with labels, a y axis from zero, and its legend above."""
+    ax.set(ylim=(0.0, None), xlabel=xlabel, ylabel=ylabel)
     legend_above(ax)
+    return Plot(name, figure)
 
 
-def finish_figure_19(ax: Axes, unit: str) -> None:
-    """Axes and legend of normal over axial force, as Figure 19 of the thesis."""
-    ax.set(xlabel=f'axial force of one seal, pressure times projected area [{unit}]')
-    ax.set(ylim=(0.0, None), ylabel=f'normal force of one seal [{unit}]')
-    legend_above(ax)
+def figure_18(figure: Figure, ax: Axes, unit: str) -> Plot:
+    """Coefficient of friction over normal force, with the axes of Figure 18 of the thesis."""
+    labels = f'normal force of one seal [{unit}]', 'coefficient of dynamic friction [-]'
+    ax.set_xlim(0.0, None)
+    return finished('fig18_coefficient_of_friction', figure, ax, *labels)
+
+
+def figure_19(figure: Figure, ax: Axes, unit: str) -> Plot:
+    """Normal over axial force, with the axes of Figure 19 of the thesis."""
+    labels = f'axial force of one seal, pressure times projected area [{unit}]', f'normal force of one seal [{unit}]'
+    return finished('fig19_normal_force', figure, ax, *labels)
 
 
 def zero_lines(ax: Axes, *, vertical: bool = False) -> None:

@@ -1,6 +1,8 @@
 """Report of an identification: measured friction, fitted law, and the out-of-sample error of each law."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,15 +15,15 @@ from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.identification.fitting import Score, offsets_of
-from seal_friction_ros.core.identification.ladder import normal_forces
-from seal_friction_ros.core.identification.readings import Readings
+from seal_friction_ros.core.identification.candidate_laws import normal_forces
+from seal_friction_ros.core.identification.fitting import CrossValidation, LawScore, offsets_of
+from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.document import worst_left_out
-from seal_friction_ros.offline.identification.pipeline import fitted_readings, normal_force_law
-from seal_friction_ros.offline.identification.results import Identification, Ring
+from seal_friction_ros.offline.identification.pipeline import fitted_readings
+from seal_friction_ros.offline.identification.results import Identification, PressureLevel, Ring
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number
 from seal_friction_ros.offline.reports.page import Table, write_page
 from seal_friction_ros.offline.work.seal_writer import seal_text
@@ -65,73 +67,60 @@ def write_identification_report(found: Identification, out: Path) -> tuple[Path,
 
 
 def _level_table(found: Identification) -> Table:
-    heads = (
-        'pressure [bar]', 'speed [mm/s]', 'measured [N]', 'law [N]', 'residual [N]', 'residual [%]', 'std [N]',
-        'predicted unseen [N]', 'off [%]', 'offset of the force sum [N]', 'drift in the run [%]', 'readings',
-    )  # fmt: skip
-    rows = [
-        (
-            number(level.pressure / BAR) + ('' if level.is_used else ' *'),
-            number(level.speed / MM, 1),
-            number(level.measured),
-            number(level.fitted),
-            number(level.measured - level.fitted, signed=True),
-            number(100.0 * (1.0 - level.fitted / level.measured), 1, signed=True),
-            number(level.std),
-            number(level.left_out),
-            number(100.0 * (level.left_out / level.measured - 1.0), 1, signed=True),
-            number(level.offset, signed=True),
-            number(100.0 * level.drift, 1, signed=True),
-            level.readings,
-        )
-        for level in found.levels
-    ]
-    return Table(heads, rows)
+    columns: dict[str, Callable[[PressureLevel], Any]] = {
+        'pressure [bar]': lambda level: number(level.pressure / BAR) + ('' if level.is_used else ' *'),
+        'speed [mm/s]': lambda level: number(level.speed / MM, 1),
+        'measured [N]': lambda level: number(level.measured),
+        'law [N]': lambda level: number(level.fitted),
+        'residual [N]': lambda level: number(level.measured - level.fitted, signed=True),
+        'residual [%]': lambda level: number(100.0 * (1.0 - level.fitted / level.measured), 1, signed=True),
+        'std [N]': lambda level: number(level.std),
+        'predicted unseen [N]': lambda level: number(level.left_out),
+        'off [%]': lambda level: number(100.0 * (level.left_out / level.measured - 1.0), 1, signed=True),
+        'offset of the force sum [N]': lambda level: number(level.offset, signed=True),
+        'drift in the run [%]': lambda level: number(100.0 * level.drift, 1, signed=True),
+        'readings': lambda level: level.readings,
+    }
+    return Table(list(columns), [[cell(level) for cell in columns.values()] for level in found.levels])
 
 
 def _ladder_table(found: Identification) -> Table:
-    heads = ('law', 'parameters', 'RMS [N]', 'mean deviation [N]', 'off [%]', 'condition', '')
     rows = [_ladder_row(score, found) for score in found.selection.scores]
-    reference = found.selection.reference
-    if reference is not None:
-        numbers = (number(reference.rms), number(reference.mean_deviation), number(100.0 * reference.error, 1))
-        rows.append(('no law: mean of the other readings at the same pressure', DASH, *numbers, DASH, ''))
-    return Table(heads, rows, (0, 6))
+    if found.selection.reference is not None:
+        text = 'no law: mean of the other readings at the same pressure'
+        rows.append((text, DASH, *_errors(found.selection.reference), DASH, ''))
+    return Table(('law', 'parameters', 'RMS [N]', 'mean deviation [N]', 'off [%]', 'condition', ''), rows, (0, 6))
 
 
-def _ladder_row(score: Score, found: Identification) -> tuple[str, ...]:
-    name, parameters = f'{score.rung.name} ({score.rung.words})', str(len(score.rung.parameters))
+def _errors(validation: CrossValidation) -> tuple[str, str, str]:
+    return number(validation.rms), number(validation.mean_deviation), number(100.0 * validation.error, 1)
+
+
+def _ladder_row(score: LawScore, found: Identification) -> tuple[str, ...]:
+    name, parameters = f'{score.law.name} ({score.law.formula})', str(len(score.law.parameters))
     if score.validation is None or score.fit is None:
         return name, parameters, DASH, DASH, DASH, DASH, score.why_not
     marks = ['recommended'] if score is found.selection.best else []
     marks += ['saved'] if score.fit is found.selection.fit else []
-    return (
-        name,
-        parameters,
-        number(score.validation.rms),
-        number(score.validation.mean_deviation),
-        number(100.0 * score.validation.error, 1),
-        number(score.fit.condition_number, 1),
-        ', '.join(marks),
-    )
+    return name, parameters, *_errors(score.validation), number(score.fit.condition_number, 1), ', '.join(marks)
 
 
 def _parameter_table(found: Identification) -> Table:
-    choice, errors, stiction = found.selection, found.quality.standard_errors, found.quality.stiction
+    selection, errors, breakaway = found.selection, found.quality.standard_errors, found.quality.breakaway
     rows = [
-        (p.name, p.symbol, f'{choice.fit.values[p.name]:.5g}', f'{errors[p.name]:.2g}', p.unit)
-        for p in choice.rung.parameters
+        (p.name, p.symbol, f'{selection.fit.values[p.name]:.5g}', f'{errors[p.name]:.2g}', p.unit)
+        for p in selection.law.parameters
     ]
-    rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in choice.rung.fixed.items()]
-    if stiction is not None:
-        value, unit = (stiction.ratio, '1') if stiction.law == 'load_dependent' else (stiction.stiction, 'N')
-        name = f'breakaway above Coulomb, {stiction.law}'
-        rows.append((name, '', f'{value:.5g}', f'{stiction.standard_error:.2g}', unit))
+    rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in selection.law.fixed.items()]
+    if breakaway is not None:
+        value, unit = (breakaway.ratio, '1') if breakaway.law == 'load_dependent' else (breakaway.stiction, 'N')
+        name = f'breakaway above Coulomb, {breakaway.law}'
+        rows.append((name, '', f'{value:.5g}', f'{breakaway.standard_error:.2g}', unit))
     return Table(('parameter of one seal', 'symbol', 'value', 'standard error', 'unit'), rows, (0, 1, 4))
 
 
 def _correlation_table(found: Identification) -> Table:
-    names = [p.name for p in found.selection.rung.parameters]
+    names = [p.name for p in found.selection.law.parameters]
     rows = [
         (name, *(number(float(x), 3, signed=True) for x in row))
         for name, row in zip(names, found.selection.fit.correlation, strict=True)
@@ -161,11 +150,9 @@ class _FittedReadings:
         self.seal = parse_seal(found.document)
         self.mounted = tuple(MountedSeal(self.seal, chamber) for chamber in found.data.sources.chambers)
         self.fitted, _ = fitted_readings(self.mounted, found.data.prepared.chamber_pressures, self.readings.at.velocity)
-        self.measured = magnitudes(self.readings, self.fitted)
+        self.measured = self.readings.magnitudes(offsets_of(self.readings, self.fitted))
         self.unit, self.size = force_unit(float(self.measured.max()))
-        self.is_used = np.ones(self.readings.count, dtype=bool)
-        if found.data.outlier is not None:
-            self.is_used = self.readings.level != found.data.outlier.level
+        self.is_used = self.readings.level != (-1 if found.data.outlier is None else found.data.outlier.level)
 
     @property
     def dots(self) -> IntArray:
@@ -177,31 +164,18 @@ class _FittedReadings:
         return fitted_readings(mounted, np.column_stack((pressure, pressure)), np.full(len(pressure), np.nan))
 
 
-def magnitudes(readings: Readings, friction: FloatArray) -> FloatArray:
-    """Measured friction with the offset of each source removed [N], shape (n,).
-
-    Args:
-        readings: The readings.
-        friction: Friction of a law at the readings [N], shape (n,).
-    """
-    offsets = offsets_of(readings, friction)
-    return np.asarray(readings.at.direction * (readings.force - offsets[readings.source]))
-
-
 def identification_figures(found: Identification) -> list[Plot]:
     """Every figure that the data allow."""
     shown = _FittedReadings(found)
+    ring, breakaway = found.data.ring, found.data.prepared.breakaway
     plots = [fitted_law_figure(shown), agreement_figure(shown), out_of_sample_figure(found), ladder_figure(found)]
     if shown.readings.are_samples:
         plots.append(velocity_cloud_figure(shown))
-    if found.data.prepared.breakaway is not None:
-        plots.append(static_figure(shown, found.data.prepared.breakaway))
-    if found.data.ring is not None:
-        plots += [
-            fitted_coefficient_figure(shown, found.data.ring),
-            computed_normal_force_figure(shown, found.data.ring),
-        ]
-        plots += prior_art_readings_figure(shown, found.data.ring)
+    if breakaway is not None:
+        plots.append(static_figure(shown, breakaway))
+    if ring is not None:
+        plots += [fitted_coefficient_figure(shown, ring), computed_normal_force_figure(shown, ring)]
+        plots += prior_art_readings_figure(shown, ring)
     return plots
 
 
@@ -239,18 +213,16 @@ def fitted_law_figure(shown: _FittedReadings) -> Plot:
     if not shown.readings.are_samples:
         x, y = np.array([(level.pressure / BAR, level.measured / size) for level in levels]).T
         ax.plot(x, y, 'D', ms=6.0, color=style.BLACK, mec='white', label='measured')
-    ax.set(ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel=f'friction of all seals [{shown.unit}]')
-    style.legend_above(ax)
-    return Plot('fig24_model_over_pressure', figure)
+    return finished('fig24_model_over_pressure', figure, ax, PRESSURE_LABEL, f'friction of all seals [{shown.unit}]')
 
 
 def agreement_figure(shown: _FittedReadings) -> Plot:
     """Measured against fitted friction, with the band."""
-    worth, size = shown.found.quality, shown.size
-    title = f'Measured against law: {100.0 * worth.coverage:.0f} % of the readings left out are in the band'
+    quality, size = shown.found.quality, shown.size
+    title = f'Measured against law: {100.0 * quality.coverage:.0f} % of the readings left out are in the band'
     figure, ax = style.new_figure(title, 4.6)
     line = np.linspace(0.0, max(float(shown.fitted.max()), float(shown.measured.max())), 101)
-    style.fill_band(ax, line / size, line / size, BAND_95 * worth.spread.std(line) / size, label='95 % band')
+    style.fill_band(ax, line / size, line / size, BAND_95 * quality.uncertainty.std(line) / size, label='95 % band')
     ax.plot(line / size, line / size, color=style.BLACK, lw=1.2, label='equal')
     _draw_readings(ax, shown, shown.fitted / size, shown.measured / size)
     ax.set(xlim=(0.0, None), xlabel=f'law [{shown.unit}]', ylabel=f'measured, all seals [{shown.unit}]')
@@ -273,7 +245,7 @@ def out_of_sample_figure(found: Identification) -> Plot:
             ax.plot(x[chosen], validation.deviation[chosen] / size, 'o', color=colour, mew=0.0, label=name, **look)
         ax.axhline(0.0, color=style.GREY, lw=0.8)
         ax.set_xlabel(label)
-    half = BAND_95 * found.quality.spread.std(validation.predicted) / size
+    half = BAND_95 * found.quality.uncertainty.std(validation.predicted) / size
     style.fill_band(axes[1], order.astype(float), np.zeros(used.count), half, alpha=0.25, label='95 % band', step='mid')
     axes[0].set_ylabel(f'measured - predicted [{unit}]')
     style.legend_above(axes[1])
@@ -288,7 +260,7 @@ def ladder_figure(found: Identification) -> Plot:
     colours = [style.GREEN if score is found.selection.best else style.SKY for score, _ in scored]
     bars = ax.barh(range(len(scored)), errors, color=colours, height=0.65)
     ax.bar_label(bars, labels=[f'{error:.1f} %' for error in errors], padding=4)
-    ax.set_yticks(range(len(scored)), [score.rung.words.replace(' + ', '\n+ ') for score, _ in scored])
+    ax.set_yticks(range(len(scored)), [score.law.formula.replace(' + ', '\n+ ') for score, _ in scored])
     ax.invert_yaxis()
     ax.grid(visible=False, axis='y')
     ax.set(xlim=(None, 1.12 * max(errors)), xlabel='sum of the deviations over sum of the measured friction [%]')
@@ -315,7 +287,7 @@ def velocity_cloud_figure(shown: _FittedReadings) -> Plot:
     return Plot('friction_over_velocity', figure)
 
 
-def static_figure(shown: _FittedReadings, breakaway: Readings) -> Plot:
+def static_figure(shown: _FittedReadings, breakaway: FrictionReadings) -> Plot:
     """Static and dynamic friction with curves of second order (as Figure 16)."""
     static = breakaway.at.direction * (breakaway.force - shown.found.selection.fit.offsets[breakaway.source])
     unit, size = force_unit(float(static.max()))
@@ -331,42 +303,31 @@ def static_figure(shown: _FittedReadings, breakaway: Readings) -> Plot:
             line = np.linspace(float(pressure.min()), float(pressure.max()), 101) / BAR
             curve = np.polyval(np.polyfit(pressure / BAR, friction, 2), line)
             ax.plot(line, curve / size, color=colour, lw=1.8, label=f'{name}, second order')
-    ax.set(ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel=f'friction of all seals [{unit}]')
-    style.legend_above(ax)
-    return Plot('fig16_static_and_dynamic', figure)
-
-
-def _normal_forces_of(shown: _FittedReadings) -> FloatArray:
-    """Normal force of each seal at each reading [N], shape (n, seals)."""
-    normal = shown.readings.at.normal_force
-    assert normal is not None  # noqa: S101 the ring is known
-    return normal
+    return finished('fig16_static_and_dynamic', figure, ax, PRESSURE_LABEL, f'friction of all seals [{unit}]')
 
 
 def fitted_coefficient_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     """Coefficient of friction over normal force (as Figure 18)."""
-    normal = _normal_forces_of(shown)
+    normal = normal_forces(shown.readings.at.pressure, *ring)
     total, seals = normal.sum(axis=1), normal.shape[1]
     unit, size = force_unit(float(total.max()) / seals)
     figure, ax = style.new_figure('Coefficient of friction over normal force', 4.0)
     pressure = np.linspace(float(shown.readings.seal_pressure.min()), float(shown.readings.seal_pressure.max()), 201)
-    of_one = normal_forces(pressure[:, np.newaxis], ring.geometry, normal_force_law(ring.normal_force))[:, 0]
+    of_one = normal_forces(pressure, *ring)
     coulomb = np.array([shown.seal.coulomb_law.coulomb_friction(float(p)) for p in pressure])
     ax.plot(of_one / size, coulomb / of_one, color=style.BLACK, lw=1.8, label='law')
     _draw_readings(ax, shown, total / seals / size, shown.measured / total)
-    style.finish_figure_18(ax, unit)
-    return Plot('fig18_coefficient_of_friction', figure)
+    return style.figure_18(figure, ax, unit)
 
 
 def computed_normal_force_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     """Normal over axial force (as Figure 19)."""
-    normal = _normal_forces_of(shown)
-    area = projected_area(ring.geometry)
+    normal, area = normal_forces(shown.readings.at.pressure, *ring), projected_area(ring.geometry)
     axial = shown.readings.at.pressure * area
     order = np.argsort(axial.ravel(), kind='stable')
     x, y = axial.ravel()[order], normal.ravel()[order]
     unit, size = force_unit(float(max(x.max(), y.max())))
-    law = normal_force_law(ring.normal_force)
+    law = ring.normal_force_law
     title = 'Normal over axial force'
     if isinstance(law, AreaDeformationGain):
         title = f'Normal force: {law.area_deformation_gain:.3g} of the axial force, plus {law.radial_force:.3g} N'
@@ -375,8 +336,7 @@ def computed_normal_force_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     levels = np.array([level.pressure * area for level in shown.found.levels])
     at_levels = np.interp(levels, x, y)
     ax.plot(levels / size, at_levels / size, 'o', color=style.BLACK, ms=5.0, label='pressures measured')
-    style.finish_figure_19(ax, unit)
-    return Plot('fig19_normal_force', figure)
+    return style.figure_19(figure, ax, unit)
 
 
 def prior_art_readings_figure(shown: _FittedReadings, ring: Ring) -> list[Plot]:
@@ -394,9 +354,7 @@ def prior_art_readings_figure(shown: _FittedReadings, ring: Ring) -> list[Plot]:
     figure, ax = style.new_figure(f'Prior art is {off.min():.0f} to {off.max():.0f} % above the readings', 4.0)
     ax.plot(pressure / BAR, prior / size, color=style.VERMILLION, lw=1.8, label='prior art, from charts')
     _draw_readings(ax, shown, shown.pressure, shown.measured / size)
-    ax.set(ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel=f'friction of all seals [{unit}]')
-    style.legend_above(ax)
-    return [Plot('fig17_prior_art_and_tests', figure)]
+    return [finished('fig17_prior_art_and_tests', figure, ax, PRESSURE_LABEL, f'friction of all seals [{unit}]')]
 
 
 def _same_ring(law: PriorArtChart, ring: Ring) -> bool:

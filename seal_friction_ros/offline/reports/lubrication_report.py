@@ -60,16 +60,8 @@ def write_run_page(run: CaseRun, out: Path) -> tuple[Path, ...]:
     """
     result = run.result
     plots = [friction_loop_figure(result), motion_figure(result), film_figure(result)]
-    figures = write_page(
-        out,
-        'lubrication_run',
-        plots,
-        case=result.case,
-        parameter_table=_parameter_table(result.case),
-        result=result,
-        found=run.found,
-        finding_table=_finding_table(run),
-    )
+    tables = {'found': run.found, 'finding_table': _finding_table(run)}
+    figures = _write_case_page(out, 'lubrication_run', plots, result.case, result=result, **tables)
     animation = figures[0].parent / 'film.gif'
     _write_animation(result, animation)
     return (*figures, animation)
@@ -92,15 +84,9 @@ def write_study_page(case: LubricationCase, study: StudyRuns, out: Path) -> tupl
         )
         for stress, friction, share, deviation, curve in zip(*study.table, strict=True)
     ]
-    return write_page(
-        out,
-        'lubrication_study',
-        [study_figure(study)],
-        case=case,
-        parameter_table=_parameter_table(case),
-        study_table=Table(heads, rows),
-        half_width=REFERENCE_HALF_WIDTH,
-    )
+    table = Table(heads, rows)
+    plots = [study_figure(study)]
+    return _write_case_page(out, 'lubrication_study', plots, case, study_table=table, half_width=REFERENCE_HALF_WIDTH)
 
 
 @house_style()
@@ -111,15 +97,9 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
         (number(speed / MM), *(number(float(row.friction[i]), 3) for row in computed.rows))
         for i, speed in enumerate(computed.law.speeds)
     ]
-    return write_page(
-        out,
-        'lubrication_map',
-        [map_figure(computed)],
-        case=computed.case,
-        parameter_table=_parameter_table(computed.case),
-        law=computed.law,
-        map_table=Table(heads, rows),
-    )
+    table = Table(heads, rows)
+    plots = [map_figure(computed)]
+    return _write_case_page(out, 'lubrication_map', plots, computed.case, law=computed.law, map_table=table)
 
 
 @house_style()
@@ -127,15 +107,10 @@ def write_comparison_page(comparison: Comparison, out: Path) -> tuple[Path, ...]
     """Write the page of simulation against measurement; see `write_page`."""
     result = comparison.result
     rows = [(name, f'{v:.3g}' if isinstance(v, float) else v) for name, v in comparison.numbers().items()]
-    return write_page(
-        out,
-        'lubrication_comparison',
-        [comparison_figure(comparison), friction_loop_figure(result), film_figure(result)],
-        case=result.case,
-        parameter_table=_parameter_table(result.case),
-        comparison=comparison,
-        number_table=Table(('number', 'value'), rows, (0,)),
-    )
+    table = Table(('number', 'value'), rows, (0,))
+    plots = [comparison_figure(comparison), friction_loop_figure(result), film_figure(result)]
+    template = 'lubrication_comparison'
+    return _write_case_page(out, template, plots, result.case, comparison=comparison, number_table=table)
 
 
 @house_style()
@@ -158,10 +133,14 @@ def _finding_table(run: CaseRun) -> Table:
     return Table(heads, rows, (0, 1))
 
 
-def _parameter_table(case: LubricationCase) -> Table:
+def _write_case_page(
+    out: Path, template: str, plots: list[Plot], case: LubricationCase, **values: Any
+) -> tuple[Path, ...]:
+    """Write a page with the parameters of a case."""
     parts = [(part.name, getattr(case, part.name)) for part in dataclasses.fields(case)]
     rows = [row for name, part in parts if dataclasses.is_dataclass(part) for row in parameter_rows(part, f'{name}.')]
-    return Table(PARAMETER_HEADS, rows, (0, 2, 3))
+    table = Table(PARAMETER_HEADS, rows, (0, 2, 3))
+    return write_page(out, template, plots, case=case, parameter_table=table, **values)
 
 
 # -- figures ----------------------------------------------------------------------------------------------------------

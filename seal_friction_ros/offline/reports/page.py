@@ -1,8 +1,7 @@
 """The page kit: a page from a template, with its figures inside and beside it.
 
-A page stands alone: style and figures are inside, nothing is fetched. The template engine escapes every value. A value
-that a template names and the report does not give is an error. Nothing on a page depends on when or where it was made,
-so the same input gives the same bytes.
+A page is self-contained: it loads neither style nor figures from elsewhere. The template engine escapes every value; a
+missing value is an error. A page contains neither time nor place, so the same input gives the same bytes.
 """
 
 from base64 import b64encode
@@ -105,7 +104,7 @@ def write_page(out: Path, template: str, plots: Iterable[Plot], **values: Any) -
     folder = out.parent / f'{out.stem}_figures'
     files = {folder / f'{name}.{kind}': data for name, kinds in rendered.items() for kind, data in kinds.items()}
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        (folder if files else out.parent).mkdir(parents=True, exist_ok=True)
         for path, content in {**files, out: page.encode('utf-8', 'replace')}.items():
             write_whole(path, content)
     except OSError as error:

@@ -1,9 +1,10 @@
 """Charts of a seal file: the curves of its laws, in the order of the thesis.
 
-The seal of the thesis is drawn with the measured and computed points of the thesis, and twice, as in its rig.
+The seal of the thesis is shown with the points of the thesis, and for two seals, as in its rig.
 """
 
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import is_at_rest, state_friction
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number
 from seal_friction_ros.offline.reports.page import Table, write_page
 from seal_friction_ros.offline.reports.thesis_data import (
@@ -141,10 +142,9 @@ def friction_over_force_sum(
 ) -> FloatArray:
     """State friction [N] of a rod at rest at each force sum [N] (Figure 23; with stiction as measured)."""
     friction = shown.friction(pressure)
-    breakaway = friction.coulomb_friction + (friction.stiction if use_stiction else 0.0)
-    return np.array(
-        [state_friction(0.0, f, True, friction.coulomb_friction, breakaway).friction_force for f in force_sums.tolist()]
-    )
+    coulomb, stiction = friction.coulomb_friction, friction.stiction if use_stiction else 0.0
+    states = (state_friction(0.0, f, True, coulomb, coulomb + stiction) for f in force_sums.tolist())
+    return np.array([state.friction_force for state in states])
 
 
 def _compared(shown: ChartedSeal) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -172,20 +172,15 @@ def _dimensions(geometry: SealGeometry) -> dict[str, float]:
 def _friction_table(shown: ChartedSeal) -> Table:
     pressures, measured = _compared(shown)
     heads = ['pressure [bar]', '[psi]', f'Coulomb friction, {shown.count_text} [N]', 'std [N]', 'breakaway force [N]']
+    heads += ['mean of the tests [N]', 'deviation [%]'] if measured else []
     rows = []
-    for pressure in pressures:
-        friction = shown.friction(pressure)
-        forces = (
-            friction.coulomb_friction,
-            friction.coulomb_friction_std,
-            friction.coulomb_friction + friction.stiction,
-        )
-        rows.append([number(pressure / BAR), number(pressure / PSI, 0), *map(number, forces)])
-    if measured:
-        heads += ['mean of the tests [N]', 'deviation [%]']
-        for row, pressure, mean in zip(rows, pressures, measured, strict=True):
-            off = 100.0 * (shown.friction(pressure).coulomb_friction / mean - 1.0)
-            row += [number(mean), number(off, 1, signed=True)]
+    for pressure, mean in zip_longest(pressures, measured):
+        found = shown.friction(pressure)
+        forces = (found.coulomb_friction, found.coulomb_friction_std, found.coulomb_friction + found.stiction)
+        row = [number(pressure / BAR), number(pressure / PSI, 0), *map(number, forces)]
+        if mean is not None:
+            row += [number(mean), number(100.0 * (found.coulomb_friction / mean - 1.0), 1, signed=True)]
+        rows.append(row)
     return Table(heads, rows)
 
 
@@ -219,8 +214,7 @@ def seal_coefficient_figure(shown: ChartedSeal, law: PhysicsBased) -> Plot:
         # 250 and 750 psi were not tested: interpolated between the neighbours.
         means = np.interp(pressures, *mean_dynamic_friction()) / 2.0
         ax.plot(normal / size, means / normal, **_SINGLE, label='tests over finite elements (Figure 18)')
-    style.finish_figure_18(ax, unit)
-    return Plot('fig18_coefficient_of_friction', figure)
+    return style.figure_18(figure, ax, unit)
 
 
 def seal_normal_force_figure(shown: ChartedSeal, law: PhysicsBased) -> Plot:
@@ -234,8 +228,7 @@ def seal_normal_force_figure(shown: ChartedSeal, law: PhysicsBased) -> Plot:
     if shown.is_thesis_seal:
         x, y = thesis_columns('normal_force', axial_force_lbf=LBF, normal_force_lbf=LBF)
         ax.plot(x / size, y / size, **_SINGLE, label='finite elements (thesis, Table 4)')
-    style.finish_figure_19(ax, unit)
-    return Plot('fig19_normal_force', figure)
+    return style.figure_19(figure, ax, unit)
 
 
 def seal_model_figure(shown: ChartedSeal) -> Plot:
@@ -247,27 +240,20 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     unit, size = force_unit(float(coulomb[-1]))
     compared, measured = _compared(shown)
     if measured:
-        off = [
-            abs(100.0 * (shown.friction(p).coulomb_friction / mean - 1.0))
-            for p, mean in zip(compared, measured, strict=True)
-        ]
-        title = f'Model and mean of the tests differ by {min(off):.1f} to {max(off):.1f} %'
+        of_law = np.array([shown.friction(p).coulomb_friction for p in compared])
+        off = np.abs(100.0 * (of_law / measured - 1.0))
+        title = f'Model and mean of the tests differ by {off.min():.1f} to {off.max():.1f} %'
     else:
         title = f'Coulomb friction reaches {coulomb[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
     figure, ax = style.new_figure(title, 4.4)
-    label = f'95 % band (± {BAND_95} std)'
-    style.fill_band(ax, pressures / BAR, coulomb / size, half / size, label=label)
+    style.fill_band(ax, pressures / BAR, coulomb / size, half / size, label=f'95 % band (± {BAND_95} std)')
     ax.plot(pressures / BAR, coulomb / size, color=style.BLUE, lw=1.8, label='Coulomb friction, model')
     breakaway = coulomb + np.array([f.stiction for f in frictions])
     ax.plot(pressures / BAR, breakaway / size, color=style.ORANGE, ls='--', label='breakaway force, model')
     if shown.is_thesis_seal:
         _draw_readings(ax, size)
-    ax.set(
-        xlim=(-0.01 * pressures[-1] / BAR, None),
-        ylim=(0.0, None),
-        xlabel=PRESSURE_LABEL,
-        ylabel=f'friction of {shown.count_text} [{unit}]',
-    )
+    ax.set(xlim=(-0.01 * pressures[-1] / BAR, None), ylim=(0.0, None))
+    ax.set(xlabel=PRESSURE_LABEL, ylabel=f'friction of {shown.count_text} [{unit}]')
     ax.legend(loc='upper left' if coulomb[-1] > coulomb[0] else 'best')
     return Plot('fig24_model_over_pressure', figure)
 
@@ -306,8 +292,7 @@ def rest_state_figure(shown: ChartedSeal) -> Plot:
     figure, ax = style.new_figure(f'At rest: the seals hold up to {coulomb / size:.3g} {unit}', 4.0)
     if friction.stiction > 0.0:
         held = friction_over_force_sum(shown, pressure, swept, use_stiction=True)
-        label = 'with stiction, as measured at breakaway'
-        ax.plot(swept / size, held / size, color=style.ORANGE, ls='--', label=label)
+        ax.plot(swept / size, held / size, color=style.ORANGE, ls='--', label='with stiction, as measured at breakaway')
     held = friction_over_force_sum(shown, pressure, swept)
     ax.plot(swept / size, held / size, color=style.BLUE, lw=1.8, label='equation of the thesis')
     for threshold in (-coulomb, coulomb):
@@ -324,9 +309,7 @@ def prior_art_table_figure() -> Plot:
     figure, ax = style.new_figure('Prior art: friction of one seal read from charts', 3.6)
     ax.plot(pressure / BAR, friction, 'o-', color=style.VERMILLION, ms=5.0, label='Table 3')
     ax.plot(pressure / BAR, part, 's--', color=style.ORANGE, ms=4.0, label='share due to pressure')
-    ax.set(ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel='friction of one seal [N]')
-    style.legend_above(ax)
-    return Plot('fig12_prior_art', figure)
+    return finished('fig12_prior_art', figure, ax, PRESSURE_LABEL, 'friction of one seal [N]')
 
 
 def prior_art_tests_figure() -> Plot:

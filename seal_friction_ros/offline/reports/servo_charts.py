@@ -9,6 +9,7 @@ import numpy as np
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
+from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.position_servo import ServoParameters, Trajectory, init, simulate
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, tracking_peak, tracking_rms
@@ -18,9 +19,8 @@ from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit, number
 from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, parameter_rows, write_page
 
-SETTLING_PERIODS = 2  # of the reference, left out; 0.4 s at 5 Hz
-EVALUATED_PERIODS = 6  # of the reference, after those
-SHOWN_PERIODS = 2  # of the evaluated ones, in the figures
+CHART_PERIODS = 6  # of the reference, evaluated after `SETTLING_PERIODS`
+SHOWN_PERIODS = 2  # in the figures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,42 +70,21 @@ def default_servo() -> ServoParameters:
     return ServoParameters(seals=load_seals(SealSelection()))
 
 
-def without_seals(parameters: ServoParameters) -> ServoParameters:
-    """The same servo without friction of seals."""
-    return replace(parameters, seals=())
-
-
 def follow_wave(parameters: ServoParameters, wave: Sine) -> FollowedWave:
     """Simulate a servo that follows a wave from rest, and evaluate it after `SETTLING_PERIODS`."""
     period = 1.0 / wave.frequency
     step = parameters.control_period
-    settling, count = round(SETTLING_PERIODS * period / step), round(EVALUATED_PERIODS * period / step)
-    wanted = [wave.at(i * step) for i in range(settling + count)]
-    _, everything = simulate(parameters, init(parameters, wave.offset), wanted)
+    settling, count = round(SETTLING_PERIODS * period / step), round(CHART_PERIODS * period / step)
+    setpoints = [wave.at(i * step) for i in range(settling + count)]
+    _, everything = simulate(parameters, init(parameters, wave.offset), setpoints)
     # A row of the trajectory holds the end of its step, so it belongs to the next reference.
     trajectory = Trajectory(*(column[settling - 1 : -1] for column in everything))
-    reference = np.array([r.position for r in wanted[settling:]])
+    reference = np.array([setpoint.position for setpoint in setpoints[settling:]])
     position = trajectory.position
     dwell = dwell_per_reversal(trajectory.velocity, step)
-    tracking = ServoTracking(
-        rms=tracking_rms(reference, position),
-        peak=tracking_peak(reference, position),
-        reached=float(np.ptp(position)) / 2.0,
-        dwell=dwell,
-        dwell_share=dwell / period,
-    )
+    rms, peak, reached = tracking_rms(reference, position), tracking_peak(reference, position), np.ptp(position) / 2.0
+    tracking = ServoTracking(rms=rms, peak=peak, reached=float(reached), dwell=dwell, dwell_share=dwell / period)
     return FollowedWave(np.linspace(0.0, (count - 1) * step, count), reference, trajectory, tracking)
-
-
-def friction_force(trajectory: Trajectory) -> FloatArray:
-    """Friction force of the seals [N]: Coulomb friction in motion, the force sum up to the breakaway force at rest.
-
-    Source: `seal_friction_ros.core.friction.states.state_friction`, for arrays.
-    """
-    breakaway = trajectory.breakaway_force
-    held = np.clip(trajectory.force_sum, -breakaway, breakaway)
-    sliding = np.sign(trajectory.velocity) * trajectory.coulomb_friction
-    return np.where(trajectory.velocity == 0.0, held, sliding)
 
 
 @house_style()
@@ -124,8 +103,8 @@ def write_servo_charts(
     """
     servo, wave = parameters or default_servo(), wave or Sine()
     if not servo.seals:
-        raise ValueError('the servo has no seals: there is no friction to compare with none')
-    rubbing, free = follow_wave(servo, wave), follow_wave(without_seals(servo), wave)
+        raise ValueError('the servo has no seals, so no friction to show')
+    rubbing, free = follow_wave(servo, wave), follow_wave(replace(servo, seals=()), wave)
     figures = write_page(
         out,
         'servo',
@@ -137,7 +116,7 @@ def write_servo_charts(
         tracking_table=_tracking_table(rubbing.tracking, free.tracking),
         parameter_table=_parameter_table(servo, wave),
         SETTLING_PERIODS=SETTLING_PERIODS,
-        EVALUATED_PERIODS=EVALUATED_PERIODS,
+        CHART_PERIODS=CHART_PERIODS,
     )
     return ServoChartsSummary(
         page=out,
@@ -180,12 +159,10 @@ def figure_25(rubbing: FollowedWave, free: FollowedWave, wave: Sine) -> Plot:
     """Position with and without friction against the reference (Figure 25), and the tracking errors."""
     part = _shown_periods(rubbing, wave)
     time, dwell = rubbing.time[part], rubbing.tracking.dwell
-    title = 'The rod reverses without a rest'
-    if dwell:
-        share = 100.0 * rubbing.tracking.dwell_share
-        title = (
-            f'Friction flattens the peaks: a rest of {dwell / MS:.1f} ms at each reversal, {share:.0f} % of a period'
-        )
+    share = 100.0 * rubbing.tracking.dwell_share
+    title = f'Friction flattens the peaks: a rest of {dwell / MS:.1f} ms at each reversal, {share:.0f} % of a period'
+    if not dwell:
+        title = 'The rod reverses without a rest'
     figure, axes = style.new_figure(title, 5.6, nrows=2, sharex=True, gridspec_kw={'height_ratios': [3.0, 1.6]})
     at_rest = rubbing.trajectory.velocity[part] == 0.0
     for ax, label in zip(axes, ('at rest, with friction', None), strict=True):
@@ -219,7 +196,7 @@ def forces_figure(rubbing: FollowedWave, wave: Sine) -> Plot:
         (breakaway, {'color': style.VERMILLION, 'lw': 1.1, 'ls': ':', 'label': 'breakaway force'}),
         (-breakaway, {'color': style.VERMILLION, 'lw': 1.1, 'ls': ':'}),
         (trajectory.force_sum, {'color': style.BLACK, 'lw': 1.2, 'label': 'force sum'}),
-        (friction_force(trajectory), {'color': style.BLUE, 'lw': 1.6, 'label': 'friction force'}),
+        (trajectory.friction_force, {'color': style.BLUE, 'lw': 1.6, 'label': 'friction force'}),
     ):
         style.thin_line(axes[0], time, values / size, **look)
     style.zero_lines(axes[0])

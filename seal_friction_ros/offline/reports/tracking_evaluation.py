@@ -1,8 +1,7 @@
 """Tracking of a servo, from a bag with reference and position of the rod.
 
-The bag is cut where the configuration changed, so that a feed-forward switched on live can be compared with the same
-servo without it. The definitions of settled, of periodic and of the same reference are our choice; see the constants
-below.
+A change of the configuration starts a new stretch, so a feed-forward that is switched on live is compared with the same
+servo without it. The definitions of settled, of periodic and of the same reference are our choice, see the constants.
 """
 
 import math
@@ -29,7 +28,7 @@ SAME = 0.05  # periods, amplitudes and shapes that differ by a smaller share are
 
 
 class Periodicity(NamedTuple):
-    """Period of a periodic reference."""
+    """Period of a reference."""
 
     period: float
     """[s]"""
@@ -39,7 +38,7 @@ class Periodicity(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingStretch:
-    """Tracking while the configuration stayed the same, without the time of settling."""
+    """Tracking over a stretch of unchanged configuration, without the settling time."""
 
     first: int
     """index of the first evaluated estimate"""
@@ -115,16 +114,11 @@ def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
     """
     if not np.isfinite(run.reference - run.position).any():
         return None
-    found, short = [], 0
-    for first, end, configuration in configuration_stretches(run):
-        stretch = _evaluate(run, first, end, configuration)
-        if stretch is None:
-            short += 1
-        else:
-            found.append(stretch)
-    base = next((stretch for stretch in found if not stretch.has_feedforward), None)
+    evaluated = [_evaluate(run, *stretch) for stretch in configuration_stretches(run)]
+    found = tuple(stretch for stretch in evaluated if stretch is not None)
+    base = TrackingEvaluation(found, ()).without
     compared = tuple(stretch if base is None else _compared(stretch, base) for stretch in found)
-    return TrackingEvaluation(compared, tuple(_notes(compared, base, short)))
+    return TrackingEvaluation(compared, tuple(_notes(compared, base, len(evaluated) - len(found))))
 
 
 def configuration_stretches(run: RecordedRun) -> Iterator[tuple[int, int, Configuration | None]]:
@@ -254,12 +248,8 @@ def periodicity(time: FloatArray, reference: FloatArray) -> Periodicity | None:
 
 
 def _same_reference(one: TrackingStretch, other: TrackingStretch) -> bool:
-    def close(a: float | None, b: float | None) -> bool:
-        if a is None or b is None:
-            return a is b
-        return abs(a - b) <= SAME * max(a, b)
-
-    return close(one.amplitude, other.amplitude) and close(one.period, other.period)
+    pairs = ((one.amplitude, other.amplitude), (one.period, other.period))
+    return all(a is b if a is None or b is None else math.isclose(a, b, rel_tol=SAME) for a, b in pairs)
 
 
 def _compared(stretch: TrackingStretch, base: TrackingStretch) -> TrackingStretch:

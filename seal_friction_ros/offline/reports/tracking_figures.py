@@ -29,20 +29,17 @@ def tracking_plots(run: RecordedRun, evaluation: TrackingEvaluation) -> list[Plo
     return plots
 
 
-def tracking_verdict(evaluation: TrackingEvaluation) -> str:
+def tracking_summary(evaluation: TrackingEvaluation) -> str:
     """Result of the comparison, in one line."""
     without, compensated = evaluation.without, evaluation.compensated
     if compensated is None or without is None or compensated.rms_change is None:
         alone = compensated or without
         if alone is None:
             return 'No stretch is long enough to evaluate the tracking'
-        return (
-            f'Tracking error {length_text(alone.rms)} RMS {"with" if alone.has_feedforward else "without"} feed-forward'
-        )
-    verb = 'cuts' if compensated.rms_change < 0.0 else 'raises'
-    return (
-        f'Feed-forward {verb} the tracking error from {length_text(without.rms)} to {length_text(compensated.rms)} RMS'
-    )
+        with_or_without = 'with' if alone.has_feedforward else 'without'
+        return f'Tracking error {length_text(alone.rms)} RMS {with_or_without} feed-forward'
+    verb, before, after = 'cuts' if compensated.rms_change < 0.0 else 'raises', without.rms, compensated.rms
+    return f'Feed-forward {verb} the tracking error from {length_text(before)} to {length_text(after)} RMS'
 
 
 def stretch_name(stretch: TrackingStretch) -> str:
@@ -73,16 +70,9 @@ def shown_part(run: RecordedRun, stretch: TrackingStretch) -> slice:
 
 def stretches_figure(run: RecordedRun, evaluation: TrackingEvaluation, shown: Sequence[TrackingStretch]) -> Plot:
     """Reference, position and error over the same few periods without and with feed-forward."""
-    figure, axes = style.new_figure(
-        tracking_verdict(evaluation),
-        5.0,
-        nrows=2,
-        ncols=len(shown),
-        sharex='col',
-        sharey='row',
-        squeeze=False,
-        gridspec_kw={'height_ratios': [3.0, 2.0]},
-    )
+    layout = {'nrows': 2, 'ncols': len(shown), 'sharex': 'col', 'sharey': 'row', 'squeeze': False}
+    heights = {'height_ratios': [3.0, 2.0]}
+    figure, axes = style.new_figure(tracking_summary(evaluation), 5.0, **layout, gridspec_kw=heights)
     largest = max(stretch.peak for stretch in shown) or UM
     unit, size = length_unit(largest)
     for stretch, (above, below) in zip(shown, axes.T, strict=True):

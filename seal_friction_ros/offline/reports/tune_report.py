@@ -1,6 +1,5 @@
-"""Report of a tuning, to check before the parameters go to a machine."""
+"""Report of a tuning, to check before use of the parameters on a machine."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,8 @@ from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import MM, MS, UM
 from seal_friction_ros.core.servo import closed_loop
-from seal_friction_ros.core.servo.closed_loop import SETTLED_PERIODS, Performance, Run
-from seal_friction_ros.core.tuning.recorded_axis import NEAR_REVERSAL
+from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS, AxisRun, Performance
+from seal_friction_ros.core.tuning.recorded_axis import NEAR_REVERSAL, Residual
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number, relative_change, signed_percent
@@ -22,8 +21,9 @@ from seal_friction_ros.offline.tuning.tune import BagTuning, SimulatorTuning
 ZOOM = 0.22  # of the period, on each side of a reversal
 SHOWN_PERIODS = 2  # of the sine
 SHOWN_REVERSALS = 6  # of a bag
-DOTS = 8000  # of a scatter
+DOTS = 8000  # in the scatter
 SHADES = (style.SKY, style.BLUE, style.BLACK)  # delay too small, right, too large
+RESIDUALS = (('sliding', 'while sliding'), ('reversal', 'near reversals'))
 TIME_LABEL = 'time since the first reference [s]'
 
 
@@ -43,19 +43,19 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
         'was': tuning.found.without,
         'now': tuning.found.nominal,
         'parameter_table': _parameter_table(tuning),
+        'case_table': _case_table(tuning),
     }
     if isinstance(tuning, SimulatorTuning):
         problem = tuning.problem
-        performances = [case.performance for case in tuning.found.cases]
+        performances = [case.outcome for case in tuning.found.cases]
         return write_page(
             out,
             'simulator_tuning',
             tuning_figures(tuning),
-            case_table=_case_table(tuning),
             worst={name: max(getattr(p, name) for p in performances) for name in ('tracking_rms', 'overshoot')},
             reversals=sum(p.limit_cycle_reversals for p in performances),
             settings=problem.settings,
-            whole_delay=closed_loop.whole_delay(problem.axis.servo, problem.settings.delay),
+            whole_delay=problem.whole_delay,
             loop=closed_loop,
             **shared,
         )
@@ -63,7 +63,6 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
         out,
         'bag_tuning',
         recorded_axis_figures(tuning),
-        residual_table=_residual_table(tuning),
         recorded=tuning.track.numbers(),
         sliding_samples=int(np.count_nonzero(tuning.found.law.sliding)),
         offset_is_known=bool(np.isfinite(tuning.found.law.offset)),
@@ -91,29 +90,31 @@ def _parameter_table(tuning: SimulatorTuning | BagTuning) -> Table:
     return Table(('parameter', 'before', 'now', 'unit', '', 'meaning'), rows, (0, 3, 4, 5))
 
 
-def _case_table(tuning: SimulatorTuning) -> Table:
-    heads = (
-        'friction model', 'delay', 'tracking RMS [µm]', 'peak [µm]', 'dwell [ms]', 'overshoot [µm]',
-        'reversals at rest', 'largest force [N]', 'largest rate [N/ms]',
-    )  # fmt: skip
+def _case_table(tuning: SimulatorTuning | BagTuning) -> Table:
+    heads: tuple[str, ...] = ('left while sliding [N]', 'left near reversals [N]')
+    if isinstance(tuning, SimulatorTuning):
+        heads = (
+            'tracking RMS [µm]', 'peak [µm]', 'dwell [ms]', 'overshoot [µm]', 'reversals at rest', 'largest force [N]',
+            'largest rate [N/ms]',
+        )  # fmt: skip
 
-    def row(friction: str, delay: str, p: Performance) -> tuple[Any, ...]:
-        lengths = [number(value / UM, 1) for value in (p.tracking_rms, p.tracking_peak)]
-        rest = number(p.dwell / MS), number(p.overshoot / UM, 1), p.limit_cycle_reversals
-        return friction, delay, *lengths, *rest, number(p.largest_force, 1), number(p.largest_force_rate * MS, 1)
+    def cells(outcome: Performance | Residual) -> tuple[Any, ...]:
+        if isinstance(outcome, Residual):
+            return tuple(number(value) for value in outcome)
+        return (
+            number(outcome.tracking_rms / UM, 1),
+            number(outcome.tracking_peak / UM, 1),
+            number(outcome.dwell / MS),
+            number(outcome.overshoot / UM, 1),
+            outcome.limit_cycle_reversals,
+            number(outcome.largest_force, 1),
+            number(outcome.largest_force_rate * MS, 1),
+        )
 
-    rows = [row('without', DASH, tuning.found.without)]
-    rows += [
-        row(signed_percent(c.friction_error), signed_percent(c.delay_error), c.performance) for c in tuning.found.cases
-    ]
-    return Table(heads, rows)
-
-
-def _residual_table(tuning: BagTuning) -> Table:
-    cases = [('without', DASH, tuning.found.without)]
-    cases += [(signed_percent(c.friction_error), signed_percent(c.delay_error), c.residual) for c in tuning.found.cases]
-    rows = [(friction, delay, number(r.sliding), number(r.reversal)) for friction, delay, r in cases]
-    return Table(('friction model', 'delay', 'left while sliding [N]', 'left near reversals [N]'), rows)
+    rows = [('without', DASH, *cells(tuning.found.without))]
+    for friction_error, delay_error, outcome in tuning.found.cases:
+        rows.append((signed_percent(friction_error), signed_percent(delay_error), *cells(outcome)))
+    return Table(('friction model', 'delay', *heads), rows)
 
 
 # -- figures of the simulated servo -----------------------------------------------------------------------------------
@@ -121,12 +122,12 @@ def _residual_table(tuning: BagTuning) -> Table:
 
 def tuning_figures(tuning: SimulatorTuning) -> list[Plot]:
     """Tracking, forces, move and robustness."""
-    without = tuning.problem.runs(closed_loop.without_feedforward(tuning.found.feedforward))
-    with_it = tuning.problem.runs(tuning.found.feedforward)
+    sine, move, _ = tuning.problem.runs(closed_loop.without_feedforward(tuning.found.feedforward))
+    tuned_sine, tuned_move, _ = tuning.problem.runs(tuning.found.feedforward)
     return [
-        tuned_tracking_figure(tuning, without[0], with_it[0]),
-        tuned_force_figure(tuning, with_it[0]),
-        move_figure(tuning, without[1], with_it[1]),
+        tuned_tracking_figure(tuning, sine, tuned_sine),
+        tuned_force_figure(tuning, tuned_sine),
+        move_figure(tuning, move, tuned_move),
         robustness_figure(tuning),
     ]
 
@@ -134,18 +135,18 @@ def tuning_figures(tuning: SimulatorTuning) -> list[Plot]:
 def _shown_time(tuning: SimulatorTuning) -> tuple[float, float]:
     """Start and end of the shown periods of the sine [s]."""
     period = 1.0 / tuning.problem.settings.frequency
-    return SETTLED_PERIODS * period, (SETTLED_PERIODS + SHOWN_PERIODS) * period
+    return SETTLING_PERIODS * period, (SETTLING_PERIODS + SHOWN_PERIODS) * period
 
 
 def _line_between(ax: Axes, span: tuple[float, float], time: FloatArray, values: FloatArray, **look: Any) -> None:
-    """Line through the samples in a span of time, so that the y axis fits them."""
+    """Line through the samples in a span of time only, so the y axis fits them."""
     inside = (time >= span[0]) & (time <= span[1])
     ax.plot(time[inside], values[inside], **look)
     ax.set_xlim(span)
 
 
-def tuned_tracking_figure(tuning: SimulatorTuning, without: Run, with_it: Run) -> Plot:
-    """Figure 25 of the thesis, with and without feed-forward: two periods, a reversal, the error."""
+def tuned_tracking_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> Plot:
+    """Figure 25 of the thesis with and without feed-forward: two periods, one reversal, the error."""
     was, now = tuning.found.without, tuning.found.nominal
     title = (
         f'With feed-forward: error {relative_change(was.tracking_rms, now.tracking_rms)}, '
@@ -173,7 +174,7 @@ def tuned_tracking_figure(tuning: SimulatorTuning, without: Run, with_it: Run) -
     return Plot('tracking', figure)
 
 
-def tuned_force_figure(tuning: SimulatorTuning, run: Run) -> Plot:
+def tuned_force_figure(tuning: SimulatorTuning, run: AxisRun) -> Plot:
     """Friction of the seals and feed-forward, over two periods."""
     figure, ax = style.new_figure('Friction of the seals and feed-forward', 3.4)
     span = _shown_time(tuning)
@@ -185,11 +186,11 @@ def tuned_force_figure(tuning: SimulatorTuning, run: Run) -> Plot:
     return Plot('force', figure)
 
 
-def move_figure(tuning: SimulatorTuning, without: Run, with_it: Run) -> Plot:
-    """Error of the move, with the right model and with one that gives too much friction."""
+def move_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> Plot:
+    """Position and error of the move, with the right model and with a model of too much friction."""
     error = tuning.problem.settings.friction_error
     worst = tuning.problem.runs(tuning.found.feedforward, friction_error=error)[1]
-    over = max(case.performance.overshoot for case in tuning.found.cases)
+    over = max(case.outcome.overshoot for case in tuning.found.cases)
     title = f'Largest overshoot of the move in all cases: {over / UM:.3g} µm'
     figure, axes = style.new_figure(title, 4.8, nrows=2, sharex=True)
     reference = {'color': style.GREY, 'lw': 2.2, 'alpha': 0.6, 'label': 'reference'}
@@ -210,34 +211,35 @@ def move_figure(tuning: SimulatorTuning, without: Run, with_it: Run) -> Plot:
     return Plot('move', figure)
 
 
-def robustness_figure(tuning: SimulatorTuning) -> Plot:
-    """Error and dwell in all cases."""
-    was, cases = tuning.found.without, tuning.found.cases
-    better = tuning.found.better_in_every_case
-    title = 'Better than none with every model and delay tried' if better else 'NOT better in every case'
+def robustness_figure(tuning: SimulatorTuning | BagTuning) -> Plot:
+    """Error and dwell, or the friction left to the controller, in all cases."""
+    found, title = tuning.found, 'NOT better in every case'
+    panels = tuple((name, 1.0, f'RMS friction left {text} [N]') for name, text in RESIDUALS)
+    if isinstance(tuning, SimulatorTuning):
+        panels = (('tracking_rms', UM, 'tracking RMS [µm]'), ('dwell', MS, 'dwell per reversal [ms]'))
+    if found.better_in_every_case:
+        simulated = isinstance(tuning, SimulatorTuning)
+        title = 'Better than none with every model and delay tried' if simulated else 'Less friction left in every case'
     figure, axes = style.new_figure(title, 3.8, ncols=2)
-    rows = [(c.friction_error, c.delay_error, c.performance.tracking_rms / UM) for c in cases]
-    _draw_cases(axes[0], rows, was.tracking_rms / UM, 'tracking RMS [µm]')
-    rows = [(c.friction_error, c.delay_error, c.performance.dwell / MS) for c in cases]
-    _draw_cases(axes[1], rows, was.dwell / MS, 'dwell per reversal [ms]')
+    for ax, (name, size, label) in zip(axes, panels, strict=True):
+        values = {case[:2]: getattr(case.outcome, name) / size for case in found.cases}
+        _draw_cases(ax, values, getattr(found.without, name) / size, label)
     style.legend_above(axes[1])
     return Plot('robustness', figure)
 
 
-def _draw_cases(ax: Axes, rows: Sequence[tuple[float, float, float]], without: float, label: str) -> None:
-    """Bars in a group for each friction error, one bar for each delay error, and the line without feed-forward."""
-    frictions = sorted({friction for friction, _, _ in rows})
-    delays = sorted({delay for _, delay, _ in rows})
+def _draw_cases(ax: Axes, values: dict[tuple[float, float], float], without: float, label: str) -> None:
+    """A group of bars for each friction error, a bar for each delay error, and a line without feed-forward."""
+    frictions, delays = (sorted(set(errors)) for errors in zip(*values, strict=True))
     width = 0.8 / len(delays)
     for place, delay in enumerate(delays):
-        heights = [value for _, other, value in rows if other == delay]
+        heights = [values[friction, delay] for friction in frictions]
         x = np.arange(len(frictions)) + (place - 0.5 * (len(delays) - 1)) * width
         colour = SHADES[place] if len(delays) == len(SHADES) else style.BLUE
         ax.bar(x, heights, 0.92 * width, color=colour, label=f'delay {signed_percent(delay)}')
     ax.axhline(without, color=style.VERMILLION, ls='--', label='without')
     ax.set_xticks(np.arange(len(frictions)), [signed_percent(friction) for friction in frictions])
-    highest = max([without, *(value for _, _, value in rows)])
-    ax.set(xlabel='error of the friction model', ylabel=label, ylim=(0.0, 1.12 * highest or 1.0))
+    ax.set(xlabel='error of the friction model', ylabel=label, ylim=(0.0, 1.12 * max(without, *values.values()) or 1.0))
     ax.grid(visible=False, axis='x')
 
 
@@ -246,14 +248,14 @@ def _draw_cases(ax: Axes, rows: Sequence[tuple[float, float, float]], without: f
 
 def recorded_axis_figures(tuning: BagTuning) -> list[Plot]:
     """Friction and feed-forward over time and velocity, robustness, and tracking if it was recorded."""
-    plots = [recorded_friction_figure(tuning), recorded_law_figure(tuning), remaining_friction_figure(tuning)]
+    plots = [recorded_friction_figure(tuning), recorded_law_figure(tuning), robustness_figure(tuning)]
     if np.isfinite(tuning.track.position).any():
         plots.append(recorded_tracking_figure(tuning))
     return plots
 
 
 def recorded_friction_figure(tuning: BagTuning) -> Plot:
-    """Friction of the axis and the feed-forward that would have compensated it."""
+    """Friction of the axis, and the feed-forward along its recorded reference."""
     found = tuning.found
     change = relative_change(found.without.sliding, found.nominal.sliding)
     figure, axes = style.new_figure(
@@ -295,18 +297,6 @@ def recorded_law_figure(tuning: BagTuning) -> Plot:
     style.zero_lines(ax, vertical=True)
     style.legend_above(ax)
     return Plot('law', figure)
-
-
-def remaining_friction_figure(tuning: BagTuning) -> Plot:
-    """Friction left to the controller in all cases."""
-    found = tuning.found
-    title = 'Less friction left in every case' if found.better_in_every_case else 'NOT better in every case'
-    figure, axes = style.new_figure(title, 3.8, ncols=2)
-    for ax, name, label in ((axes[0], 'sliding', 'while sliding'), (axes[1], 'reversal', 'near reversals')):
-        rows = [(c.friction_error, c.delay_error, getattr(c.residual, name)) for c in found.cases]
-        _draw_cases(ax, rows, getattr(found.without, name), f'RMS friction left {label} [N]')
-    style.legend_above(axes[1])
-    return Plot('robustness', figure)
 
 
 def recorded_tracking_figure(tuning: BagTuning) -> Plot:

@@ -1,7 +1,7 @@
 """Tuning of the feed-forward for a simulated or a recorded axis, and the ROS parameter file with the result.
 
-The file holds every parameter of the feed-forward and nothing else. It does not depend on when or where it was made, so
-the same axis gives the same bytes.
+The file holds every parameter of the feed-forward and nothing else. It does not depend on time or place, so the same
+axis gives the same bytes.
 """
 
 import os
@@ -33,13 +33,13 @@ from seal_friction_ros.core.foundation.units import MM, MS
 from seal_friction_ros.core.servo.closed_loop import Axis
 from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
-from seal_friction_ros.core.tuning.recorded_axis import Match, Recording, match
-from seal_friction_ros.core.tuning.settings import MatchSettings, TuningSettings
-from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Problem, Tuning, tune
+from seal_friction_ros.core.tuning.recorded_axis import RecordedTuning, Recording, tune_recorded_axis
+from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
+from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
-from seal_friction_ros.offline.bags.topics import Topics, find_topics
-from seal_friction_ros.offline.replay.replay import Step, steps
+from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.replay.replay import steps
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.progress import progress
 
@@ -52,7 +52,7 @@ PERFORMANCE = ('tracking_rms', 'tracking_peak', 'dwell', 'overshoot', 'limit_cyc
 
 
 class TuningTask(NamedTuple):
-    """What was tuned."""
+    """Subject of a tuning."""
 
     source: str
     motion: str
@@ -64,12 +64,10 @@ class TuningTask(NamedTuple):
 
 
 class RecordedTrack(NamedTuple):
-    """Reference and position of the rod of a recorded axis, shape (n,); NaN where they are unknown."""
+    """Reference and position of the rod of a recorded axis [m], shape (n,); NaN where they are unknown."""
 
     reference: FloatArray
-    """[m]"""
     position: FloatArray
-    """[m]"""
 
     def numbers(self) -> dict[str, float | None]:
         """Tracking error as recorded [m], with any compensation active at that time; None without positions."""
@@ -86,48 +84,44 @@ class SimulatorTuning:
     """Result of a tuning on the simulated servo."""
 
     task: TuningTask
-    problem: Problem
+    problem: TuningProblem
     found: Tuning
 
     @property
-    def verdict(self) -> str:
-        """Result in words."""
+    def summary(self) -> str:
+        """Result as a sentence."""
         was, now = self.found.without, self.found.nominal
         if not self.found.feedforward.coulomb_scale:
             return 'No feed-forward is better than none on this plant.'
+        worst = self.found.cases[-1]
+        better = 'better than none, and at rest,'
+        if not self.found.better_in_every_case:
+            better = 'NOT better than none, or not at rest,'
         text = (
             f'Tracking RMS {was.tracking_rms / MM:.3g} to {now.tracking_rms / MM:.3g} mm, '
-            f'dwell per reversal {was.dwell / MS:.3g} to {now.dwell / MS:.3g} ms'
+            f'dwell per reversal {was.dwell / MS:.3g} to {now.dwell / MS:.3g} ms; '
+            f'{better} in every case with a model error up to {100.0 * worst.friction_error:.3g} % and a delay error '
+            f'up to {100.0 * worst.delay_error:.3g} %'
         )
-        worst = self.found.cases[-1]
-        errors = (
-            f'with a model error up to {100.0 * worst.friction_error:.3g} % and a delay error up to '
-            f'{100.0 * worst.delay_error:.3g} %'
-        )
-        if self.found.better_in_every_case:
-            return f'{text}; better than none, and at rest, in every case {errors}.'
-        return f'{text}; NOT better than none, or not at rest, in every case {errors}: see the robustness cases.'
+        return f'{text}.' if self.found.better_in_every_case else f'{text}: see the robustness cases.'
 
     @property
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON, in SI units."""
-        was, now = self.found.without, self.found.nominal
+        found = self.found
         return {
             'source': 'simulator',
-            'parameters': asdict(self.found.feedforward),
-            'merit': self.found.merit,
-            **{f'{name}_without': getattr(was, name) for name in PERFORMANCE},
-            **{f'{name}_with': getattr(now, name) for name in PERFORMANCE},
-            'largest_force': now.largest_force,
-            'largest_force_rate': now.largest_force_rate,
-            'better_in_every_case': self.found.better_in_every_case,
+            'parameters': asdict(found.feedforward),
+            'merit': found.merit,
+            **{f'{name}_without': getattr(found.without, name) for name in PERFORMANCE},
+            **{f'{name}_with': getattr(found.nominal, name) for name in PERFORMANCE},
+            'largest_force': found.nominal.largest_force,
+            'largest_force_rate': found.nominal.largest_force_rate,
+            'better_in_every_case': found.better_in_every_case,
             'robustness': [
-                {
-                    'friction_error': case.friction_error,
-                    'delay_error': case.delay_error,
-                    **{name: getattr(case.performance, name) for name in PERFORMANCE},
-                }
-                for case in self.found.cases
+                {'friction_error': friction_error, 'delay_error': delay_error}
+                | {name: getattr(performance, name) for name in PERFORMANCE}
+                for friction_error, delay_error, performance in found.cases
             ],
             'settings': asdict(self.problem.settings),
         }
@@ -142,49 +136,44 @@ class BagTuning:
     task: TuningTask
     recording: Recording
     track: RecordedTrack
-    known: MatchSettings
-    found: Match
+    known: RecordedAxisSettings
+    found: RecordedTuning
 
     @property
-    def verdict(self) -> str:
-        """Result in words."""
+    def summary(self) -> str:
+        """Result as a sentence."""
         was, now = self.found.without, self.found.nominal
         text = (
             f'RMS friction left to the controller while sliding {was.sliding:.3g} to {now.sliding:.3g} N, '
             f'near reversals {was.reversal:.3g} to {now.reversal:.3g} N'
         )
-        unknown = [name for name, is_told in self.found.told.items() if not is_told]
-        kept = f'; not identifiable from the bag and unchanged: {", ".join(unknown)}' if unknown else ''
-        wrong = (
-            '' if self.found.better_in_every_case else '; NOT better than none in every case: see the robustness cases'
-        )
-        return f'{text}{kept}{wrong}.'
+        if unchanged := [name for name, is_identified in self.found.identified.items() if not is_identified]:
+            text += f'; not identifiable from the bag and unchanged: {", ".join(unchanged)}'
+        if not self.found.better_in_every_case:
+            text += '; NOT better than none in every case: see the robustness cases'
+        return f'{text}.'
 
     @property
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON, in SI units; None for the numbers that need a closed loop."""
-        law = self.found.law
+        found, law = self.found, self.found.law
         return {
             'source': 'bag',
             'bag': self.bag,
-            'parameters': asdict(self.found.feedforward),
-            'told_by_bag': self.found.told,
+            'parameters': asdict(found.feedforward),
+            'told_by_bag': found.identified,
             **{f'{name}_{which}': None for name in PERFORMANCE for which in ('without', 'with')},
-            'residual_without': self.found.without._asdict(),
-            'residual_with': self.found.nominal._asdict(),
+            'residual_without': found.without._asdict(),
+            'residual_with': found.nominal._asdict(),
             'friction_over_model': law.scale,
             'friction_over_model_std': law.scale_std,
             'mass': law.mass,
             'mass_is_fitted': law.mass_is_fitted,
             'force_offset': law.offset,
-            'better_in_every_case': self.found.better_in_every_case,
+            'better_in_every_case': found.better_in_every_case,
             'robustness': [
-                {
-                    'friction_error': case.friction_error,
-                    'delay_error': case.delay_error,
-                    'residual': case.residual._asdict(),
-                }
-                for case in self.found.cases
+                {'friction_error': friction_error, 'delay_error': delay_error, 'residual': left._asdict()}
+                for friction_error, delay_error, left in found.cases
             ],
             **self.track.numbers(),
             'settings': asdict(self.known),
@@ -195,16 +184,16 @@ def tune_simulator(settings: TuningSettings, configuration: Configuration | None
     """Tune on the simulated servo, with the seals of the configuration.
 
     Args:
-        settings: Test motion of the axis, and errors of its model.
+        settings: Task of the axis, and errors of its model.
         configuration: Seals and estimator; its feed-forward has the parameters that are not tuned.
 
     Raises:
-        ValueError: The servo cannot follow.
+        ValueError: The servo cannot follow the task.
     """
     chosen = configuration or default_configuration()
     parameters = chosen.parameters()
     servo = ServoParameters(seals=parameters.estimator.seals, control_period=CONTROL_PERIOD, inner_step=INNER_STEP)
-    problem = Problem(Axis(servo, parameters), settings, sensor_noise(settings))
+    problem = TuningProblem(Axis(servo, parameters), settings, sensor_noise(settings))
     with progress('tune', MOST_CANDIDATES) as advance:
         found = tune(problem, advance)
     motion = (
@@ -216,7 +205,7 @@ def tune_simulator(settings: TuningSettings, configuration: Configuration | None
 
 
 def tune_bag(
-    bag: Path, known: MatchSettings, configuration: Configuration | None = None, namespace: str = ''
+    bag: Path, known: RecordedAxisSettings, configuration: Configuration | None = None, namespace: str = ''
 ) -> BagTuning:
     """Find the feed-forward that matches the friction in a bag of a real axis.
 
@@ -227,14 +216,14 @@ def tune_bag(
         namespace: Only topics below it count.
 
     Raises:
-        ValueError: The bag cannot be read, or an input is missing in it.
+        BagError: The bag cannot be read, or an input is missing in it.
     """
     recording, track, recorded = read_recording(bag, configuration, namespace)
     try:
-        found = match(recording, recorded.feedforward, known)
+        found = tune_recorded_axis(recording, recorded.feedforward, known)
     except ValueError as error:
         raise BagError(f'{bag}: {error}') from None
-    tuned = tuple(parameter for parameter, is_told in found.told.items() if is_told)
+    tuned = tuple(parameter for parameter, is_identified in found.identified.items() if is_identified)
     motion = f'{len(recording.estimates)} samples, {recording.time[-1]:.3f} s'
     name = bag.resolve().name
     task = TuningTask(f'bag {name}', motion, _seals_text(recorded), recorded.feedforward, tuned)
@@ -242,7 +231,7 @@ def tune_bag(
 
 
 def sensor_noise(settings: TuningSettings) -> FloatArray:
-    """White noise of the sensors of the estimator, shape (`NOISE_LENGTH`, 4), as `closed_loop` takes it."""
+    """White noise of the sensors of the estimator, shape (`NOISE_LENGTH`, 4), as `run_closed_loop` takes it."""
     spread = [settings.pressure_noise, settings.pressure_noise, settings.force_noise, settings.velocity_noise]
     return np.random.default_rng(settings.seed).normal(size=(NOISE_LENGTH, 4)) * spread
 
@@ -253,20 +242,19 @@ def _seals_text(configuration: Configuration) -> str:
     return ', '.join(f'{name} on chamber {chamber}' for name, chamber in zip(names, chambers, strict=True))
 
 
-# -- recorded axis ----------------------------------------------------------------------------------------------------
-
-
-class ReadBag(NamedTuple):
-    """Contents of a bag that the tuning needs."""
+class RecordedAxis(NamedTuple):
+    """Contents of a bag for the tuning."""
 
     recording: Recording
     track: RecordedTrack
     configuration: Configuration
-    """the last one"""
+    """the last one in the bag"""
 
 
-def read_recording(bag: Path, override: Configuration | None = None, namespace: str = '') -> ReadBag:
-    """Recording of an axis, with the estimates computed anew; samples with a stamp not after the last are left out.
+def read_recording(bag: Path, override: Configuration | None = None, namespace: str = '') -> RecordedAxis:
+    """Recording of an axis from the first reference on; the estimates are computed anew.
+
+    A velocity sample takes the newest other inputs. A sample with a stamp not after the previous one is left out.
 
     Raises:
         BagError: The bag cannot be read, or an input is missing in it.
@@ -280,61 +268,37 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
     for type_name, (topic, reason) in needed.items():
         if not topic:
             raise BagError(f'{bag}: no message of {type_name} in it, but {reason}: record this topic too')
-    collector = _RecordingCollector(topics, override or default_configuration())
+    configuration = override or default_configuration()
+    held: dict[type, Any] = {Force: Force(0, np.nan), Position: Position(0, np.nan)}
+    estimates: list[FrictionEstimate] = []
+    motions, rows = [], []
     total = sum(info.message_count for info in bag_topics(bag).values())
     with progress(f'read {bag.name}', total) as advance:
         for count, step in enumerate(steps(read_messages(bag), topics, override), start=1):
-            collector.take(step)
             if count % 1000 == 0:
                 advance(1000)
-    if len(collector.estimates) < 2:
+            message = step.message
+            if message.type_name == CONFIGURATION_TYPE:
+                configuration = parse_snapshot(decode_text(message.data)).configuration
+                continue
+            if message.topic not in topics:
+                continue
+            sample = DECODERS[message.type_name](message.data)
+            held[type(sample)] = sample
+            reference = held.get(ServoReference)
+            if not isinstance(sample, Velocity) or reference is None:
+                continue
+            if not estimates or sample.stamp > estimates[-1].stamp:
+                (data,) = (data for type_name, data in step.answers if type_name == ESTIMATE_TYPE)
+                estimates.append(decode(ESTIMATE_TYPE, data))
+                age = (sample.stamp - reference.stamp) * 1e-9
+                motions.append(Motion(reference.velocity, reference.acceleration, sample.velocity, age))
+                rows.append((held[Force].force, reference.position, held[Position].position))
+    if len(estimates) < 2:
         raise BagError(f'{bag}: fewer than two velocity samples after the first reference')
-    return collector.result()
-
-
-class _RecordingCollector:
-    """Follows the messages of a bag and keeps the held inputs at each velocity sample after the first reference."""
-
-    def __init__(self, topics: Topics, configuration: Configuration) -> None:
-        self.estimates: list[FrictionEstimate] = []
-        self._topics = topics
-        self._configuration = configuration
-        self._motions: list[Motion] = []
-        self._rows: list[tuple[float, float, float]] = []
-        self._reference: ServoReference | None = None
-        self._position = self._force = np.nan
-
-    def take(self, step: Step) -> None:
-        """Add one message with the answers to it."""
-        message = step.message
-        if message.type_name == CONFIGURATION_TYPE:
-            self._configuration = parse_snapshot(decode_text(message.data)).configuration
-        elif message.topic in self._topics:
-            record = DECODERS[message.type_name](message.data)
-            if isinstance(record, ServoReference):
-                self._reference = record
-            elif isinstance(record, Position):
-                self._position = record.position
-            elif isinstance(record, Force):
-                self._force = record.force
-            elif isinstance(record, Velocity):
-                self._take_velocity(record, step)
-
-    def _take_velocity(self, sample: Velocity, step: Step) -> None:
-        if self._reference is None or (self.estimates and sample.stamp <= self.estimates[-1].stamp):
-            return
-        (data,) = (data for type_name, data in step.answers if type_name == ESTIMATE_TYPE)
-        reference = self._reference
-        age = (sample.stamp - reference.stamp) * 1e-9
-        self.estimates.append(decode(ESTIMATE_TYPE, data))
-        self._motions.append(Motion(reference.velocity, reference.acceleration, sample.velocity, age))
-        self._rows.append((self._force, reference.position, self._position))
-
-    def result(self) -> ReadBag:
-        """Arrays of all messages so far."""
-        force, reference, position = np.array(self._rows).T
-        recording = Recording(tuple(self.estimates), tuple(self._motions), force)
-        return ReadBag(recording, RecordedTrack(reference, position), self._configuration)
+    force, reference_position, position = np.array(rows).T
+    track = RecordedTrack(reference_position, position)
+    return RecordedAxis(Recording(estimates, motions, force), track, configuration)
 
 
 # -- parameter file ---------------------------------------------------------------------------------------------------
@@ -363,9 +327,9 @@ def check_target(out: Path) -> None:
 
 
 def parameter_text(tuning: SimulatorTuning | BagTuning) -> str:
-    """ROS parameter file of a feed-forward, with the task and the verdict as a comment."""
+    """ROS parameter file of a feed-forward, with task and summary as a comment."""
     task, settings = tuning.task, tuning.found.feedforward
-    comment = f'# Tuned on {task.source}: {task.motion}; seals: {task.seals}. {tuning.verdict}'
+    comment = f'# Tuned on {task.source}: {task.motion}; seals: {task.seals}. {tuning.summary}'
     comment = ''.join(letter if letter.isprintable() else '?' for letter in comment)  # names come from outside
     lines = [MADE_BY, *textwrap.wrap(comment, 110, subsequent_indent='# ', break_on_hyphens=False)]
     lines += [f'{NODE}:', '  ros__parameters:', f'    {FEEDFORWARD_PREFIX.rstrip(".")}:']

@@ -61,13 +61,9 @@ def run_all(
     workers: int,
     on_result: Callable[[int, Result], None] = lambda *_: None,
 ) -> list[Result]:
-    """Run calls that are of use only together.
+    """Run calls that are of use only together; arguments as `try_all`.
 
-    Args:
-        label: As `try_all`.
-        calls: As `try_all`.
-        workers: As `try_all`.
-        on_result: Called in this process with the number of a call and its result, as soon as it is done.
+    ``on_result`` is called in this process with the number of a call and its result, as soon as it is done.
 
     Returns:
         Results in the order of the calls.

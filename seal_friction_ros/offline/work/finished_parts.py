@@ -29,8 +29,8 @@ class Part(NamedTuple):
     """from `part_key`"""
     names: tuple[str, ...]
     """of the values in the result"""
-    call: Callable[[], Values]
-    """picklable function that computes the part"""
+    call: Callable[[], Any]
+    """picklable function that computes the part; returns `Values`, or a named tuple with these fields"""
 
 
 def part_key(kind: str, inputs: Any) -> str:
@@ -54,11 +54,7 @@ def _code_digest() -> str:
 
 
 def run_parts(
-    label: str,
-    parts: Sequence[Part],
-    workers: int,
-    folder: Path | None,
-    prepare: Callable[[], None] = lambda: None,
+    label: str, parts: Sequence[Part], workers: int, folder: Path | None, prepare: Callable[[], None] = lambda: None
 ) -> list[Values]:
     """Results of all parts, in their order; parts that are kept in ``folder`` are not computed.
 
@@ -80,8 +76,8 @@ def run_parts(
     results = {number: kept for number, part in enumerate(parts) if (kept := _kept(folder, part)) is not None}
     missing = [number for number in range(len(parts)) if number not in results]
 
-    def keep(place: int, values: Values) -> None:
-        number = missing[place]
+    def keep(place: int, result: Any) -> None:
+        number, values = missing[place], result._asdict() if hasattr(result, '_asdict') else result
         results[number] = values
         if folder is not None:
             plain = {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values.items()}

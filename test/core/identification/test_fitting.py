@@ -4,32 +4,34 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
-from seal_friction_ros.core.identification.fitting import (
-    band_coverage,
+from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, candidate_laws
+from seal_friction_ros.core.identification.diagnostics import (
     changed_levels,
-    climb,
     collinear_regressors,
     compare_with_law,
-    cross_validate,
-    fit,
-    identify_stiction,
-    is_beaten,
     outlying_level,
-    plain_mean,
-    recommended,
     repeatability,
     run_drift,
-    spread_of,
-    standard_errors,
     traded_off,
 )
-from seal_friction_ros.core.identification.ladder import Conditions, ladder
-from seal_friction_ros.core.identification.readings import Readings
+from seal_friction_ros.core.identification.fitting import (
+    band_coverage,
+    cross_validate,
+    fit,
+    fit_breakaway,
+    is_beaten,
+    jackknife_errors,
+    plain_mean,
+    prediction_uncertainty,
+    recommended,
+    score_laws,
+)
+from seal_friction_ros.core.identification.readings import FrictionReadings
 
 POWER = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 0.65}
 CONSTANT = 'coulomb_friction_at_any_pressure'
-LADDER = {r.name: r for r in ladder(with_speeds=True, with_exponent=True)}
-LAW = LADDER['pressure_power_law']
+LAWS = {r.name: r for r in candidate_laws(with_speeds=True, with_exponent=True)}
+LAW = LAWS['pressure_power_law']
 
 
 def noted(scatter=0.0, seed=0, law=LAW, values=POWER, offset=0.0, pressures=11, count=3, seals=2, test_scatter=0.0):
@@ -39,9 +41,9 @@ def noted(scatter=0.0, seed=0, law=LAW, values=POWER, offset=0.0, pressures=11, 
     test = np.repeat(np.arange(count), 2 * pressures)
     n = len(pressure)
     direction = np.tile([1.0, -1.0], n // 2)
-    at = Conditions(np.repeat(pressure[:, np.newaxis], seals, axis=1), None, 0.01 * direction, direction)
+    at = OperatingConditions(np.repeat(pressure[:, np.newaxis], seals, axis=1), None, 0.01 * direction, direction)
     shares = 1.0 + scatter * rng.normal(size=n) + test_scatter * rng.normal(size=count)[test]
-    return Readings(
+    return FrictionReadings(
         at=at,
         force=offset + direction * law.friction(at, values) * shares,
         source=np.zeros(n, dtype=int),
@@ -61,8 +63,8 @@ def swept(values, law, scatter=20.0, seed=0, n=3000, tied=False, offset=200.0, n
     free = 5e6 * (1.0 + np.sin(0.05 * time))
     pressure = 1e6 + 2e7 * np.abs(velocity) + 1e5 * rng.normal(size=n) if tied else free
     both = np.column_stack((pressure, 0.5 * pressure))
-    at = Conditions(both, None, velocity, np.sign(velocity))
-    return Readings(
+    at = OperatingConditions(both, None, velocity, np.sign(velocity))
+    return FrictionReadings(
         at=at,
         force=offset + np.sign(velocity) * law.friction(at, values) + scatter * rng.normal(size=n),
         source=np.zeros(n, dtype=int),
@@ -83,7 +85,7 @@ def swept(values, law, scatter=20.0, seed=0, n=3000, tied=False, offset=200.0, n
 def test_a_law_is_found_again_from_what_it_made_with_its_offset(name):
     truth = POWER | {CONSTANT: 90.0, 'viscous_friction': 800.0, 'stribeck_friction': 60.0,
                      'stribeck_velocity': 0.03, 'asymmetry': 0.15}  # fmt: skip
-    law = LADDER[name]
+    law = LAWS[name]
     found = fit(law, swept(truth, law, scatter=0.0))
     assert found.offsets == pytest.approx([200.0], abs=0.01)
     assert {p: found.values[p] for p in found.values} == pytest.approx({p: truth[p] for p in found.values}, rel=1e-3)
@@ -96,7 +98,7 @@ def test_a_term_that_is_not_there_is_exactly_nothing():
         'stribeck_velocity': 0.3,
         'viscous_friction': 0.0,
     }
-    found = fit(LADDER['coulomb_viscous'], swept(falling, LADDER['coulomb_stribeck']))
+    found = fit(LAWS['coulomb_viscous'], swept(falling, LAWS['coulomb_stribeck']))
     assert found.values['viscous_friction'] == 0.0  # friction falls with speed: a negative viscous term is no friction
 
 
@@ -106,55 +108,55 @@ def test_standard_errors_are_those_of_repeating_it_all():
         readings = noted(scatter=0.08, seed=seed, count=6)
         found = fit(LAW, readings)
         estimates.append(found.values['friction_at_no_pressure'])
-        errors.append(standard_errors(cross_validate(LAW, readings, found.values))[0])
+        errors.append(jackknife_errors(cross_validate(LAW, readings, found.values).parameters)[0])
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(estimates), rel=0.35)
 
 
 def test_standard_errors_know_that_the_readings_of_a_test_are_off_together():
     """Readings that share a scatter of 10 % tell the level no better than the number of tests allows."""
-    constant = LADDER['constant_coulomb']
+    constant = LAWS['constant_coulomb']
     errors = []
     for seed in range(40):
         readings = noted(scatter=0.01, test_scatter=0.1, seed=seed, law=constant, values={CONSTANT: 20.0})
         found = fit(constant, readings)
-        errors.append(standard_errors(cross_validate(constant, readings, found.values))[0] / 20.0)
+        errors.append(jackknife_errors(cross_validate(constant, readings, found.values).parameters)[0] / 20.0)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(0.1 / np.sqrt(3.0), rel=0.25)
 
 
 # --- which law ---
 
 
-def rungs(*names):
-    return [LADDER[name] for name in names]
+def laws(*names):
+    return [LAWS[name] for name in names]
 
 
 def test_constant_friction_gets_a_constant():
-    readings = noted(scatter=0.08, law=LADDER['constant_coulomb'], values={CONSTANT: 20.0})
-    scores = climb(rungs('constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric'), readings)
-    assert recommended(scores).rung.name == 'constant_coulomb'
+    readings = noted(scatter=0.08, law=LAWS['constant_coulomb'], values={CONSTANT: 20.0})
+    scores = score_laws(laws('constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric'), readings)
+    assert recommended(scores).law.name == 'constant_coulomb'
 
 
 @pytest.mark.parametrize('seed', range(5))
 def test_friction_that_follows_pressure_gets_that_and_no_asymmetry(seed):
-    scores = climb(rungs('constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric'),
+    scores = score_laws(laws('constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric'),
                    noted(scatter=0.08, seed=seed))  # fmt: skip
-    assert recommended(scores).rung.name == 'pressure_power_law'
+    assert recommended(scores).law.name == 'pressure_power_law'
 
 
 def test_a_stribeck_term_pays_where_it_is_there_and_nowhere_else():
     values = {CONSTANT: 100.0, 'viscous_friction': 500.0, 'stribeck_friction': 200.0,
               'stribeck_velocity': 0.05}  # fmt: skip
     names = ('constant_coulomb', 'coulomb_viscous', 'coulomb_stribeck')
-    there = climb(rungs(*names), swept(values, LADDER['coulomb_stribeck']))
-    absent = climb(rungs(*names), swept(values, LADDER['coulomb_viscous']))
-    assert recommended(there).rung.name == 'coulomb_stribeck'
-    assert recommended(absent).rung.name == 'coulomb_viscous'
+    there = score_laws(laws(*names), swept(values, LAWS['coulomb_stribeck']))
+    absent = score_laws(laws(*names), swept(values, LAWS['coulomb_viscous']))
+    assert recommended(there).law.name == 'coulomb_stribeck'
+    assert recommended(absent).law.name == 'coulomb_viscous'
 
 
 def test_a_law_needs_more_pressures_than_parameters():
     readings = noted(pressures=2)
-    (score,) = climb([LAW], readings)
-    assert not score.is_scored
+    (score,) = score_laws([LAW], readings)
+    assert score.validation is None
     assert '3 parameters need 3 pressures, there are 2' in score.why_not
     with pytest.raises(ValueError, match='no law could be fitted'):
         recommended([score])
@@ -173,7 +175,7 @@ def test_leaving_out_predicts_what_was_not_seen():
     readings = noted(scatter=0.02)
     wild = readings.group == 1
     force = np.where(wild, 1.5 * readings.force, readings.force)
-    readings = Readings(**{**vars(noted(scatter=0.02)), 'force': force})
+    readings = FrictionReadings(**{**vars(noted(scatter=0.02)), 'force': force})
     found = fit(LAW, readings)
     validation = cross_validate(LAW, readings, found.values)
     assert np.argmax(validation.losses) == 1
@@ -202,7 +204,7 @@ def test_the_band_holds_for_new_readings(scatter):
         readings = noted(scatter=scatter, seed=seed)
         found = fit(LAW, readings)
         validation = cross_validate(LAW, readings, found.values)
-        spread = spread_of(validation.predicted, validation.deviation, 3)
+        spread = prediction_uncertainty(validation.predicted, validation.deviation, 3)
         new = noted(scatter=scatter, seed=1000 + seed)
         friction = found.friction(new.at)
         inside += np.count_nonzero(np.abs(np.abs(new.force) - friction) <= BAND_95 * spread.std(friction))
@@ -221,8 +223,8 @@ def test_band_coverage_is_that_of_readings_that_neither_law_nor_band_had_seen():
 def test_a_spread_that_does_not_scale_is_absolute_and_one_that_does_is_relative():
     rng = np.random.default_rng(5)
     friction = np.linspace(5.0, 100.0, 4000)
-    absolute = spread_of(friction, 3.0 * rng.normal(size=4000), 10**6)
-    relative = spread_of(friction, 0.1 * friction * rng.normal(size=4000), 10**6)
+    absolute = prediction_uncertainty(friction, 3.0 * rng.normal(size=4000), 10**6)
+    relative = prediction_uncertainty(friction, 0.1 * friction * rng.normal(size=4000), 10**6)
     somewhere = np.array([20.0, 50.0, 90.0])
     assert absolute.std(somewhere) == pytest.approx(np.full(3, 3.0), rel=0.1)
     assert relative.std(somewhere) == pytest.approx(0.1 * somewhere, rel=0.1)
@@ -230,7 +232,7 @@ def test_a_spread_that_does_not_scale_is_absolute_and_one_that_does_is_relative(
 
 def test_what_the_data_cannot_show_is_added_in_square():
     friction, deviation = np.full(100, 10.0), np.tile([0.3, -0.3], 50)
-    alone, more = spread_of(friction, deviation, 3), spread_of(friction, deviation, 3, 0.12)
+    alone, more = prediction_uncertainty(friction, deviation, 3), prediction_uncertainty(friction, deviation, 3, 0.12)
     assert more.std(friction)[0] == pytest.approx(np.hypot(alone.std(friction)[0], 1.2))
 
 
@@ -240,14 +242,14 @@ def test_repeatability_is_the_scatter_at_one_pressure():
 
 
 def test_repeatability_of_a_swept_log_is_the_scatter_within_a_cell():
-    readings = swept({CONSTANT: 400.0}, LADDER['constant_coulomb'], scatter=20.0)
+    readings = swept({CONSTANT: 400.0}, LAWS['constant_coulomb'], scatter=20.0)
     assert repeatability(readings, np.array([200.0])) == pytest.approx(20.0 / 800.0, rel=0.1)
 
 
 def test_drift_is_the_change_over_the_run():
     readings = noted(pressures=3, count=10, offset=1.0)
     rising = readings.force + 0.02 * readings.group * (readings.force - 1.0)
-    drift = run_drift(Readings(**{**vars(noted(pressures=3, count=10)), 'force': rising}), np.array([1.0]))
+    drift = run_drift(FrictionReadings(**{**vars(noted(pressures=3, count=10)), 'force': rising}), np.array([1.0]))
     assert set(drift) == {0, 1, 2}
     assert list(drift.values()) == pytest.approx([0.18 / 1.09] * 3, rel=1e-6)
 
@@ -257,7 +259,7 @@ def test_drift_is_the_change_over_the_run():
 
 def test_speed_that_goes_with_pressure_is_said_to_be_collinear():
     values = {CONSTANT: 100.0, 'viscous_friction': 500.0}
-    law = LADDER['coulomb_viscous']
+    law = LAWS['coulomb_viscous']
     tied, free = swept(values, law, tied=True), swept(values, law)
     (found,) = collinear_regressors(tied, np.zeros((tied.count, 2)))
     assert (found.one, found.other) == ('speed', 'pressure of the seals')
@@ -269,7 +271,7 @@ def test_speed_that_goes_with_pressure_is_said_to_be_collinear():
 
 def test_a_fit_to_collinear_data_is_ill_conditioned_and_trades_its_parameters():
     values = POWER | {'viscous_friction': 50.0, 'pressure_exponent': 2.0 / 3.0}
-    law = {r.name: r for r in ladder(with_speeds=True, with_exponent=False)}
+    law = {r.name: r for r in candidate_laws(with_speeds=True, with_exponent=False)}
     law = law['pressure_power_law_viscous']
     tied, free = (fit(law, swept(values, law, scatter=1.0, tied=tied)) for tied in (True, False))
     assert tied.condition_number > 4.0 * free.condition_number
@@ -280,24 +282,24 @@ def test_a_fit_to_collinear_data_is_ill_conditioned_and_trades_its_parameters():
 
 @pytest.mark.parametrize('level', [0, 2, 3])
 def test_the_one_pressure_that_disagrees_is_the_outlier(level):
-    law = {r.name: r for r in ladder(with_speeds=False, with_exponent=False)}['pressure_power_law']
+    law = {r.name: r for r in candidate_laws(with_speeds=False, with_exponent=False)}['pressure_power_law']
     readings = noted(scatter=0.03, pressures=5, law=law, values=POWER | {'pressure_exponent': 2.0 / 3.0})
     force = np.where(readings.level == level, 1.7 * readings.force, readings.force)
-    spoiled = Readings(**{**vars(noted(pressures=5)), 'force': force})
+    spoiled = FrictionReadings(**{**vars(noted(pressures=5)), 'force': force})
     values = fit(law, spoiled).values
     assert outlying_level(law, spoiled, values, 0.04).level == level
     assert outlying_level(law, readings, fit(law, readings).values, 0.04) is None
 
 
 def test_three_pressures_have_no_outlier():
-    law = {r.name: r for r in ladder(with_speeds=False, with_exponent=False)}['pressure_power_law']
+    law = {r.name: r for r in candidate_laws(with_speeds=False, with_exponent=False)}['pressure_power_law']
     readings = noted(pressures=3)
     assert outlying_level(law, readings, fit(law, readings).values, 0.04) is None
 
 
 @pytest.mark.parametrize('ratio', [0.6, 0.95, 1.5])
 def test_friction_that_changed_between_two_logs_is_told_by_how_much(ratio):
-    law = LADDER['coulomb_viscous']
+    law = LAWS['coulomb_viscous']
     first = swept({CONSTANT: 200.0, 'viscous_friction': 1000.0}, law)
     other = swept(
         {CONSTANT: 200.0 * ratio, 'viscous_friction': 1000.0 * ratio},
@@ -312,7 +314,7 @@ def test_friction_that_changed_between_two_logs_is_told_by_how_much(ratio):
 
 
 def test_logs_under_other_conditions_are_not_compared():
-    law = LADDER['coulomb_viscous']
+    law = LAWS['coulomb_viscous']
     values = {CONSTANT: 200.0, 'viscous_friction': 1000.0}
     first, other = swept(values, law), swept(values, law, least=1.0)
     with pytest.raises(ValueError, match='cannot be compared'):
@@ -323,7 +325,9 @@ def test_sources_that_disagree_at_a_pressure_are_named():
     one = noted(pressures=3, count=2)
     part = one.group
     force = np.where((part == 1) & (one.level == 2), 1.5 * one.force, one.force)
-    both = Readings(**{**vars(noted(pressures=3, count=2)), 'force': force, 'source': part, 'names': ('a', 'b')})
+    both = FrictionReadings(
+        **{**vars(noted(pressures=3, count=2)), 'force': force, 'source': part, 'names': ('a', 'b')}
+    )
     (change,) = changed_levels(both)
     assert (change.name, change.other_name) == ('a', 'b')
     assert change.other_friction / change.friction == pytest.approx(1.5)
@@ -338,7 +342,7 @@ def test_breakaway_is_constant_unless_it_follows_the_load(law):
     readings = noted(scatter=0.01)
     friction = LAW.friction(readings.at, POWER)
     more = 3.0 if law == 'constant' else 0.15 * friction
-    static = Readings(**{**vars(noted()), 'force': readings.force + readings.at.direction * more})
-    found = identify_stiction(static, friction, np.zeros(1))
+    static = FrictionReadings(**{**vars(noted()), 'force': readings.force + readings.at.direction * more})
+    found = fit_breakaway(static, friction, np.zeros(1))
     assert found.law == law
     assert (found.stiction, found.ratio) == pytest.approx((1.5, 0.0) if law == 'constant' else (0.0, 0.15), rel=0.1)

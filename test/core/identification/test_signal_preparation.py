@@ -8,7 +8,6 @@ from seal_friction_ros.core.identification.signal_preparation import (
     SavitzkyGolay,
     Signals,
     Sliding,
-    acceleration,
     breakaways,
     clipped_share,
     even_sliding,
@@ -53,14 +52,14 @@ def test_acceleration_from_a_position_is_the_slope_of_its_slope():
     velocity = slope(time, 0.1 + 0.02 * time + 0.03 * time**2, law)
     assert velocity == pytest.approx(0.02 + 0.06 * time, abs=1e-9)
     assert slope(time, velocity, law) == pytest.approx(np.full(500, 0.06), abs=1e-9)
-    assert acceleration(time, velocity) == pytest.approx(np.full(500, 0.06), abs=1e-9)
+    assert np.gradient(velocity, time) == pytest.approx(np.full(500, 0.06), abs=1e-9)
 
 
 def test_starting_and_stopping_are_no_even_sliding():
     signals = trapezoid([0.02])
     even = even_sliding(signals, SLIDING)
     assert even.sum() == pytest.approx(2.0 * RATE, abs=3)
-    assert np.abs(acceleration(signals.time, signals.velocity))[even].max() < SLIDING.largest_acceleration
+    assert np.abs(np.gradient(signals.velocity, signals.time))[even].max() < SLIDING.largest_acceleration
 
 
 def test_every_stroke_gives_its_force_and_pressure_and_nothing_of_its_ends():

@@ -101,7 +101,7 @@ def test_too_few_cycles_and_too_short_strokes_are_refused():
     third = len(time) // 3
     with pytest.raises(ValueError, match='but cycle 9 is to be evaluated'):
         evaluate_cycles(time[:third], displacement[:third], force[:third], PAPER)
-    with pytest.raises(ValueError, match='no cycle: drive to and fro'):
+    with pytest.raises(ValueError, match='no cycle: drive in both directions'):
         cycle_starts(np.linspace(0.0, 1.0, 100))
     with pytest.raises(ValueError, match='does not reach'):
         reference_force(displacement / 10.0, force, 0.5e-3)

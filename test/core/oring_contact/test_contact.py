@@ -8,6 +8,7 @@ from statistics import linear_regression
 import numpy as np
 import pytest
 import yaml
+from harness.hertz import LineContact, cylinder_between_plates
 from paths import ROOT
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError
@@ -15,7 +16,6 @@ from seal_friction_ros.core.foundation.units import INCH, LBF, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
 from seal_friction_ros.core.oring_contact import continuation, loading
 from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
-from seal_friction_ros.core.oring_contact.hertz import LineContact, cylinder_between_plates
 from seal_friction_ros.core.oring_contact.loading import oring_model, squeeze_ring
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import (

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.foundation.units import PSI
-from seal_friction_ros.core.servo.motions import Chirp, PullTest, Reference, Sine, Step, Trapezoid, spool_cycles
+from seal_friction_ros.core.servo.motions import Chirp, PullTest, Setpoint, Sine, Step, Trapezoid, spool_cycles
 
 WAVES = [Sine(0.002, 3.0, 0.01), Trapezoid(), Chirp(duration=2.0), Chirp(start_frequency=9.0, end_frequency=2.0)]
 
@@ -25,7 +25,7 @@ def test_velocity_and_acceleration_are_the_derivatives(wave, time):
 
 @pytest.mark.parametrize('wave', [*WAVES, Step(0.1, 1.0, 0.2)], ids=lambda w: type(w).__name__)
 def test_before_time_0_a_wave_stands_still(wave):
-    assert wave.at(-1.0) == Reference(wave.offset, 0.0, 0.0)
+    assert wave.at(-1.0) == Setpoint(wave.offset, 0.0, 0.0)
 
 
 def test_step_steps_once():
@@ -55,8 +55,8 @@ def test_spool_cycles_are_those_of_the_paper(distance):
     assert min(s.velocity for s in samples) == -0.034
     starts = sum(a.velocity <= 0 < b.velocity for a, b in pairwise(samples))
     assert starts == 10
-    assert wave.at(0.5 / 3.0 - 1e-6) == Reference(distance, 0.0, 0.0)  # rest at the far end
-    assert wave.at(10 / 3) == Reference(0.0, 0.0, 0.0)
+    assert wave.at(0.5 / 3.0 - 1e-6) == Setpoint(distance, 0.0, 0.0)  # rest at the far end
+    assert wave.at(10 / 3) == Setpoint(0.0, 0.0, 0.0)
 
 
 def test_pull_test_is_that_of_appendix_a():

@@ -308,7 +308,7 @@ def test_whatever_is_done_to_it_stays_physical(inputs, seals):
         ({'control_period': 1e-2}, 'closed loop is unstable'),
     ],
 )
-def test_servo_that_cannot_work_is_refused_with_the_reason(changes, reason):
+def test_servo_that_cannot_work_is_rejected_with_the_reason(changes, reason):
     with pytest.raises(ValueError, match=reason):
         ServoParameters(seals=SEALS, **changes)
 
@@ -324,7 +324,7 @@ def test_servo_that_cannot_work_is_refused_with_the_reason(changes, reason):
         (lambda: init(SERVO, 0.03), 'not within the stroke'),
     ],
 )
-def test_part_that_is_not_physical_is_refused_with_the_reason(part, reason):
+def test_part_that_is_not_physical_is_rejected_with_the_reason(part, reason):
     with pytest.raises(ValueError, match=reason):
         part()
 

@@ -1,4 +1,4 @@
-"""The servo as a whole: rest, Figure 25, feed-forward, and references that are no good."""
+"""The servo as a whole: rest, Figure 25, feed-forward, and invalid references."""
 
 import dataclasses
 import math
@@ -17,7 +17,7 @@ from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.servo.controller import ControllerState, Limited, ServoController, control, limit_reference
-from seal_friction_ros.core.servo.motions import Reference, Sine, Step
+from seal_friction_ros.core.servo.motions import Setpoint, Sine, Step
 from seal_friction_ros.core.servo.plant import Cylinder, Load, ServoValve, stored_energy
 from seal_friction_ros.core.servo.position_servo import (
     ServoParameters,
@@ -61,7 +61,7 @@ def closed_loop(wave, settings, error=1.0):
         motion = feedforward.Motion(reference.velocity, reference.acceleration, out.velocity)
         fed, force = feedforward.step(settings, fed, stamp, estimate, motion)
         state, out = step(SERVO, state, reference, force.force)
-        rows.append((out.position, out.velocity, *[0.0] * 7))
+        rows.append((out.position, out.velocity, *[0.0] * (len(Trajectory._fields) - 2)))
     return Trajectory(*np.array(rows).T)
 
 
@@ -108,7 +108,7 @@ def test_no_chatter_at_rest_with_noise_on_every_sensor():
             pressure_a=exact.pressure_a + a,
             pressure_b=exact.pressure_b + b,
         )
-        controller, command = control(g, c, controller, noisy, Reference(1e-4, 0.0, 0.0), 0.0)
+        controller, command = control(g, c, controller, noisy, Setpoint(1e-4, 0.0, 0.0), 0.0)
         plant = advance(SERVO, plant, command.spool)
         stamp = i * 500_000
         pressure = Pressure(stamp, noisy.pressure_a, noisy.pressure_b)
@@ -168,15 +168,15 @@ def test_integrator_takes_most_of_that_error():
 @pytest.mark.parametrize(
     ('wish', 'flag', 'followed'),
     [
-        (Reference(math.nan, 0.0, 0.0), Limited.REFERENCE_NOT_FINITE, Reference(1e-3, 0.0, 0.0)),
-        (Reference(1e-3, math.inf, 0.0), Limited.REFERENCE_NOT_FINITE, Reference(1e-3, 0.0, 0.0)),
-        (Reference(1e-3, 0.01, 0.5), 0, Reference(1e-3, 0.01, 0.5)),
-        (Reference(2e-3, 0.0, 0.0), Limited.REFERENCE_TOO_FAST, Reference(1.1e-3, 0.2, 0.0)),
-        (Reference(1e-3, 0.9, 0.0), Limited.REFERENCE_TOO_FAST, Reference(1e-3, 0.2, 0.0)),
+        (Setpoint(math.nan, 0.0, 0.0), Limited.REFERENCE_NOT_FINITE, Setpoint(1e-3, 0.0, 0.0)),
+        (Setpoint(1e-3, math.inf, 0.0), Limited.REFERENCE_NOT_FINITE, Setpoint(1e-3, 0.0, 0.0)),
+        (Setpoint(1e-3, 0.01, 0.5), 0, Setpoint(1e-3, 0.01, 0.5)),
+        (Setpoint(2e-3, 0.0, 0.0), Limited.REFERENCE_TOO_FAST, Setpoint(1.1e-3, 0.2, 0.0)),
+        (Setpoint(1e-3, 0.9, 0.0), Limited.REFERENCE_TOO_FAST, Setpoint(1e-3, 0.2, 0.0)),
         (
-            Reference(-9.0, 0.0, 0.0),
+            Setpoint(-9.0, 0.0, 0.0),
             Limited.REFERENCE_OUT_OF_STROKE | Limited.REFERENCE_TOO_FAST,
-            Reference(0.9e-3, -0.2, 0.0),
+            Setpoint(0.9e-3, -0.2, 0.0),
         ),
     ],
 )
@@ -187,23 +187,23 @@ def test_bad_reference_is_limited_and_says_so(wish, flag, followed):
 
 
 def test_rod_goes_no_further_than_short_of_the_stop():
-    _, moved = simulate(SERVO, init(SERVO), [Reference(1.0, 0.0, 0.0)] * 1000)
+    _, moved = simulate(SERVO, init(SERVO), [Setpoint(1.0, 0.0, 0.0)] * 1000)
     assert 0.0235 < moved.position[-1] < 0.0245
     assert moved.limited[-1] == Limited.REFERENCE_OUT_OF_STROKE
 
 
 def test_feedforward_that_is_not_finite_counts_as_zero():
-    state, out = step(SERVO, init(SERVO), Reference(0.0, 0.0, 0.0), math.nan)
+    state, out = step(SERVO, init(SERVO), Setpoint(0.0, 0.0, 0.0), math.nan)
     assert out.command.limited == Limited.FEEDFORWARD_NOT_FINITE
-    assert state == step(SERVO, init(SERVO), Reference(0.0, 0.0, 0.0))[0]
+    assert state == step(SERVO, init(SERVO), Setpoint(0.0, 0.0, 0.0))[0]
 
 
 def test_command_beyond_what_supply_and_spool_can_do_is_cut_and_says_so():
-    _, out = step(SERVO, init(SERVO), Reference(0.0, 0.0, 0.0), 1e9)
+    _, out = step(SERVO, init(SERVO), Setpoint(0.0, 0.0, 0.0), 1e9)
     assert out.command.limited == Limited.FORCE
     assert out.command.force == pytest.approx(SERVO.constants.area * (SERVO.valve.supply_pressure - 1e5))
     fast = measure(SERVO.constants, init(SERVO).plant)._replace(velocity=5.0)
-    _, command = control(SERVO.gains, SERVO.constants, ControllerState(0.0, 0.0), fast, Reference(0.0, 0.0, 0.0), 0.0)
+    _, command = control(SERVO.gains, SERVO.constants, ControllerState(0.0, 0.0), fast, Setpoint(0.0, 0.0, 0.0), 0.0)
     assert command.limited == Limited.FORCE | Limited.SPOOL
     assert command.spool == 1.0
 
@@ -250,6 +250,20 @@ def test_friction_that_depends_on_the_velocity_is_that_of_the_estimator_and_bala
     assert abs(end.energy_in - stored - end.energy_dissipated) < 1e-6 * end.energy_in
 
 
+@pytest.mark.parametrize('name', BY_VELOCITY)
+def test_simulate_and_step_have_the_same_friction_over_velocity(name):
+    servo = ServoParameters(seals=(MountedSeal(BY_VELOCITY[name], 'a'), MountedSeal(SEAL, 'b')), inner_step=2.5e-5)
+    setpoints = [Sine(0.002, 4.0).at(i * servo.control_period) for i in range(600)]
+    _, trajectory = simulate(servo, init(servo), setpoints)
+    state, rows = init(servo), []
+    for setpoint in setpoints:
+        state, out = step(servo, state, setpoint)
+        rows.append(out[:9])
+    np.testing.assert_array_equal(np.array(rows).T, trajectory[:9])
+    sliding = trajectory.velocity != 0.0
+    assert np.abs(np.abs(trajectory.friction_force) - trajectory.coulomb_friction)[sliding].max() > 1.0  # [N]
+
+
 def test_viscous_seals_brake_a_coasting_rod_as_the_closed_form_has_it():
     seal = dataclasses.replace(SEAL, coulomb_law=ConstantCoulomb(0.0), stiction=0.0, velocity_terms=VelocityTerms(50.0))
     servo = ServoParameters(
@@ -265,7 +279,7 @@ def test_viscous_seals_brake_a_coasting_rod_as_the_closed_form_has_it():
     assert plant.velocity == pytest.approx(0.1 * math.exp(-2 * 50.0 / 5.0 * elapsed), rel=0.02)
 
 
-def test_friction_that_rises_too_steeply_for_the_inner_step_is_refused_with_the_step_that_suits():
+def test_friction_that_rises_too_steeply_for_the_inner_step_is_rejected_with_the_step_that_suits():
     seal = dataclasses.replace(SEAL, velocity_terms=VelocityTerms(viscous_friction=1e6))
     with pytest.raises(ValueError, match=r'inner_step = 0.0001 s is too long: at most .*damping'):
         ServoParameters(seals=(MountedSeal(seal, 'a'),))

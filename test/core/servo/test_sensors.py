@@ -1,4 +1,4 @@
-"""Sensors of the simulated servo: the noise that was asked for, the same each time, and nothing else."""
+"""Sensors of the simulated servo: noise, resolution, drop-outs, reproducibility."""
 
 import itertools
 import math
@@ -22,7 +22,7 @@ def flat(readings: Readings) -> list[float | None]:
 
 
 @given(st.integers(0, 2**40))
-def test_perfect_sensors_say_the_truth(index):
+def test_ideal_sensors_read_the_true_values(index):
     assert read(SensorSettings(), index, TRUTH) == TRUTH
 
 
@@ -57,6 +57,6 @@ def test_resolution_rounds_to_the_nearest_step():
     assert (readings.velocity, readings.force_sum, readings.position) == (0.03, -50.0, 0.005)
 
 
-def test_what_makes_no_sense_is_refused():
+def test_invalid_settings_are_rejected():
     with pytest.raises(ValueError, match=r'SensorSettings\.drop_out = 1\.5 1 is above its upper bound'):
         SensorSettings(drop_out=1.5)

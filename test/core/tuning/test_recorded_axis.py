@@ -1,4 +1,4 @@
-"""What a recording tells about the friction of an axis: recordings with a known answer, made from formulas."""
+"""Friction law and feed-forward from recordings that are made from formulas."""
 
 import dataclasses
 import math
@@ -15,15 +15,15 @@ from seal_friction_ros.core.tuning.recorded_axis import (
     delayed,
     feedforward_force,
     fit_law,
-    match,
     near_reversals,
+    tune_recorded_axis,
 )
-from seal_friction_ros.core.tuning.settings import MatchSettings
+from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
 
 RATE, SECONDS = 500.0, 4.0  # [Hz], [s]
 TIME = np.arange(round(RATE * SECONDS)) / RATE
 SETTINGS = FeedForwardSettings()
-KNOWN = MatchSettings()
+KNOWN = RecordedAxisSettings()
 
 
 def recording(
@@ -123,15 +123,15 @@ def test_reversals_of_the_reference_are_found_also_across_rest():
     assert list(np.flatnonzero(near)) == [21, 22, 23, 24, 25, 26, 27, 28, 56, 57, 58, 59, 60, 61, 62, 63]
 
 
-def test_reference_that_does_not_reverse_is_refused():
+def test_reference_that_does_not_reverse_is_rejected():
     with pytest.raises(ValueError, match='reverses 0 times'):
         near_reversals(TIME, np.ones(len(TIME)))
 
 
-def test_match_takes_the_scale_and_most_of_the_friction():
-    found = match(recording(noise=1.0), SETTINGS, KNOWN)
+def test_tuning_takes_the_scale_and_most_of_the_friction():
+    found = tune_recorded_axis(recording(noise=1.0), SETTINGS, KNOWN)
     assert found.feedforward.coulomb_scale == 0.8
-    assert found.told == {
+    assert found.identified == {
         'coulomb_scale': True, 'lead_time': False, 'smoothing_velocity': True, 'slew_limit': True
     }  # fmt: skip
     assert found.without.sliding == pytest.approx(32.0, rel=0.05)
@@ -141,23 +141,23 @@ def test_match_takes_the_scale_and_most_of_the_friction():
 
 
 def test_wrong_model_leaves_its_share():
-    found = match(recording(), SETTINGS, KNOWN)
+    found = tune_recorded_axis(recording(), SETTINGS, KNOWN)
     for case in found.cases:
         if case.friction_error:
-            assert case.residual.sliding == pytest.approx(0.3 * found.without.sliding, rel=0.15)
+            assert case.outcome.sliding == pytest.approx(0.3 * found.without.sliding, rel=0.15)
     assert len(found.cases) == 9
 
 
 def test_smoothing_follows_the_seal():
     """A seal whose friction rises over a speed wants a feed-forward that does."""
-    sharp = match(recording(), SETTINGS, KNOWN).feedforward.smoothing_velocity
-    soft = match(recording(width=0.008), SETTINGS, KNOWN).feedforward.smoothing_velocity
+    sharp = tune_recorded_axis(recording(), SETTINGS, KNOWN).feedforward.smoothing_velocity
+    soft = tune_recorded_axis(recording(width=0.008), SETTINGS, KNOWN).feedforward.smoothing_velocity
     assert sharp < 0.002
     assert soft == pytest.approx(0.008, rel=0.5)
 
 
 def test_slew_limit_lets_the_force_through_but_no_more():
-    found = match(recording(), SETTINGS, KNOWN).feedforward
+    found = tune_recorded_axis(recording(), SETTINGS, KNOWN).feedforward
     limited, free = (
         feedforward_force(s, recording()) for s in (found, dataclasses.replace(found, slew_limit=1e9))
     )  # fmt: skip
@@ -168,20 +168,20 @@ def test_slew_limit_lets_the_force_through_but_no_more():
 
 def test_fast_rod_cannot_tell_the_smoothing_and_keeps_it():
     velocity = 0.03 * np.sign(np.cos(4.0 * math.pi * TIME)) * (1.0 + 0.2 * np.sin(40.0 * TIME))
-    found = match(recording(velocity=velocity, mass=0.0), SETTINGS, KNOWN)
+    found = tune_recorded_axis(recording(velocity=velocity, mass=0.0), SETTINGS, KNOWN)
     assert found.feedforward.smoothing_velocity >= SETTINGS.smoothing_velocity
 
 
 def test_given_delay_is_the_lead_time_and_else_it_stays():
-    assert match(recording(), SETTINGS, KNOWN).feedforward.lead_time == SETTINGS.lead_time
-    found = match(recording(), SETTINGS, MatchSettings(whole_delay=0.007))
+    assert tune_recorded_axis(recording(), SETTINGS, KNOWN).feedforward.lead_time == SETTINGS.lead_time
+    found = tune_recorded_axis(recording(), SETTINGS, RecordedAxisSettings(whole_delay=0.007))
     assert found.feedforward.lead_time == 0.007
-    assert found.told['lead_time']
+    assert found.identified['lead_time']
 
 
 def test_friction_against_the_model_is_not_taken_for_a_scale():
-    found = match(recording(scale=-0.5), SETTINGS, KNOWN)
-    assert not found.told['coulomb_scale']
+    found = tune_recorded_axis(recording(scale=-0.5), SETTINGS, KNOWN)
+    assert not found.identified['coulomb_scale']
     assert found.feedforward.coulomb_scale == SETTINGS.coulomb_scale
     assert not found.better_in_every_case
 

@@ -1,4 +1,4 @@
-"""The tuning and its closed loop: what the figures say, that what is found holds, and that a limit cycle is seen."""
+"""Closed loop, performance, and search for the feed-forward of a simulated axis."""
 
 import dataclasses
 import math
@@ -17,21 +17,20 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.servo.closed_loop import (
     Axis,
     Performance,
-    Stopped,
-    closed_loop,
+    StoppedWave,
     dwell,
+    run_closed_loop,
     whole_delay,
     with_wrong_friction,
     without_feedforward,
 )
-from seal_friction_ros.core.servo.motions import Reference, Sine
+from seal_friction_ros.core.servo.motions import Setpoint, Sine
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, simulate
-from seal_friction_ros.core.tuning.settings import TuningSettings
+from seal_friction_ros.core.tuning.settings import RobustnessCase, TuningSettings
 from seal_friction_ros.core.tuning.simulated_axis import (
-    AS_GOOD,
     MOST_CANDIDATES,
-    Case,
-    Problem,
+    NEARLY_AS_GOOD,
+    TuningProblem,
     bounded,
     merit,
     nearest_preferred,
@@ -45,15 +44,15 @@ PERIOD = 1e-3  # [s]
 SERVO = ServoParameters(seals=SEALS, control_period=PERIOD, inner_step=1e-4)
 PIPELINE = PipelineParameters(EstimatorParameters(EstimatorSettings(), SEALS), FeedForwardSettings())
 AXIS = Axis(SERVO, PIPELINE)
-DEFAULT = Problem(AXIS, TuningSettings(hold_time=0.2))
-# Small and fast, so that a test has time for a whole search. Without feed-forward the rod does not even move.
-QUICK = Problem(AXIS, TuningSettings(amplitude=5e-4, frequency=10.0, delay_error=0.0, hold_time=0.1))
+DEFAULT = TuningProblem(AXIS, TuningSettings(hold_time=0.2))
+# Small and fast: a whole search takes seconds. Without feed-forward the rod does not move.
+QUICK = TuningProblem(AXIS, TuningSettings(amplitude=5e-4, frequency=10.0, delay_error=0.0, hold_time=0.1))
 
 
 @cache
 def case(friction_error=0.0, delay_error=0.0):
     """The axis with the default feed-forward on the wave of Figure 25."""
-    return DEFAULT.case(PIPELINE.feedforward, friction_error, delay_error, 0.2).performance
+    return DEFAULT.case(PIPELINE.feedforward, friction_error, delay_error, 0.2).outcome
 
 
 @cache
@@ -71,7 +70,7 @@ def found():
 
 def test_loop_without_feedforward_is_the_servo_alone():
     none = PIPELINE._replace(feedforward=without_feedforward(PIPELINE.feedforward))
-    run = closed_loop(Axis(SERVO, none), Sine(), 300, 1e-3)
+    run = run_closed_loop(Axis(SERVO, none), Sine(), 300, 1e-3)
     _, alone = simulate(SERVO, init(SERVO), [Sine().at(i * PERIOD) for i in range(300)])
     np.testing.assert_array_equal(run.position, alone.position)
     np.testing.assert_array_equal(run.velocity, alone.velocity)
@@ -79,15 +78,15 @@ def test_loop_without_feedforward_is_the_servo_alone():
 
 
 def test_run_is_stamped_at_the_end_of_each_sample():
-    run = closed_loop(AXIS, Sine(), 20, 1e-3)
+    run = run_closed_loop(AXIS, Sine(), 20, 1e-3)
     np.testing.assert_allclose(run.time, np.arange(1, 21) * PERIOD)
     np.testing.assert_allclose(run.reference, [Sine().at(time).position for time in run.time])
 
 
 @pytest.mark.parametrize(('delay', 'weights'), [(0.002, (0, 0, 1)), (0.0025, (0, 0, 0.5, 0.5)), (0.0007, (0.3, 0.7))])
 def test_force_arrives_a_delay_later(delay, weights):
-    now = closed_loop(AXIS, Sine(), 200, 0.0).feedforward
-    late = closed_loop(AXIS, Sine(), 200, delay).feedforward
+    now = run_closed_loop(AXIS, Sine(), 200, 0.0).feedforward
+    late = run_closed_loop(AXIS, Sine(), 200, delay).feedforward
     expected = sum(weight * np.concatenate((np.zeros(i), now))[:200] for i, weight in enumerate(weights))
     np.testing.assert_allclose(late, expected, atol=0.2)  # [N]: the pressure, and so the friction, is a little other
     assert np.abs(now).max() > 35.0
@@ -95,10 +94,10 @@ def test_force_arrives_a_delay_later(delay, weights):
 
 def test_noise_reaches_the_estimator_and_not_the_servo():
     pressure = np.tile([1e6, 1e6, 0.0, 0.0], (7, 1))
-    sure, unsure = closed_loop(AXIS, Sine(), 100, 1e-3), closed_loop(AXIS, Sine(), 100, 1e-3, pressure)
+    sure, unsure = run_closed_loop(AXIS, Sine(), 100, 1e-3), run_closed_loop(AXIS, Sine(), 100, 1e-3, pressure)
     assert unsure.feedforward.max() > 1.05 * sure.feedforward.max()
     none = Axis(SERVO, PIPELINE._replace(feedforward=without_feedforward(PIPELINE.feedforward)))
-    sure, unsure = closed_loop(none, Sine(), 100, 1e-3), closed_loop(none, Sine(), 100, 1e-3, pressure)
+    sure, unsure = run_closed_loop(none, Sine(), 100, 1e-3), run_closed_loop(none, Sine(), 100, 1e-3, pressure)
     np.testing.assert_array_equal(sure.position, unsure.position)
 
 
@@ -107,15 +106,17 @@ def test_wrong_friction_is_wrong_in_the_model_alone():
     right, scaled = (actuator_friction(p.estimator.seals, 2e6, 3e6) for p in (PIPELINE, wrong))
     assert scaled.coulomb_friction == pytest.approx(1.3 * right.coulomb_friction)
     assert scaled.stiction == pytest.approx(1.3 * right.stiction)
-    run = closed_loop(Axis(SERVO, wrong), Sine(), 60, 1e-3)
+    run = run_closed_loop(Axis(SERVO, wrong), Sine(), 60, 1e-3)
     assert np.abs(run.friction_force).max() < 1.15 * right.coulomb_friction * 1.1
-    assert run.feedforward.max() == pytest.approx(1.3 * closed_loop(AXIS, Sine(), 60, 1e-3).feedforward.max(), rel=0.01)
+    assert run.feedforward.max() == pytest.approx(
+        1.3 * run_closed_loop(AXIS, Sine(), 60, 1e-3).feedforward.max(), rel=0.01
+    )
 
 
 def test_stopped_wave_stands_where_it_was():
-    wave = Stopped(Sine(), 0.15)
+    wave = StoppedWave(Sine(), 0.15)
     assert wave.at(0.1) == Sine().at(0.1)
-    assert wave.at(7.0) == Reference(Sine().at(0.15).position)
+    assert wave.at(7.0) == Setpoint(Sine().at(0.15).position)
     assert Sine().at(0.15).velocity == pytest.approx(0.0, abs=1e-9)
 
 
@@ -129,12 +130,14 @@ def test_whole_delay_adds_force_loop_and_valve():
     assert whole_delay(SERVO, 0.001) == pytest.approx(0.001 + 1.0 / 500.0 + 2.0 * 0.8 / 1257.0 + 0.5 * PERIOD)
 
 
-# -- what must hold at the default ------------------------------------------------------------------------------------
+# -- the default feed-forward ----------------------------------------------------------------------------------------
 
 
 def test_figure_25_dwell_is_above_5_percent_of_the_period_with_friction_and_none_without():
     assert without().dwell > 0.05 * 0.2
-    free = Problem(Axis(ServoParameters(seals=(), control_period=PERIOD), PIPELINE), TuningSettings(hold_time=0.2))
+    free = TuningProblem(
+        Axis(ServoParameters(seals=(), control_period=PERIOD), PIPELINE), TuningSettings(hold_time=0.2)
+    )
     assert free.without().dwell == 0.0
     assert free.without().tracking_rms < 0.1 * without().tracking_rms
 
@@ -159,8 +162,8 @@ def test_limit_cycle_is_seen():
     """From the rod's own velocity, too large a force closes a loop that never comes to rest."""
     looped = dataclasses.replace(PIPELINE.feedforward, use_measured_velocity=True, coulomb_scale=2.0)
     cycling = DEFAULT.case(looped, 0.3, 0.0, 0.2)
-    assert cycling.performance.limit_cycle_reversals > 5
-    nominal = Case(0.0, 0.0, case())
+    assert cycling.outcome.limit_cycle_reversals > 5
+    nominal = RobustnessCase(0.0, 0.0, case())
     assert merit(DEFAULT, without(), [nominal, cycling]) == math.inf
 
 
@@ -174,23 +177,23 @@ def test_overshoot_grows_with_a_feedforward_that_is_too_large():
 
 def test_merit_is_1_without_and_falls_with_error_and_dwell():
     was = Performance(4e-4, 5e-4, 0.04, 0.0, 0, 0.0, 0.0)
-    assert merit(DEFAULT, was, [Case(0.0, 0.0, was)]) == 1.0
+    assert merit(DEFAULT, was, [RobustnessCase(0.0, 0.0, was)]) == 1.0
     half = was._replace(tracking_rms=2e-4)
-    assert merit(DEFAULT, was, [Case(0.0, 0.0, half)]) == 0.75
-    assert merit(DEFAULT, was, [Case(0.0, 0.0, half), Case(0.3, 0.0, was)]) == 0.875
+    assert merit(DEFAULT, was, [RobustnessCase(0.0, 0.0, half)]) == 0.75
+    assert merit(DEFAULT, was, [RobustnessCase(0.0, 0.0, half), RobustnessCase(0.3, 0.0, was)]) == 0.875
 
 
 @pytest.mark.parametrize('flaw', [{'overshoot': 1.01e-4}, {'limit_cycle_reversals': 1}])
 def test_overshoot_beyond_the_limit_and_limit_cycles_are_out(flaw):
     was = Performance(4e-4, 5e-4, 0.04, 0.0, 0, 0.0, 0.0)
-    good = Case(0.0, 0.0, was._replace(tracking_rms=1e-6, dwell=0.0, overshoot=0.99e-4))
+    good = RobustnessCase(0.0, 0.0, was._replace(tracking_rms=1e-6, dwell=0.0, overshoot=0.99e-4))
     assert merit(DEFAULT, was, [good]) < 0.01
-    assert merit(DEFAULT, was, [good, Case(0.3, 0.0, was._replace(**flaw))]) == math.inf
+    assert merit(DEFAULT, was, [good, RobustnessCase(0.3, 0.0, was._replace(**flaw))]) == math.inf
 
 
 def test_axis_that_never_dwells_has_a_merit():
     was = Performance(4e-4, 5e-4, 0.0, 0.0, 0, 0.0, 0.0)
-    assert merit(DEFAULT, was, [Case(0.0, 0.0, was)]) == 0.5
+    assert merit(DEFAULT, was, [RobustnessCase(0.0, 0.0, was)]) == 0.5
 
 
 def test_rod_that_does_not_move_without_feedforward_dwells_for_the_half_period():
@@ -198,19 +201,19 @@ def test_rod_that_does_not_move_without_feedforward_dwells_for_the_half_period()
     assert found().without.tracking_rms == pytest.approx(5e-4 / math.sqrt(2.0), rel=1e-2)
 
 
-def test_what_is_found_is_better_than_none_and_than_the_default_in_the_worst_case():
+def test_the_result_is_better_than_none_and_than_the_default_in_the_worst_case():
     assert found().better_in_every_case
     default = [QUICK.case(PIPELINE.feedforward, *errors, 0.1) for errors in QUICK.errors()]
-    assert found().merit < AS_GOOD * merit(QUICK, found().without, default)
+    assert found().merit < NEARLY_AS_GOOD * merit(QUICK, found().without, default)
     assert found().nominal.tracking_rms <= 0.4 * found().without.tracking_rms
     assert found().nominal.dwell <= 0.2 * found().without.dwell
     assert found().candidates <= MOST_CANDIDATES
 
 
-def test_what_is_found_keeps_the_overshoot_and_does_not_limit_cycle():
-    worst = max(c.performance.overshoot for c in found().cases)
+def test_the_result_keeps_the_overshoot_and_does_not_limit_cycle():
+    worst = max(c.outcome.overshoot for c in found().cases)
     assert worst <= 0.05 * 2.0 * 5e-4
-    assert all(c.performance.limit_cycle_reversals == 0 for c in found().cases)
+    assert all(c.outcome.limit_cycle_reversals == 0 for c in found().cases)
 
 
 def test_cases_are_all_combinations_in_order():
@@ -226,7 +229,7 @@ def test_force_is_no_sharper_than_it_must_be():
     assert found().feedforward.slew_limit < 2.0 * found().feedforward.force_limit / PERIOD
 
 
-def test_what_is_not_searched_stays():
+def test_other_settings_are_unchanged():
     tuned = {'coulomb_scale', 'lead_time', 'smoothing_velocity', 'slew_limit'}
     for field in dataclasses.fields(FeedForwardSettings):
         if field.name not in tuned:
@@ -234,21 +237,21 @@ def test_what_is_not_searched_stays():
 
 
 @pytest.mark.parametrize(
-    ('settings', 'words'),
+    ('settings', 'text'),
     [
         ({'amplitude': 0.05, 'frequency': 0.1}, 'way 0.05 m'),
         ({'amplitude': 0.02, 'frequency': 5.0}, 'speed'),
         ({'amplitude': 1e-3, 'frequency': 50.0}, 'speed|acceleration'),
     ],
 )
-def test_motion_that_the_servo_does_not_follow_is_refused(settings, words):
-    with pytest.raises(ValueError, match=words):
-        Problem(AXIS, TuningSettings(**settings))
+def test_motion_that_the_servo_does_not_follow_is_rejected(settings, text):
+    with pytest.raises(ValueError, match=text):
+        TuningProblem(AXIS, TuningSettings(**settings))
 
 
 @pytest.mark.parametrize('name', ['amplitude', 'frequency', 'delay', 'friction_error', 'hold_time'])
 @pytest.mark.parametrize('value', [-1.0, math.nan, 1e9])
-def test_settings_out_of_bounds_are_refused_by_name(name, value):
+def test_settings_out_of_bounds_are_rejected_by_name(name, value):
     with pytest.raises(ValueError, match=name):
         TuningSettings(**{name: value})
 

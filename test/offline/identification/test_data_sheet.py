@@ -10,12 +10,12 @@ from seal_friction_ros.core.foundation.units import INCH
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.identification.data_sheet import (
+    FrictionTestPlan,
     columns,
-    make_plan,
     read_data_sheet,
-    sheet_page,
     sheet_text,
 )
+from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
 
 THESIS = ROOT / 'data' / 'thesis' / 'friction_tests.csv'
 RING = SealGeometry(0.106 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
@@ -23,7 +23,7 @@ UNITS = {'pressure_unit': 'psi', 'force_unit': 'lbf', 'length_unit': 'in'}
 
 
 def plan(tests=3, geometry=RING):
-    return make_plan('ring_114', 0.0, 1000.0, 10, tests=tests, seals=2, geometry=geometry, **UNITS)
+    return FrictionTestPlan('ring_114', 0.0, 1000.0, 10, tests=tests, seals=2, geometry=geometry, **UNITS)
 
 
 def readings() -> dict[tuple[float, str], str]:
@@ -63,8 +63,10 @@ def test_the_sheet_has_the_132_cells_of_the_thesis():
     assert [row.split(',')[0] for row in rows] == [str(100 * i) for i in range(11)]
 
 
-def test_the_printed_page_has_the_same_cells_and_the_thirty_seconds():
-    page = sheet_page(plan())
+def test_the_printed_page_has_the_same_cells_and_the_thirty_seconds(tmp_path):
+    write_data_sheet_page(plan(), tmp_path / 'sheet.html')
+    assert [path.name for path in tmp_path.iterdir()] == ['sheet.html']
+    page = (tmp_path / 'sheet.html').read_text()
     assert page.count('<td') - page.count('<td>0</td>') >= 132
     assert 'Wait 30 s' in page
     assert '0.821' in page  # the known geometry is filled in
@@ -96,8 +98,8 @@ def test_a_dash_is_a_reading_that_was_not_to_be_had(tmp_path, capsys):
         ({(300.0, 'test 2 dynamic extend'): ''}, ['1 readings are missing: test 2 dynamic extend at 300 psi', 'dash']),
         ({(p, 'test 3 static retract'): '' for p in (0.0, 100.0, 200.0, 300.0, 400.0)}, ['5 readings', 'and 1 more']),
         ({(500.0, 'test 1 dynamic extend'): '80'}, ['test 1 dynamic extend at 500 psi is 80 lbf', 'measure it again']),
-        ({(500.0, 'test 1 dynamic extend'): '8.5.'}, ['8.5.', 'not a force']),
-        ({(500.0, 'test 1 dynamic extend'): '-8'}, ["'-8'", 'not a force']),
+        ({(500.0, 'test 1 dynamic extend'): '8.5.'}, ['8.5.', 'not a number']),
+        ({(500.0, 'test 1 dynamic extend'): '-8'}, ["'-8'", 'not a magnitude of a force']),
         ({(100.0, 'test 1 dynamic extend'): '6.5'}, ['the static one is less, 6 lbf']),
     ],
 )
@@ -169,4 +171,4 @@ def test_an_empty_sheet_is_told_to_be_filled(tmp_path, capsys):
 @pytest.mark.parametrize(('low', 'high', 'steps'), [(0.0, 0.0, 5), (-1.0, 5.0, 5), (0.0, 5.0, 1), (0.0, 5.0, 1000)])
 def test_a_plan_that_makes_no_sense_is_refused(low, high, steps):
     with pytest.raises(ValueError, match='pressure'):
-        make_plan('ring', low, high, steps, tests=3, seals=2, geometry=None, **UNITS)
+        FrictionTestPlan('ring', low, high, steps, tests=3, seals=2, geometry=None, **UNITS)

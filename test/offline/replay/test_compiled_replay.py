@@ -38,7 +38,8 @@ from seal_friction_ros.offline.bags.mcap_reader import MAGIC
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay import compiled_replay
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
-from seal_friction_ros.offline.replay.replay import BULK_FROM, replay
+from seal_friction_ros.offline.replay.parallel_replay import BULK_FROM, verify
+from seal_friction_ros.offline.replay.replay import replay
 
 CORPUS = ROOT / 'test' / 'corpus'
 
@@ -52,7 +53,7 @@ def in_bulk(bag: Path, override: Configuration | None = None) -> ReplayResult | 
 
 
 def assert_same_verdict(bag: Path, override: Configuration | None = None) -> ReplayResult:
-    expected = replay(bag, override, bulk_from=BULK_FROM)
+    expected = verify(bag, override, bulk_from=BULK_FROM)
     assert in_bulk(bag, override) == expected
     return expected
 
@@ -207,7 +208,7 @@ def test_a_malformed_message_is_left_to_the_general_way_which_names_it(recorded:
     errors = []
     for bulk_from in (0, BULK_FROM):
         with pytest.raises(BagError, match='bytes where the message has') as found:
-            replay(bag, bulk_from=bulk_from)
+            verify(bag, bulk_from=bulk_from)
         errors.append(str(found.value))
     assert errors[0] == errors[1]
 
@@ -226,7 +227,7 @@ def test_any_order_of_messages_and_any_rubbish_gets_the_same_verdict(folder: Pat
     outcomes = []
     for bulk_from in (0, BULK_FROM):
         try:
-            outcomes.append(str(replay(folder / 'any', bulk_from=bulk_from)))
+            outcomes.append(str(verify(folder / 'any', bulk_from=bulk_from)))
         except BagError as error:
             outcomes.append(str(error))
     assert outcomes[0] == outcomes[1]

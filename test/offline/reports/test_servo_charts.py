@@ -13,15 +13,13 @@ from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.reports.servo_charts import (
     default_servo,
     follow_wave,
-    friction_force,
-    without_seals,
     write_servo_charts,
 )
 
 SERVO = default_servo()
 WAVE = Sine()
 RUBBING = follow_wave(SERVO, WAVE)
-FREE = follow_wave(without_seals(SERVO), WAVE)
+FREE = follow_wave(dataclasses.replace(SERVO, seals=()), WAVE)
 
 
 def test_figure_25_flat_peaks_with_friction_and_none_without():
@@ -65,7 +63,7 @@ def test_friction_force_is_that_of_the_estimator():
             strict=True,
         )
     ]
-    assert friction_force(trajectory) == pytest.approx(np.array(expected))
+    assert trajectory.friction_force == pytest.approx(np.array(expected))
 
 
 @pytest.mark.renders
@@ -86,7 +84,7 @@ def test_the_page_stands_alone_and_gives_the_same_bytes_again(tmp_path):
 
 def test_a_servo_without_seals_has_nothing_to_compare(tmp_path):
     with pytest.raises(ValueError, match='no seals'):
-        write_servo_charts(tmp_path / 'out' / 'servo.html', without_seals(SERVO))
+        write_servo_charts(tmp_path / 'out' / 'servo.html', dataclasses.replace(SERVO, seals=()))
     assert not (tmp_path / 'out').exists()
 
 

@@ -1,4 +1,4 @@
-"""``seal_friction tune``: the parameter file it writes, the figures it says, and what it does with what is no good."""
+"""``seal_friction tune``: parameter file, report, JSON, and rejected input."""
 
 import contextlib
 import dataclasses
@@ -26,16 +26,17 @@ from seal_friction_ros.core.estimation.records import Force, Position, Pressure,
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.closed_loop import with_wrong_friction
 from seal_friction_ros.core.servo.motions import Sine, Step
+from seal_friction_ros.core.tuning import simulated_axis
 from seal_friction_ros.core.tuning.settings import TuningSettings
 from seal_friction_ros.files import load_parameter_file
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.reports.formatting import number
-from seal_friction_ros.offline.tuning.tune import MADE_BY, read_recording, sensor_noise
+from seal_friction_ros.offline.tuning.tune import MADE_BY, read_recording, sensor_noise, tune_simulator
 
-SURE = ['--friction-error', '0', '--delay-error', '0']  # one case, so that a search takes seconds
+SURE = ['--friction-error', '0', '--delay-error', '0']  # one case: a search of seconds
 QUICK = ['--amplitude', '5e-4', '--frequency', '10', '--hold-time', '0.1', *SURE]
-ISSUE_KEYS = {'tracking_rms_without', 'tracking_rms_with', 'dwell_without', 'dwell_with', 'robustness'}
+COMMON_KEYS = {'tracking_rms_without', 'tracking_rms_with', 'dwell_without', 'dwell_with', 'robustness'}
 TRUE_SCALE, TRUE_MASS, OFFSET = 0.8, 5.0, 3.0  # [-], [kg], [N]
 LEAVE_OUT = {
     'reference': 'ServoReference',
@@ -45,7 +46,7 @@ LEAVE_OUT = {
 
 
 def write_axis(path: Path, wave=None, seconds=2.0, leave_out='', configuration: Configuration | None = None, sign=1.0):
-    """A simulated axis without feed-forward, with less friction than its model says, recorded by its noisy sensors."""
+    """Bag of a simulated axis without feed-forward, with less friction than its model, and with noisy sensors."""
     wave = wave or Sine()
     known = configuration or default_configuration()
     seals = with_wrong_friction(known.parameters(), TRUE_SCALE - 1.0).estimator.seals
@@ -86,17 +87,17 @@ def axis(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope='module')
 def simulated(tmp_path_factory) -> Path:
-    """Folder with what two runs on the simulated servo wrote, and what the second one said."""
+    """Files of two runs on the simulated servo, and the JSON output of the second."""
     folder = tmp_path_factory.mktemp('simulated')
     for run, options in (('one', []), ('two', ['--json'])):
         (folder / run).mkdir()
         with contextlib.redirect_stdout(io.StringIO()) as output:
             assert main(['tune', '--out', str(folder / run / 'feedforward.yaml'), *QUICK, *options]) == 0
-    (folder / 'said.json').write_text(output.getvalue())
+    (folder / 'numbers.json').write_text(output.getvalue())
     return folder
 
 
-def said(arguments: list[str], capsys) -> dict:
+def numbers_of(arguments: list[str], capsys) -> dict:
     capsys.readouterr()
     assert main([*arguments, '--json']) == 0
     return json.loads(capsys.readouterr().out)
@@ -131,7 +132,7 @@ def test_file_is_a_parameter_file_of_the_node(simulated: Path):
 
 def test_report_stands_alone_and_shows_every_case(simulated: Path):
     page = checked_page(simulated / 'one' / 'feedforward.html')
-    numbers = json.loads((simulated / 'said.json').read_text())
+    numbers = json.loads((simulated / 'numbers.json').read_text())
     assert page.figures == ['tracking', 'force', 'move', 'robustness']
     assert 'http' not in page.prose
     (case,) = numbers['robustness']
@@ -143,9 +144,9 @@ def test_report_stands_alone_and_shows_every_case(simulated: Path):
     assert float(now['coulomb_scale']) == numbers['parameters']['coulomb_scale']
 
 
-def test_json_says_what_the_issue_asks_for(simulated: Path):
-    numbers = json.loads((simulated / 'said.json').read_text())
-    assert set(numbers) >= ISSUE_KEYS
+def test_json_has_every_number_without_and_with_feedforward(simulated: Path):
+    numbers = json.loads((simulated / 'numbers.json').read_text())
+    assert set(numbers) >= COMMON_KEYS
     assert numbers['dwell_without'] == pytest.approx(0.05)  # the rod does not even move
     assert numbers['tracking_rms_with'] < 0.4 * numbers['tracking_rms_without']
     assert numbers['dwell_with'] < 0.2 * numbers['dwell_without']
@@ -154,6 +155,33 @@ def test_json_says_what_the_issue_asks_for(simulated: Path):
     assert case['tracking_rms'] == numbers['tracking_rms_with']
     written = dataclasses.asdict(load_parameter_file(simulated / 'two' / 'feedforward.yaml')[2])
     assert numbers['parameters'] == written
+
+
+MAP = {
+    'speeds': [1e-3, 1e-2, 1e-1], 'pressures': [0.0, 7e6], 'frictions': [9.0, 7.0, 8.0, 32.0, 28.0, 30.0],
+    'reference_speed': 0.02,
+}  # fmt: skip
+BY_VELOCITY = {
+    'velocity terms': {'velocity_terms': {'viscous_friction': 150.0, 'stribeck_friction': 4.0, 'asymmetry': 0.1}},
+    'friction map': {'coulomb_law': 'friction_map', 'friction_map': MAP},
+}
+
+
+@pytest.mark.parametrize('law', BY_VELOCITY)
+def test_friction_over_velocity_can_be_tuned(law, monkeypatch):
+    monkeypatch.setattr(simulated_axis, 'MOST_CANDIDATES', 14)  # the grid, to save time
+    known = default_configuration()
+    changed = {**known.seal_documents[0], **BY_VELOCITY[law]}
+    if law == 'friction map':
+        del changed['normal_force'], changed['friction_coefficient']
+    configuration = dataclasses.replace(known, seal_documents=(changed, known.seal_documents[1]))
+    assert configuration.parameters().estimator.seals[0].seal.depends_on_velocity
+    settings = TuningSettings(amplitude=5e-4, frequency=10.0, hold_time=0.1, friction_error=0.0, delay_error=0.0)
+    tuning = tune_simulator(settings, configuration)
+    assert tuning.found.better_in_every_case
+    assert tuning.found.nominal.tracking_rms < 0.5 * tuning.found.without.tracking_rms
+    assert tuning.found.nominal.dwell < 0.5 * tuning.found.without.dwell
+    assert json.dumps(tuning.numbers, allow_nan=False)
 
 
 def test_noise_is_seeded():
@@ -166,8 +194,8 @@ def test_noise_is_seeded():
 # -- a recorded axis --------------------------------------------------------------------------------------------------
 
 
-def test_bag_tells_the_scale_the_mass_and_the_offset(axis: Path, tmp_path: Path, capsys):
-    numbers = said(['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')], capsys)
+def test_scale_mass_and_offset_are_identified_from_a_bag(axis: Path, tmp_path: Path, capsys):
+    numbers = numbers_of(['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')], capsys)
     assert numbers['friction_over_model'] == pytest.approx(TRUE_SCALE, abs=0.01)
     assert numbers['mass'] == pytest.approx(TRUE_MASS, rel=0.1)
     assert numbers['force_offset'] == pytest.approx(OFFSET, abs=0.5)
@@ -175,9 +203,9 @@ def test_bag_tells_the_scale_the_mass_and_the_offset(axis: Path, tmp_path: Path,
     assert load_parameter_file(tmp_path / 'f.yaml')[2].coulomb_scale == pytest.approx(TRUE_SCALE, abs=0.01)
 
 
-def test_bag_says_what_it_cannot_tell(axis: Path, tmp_path: Path, capsys):
-    numbers = said(['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')], capsys)
-    assert set(numbers) >= ISSUE_KEYS
+def test_parameters_that_a_bag_does_not_identify_are_named(axis: Path, tmp_path: Path, capsys):
+    numbers = numbers_of(['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')], capsys)
+    assert set(numbers) >= COMMON_KEYS
     assert numbers['tracking_rms_with'] is numbers['dwell_with'] is None
     assert not numbers['told_by_bag']['lead_time']
     assert numbers['parameters']['lead_time'] == default_configuration().feedforward.lead_time
@@ -186,14 +214,14 @@ def test_bag_says_what_it_cannot_tell(axis: Path, tmp_path: Path, capsys):
     assert 'lead_time' in (tmp_path / 'f.yaml').read_text().split('ros__parameters')[0]
 
 
-def test_what_is_known_besides_the_bag_is_taken(axis: Path, tmp_path: Path, capsys):
+def test_given_mass_and_delay_are_used(axis: Path, tmp_path: Path, capsys):
     arguments = ['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml'), '--mass', '5', '--whole-delay', '0.004']
-    numbers = said(arguments, capsys)
+    numbers = numbers_of(arguments, capsys)
     assert (numbers['mass'], numbers['mass_is_fitted']) == (5.0, False)
     assert numbers['parameters']['lead_time'] == 0.004
 
 
-def test_recording_is_as_the_pipeline_saw_it(axis: Path):
+def test_recording_has_the_inputs_of_the_pipeline(axis: Path):
     recording, track, configuration = read_recording(axis)
     assert len(recording.estimates) == len(track.position) == 2000
     assert recording.motions[50].reference_velocity == Sine().at(0.05).velocity
@@ -228,42 +256,42 @@ def test_friction_against_the_motion_is_a_failed_check(tmp_path: Path, capsys):
     assert 'NOT better than none' in capsys.readouterr().out
 
 
-# -- what is no good --------------------------------------------------------------------------------------------------
+# -- rejected input ----------------------------------------------------------------------------------------------------
 
 
-def refused(arguments: list[str], folder: Path, capsys) -> str:
-    """One line of what was said; nothing in ``folder`` changed."""
+def rejected(arguments: list[str], folder: Path, capsys) -> str:
+    """Error message of one line; no file in ``folder`` changed."""
     before = files_below(folder)
     capsys.readouterr()
     assert main(arguments) == 2
-    words = capsys.readouterr().err
-    assert words.count('\n') == 1
+    text = capsys.readouterr().err
+    assert text.count('\n') == 1
     assert files_below(folder) == before
-    return words
+    return text
 
 
 @pytest.mark.parametrize('missing', LEAVE_OUT)
-def test_bag_without_an_input_is_refused_and_says_which_to_record(missing: str, tmp_path: Path, capsys):
+def test_bag_without_an_input_is_rejected_with_the_input_to_record(missing: str, tmp_path: Path, capsys):
     bag = write_axis(tmp_path / 'bag', seconds=0.05, leave_out=missing)
-    words = refused(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')], tmp_path, capsys)
-    assert LEAVE_OUT[missing] in words
-    assert 'record' in words
+    text = rejected(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')], tmp_path, capsys)
+    assert LEAVE_OUT[missing] in text
+    assert 'record' in text
 
 
 @pytest.mark.parametrize(
-    ('wave', 'seconds', 'words'),
+    ('wave', 'seconds', 'text'),
     [
         (Step(size=0.001), 0.5, 'reverses 0 times'),
         (Sine(amplitude=1e-5), 1.0, 'slides in'),
     ],
 )
-def test_bag_that_shows_no_friction_is_refused_and_says_what_to_record(wave, seconds, words, tmp_path: Path, capsys):
+def test_bag_that_shows_no_friction_is_rejected_with_the_motion_to_record(wave, seconds, text, tmp_path: Path, capsys):
     bag = write_axis(tmp_path / 'bag', wave, seconds)
-    assert words in refused(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')], tmp_path, capsys)
+    assert text in rejected(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')], tmp_path, capsys)
 
 
 @pytest.mark.parametrize(
-    ('arguments', 'words'),
+    ('arguments', 'text'),
     [
         (['--amplitude', '5'], 'amplitude'),
         (['--amplitude', 'nan'], 'amplitude'),
@@ -273,17 +301,17 @@ def test_bag_that_shows_no_friction_is_refused_and_says_what_to_record(wave, sec
         (['--params', 'absent.yaml'], 'absent.yaml'),
     ],
 )
-def test_option_that_makes_no_sense_is_refused(arguments: list[str], words: str, tmp_path: Path, capsys):
-    assert words in refused(['tune', '--out', str(tmp_path / 'f.yaml'), *arguments], tmp_path, capsys)
+def test_invalid_option_is_rejected(arguments: list[str], text: str, tmp_path: Path, capsys):
+    assert text in rejected(['tune', '--out', str(tmp_path / 'f.yaml'), *arguments], tmp_path, capsys)
 
 
-def test_option_of_the_simulator_is_refused_with_a_bag(axis: Path, tmp_path: Path, capsys):
+def test_option_of_the_simulator_is_rejected_with_a_bag(axis: Path, tmp_path: Path, capsys):
     arguments = ['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml'), '--frequency', '5']
-    assert '--frequency is not for a --bag' in refused(arguments, tmp_path, capsys)
+    assert '--frequency is not for a --bag' in rejected(arguments, tmp_path, capsys)
 
 
 @pytest.mark.parametrize('kind', ['html', 'folder', 'other file', 'other page', 'below a file'])
-def test_target_that_must_not_be_written_is_refused_before_the_work(kind: str, tmp_path: Path, capsys):
+def test_target_that_must_not_be_written_is_rejected_before_the_work(kind: str, tmp_path: Path, capsys):
     out = tmp_path / ('f.html' if kind == 'html' else 'f.yaml')
     if kind == 'folder':
         out.mkdir()
@@ -294,4 +322,4 @@ def test_target_that_must_not_be_written_is_refused_before_the_work(kind: str, t
     elif kind == 'below a file':
         out.write_text('')
         out = out / 'g.yaml'
-    assert str(out.with_suffix('')) in refused(['tune', '--out', str(out)], tmp_path, capsys)
+    assert str(out.with_suffix('')) in rejected(['tune', '--out', str(out)], tmp_path, capsys)

@@ -1,4 +1,4 @@
-"""The ladder of laws: what is fitted is what the node runs, and each law has the limits that its physics has."""
+"""Candidate laws: what is fitted is what the node runs, and each law has the limits that its physics has."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,12 @@ from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_frict
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, squeeze_force
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.identification.ladder import COMPILED_FROM, Conditions, ladder, normal_forces
+from seal_friction_ros.core.identification.candidate_laws import (
+    COMPILED_FROM,
+    OperatingConditions,
+    candidate_laws,
+    normal_forces,
+)
 
 THESIS_RING = SealGeometry(0.106 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
 NORMAL_FORCE = {'law': 'area_deformation_gain', 'area_deformation_gain': 0.3925, 'radial_force': 9.3}
@@ -25,18 +30,20 @@ VALUES = {
     'asymmetry': 0.1,
 }
 NORMAL_FORCE_LAW = AreaDeformationGain(0.3925, 9.3)
-ALL = ladder(geometry=THESIS_RING, normal_force_law=NORMAL_FORCE_LAW, with_speeds=True, with_exponent=True)
+ALL = candidate_laws(geometry=THESIS_RING, normal_force_law=NORMAL_FORCE_LAW, with_speeds=True, with_exponent=True)
 
 
-def conditions(rows=50) -> Conditions:
+def conditions(rows=50) -> OperatingConditions:
     """Two seals, one on each chamber, at any pressures and speeds."""
     rng = np.random.default_rng(4)
     pressure = rng.uniform(0.0, 5e6, (rows, 2))
     velocity = rng.uniform(-0.2, 0.2, rows)
-    return Conditions(pressure, normal_forces(pressure, THESIS_RING, NORMAL_FORCE_LAW), velocity, np.sign(velocity))
+    return OperatingConditions(
+        pressure, normal_forces(pressure, THESIS_RING, NORMAL_FORCE_LAW), velocity, np.sign(velocity)
+    )
 
 
-def seal_of(rung):
+def seal_of(law):
     """The seal that a seal file with these values makes."""
     parts = {
         'constant_coulomb': {'constant_coulomb': {'coulomb_friction_at_any_pressure': 12.0}},
@@ -54,47 +61,47 @@ def seal_of(rung):
             'friction_coefficient': {'law': 'power_law', 'coefficient': 2.0, 'exponent': 0.56},
         },
     }
-    names = [p.name for p in rung.parameters]
+    names = [p.name for p in law.parameters]
     terms = {n: VALUES[n] for n in names if n.startswith(('viscous', 'stribeck', 'asymmetry'))}
     document = {
         'name': 'test',
-        'coulomb_law': rung.coulomb_law,
-        **parts[rung.coulomb_law],
+        'coulomb_law': law.law_type.NAME,
+        **parts[law.law_type.NAME],
         'uncertainty': {'relative_std': 0.1},
         'identified_pressure': [0.0, 5e6],
     }
     return parse_seal(document | ({'velocity_terms': terms} if terms else {}))
 
 
-@pytest.mark.parametrize('rung', ALL, ids=lambda rung: rung.name)
-def test_what_is_fitted_is_what_the_node_runs(rung):
+@pytest.mark.parametrize('law', ALL, ids=lambda law: law.name)
+def test_what_is_fitted_is_what_the_node_runs(law):
     at = conditions()
-    seal = seal_of(rung)
+    seal = seal_of(law)
     mounted = (MountedSeal(seal, 'a'), MountedSeal(seal, 'b'))
     node = []
     for (a, b), v in zip(at.pressure, at.velocity, strict=True):
         found = actuator_friction(mounted, a, b, v)
         node.append(found.coulomb_friction + found.velocity_friction)
-    assert rung.friction(at, VALUES) == pytest.approx(np.array(node), rel=1e-12)
+    assert law.friction(at, VALUES) == pytest.approx(np.array(node), rel=1e-12)
 
 
-def test_the_ladder_climbs_from_what_the_field_does_to_the_physics():
-    names = [rung.name for rung in ALL]
+def test_the_candidates_are_ordered_from_constant_to_physics_based():
+    names = [law.name for law in ALL]
     assert names[0] == 'constant_coulomb'
     order = ['constant_coulomb', 'coulomb_viscous', 'pressure_power_law', 'physics_based', 'physics_based_stribeck']
     assert [name for name in names if name in order] == order
     assert names[-1] == 'physics_based_asymmetric'
-    assert all(rung.depends_on_pressure != rung.name.startswith(('constant', 'coulomb')) for rung in ALL)
+    assert all(law.depends_on_pressure != law.name.startswith(('constant', 'coulomb')) for law in ALL)
 
 
 def test_without_geometry_or_speeds_the_laws_that_need_them_are_not_there():
-    bare = ladder(with_speeds=False, with_exponent=True)
-    assert [rung.name for rung in bare] == ['constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric']
-    assert not any(rung.needs_geometry or 'viscous_friction' in rung.velocity_terms for rung in bare)
+    bare = candidate_laws(with_speeds=False, with_exponent=True)
+    assert [law.name for law in bare] == ['constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric']
+    assert not any(law.parts or 'viscous_friction' in law.velocity_terms for law in bare)
 
 
 def test_few_pressures_get_the_exponent_of_an_elastic_contact():
-    (law,) = (r for r in ladder(with_speeds=False, with_exponent=False)
+    (law,) = (r for r in candidate_laws(with_speeds=False, with_exponent=False)
               if r.name == 'pressure_power_law')  # fmt: skip
     assert [p.name for p in law.parameters] == ['friction_at_no_pressure', 'friction_at_one_bar']
     assert law.fixed == {'pressure_exponent': pytest.approx(2.0 / 3.0)}
@@ -102,22 +109,22 @@ def test_few_pressures_get_the_exponent_of_an_elastic_contact():
 
 def test_at_no_pressure_and_at_one_bar_the_power_law_is_what_its_parameters_say():
     (law,) = (r for r in ALL if r.name == 'pressure_power_law')
-    at = Conditions(np.array([[0.0], [1e5]]), None, np.zeros(2), np.ones(2))
+    at = OperatingConditions(np.array([[0.0], [1e5]]), None, np.zeros(2), np.ones(2))
     assert law.friction(at, VALUES) == pytest.approx([5.0, 5.8])
 
 
 def test_stribeck_friction_has_faded_to_37_percent_at_its_velocity():
     (law,) = (r for r in ALL if r.name == 'coulomb_stribeck')
-    at = Conditions(np.zeros((2, 1)), None, np.array([0.0, -0.02]), np.array([1.0, -1.0]))
+    at = OperatingConditions(np.zeros((2, 1)), None, np.array([0.0, -0.02]), np.array([1.0, -1.0]))
     viscous = np.array([0.0, 0.02 * 150.0])
     assert law.friction(at, VALUES) - 12.0 - viscous == pytest.approx([4.0, 4.0 * np.exp(-1.0)])
 
 
-@pytest.mark.parametrize('rung', ALL, ids=lambda rung: rung.name)
-def test_many_readings_are_computed_by_compiled_code_to_the_same_bits(rung):
+@pytest.mark.parametrize('law', ALL, ids=lambda law: law.name)
+def test_many_readings_are_computed_by_compiled_code_to_the_same_bits(law):
     at, part = conditions(rows=400), COMPILED_FROM // 2 - 1
-    few = [rung.friction(at.taken(np.arange(i, min(i + part, 400))), VALUES) for i in range(0, 400, part)]
-    assert rung.friction(at, VALUES).tobytes() == np.concatenate(few).tobytes()
+    few = [law.friction(at.taken(np.arange(i, min(i + part, 400))), VALUES) for i in range(0, 400, part)]
+    assert law.friction(at, VALUES).tobytes() == np.concatenate(few).tobytes()
 
 
 def test_squeeze_force_of_the_thesis_ring_is_near_that_of_its_finite_elements():

@@ -1,0 +1,217 @@
+"""Candidate laws of an identification: friction laws with and without velocity terms, ordered from simple to complex.
+
+Fit and live node evaluate the same function of the law. The parameters are those of one seal; the friction is that of
+all seals of the rig.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.compiled import for_compiler
+from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.friction.actuator import SealNumbers, numbers_of_law, sliding_friction_of_seals
+from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
+from seal_friction_ros.core.friction.laws import FRICTION_LAWS
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.law import FrictionLaw, TypicalReading
+from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
+from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
+from seal_friction_ros.core.friction.laws.pressure_power_law import ELASTIC_EXPONENT, PressurePowerLaw
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+
+COMPILED_FROM = 100  # pressures from which compiled code is faster: compiling a law takes about 1 s
+
+
+class OperatingConditions(NamedTuple):
+    """Operating conditions of n readings with k seals."""
+
+    pressure: FloatArray
+    """[Pa, gauge, >= 0] of each seal, shape (n, k)"""
+    normal_force: FloatArray | None
+    """[N] of each seal, shape (n, k); None without geometry"""
+    velocity: FloatArray
+    """[m/s] shape (n,); NaN if not measured"""
+    direction: FloatArray
+    """-1.0 or 1.0, shape (n,)"""
+
+    def taken(self, index: IntArray) -> 'OperatingConditions':
+        """The readings in ``index``."""
+        normal_force = None if self.normal_force is None else self.normal_force[index]
+        return OperatingConditions(self.pressure[index], normal_force, self.velocity[index], self.direction[index])
+
+    def typical(self, friction: float) -> TypicalReading:
+        """Magnitudes that occur in the readings; ``friction`` is the mean of one seal [N]."""
+        return TypicalReading(
+            friction,
+            float(self.pressure.max()),
+            float(np.nanmax(np.abs(self.velocity), initial=0.0)),
+            math.nan if self.normal_force is None else float(self.normal_force.mean()),
+        )
+
+
+ParameterValues = Mapping[str, float]
+
+
+class FittedParameter(NamedTuple):
+    """A parameter with its bounds in the fit."""
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    start: Callable[[TypicalReading], float]
+    """first guess"""
+    symbol: str
+
+
+def fitted_parameters(record_type: type) -> tuple[FittedParameter, ...]:
+    """Parameters of a law, or of the velocity terms, that have a first guess."""
+    return tuple(
+        FittedParameter(
+            name, m.unit, *(m.fit_bounds or (float(m.lower or 0.0), float(m.upper or 0.0))), m.start, m.symbol
+        )
+        for name, m in meanings(record_type).items()
+        if m.start is not None
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateLaw:
+    """A friction law of the registry, with or without velocity terms."""
+
+    name: str
+    formula: str
+    law_type: type[FrictionLaw]
+    parameters: tuple[FittedParameter, ...]
+    fixed: ParameterValues = field(default_factory=dict)
+    """parameters that are not fitted"""
+    parts: Mapping[str, Any] = field(default_factory=dict)
+    """known fields of the law: geometry and normal force; empty if it needs neither"""
+
+    @property
+    def depends_on_pressure(self) -> bool:
+        """Whether its Coulomb friction depends on pressure."""
+        return self.law_type is not ConstantCoulomb
+
+    @property
+    def velocity_terms(self) -> tuple[str, ...]:
+        """Fitted parameters that belong to the velocity terms."""
+        fitted = {parameter.name for parameter in self.parameters}
+        return tuple(name for name in meanings(VelocityTerms) if name in fitted)
+
+    def named(self, vector: Sequence[float] | FloatArray) -> dict[str, float]:
+        """Parameters by name, including the fixed ones, from the fitted values in the order of ``parameters``."""
+        return {**{p.name: float(x) for p, x in zip(self.parameters, vector, strict=True)}, **self.fixed}
+
+    def friction_law(self, values: ParameterValues) -> FrictionLaw:
+        """The friction law of one seal, without velocity terms.
+
+        Args:
+            values: Parameters by name; parameters of other laws are ignored.
+
+        Raises:
+            ValueError: A value is out of bounds.
+        """
+        part_name, part_type = self.law_type.FITTED_PART or ('', self.law_type)
+        known = {**values, **self.fixed}
+        chosen = {f.name: known[f.name] for f in fields(part_type) if f.init and f.name in known}
+        fitted: Any = part_type(**chosen, **({} if part_name else self.parts))
+        return self.law_type(**self.parts, **{part_name: fitted}) if part_name else fitted
+
+    def friction(self, at: OperatingConditions, values: ParameterValues) -> FloatArray:
+        """Magnitude of the sliding friction of all seals [N], shape (n,)."""
+        terms = VelocityTerms(**{name: values[name] for name in self.velocity_terms}) if self.velocity_terms else None
+        return friction_of_seals(numbers_of_law(self.friction_law(values), terms), at)
+
+    def coulomb_friction(self, at: OperatingConditions, values: ParameterValues) -> FloatArray:
+        """Magnitude of the Coulomb friction of all seals [N], shape (n,)."""
+        return friction_of_seals(numbers_of_law(self.friction_law(values), None), at)
+
+
+def friction_of_seals(seal: SealNumbers, at: OperatingConditions) -> FloatArray:
+    """Magnitude of the sliding friction [N] of k equal seals, shape (n,). An unknown speed counts as 0."""
+    speed, direction = np.nan_to_num(np.abs(at.velocity)), at.direction.astype(np.int64)
+    if at.pressure.size >= COMPILED_FROM:
+        from seal_friction_ros.core.identification.compiled_friction import sum_over_seals  # noqa: PLC0415
+
+        return np.asarray(sum_over_seals(for_compiler((seal,)), at.pressure, speed, direction))
+    rows = zip(at.pressure.tolist(), speed.tolist(), direction.tolist(), strict=True)
+    return np.array([sum(sliding_friction_of_seals((seal,), p, p, v, d) for p in each) for each, v, d in rows])
+
+
+def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForceLaw) -> FloatArray:
+    """Normal force of each seal [N], shape (n, k), at ``pressure`` [Pa, gauge], shape (n, k)."""
+    area = projected_area(geometry)
+    distinct, back = np.unique(pressure, return_inverse=True)
+    forces = np.array([law.normal_force(float(p), area) for p in distinct])
+    return np.asarray(forces[back].reshape(pressure.shape))
+
+
+# -- the list of candidates -------------------------------------------------------------------------------------------
+
+_VISCOUS, _STRIBECK = ('viscous_friction',), ('stribeck_friction', 'stribeck_velocity')
+_WITH_SPEEDS = (
+    ('viscous', 'viscous', _VISCOUS),
+    ('stribeck', 'viscous + Stribeck', (*_VISCOUS, *_STRIBECK)),
+    ('asymmetric', 'viscous + asymmetry', (*_VISCOUS, 'asymmetry')),
+)
+_WITHOUT_SPEEDS = (('asymmetric', 'asymmetry', ('asymmetry',)),)
+
+
+def candidate_laws(
+    *,
+    geometry: SealGeometry | None = None,
+    normal_force_law: NormalForceLaw | None = None,
+    with_speeds: bool,
+    with_exponent: bool,
+) -> tuple[CandidateLaw, ...]:
+    """Laws that the data can identify: constant, pressure-dependent, physics-based, each with velocity terms if any.
+
+    Args:
+        geometry: Of the ring; without it, laws that need it are left out.
+        normal_force_law: Likewise.
+        with_speeds: The readings differ in speed, so velocity terms are identifiable.
+        with_exponent: There are enough pressures to identify the pressure exponent; otherwise it is 2/3.
+    """
+    parts = {'geometry': geometry, 'normal_force_law': normal_force_law} if geometry and normal_force_law else {}
+    bases = [_base(law_type, parts, with_speeds, with_exponent) for law_type in FRICTION_LAWS]
+    constant, *laws = [base for base in bases if base is not None]
+    highest = next(base for base in laws if base.law_type is (PhysicsBased if parts else PressurePowerLaw))
+    on_constant = _with_velocity_terms(constant, 'coulomb', _WITH_SPEEDS) if with_speeds else ()
+    on_highest = _with_velocity_terms(highest, highest.name, _WITH_SPEEDS if with_speeds else _WITHOUT_SPEEDS)
+    return (constant, *on_constant, *laws, *on_highest)
+
+
+def _base(
+    law_type: type[FrictionLaw], parts: Mapping[str, Any], with_speeds: bool, with_exponent: bool
+) -> CandidateLaw | None:
+    """A law without velocity terms; None if it has no fitted parameter or needs something unknown."""
+    part_name, part_type = law_type.FITTED_PART or ('', law_type)
+    parameters = fitted_parameters(part_type)
+    needed = [f.name for f in fields(law_type) if f.init and f.name != part_name and f.name not in meanings(law_type)]
+    depends_on_speed = 'reference_speed' in meanings(law_type)
+    if not parameters or not set(needed) <= set(parts) or (depends_on_speed and not with_speeds):
+        return None
+    fixed = {'pressure_exponent': ELASTIC_EXPONENT} if law_type is PressurePowerLaw and not with_exponent else {}
+    parameters = tuple(p for p in parameters if p.name not in fixed)
+    return CandidateLaw(law_type.NAME, law_type.FORMULA, law_type, parameters, fixed, {n: parts[n] for n in needed})
+
+
+def _with_velocity_terms(
+    base: CandidateLaw, prefix: str, extensions: Sequence[tuple[str, str, tuple[str, ...]]]
+) -> list[CandidateLaw]:
+    """The law with each extension: suffix of its name, text of its formula, names of its velocity terms."""
+    return [
+        replace(
+            base,
+            name=f'{prefix}_{suffix}',
+            formula=f'{base.formula} + {terms}',
+            parameters=(*base.parameters, *(p for p in fitted_parameters(VelocityTerms) if p.name in names)),
+        )
+        for suffix, terms, names in extensions
+    ]

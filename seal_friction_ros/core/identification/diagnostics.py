@@ -1,0 +1,289 @@
+"""Diagnostics of friction readings: repeatability, drift, collinearity, outliers, and changes between sources."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, ParameterValues
+from seal_friction_ros.core.identification.fitting import LawFit, fit, jackknife_errors, offsets_of, root_mean_square
+from seal_friction_ros.core.identification.readings import FrictionReadings
+
+COLLINEAR = 0.9  # correlation above which two regressors are called collinear (our choice)
+TRADED_OFF = 0.95  # correlation above which two fitted parameters cannot be determined separately (our choice)
+ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
+OUTLIER = 3.0  # standard deviations from the law of the other pressures (our choice)
+CHANGED = 0.2  # relative difference of two files that are two states; runs on a rig repeat within 10 to 15 %
+SETTLED = 0.1  # relative change of the friction over one run above which the seal has not settled (our choice)
+
+
+# -- scatter ----------------------------------------------------------------------------------------------------------
+
+
+def repeatability(readings: FrictionReadings, offsets: FloatArray) -> float:
+    """Scatter of readings under the same conditions over the friction [-]: a lower bound for the error of any law.
+
+    Same conditions are one pressure level, or for samples one cell of a grid (quantiles) of 12 speeds, 6 pressures of
+    each seal, and the direction. NaN if no condition was repeated.
+
+    Args:
+        readings: The readings.
+        offsets: Offset of the force sum of each source [N].
+    """
+    measured = readings.magnitudes(offsets)
+    if not readings.are_samples:
+        return _pooled_std(measured[inside] for inside in readings.levels.values())
+    cells = _cells(readings)
+    mean = float(measured.mean())
+    return _pooled_std((measured[cells == cell] for cell in np.unique(cells)), mean)
+
+
+def _pooled_std(parts: Iterable[FloatArray], unit: float | None = None) -> float:
+    """Standard deviation within the parts, pooled, over ``unit``; None: each over the mean of its part."""
+    squares = freedom = 0.0
+    for part in parts:
+        mean = float(part.mean())
+        squares += float(np.sum((part - mean) ** 2)) / (max(mean**2, 1e-24) if unit is None else 1.0)
+        freedom += len(part) - 1
+    return math.sqrt(squares / freedom) / (unit or 1.0) if freedom else math.nan
+
+
+def _cells(readings: FrictionReadings) -> IntArray:
+    """Number of the cell of each sample, in a grid of quantiles of speed and of each pressure."""
+    cells = (readings.at.direction > 0.0).astype(np.int64)
+    for column, parts in [(np.abs(readings.at.velocity), 12), *((column, 6) for column in readings.at.pressure.T)]:
+        edges = np.quantile(column, np.linspace(0.0, 1.0, parts + 1)[1:-1])
+        cells = cells * parts + np.searchsorted(edges, column)
+    return cells
+
+
+def run_drift(readings: FrictionReadings, offsets: FloatArray) -> dict[int, float]:
+    """Relative change of the friction from the first to the last stroke at each pressure level [-].
+
+    It is the slope of a line through the strokes of one source in one direction, in order of time; mean over directions
+    and sources. Levels with fewer than four strokes in a direction are left out.
+    """
+    measured = readings.magnitudes(offsets)
+    result: dict[int, list[float]] = {}
+    for level, inside in readings.levels.items():
+        for source in np.unique(readings.source[inside]):
+            for side in (-1.0, 1.0):
+                run = measured[inside & (readings.source == source) & (readings.at.direction == side)]
+                if len(run) >= 4:
+                    slope = float(np.polyfit(np.arange(len(run)), run, 1)[0])
+                    result.setdefault(level, []).append(slope * (len(run) - 1) / float(run.mean()))
+    return {level: float(np.mean(values)) for level, values in result.items()}
+
+
+def between_runs(readings: FrictionReadings) -> float:
+    """Relative standard deviation of the friction between sources at one pressure [-]; NaN if none was repeated."""
+    frictions = (readings.frictions_of_sources(inside) for inside in readings.levels.values())
+    return _pooled_std(np.array(list(of_source.values())) for of_source in frictions)
+
+
+# -- collinearity -----------------------------------------------------------------------------------------------------
+
+
+class CorrelatedPair(NamedTuple):
+    """Two correlated regressors or parameters."""
+
+    one: str
+    other: str
+    correlation: float
+
+
+def collinear_regressors(readings: FrictionReadings, chamber_pressures: FloatArray) -> list[CorrelatedPair]:
+    """Pairs of regressors whose correlation is above `COLLINEAR`.
+
+    Speed and seal pressure determine viscous and pressure-dependent friction; velocity and pressure difference
+    determine viscous friction and an area error. Readings at held pressures are averaged over each pressure first.
+
+    Args:
+        readings: The readings.
+        chamber_pressures: [Pa] of chambers a and b, shape (n, 2).
+    """
+    velocity = readings.at.velocity
+    if not np.isfinite(velocity).all():
+        return []
+    found = []
+    for one, x, other, y in (
+        ('speed', np.abs(velocity), 'pressure of the seals', readings.seal_pressure),
+        ('velocity', velocity, 'pressure difference', chamber_pressures[:, 0] - chamber_pressures[:, 1]),
+    ):
+        both = np.array([x, y])
+        if not readings.are_samples:
+            both = np.array([[column[inside].mean() for inside in readings.levels.values()] for column in both])
+        varied = np.ptp(both, axis=1) > 1e-3 * np.abs(both).max(axis=1)
+        if both.shape[1] < 3 or not varied.all():
+            continue
+        correlation = float(np.corrcoef(both)[0, 1])
+        if abs(correlation) > COLLINEAR:
+            found.append(CorrelatedPair(one, other, correlation))
+    return found
+
+
+def traded_off(found: LawFit) -> list[CorrelatedPair]:
+    """Pairs of fitted parameters whose correlation is above `TRADED_OFF`."""
+    parameters = enumerate(p.name for p in found.law.parameters)
+    pairs = [CorrelatedPair(a, b, float(found.correlation[i, j])) for (i, a), (j, b) in combinations(parameters, 2)]
+    return [pair for pair in pairs if abs(pair.correlation) > TRADED_OFF]
+
+
+# -- outliers ---------------------------------------------------------------------------------------------------------
+
+
+class Outlier(NamedTuple):
+    """A pressure level whose friction disagrees with the law of the other levels."""
+
+    level: int
+    measured: float
+    """[N]"""
+    expected: float
+    """[N] by the law fitted to the other levels"""
+    standard_deviations: float
+
+
+def outlying_level(
+    law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, floor: float
+) -> Outlier | None:
+    """The pressure level that deviates most from the law of the others, if by more than `OUTLIER`; else None.
+
+    Each level is left out and the law is fitted to the rest. The standard deviation of the deviation contains the
+    residuals of the rest, the repeatability, and the leverage of the level. An outlier also disturbs the law of the
+    rest when another level is left out; only without the outlier do the rest agree.
+
+    Args:
+        law: The law.
+        readings: At held pressures; fewer than four levels have no outlier.
+        near: Parameters of the fit to all readings, as start values.
+        floor: Relative standard deviation of repeated readings.
+    """
+    if len(readings.levels) < 4:
+        return None
+    found: list[Outlier] = []
+    for level, out in readings.levels.items():
+        rest = readings.taken(~out)
+        of_rest = fit(law, rest, near, is_close=True)
+        expected, measured = _mean_friction(of_rest, readings, out), readings.half_range(out).friction
+        others = rest.levels.values()
+        residuals = [
+            rest.half_range(inside).friction / _mean_friction(of_rest, rest, inside) - 1.0 for inside in others
+        ]
+        freedom = max(len(residuals) - len(law.parameters), 1)
+        noise = math.hypot(math.sqrt(sum(r**2 for r in residuals) / freedom), floor)
+        slopes = np.array([_relative_slope(of_rest, rest, inside) for inside in others])
+        slope = _relative_slope(of_rest, readings, out)
+        leverage = float(slope @ np.linalg.pinv(slopes.T @ slopes) @ slope)
+        size = abs(measured / expected - 1.0) / (noise * math.sqrt(1.0 + leverage))
+        found.append(Outlier(level, measured, expected, size))
+    worst = max(found, key=lambda outlier: outlier.standard_deviations)
+    return worst if worst.standard_deviations > OUTLIER else None
+
+
+def _mean_friction(found: LawFit, readings: FrictionReadings, inside: BoolArray) -> float:
+    """Mean friction of a law over the readings ``inside`` [N]."""
+    return float(found.friction(readings.at.taken(np.flatnonzero(inside))).mean())
+
+
+def _relative_slope(found: LawFit, readings: FrictionReadings, inside: BoolArray) -> FloatArray:
+    """Relative change of `_mean_friction` by a relative change of each parameter, by differences; (parameters,)."""
+    middle = _mean_friction(found, readings, inside)
+    result = np.empty(len(found.law.parameters))
+    for i, parameter in enumerate(found.law.parameters):
+        value = found.values[parameter.name]
+        share = 1e-4 if value + 1e-4 * (abs(value) or 1.0) <= parameter.upper else -1e-4
+        moved = replace(found, values=found.values | {parameter.name: value + share * (abs(value) or 1.0)})
+        result[i] = (_mean_friction(moved, readings, inside) / middle - 1.0) / share
+    return result
+
+
+# -- changes between sources ------------------------------------------------------------------------------------------
+
+
+class FrictionChange(NamedTuple):
+    """Friction of another source relative to a law."""
+
+    name: str
+    ratio: float
+    """friction of the source over friction by the law [-]"""
+    standard_error: float
+    """of the ratio [-]"""
+    rms: float
+    """[N] residual of the law on the source, offset removed"""
+    own_rms: float
+    """[N] residual of the same law fitted to the source"""
+
+    @property
+    def is_change(self) -> bool:
+        """Whether the friction has changed: by more than `CHANGED` and more than twice the standard error."""
+        return abs(self.ratio - 1.0) > max(CHANGED, 2.0 * self.standard_error)
+
+
+def compare_with_law(found: LawFit, fitted: FrictionReadings, other: FrictionReadings) -> FrictionChange:
+    """Compare the friction of another source with a law fitted without it.
+
+    The ratio comes from least squares, offset eliminated, over the samples up to the highest pressure and speed of the
+    fit; its standard error is that of the jackknife over groups.
+
+    Args:
+        found: The law.
+        fitted: Readings that it was fitted to.
+        other: Samples of the other source.
+
+    Raises:
+        ValueError: Fewer than 10 % of the samples are at pressures and speeds of the fit.
+    """
+    inside = other.seal_pressure <= fitted.seal_pressure.max()
+    if np.isfinite(other.at.velocity).all() and np.isfinite(fitted.at.velocity).all():
+        inside &= np.abs(other.at.velocity) <= np.abs(fitted.at.velocity).max()
+    if inside.sum() < 0.1 * other.count:
+        raise ValueError(
+            f'{other.names[0]}: {100.0 * inside.mean():.0f} % of its samples are at pressures and speeds of '
+            f'{fitted.names[0]}, so they cannot be compared: identify each separately'
+        )
+    other = other.taken(inside)
+    friction = found.friction(other.at)
+
+    def ratio(index: BoolArray | slice) -> float:
+        """Slope of measured over predicted friction."""
+        x = other.at.direction[index] * friction[index]
+        y = other.force[index]
+        x = x - x.mean()
+        return float(np.sum(x * (y - y.mean())) / np.sum(x * x))
+
+    error = float(jackknife_errors(np.array([ratio(~out) for out in other.groups])))
+    own = fit(found.law, other, found.values, is_close=True)
+    rms = root_mean_square(other.magnitudes(offsets_of(other, friction)) - friction)
+    own_rms = root_mean_square(other.magnitudes(own.offsets) - own.friction(other.at))
+    return FrictionChange(other.names[int(other.source[0])], ratio(slice(None)), error, rms, own_rms)
+
+
+class LevelChange(NamedTuple):
+    """Two sources that disagree at one pressure."""
+
+    pressure: float
+    """[Pa]"""
+    name: str
+    friction: float
+    """[N]"""
+    other_name: str
+    other_friction: float
+    """[N]"""
+
+
+def changed_levels(readings: FrictionReadings) -> list[LevelChange]:
+    """Pressures at which a source differs by more than `CHANGED` from the first source there."""
+    found = []
+    for inside, pressure in zip(readings.levels.values(), readings.level_pressures.tolist(), strict=True):
+        (first, friction), *others = readings.frictions_of_sources(inside).items()
+        names = readings.names
+        found += [
+            LevelChange(pressure, names[first], friction, names[source], of_source)
+            for source, of_source in others
+            if abs(of_source / friction - 1.0) > CHANGED
+        ]
+    return found

@@ -1,0 +1,219 @@
+"""Preparation of friction readings from recorded logs or from manual readings.
+
+With held speed and pressure, each stroke is one reading. With swept speed or pressure, each sample of even sliding is
+one reading, and the log is divided into contiguous blocks, because neighbouring samples are correlated.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
+from seal_friction_ros.core.identification.checks import check_log, check_manual_readings, check_readings
+from seal_friction_ros.core.identification.readings import (
+    FrictionReadings,
+    ManualReadings,
+    PreparedReadings,
+    RecordedLog,
+)
+from seal_friction_ros.core.identification.signal_preparation import (
+    SignalReading,
+    Signals,
+    breakaways,
+    even_sliding,
+    pressure_levels,
+    strokes,
+)
+
+BLOCKS = 10  # contiguous parts of a swept log, each predicted from the others
+HELD_LOG = 0.8  # of the even samples in strokes at held speed and pressure: each stroke is a reading (our choice)
+FEWEST_SWEPT = 200  # samples of even sliding, so that a block has 20 (our choice)
+
+_Row = tuple[int, SignalReading]
+"""number of the log, reading"""
+
+
+# -- logs -------------------------------------------------------------------------------------------------------------
+
+
+def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> PreparedReadings:
+    """Readings from logs.
+
+    Args:
+        logs: One for each source.
+        chambers: Chamber (a or b) of each seal.
+
+    Raises:
+        ValueError: A log is unfit for identification; one line with the reason and what to measure instead.
+    """
+    for log in logs:
+        check_log(log)
+    of_strokes = [(number, stroke) for number, log in enumerate(logs) for stroke in strokes(log.signals, log.sliding)]
+    even = [even_sliding(log.signals, log.sliding) for log in logs]
+    held = [sum(len(stroke.samples) for source, stroke in of_strokes if source == i) for i in range(len(logs))]
+    are_samples = sum(held) < HELD_LOG * sum(int(part.sum()) for part in even)
+    if are_samples:
+        readings, chamber_pressures = _swept(logs, even, chambers)
+        breakaway = None
+        counts = [int(part.sum()) for part in even]
+    else:
+        readings, chamber_pressures = _held(logs, of_strokes, chambers)
+        breakaway = _breakaway(logs, chambers, readings)
+        counts = held
+    check_readings(readings)
+    used = {log.name: count for log, count in zip(logs, counts, strict=True)}
+    total = {log.name: len(log.signals.time) for log in logs}
+    return PreparedReadings(readings, chamber_pressures, breakaway, used, total, _left_out(logs, even, sum(counts)))
+
+
+def _seal_pressures(chamber_pressures: FloatArray, chambers: Sequence[str]) -> FloatArray:
+    """Pressure of each seal [Pa, gauge, >= 0], shape (n, k); negative gauge pressure counts as zero."""
+    return np.maximum(chamber_pressures[:, ['ab'.index(chamber) for chamber in chambers]], 0.0)
+
+
+def _columns(rows: Sequence[_Row], chambers: Sequence[str]) -> tuple[OperatingConditions, FloatArray, IntArray]:
+    """Operating conditions, chamber pressures [Pa], shape (n, 2), and number of the log of each reading."""
+    both = np.array([(r.pressure_a, r.pressure_b) for _, r in rows])
+    velocity, direction = np.array([(r.velocity, r.direction) for _, r in rows], dtype=np.float64).T
+    at = OperatingConditions(_seal_pressures(both, chambers), None, velocity, direction)
+    return at, both, np.array([number for number, _ in rows])
+
+
+def _held(
+    logs: Sequence[RecordedLog], rows: Sequence[_Row], chambers: Sequence[str]
+) -> tuple[FrictionReadings, FloatArray]:
+    at, both, source = _columns(rows, chambers)
+    level = pressure_levels(at.pressure.mean(axis=1))
+    group, by = _groups(level, source, 'file')
+    readings = FrictionReadings(
+        at=at,
+        force=np.array([r.force_sum for _, r in rows]),
+        source=source,
+        group=group,
+        level=level,
+        names=tuple(log.name for log in logs),
+        left_out_by=by,
+        are_samples=False,
+        samples=tuple(logs[number].signals.force_sum[r.samples] for number, r in rows),
+    )
+    return readings, both
+
+
+def _breakaway(
+    logs: Sequence[RecordedLog], chambers: Sequence[str], dynamic: FrictionReadings
+) -> FrictionReadings | None:
+    rows = [(number, peak) for number, log in enumerate(logs) for peak in breakaways(log.signals, log.sliding)]
+    if not rows:
+        return None
+    at, _, source = _columns(rows, chambers)
+    level = _nearest_level(at.pressure.mean(axis=1), dynamic)
+    group = source if dynamic.left_out_by == 'file' else level
+    force = np.array([r.force_sum for _, r in rows])
+    return replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=())
+
+
+def _groups(level: IntArray, part: IntArray, kind: str) -> tuple[IntArray, str]:
+    """Groups and their kind: whole tests or files if each has most of the pressures, otherwise pressures."""
+    levels = len(np.unique(level))
+    parts = np.unique(part)
+    most = all(len(np.unique(level[part == p])) > 0.5 * levels for p in parts)
+    return (part, kind) if len(parts) >= 2 and most else (level, 'pressure')
+
+
+def _nearest_level(pressure: FloatArray, dynamic: FrictionReadings) -> IntArray:
+    """Level of the sliding readings nearest to each pressure [Pa], shape (n,)."""
+    nearest = np.argmin(np.abs(pressure[:, np.newaxis] - dynamic.level_pressures), axis=1)
+    return np.asarray(np.array(list(dynamic.levels))[nearest])
+
+
+def _swept(
+    logs: Sequence[RecordedLog], even: Sequence[BoolArray], chambers: Sequence[str]
+) -> tuple[FrictionReadings, FloatArray]:
+    parts = [log.signals.taken(index) for log, index in zip(logs, even, strict=True)]
+    counts = [len(part.time) for part in parts]
+    if min(counts) < FEWEST_SWEPT:
+        raise ValueError(
+            f'{logs[int(np.argmin(counts))].name}: {min(counts)} samples of even sliding, {FEWEST_SWEPT} are needed: '
+            'drive longer strokes at even speed, in both directions'
+        )
+    joined = Signals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    both = np.column_stack((joined.pressure_a, joined.pressure_b))
+    pressure = _seal_pressures(both, chambers)
+    mean = pressure.mean(axis=1)
+    edges = np.quantile(mean, np.linspace(0.0, 1.0, BLOCKS + 1)[1:-1])
+    readings = FrictionReadings(
+        at=OperatingConditions(pressure, None, joined.velocity, np.sign(joined.velocity)),
+        force=joined.force_sum,
+        source=np.repeat(np.arange(len(parts)), counts),
+        group=np.concatenate([i * BLOCKS + np.arange(n) * BLOCKS // n for i, n in enumerate(counts)]),
+        level=np.unique(np.searchsorted(edges, mean), return_inverse=True)[1],
+        names=tuple(log.name for log in logs),
+        left_out_by='block',
+        are_samples=True,
+    )
+    return readings, both
+
+
+def _left_out(logs: Sequence[RecordedLog], even: Sequence[BoolArray], used: int) -> dict[str, int]:
+    missing = slow = accelerated = 0
+    for log, index in zip(logs, even, strict=True):
+        finite = np.logical_and.reduce([np.isfinite(column) for column in log.signals])
+        with np.errstate(invalid='ignore'):
+            moving = np.abs(log.signals.velocity) > log.sliding.slowest
+        missing += int((~finite).sum())
+        slow += int((finite & ~moving).sum())
+        accelerated += int((finite & moving & ~index).sum())
+    in_no_stroke = sum(int(index.sum()) for index in even) - used
+    counts = {'not finite': missing, 'at rest': slow, 'accelerated': accelerated, 'in no even stroke': in_no_stroke}
+    return {reason: count for reason, count in counts.items() if count}
+
+
+# -- manual readings --------------------------------------------------------------------------------------------------
+
+
+def prepare_manual_readings(
+    dynamic: Sequence[ManualReadings], static: Sequence[ManualReadings], seals: int
+) -> PreparedReadings:
+    """Readings from manual readings.
+
+    Args:
+        dynamic: Running friction, one for each source.
+        static: Breakaway friction, one for each source; may be empty.
+        seals: Number of seals that share the pressure.
+
+    Raises:
+        ValueError: The readings are unfit for identification; one line with the reason and what to do.
+    """
+    for manual in (*dynamic, *static):
+        check_manual_readings(manual)
+    readings = _joined(dynamic, seals)
+    check_readings(readings)
+    breakaway = _joined(static, seals) if static and len(static[0].friction) else None
+    if breakaway is not None:
+        breakaway = replace(breakaway, level=_nearest_level(breakaway.seal_pressure, readings))
+        if readings.left_out_by == 'pressure':
+            breakaway = replace(breakaway, group=breakaway.level, left_out_by='pressure')
+    counts = {manual.name: len(manual.friction) for manual in dynamic}
+    return PreparedReadings(readings, np.repeat(readings.at.pressure[:, :1], 2, axis=1), breakaway, counts, counts, {})
+
+
+def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
+    names, *columns = zip(*sources, strict=True)
+    test, pressure, direction, friction, velocity = (np.concatenate(column) for column in columns)
+    of_seals = np.repeat(np.maximum(pressure, 0.0)[:, np.newaxis], seals, axis=1)
+    source = np.repeat(np.arange(len(sources)), [len(manual.friction) for manual in sources])
+    level = pressure_levels(of_seals[:, 0])
+    tests = np.unique(np.column_stack((source, test)), axis=0, return_inverse=True)[1].reshape(-1)
+    group, by = _groups(level, tests, 'test')
+    return FrictionReadings(
+        at=OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64)),
+        force=direction * friction,
+        source=source,
+        group=group,
+        level=level,
+        names=names,
+        left_out_by=by,
+        are_samples=False,
+    )

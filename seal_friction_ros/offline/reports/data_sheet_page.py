@@ -1,0 +1,15 @@
+"""Printable page of an empty data sheet."""
+
+from pathlib import Path
+
+from seal_friction_ros.offline.identification.data_sheet import DIMENSIONS, PROCEDURE, FrictionTestPlan
+from seal_friction_ros.offline.reports.page import write_page
+
+
+def write_data_sheet_page(plan: FrictionTestPlan, out: Path) -> None:
+    """Write the empty sheet as a page to print.
+
+    Raises:
+        ValueError: The page cannot be written.
+    """
+    write_page(out, 'data_sheet', (), plan=plan, dimensions=DIMENSIONS, procedure=PROCEDURE)
