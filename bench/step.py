@@ -31,8 +31,8 @@ from harness.processes import free_domain
 
 from seal_friction_ros.core.estimation.estimator import step
 from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, Output, decode, encode
-from seal_friction_ros.core.estimation.pipeline import WantedMotion, init, receive
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Velocity
+from seal_friction_ros.core.estimation.pipeline import init, init_running, receive
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, ServoReference, Velocity
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.offline.bags.recorder import Recorder
@@ -50,19 +50,20 @@ def stages() -> dict[str, Callable[[], object]]:
 
     sample = RodSample(1, 0.1, pressure, force)
     alone = init(parameters)._replace(pressure=pressure, force=force)
-    guided = alone._replace(reference=WantedMotion(1, 0.1, 0.0))
+    guided = init_running(parameters)._replace(pressure=pressure, force=force)
+    guided = receive(parameters, guided, ServoReference(1, 0.0, 0.1, 0.0), 1, drop)
     records: list[tuple[Output, bytes]] = []
-    receive(parameters, guided, velocity, lambda record, frame: records.append((record, frame)))
+    receive(parameters, guided, velocity, 1, lambda record, frame: records.append((record, frame)))
     estimate, feedforward = records
     velocity_bytes, pressure_bytes = encode(velocity), encode(pressure, b'rod')
     return {
         'bare call': lambda: None,
         'decode pressure': lambda: decode(PRESSURE_TYPE, pressure_bytes),
         'decode velocity': lambda: decode(VELOCITY_TYPE, velocity_bytes),
-        'receive pressure': lambda: receive(parameters, alone, pressure, drop),
+        'receive pressure': lambda: receive(parameters, alone, pressure, 1, drop),
         'estimator step': lambda: step(parameters.estimator, alone.estimator, sample),
-        'receive velocity': lambda: receive(parameters, alone, velocity, drop),
-        'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity, drop),
+        'receive velocity': lambda: receive(parameters, alone, velocity, 1, drop),
+        'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity, 1, drop),
         'encode estimate': lambda: encode(*estimate),
         'encode estimate and feed-forward': lambda: [encode(*estimate), encode(*feedforward)],
     }

@@ -180,10 +180,10 @@ def test_a_parameter_file_gives_selection_and_settings_of_any_node_name(written)
     assert load_parameter_file(path) == expected
 
 
-@pytest.mark.parametrize('content', ['{feedforward: {coulomb_scale: 0.5}}', '{feedforward.coulomb_scale: 0.5}'])
+@pytest.mark.parametrize('content', ['{feedforward: {scale: 0.5}}', '{feedforward.scale: 0.5}'])
 def test_settings_of_the_feed_forward_may_be_nested_or_dotted_as_in_ros(written, content):
     path = written(f'/**:\n  ros__parameters: {content}\n')
-    assert load_parameter_file(path)[2] == FeedForwardSettings(coulomb_scale=0.5)
+    assert load_parameter_file(path)[2] == FeedForwardSettings(scale=0.5)
 
 
 def test_the_shipped_parameter_file_holds_the_defaults():
@@ -224,8 +224,8 @@ def test_sections_of_other_nodes_in_a_parameter_file_are_ignored(written):
     ('name', 'expected'),
     [
         ('stick_velocty', 'no parameter stick_velocty (did you mean stick_velocity?)'),
-        ('feedforward.coulomb_scal', '(did you mean feedforward.coulomb_scale?)'),
-        ('coulomb_scale', '(did you mean feedforward.coulomb_scale?)'),
+        ('feedforward.coulomb_scal', '(did you mean feedforward.scale?)'),
+        ('scale', '(did you mean feedforward.scale?)'),
         ('feedforward.stick_velocity', '(did you mean stick_velocity?)'),
         ('refuse_second_publishers', '(did you mean refuse_second_publisher?)'),
         ('wave', 'no parameter wave (a parameter of servo_simulator)'),

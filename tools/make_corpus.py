@@ -178,7 +178,8 @@ def snapshots() -> dict[str, str]:
     state = init(parameters)
     start = snapshot_text(first_snapshot(configuration))
     for type_name in (PRESSURE_TYPE, FORCE_TYPE, REFERENCE_TYPE, VELOCITY_TYPE):
-        state, _ = answered(parameters, state, decode(type_name, MESSAGES[type_name]))
+        record = decode(type_name, MESSAGES[type_name])
+        state, _ = answered(parameters, state, record, record.stamp)
     running = snapshot_text(first_snapshot(configuration)._replace(state=state))
     return {
         'start': start,

@@ -24,11 +24,9 @@ RATE = 1000  # [Hz]
 START = 1_700_000_000_000_000_000  # [ns]
 
 
-def with_coulomb_scale(scale: float) -> Configuration:
+def with_scale(scale: float) -> Configuration:
     configuration = default_configuration()
-    return dataclasses.replace(
-        configuration, feedforward=dataclasses.replace(configuration.feedforward, coulomb_scale=scale)
-    )
+    return dataclasses.replace(configuration, feedforward=dataclasses.replace(configuration.feedforward, scale=scale))
 
 
 def write_closed_loop(
@@ -40,11 +38,11 @@ def write_closed_loop(
     )
     state = init(servo)
     now = outputs(servo, state.plant)
-    known = pipeline.init(with_coulomb_scale(scales[0]).parameters())
+    known = pipeline.init_running(with_scale(scales[0]).parameters())
     samples = round(seconds * RATE)
     with b.BagWriter(path) as writer:
         for stretch, scale in enumerate(scales):
-            configuration = with_coulomb_scale(scale)
+            configuration = with_scale(scale)
             parameters, wave = configuration.parameters(), waves[stretch % len(waves)]
             text = encode_text(snapshot_text(Snapshot(configuration, known)))
             stamp = START + stretch * samples * (1_000_000_000 // RATE)
@@ -60,7 +58,7 @@ def write_closed_loop(
                 )
                 for topic, record in inputs:
                     writer.write(topic, INPUTS[topic.strip('/')], stamp, encode(record))
-                    known, answers = pipeline.answered(parameters, known, record)
+                    known, answers = pipeline.answered(parameters, known, record, stamp)
                     for kind, data in answers:
                         writer.write(ANSWER_TOPICS[kind], kind, stamp, data)
                         force = decode(kind, data).force if kind == FEEDFORWARD_TYPE else force

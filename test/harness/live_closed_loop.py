@@ -15,7 +15,7 @@ from harness.processes import node_process
 from harness.spin_nodes import SpunNodes, ros_context
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 
-_SCALE = 'feedforward.coulomb_scale'
+_SCALE = 'feedforward.scale'
 
 
 class Operator(SpunNodes):
@@ -90,7 +90,7 @@ def record_closed_loop(out: Path, domain: int, seconds: float, simulator: Path, 
         if not operator.spin_until(lambda: operator.is_estimating):  # the simulator compiles first
             raise RuntimeError(f'no estimate; {log}: {log.read_text().strip()}')
         operator.spin(seconds)
-        operator.set_scale(FeedForwardSettings().coulomb_scale)
+        operator.set_scale(FeedForwardSettings().scale)
         operator.spin(seconds)
         diagnostics = dict(operator.diagnostics)
     if not (out / 'metadata.yaml').is_file():

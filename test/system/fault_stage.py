@@ -255,7 +255,7 @@ def try_row(place: Stage, row: Row) -> list[str]:
 
 
 def _wrong_feedforward(row: Row, estimates: list[FrictionEstimate], forces: list[FeedForward]) -> list[str]:
-    scale = FeedForwardSettings().coulomb_scale
+    scale = FeedForwardSettings().scale
     if row.feedforward == 'nothing':
         return [f'{len(forces)} feed-forwards'] if forces else []
     if not forces:

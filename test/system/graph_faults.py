@@ -187,13 +187,13 @@ def parameters_change(chance: random.Random, folder: Path) -> list[str]:
         for _ in range(25):
             name, value, is_valid = chance.choice(
                 [
-                    ('feedforward.coulomb_scale', chance.uniform(0.0, 1.5), True),
+                    ('feedforward.scale', chance.uniform(0.0, 1.5), True),
                     ('feedforward.smoothing_velocity', chance.uniform(1e-4, 0.5), True),
                     ('feedforward.force_limit', chance.uniform(0.0, 60.0), True),
                     ('feedforward.lead_time', chance.uniform(0.0, 0.1), True),
                     ('slip_velocity', chance.uniform(2e-3, 0.2), True),
                     ('use_stiction', chance.random() < 0.5, True),
-                    ('feedforward.coulomb_scale', float('nan'), False),
+                    ('feedforward.scale', float('nan'), False),
                     ('stick_velocity', 5.0, False),
                     ('seals', ['nothing'], False),
                     ('pressure_timeout', 'long', False),

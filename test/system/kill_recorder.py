@@ -66,10 +66,11 @@ def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
     recorder = Recorder(bag, split_size=split_size)
     places = count()
 
-    def record(topic: str, type_name: str, data: bytes) -> None:
+    def record(topic: str, type_name: str, data: bytes) -> int:
         log_time = time.time_ns()
         _OFFERED.pack_into(offered, next(places) * _OFFERED.size, log_time)
         recorder.record(topic, type_name, log_time, data)
+        return log_time
 
     text = snapshot_text(first_snapshot(configuration))
     record(b.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, encode_text(text))
@@ -78,8 +79,8 @@ def record_until_killed(bag: Path, offered_file: Path, split_size: int) -> None:
     for number in count():
         time.sleep(max(start + number * PERIOD - time.perf_counter_ns(), 0) * 1e-9)
         for topic, type_name, message, data in inputs(time.time_ns(), number):
-            record(topic, type_name, data)
-            state, answers = answered(parameters, state, message)
+            received = record(topic, type_name, data)
+            state, answers = answered(parameters, state, message, received)
             for answer_type, answer_data in answers:
                 record(ANSWER_TOPICS[answer_type], answer_type, answer_data)
 

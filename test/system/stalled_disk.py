@@ -63,8 +63,9 @@ def latencies(bag: Path, seconds: float, disk: StallingDisk) -> tuple[list[float
         due = start + number * PERIOD
         time.sleep(max(due - time.perf_counter_ns(), 0) * 1e-9)
         for topic, type_name, message, data in inputs(first + number * PERIOD, number):
-            recorder.record(topic, type_name, time.time_ns(), data)
-            state, answers = answered(parameters, state, message)
+            received = time.time_ns()
+            recorder.record(topic, type_name, received, data)
+            state, answers = answered(parameters, state, message, received)
             for answer_type, answer_data in answers:
                 recorder.record(ANSWER_TOPICS[answer_type], answer_type, time.time_ns(), answer_data)
         found.append((time.perf_counter_ns() - due) * 1e-9)

@@ -79,7 +79,7 @@ def condition_velocity(
         resolution: Smallest ripple to assume [m/s], 0: what is learnt.
     """
     if state.stamp == NEVER:
-        return _clean(stamp, velocity, 0.0, 0.0, 1)
+        return _clean(stamp, velocity, 0.0, 0.0, max(state.samples, 1))
     if stamp == state.stamp:
         if state.half_width > 0.0:
             return state

@@ -1,6 +1,6 @@
 r"""Estimate and wanted velocity -> the force that cancels the seal friction before the controller has to.
 
-``state = init(settings)``, then ``state, feedforward = step(settings, state, stamp, received, friction, velocity)``.
+From `FADED_OUT` on, ``state, feedforward = step(settings, state, stamp, received, friction, velocity)``.
 
 .. math::
     F = s\,\max(f, 0) \tanh(v / w)
@@ -142,10 +142,10 @@ class FeedForward(NamedTuple):
     """bits of `Limited`"""
 
 
-def init(settings: FeedForwardSettings) -> FeedForwardState:
-    """Before the first estimate: faded out."""
-    del settings
-    return FeedForwardState(NEVER, 0.0, 0.0, -1.0, 0.0)
+FADED_OUT = FeedForwardState(NEVER, 0.0, 0.0, -1.0, 0.0)
+"""State before the first estimate."""
+FADED_IN = FADED_OUT._replace(fade=1.0)
+"""State in a simulation that shall not begin with a fade."""
 
 
 @compilable

@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.estimation import estimator, feedforward
+from seal_friction_ros.core.estimation import estimator
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
     SETTLING,
@@ -30,6 +30,8 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
 from seal_friction_ros.core.estimation.estimator import NO_VELOCITY, EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.estimator import step as estimator_step
 from seal_friction_ros.core.estimation.feedforward import (
+    FADED_IN,
+    FADED_OUT,
     FASTEST,
     NO_MOTION,
     FeedForwardSettings,
@@ -112,7 +114,15 @@ class PipelineState(NamedTuple):
 
 def init(parameters: PipelineParameters) -> PipelineState:
     """State before the first message."""
-    return PipelineState(estimator.init(parameters.estimator), feedforward.init(parameters.feedforward))
+    return PipelineState(estimator.init(parameters.estimator), FADED_OUT)
+
+
+def init_running(parameters: PipelineParameters) -> PipelineState:
+    """State of a simulation that shall begin without fade and settling."""
+    known = NOT_CONDITIONED._replace(samples=SETTLING)
+    state = init(parameters)
+    running = state.estimator._replace(motion=known)
+    return state._replace(estimator=running, feedforward=FADED_IN, reference=NO_REFERENCE._replace(velocity=known))
 
 
 def receive(
@@ -193,7 +203,7 @@ def receive_reference(_parameters: Any, state: PipelineState, wanted: Any, recei
     """Condition the reference and keep it for the next velocity sample; one that is not finite is no new sample."""
     known, guided, friction, pressure, force, reference, receipt, refused, offset = state
     if wanted.stamp != reference.velocity.stamp and math.isfinite(wanted.velocity):
-        reference = _conditioned(reference, wanted)
+        reference = condition_reference(reference, wanted)
         receipt = ReceiptTimes(receipt.velocity, receipt.pressure, receipt.force, received)
     return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
 
@@ -233,7 +243,7 @@ def is_tick_due(state: PipelineState, now: int) -> bool:
 
 
 @compilable
-def _conditioned(reference: Reference, wanted: Any) -> Reference:
+def condition_reference(reference: Reference, wanted: Any) -> Reference:
     """Reference after a new one, with a velocity without ripple and an acceleration that two references agree on.
 
     Two accelerations in a row of the same sign count with the smaller magnitude, others as 0: the difference of a

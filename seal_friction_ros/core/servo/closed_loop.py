@@ -75,7 +75,7 @@ def with_wrong_friction(parameters: PipelineParameters, error: float) -> Pipelin
 
 def without_feedforward(settings: FeedForwardSettings) -> FeedForwardSettings:
     """Settings with a feed-forward of 0 N."""
-    return replace(settings, coulomb_scale=0.0, stribeck_scale=0.0, viscous_scale=0.0)
+    return replace(settings, scale=0.0)
 
 
 def whole_delay(parameters: ServoParameters, delay: float) -> float:
@@ -92,7 +92,7 @@ def whole_delay(parameters: ServoParameters, delay: float) -> float:
 def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: FloatArray | None = None) -> AxisRun:
     """Run the loop from rest at the start of the wave.
 
-    The sensors start one sample before the reference, so the feed-forward does not fade in.
+    The feed-forward does not fade in.
 
     Args:
         axis: Servo, estimator and feed-forward.
@@ -108,7 +108,7 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
     back = int(whole)
     errors = [(0.0, 0.0, 0.0, 0.0)] if noise is None else noise.tolist()
     forces = [0.0] * (back + 1)
-    estimation = pipeline.init(parameters)
+    estimation = pipeline.init_running(parameters)
     state = servo.init(plant, wave.at(0.0).position)
     out = servo.outputs(plant, state.plant)
     newest = FeedForward(0, 0.0, 0.0, 0)
@@ -126,10 +126,9 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
             Pressure(stamp, out.pressure_a + a, out.pressure_b + b),
             Force(stamp, out.force_sum + f),
         ]
-        messages += [ServoReference(stamp, *setpoint)] if i else []
-        messages.append(Velocity(stamp, out.velocity + v))
+        messages += [ServoReference(stamp, *setpoint), Velocity(stamp, out.velocity + v)]
         for message in messages:
-            estimation = pipeline.receive(parameters, estimation, message, emit)
+            estimation = pipeline.receive(parameters, estimation, message, stamp, emit)
         forces.append(newest.force)
         force = (1.0 - part) * forces[-1 - back] + part * forces[-2 - back]
         state, out = servo.step(plant, state, setpoint, force)

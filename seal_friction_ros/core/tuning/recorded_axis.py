@@ -21,7 +21,14 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from seal_friction_ros.core.estimation import feedforward
-from seal_friction_ros.core.estimation.feedforward import UNUSABLE, FeedForwardSettings, Motion
+from seal_friction_ros.core.estimation.feedforward import (
+    FADED_IN,
+    UNUSABLE,
+    FeedForwardSettings,
+    WantedMotion,
+    usable,
+    wanted_velocity,
+)
 from seal_friction_ros.core.estimation.records import FrictionEstimate
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.friction.states import FrictionState
@@ -38,11 +45,26 @@ IDENTIFIED = 0.05  # largest relative standard deviation of an identified parame
 SHARPEST_SMOOTHING = 1e-5  # [m/s]
 
 
+class RecordedMotion(NamedTuple):
+    """Reference and rod at one velocity sample."""
+
+    reference_velocity: float
+    """[m/s] conditioned, as in `pipeline`"""
+    reference_acceleration: float = 0.0
+    """[m/s^2]"""
+    measured_velocity: float = 0.0
+    """[m/s]"""
+    reference_age: float = 0.0
+    """[s]"""
+    ripple: float = 0.0
+    """[m/s] of the reference velocity"""
+
+
 class Recording(NamedTuple):
     """Recorded motion of an axis, one entry per velocity sample."""
 
     estimates: Sequence[FrictionEstimate]
-    motions: Sequence[Motion]
+    motions: Sequence[RecordedMotion]
     """reference and measured motion"""
     force_sum: FloatArray
     """[N], shape (n,)"""
@@ -197,13 +219,15 @@ def near_reversals(time: FloatArray, reference_velocity: FloatArray) -> BoolArra
 
 def feedforward_force(settings: FeedForwardSettings, recording: Recording, friction_error: float = 0.0) -> FloatArray:
     """Feed-forward force along a recording [N], shape (n,), with a relative error of the friction model."""
-    state, factor = feedforward.init(settings), 1.0 + friction_error
-    forces = []
+    state, forces = FADED_IN, []
     for estimate, motion in zip(recording.estimates, recording.motions, strict=True):
-        wrong = estimate._replace(
-            coulomb_friction=factor * estimate.coulomb_friction, breakaway_force=factor * estimate.breakaway_force
-        )
-        state, out = feedforward.step(settings, state, estimate.stamp, wrong, motion)
+        friction = (1.0 + friction_error) * estimate.coulomb_friction if usable(settings, estimate) else -1.0
+        velocity = motion.measured_velocity
+        if not settings.use_measured_velocity:
+            wanted = WantedMotion(motion.reference_velocity, motion.reference_acceleration, motion.ripple)
+            late = abs(motion.reference_age) > settings.reference_timeout
+            velocity = math.nan if late else wanted_velocity(settings, wanted)
+        state, out = feedforward.step(settings, state, estimate.stamp, estimate.stamp, friction, velocity)
         forces.append(out.force)
     return np.array(forces)
 
@@ -236,7 +260,7 @@ def tune_recorded_axis(
     reversal = near_reversals(time, recording.reference_velocity)
     law = fit_law(recording, known.mass or None)
     identified: dict[str, float | None] = {
-        'coulomb_scale': round(law.scale, 2) if law.scale > 0.0 and law.scale_std <= IDENTIFIED * law.scale else None,
+        'scale': round(law.scale, 2) if law.scale > 0.0 and law.scale_std <= IDENTIFIED * law.scale else None,
         'lead_time': known.whole_delay or None,
         'smoothing_velocity': _smoothing(recording, law),
     }

@@ -37,7 +37,7 @@ from seal_friction_ros.core.tuning.settings import RobustnessCase, TunedFeedForw
 MOST_CANDIDATES = 100
 """Number of settings after which the search ends, to bound its time."""
 
-SCALE_STEP = 0.01  # [-] step of coulomb_scale
+SCALE_STEP = 0.01  # [-] step of scale
 LEAD_STEPS = 20  # steps of lead_time over the whole delay
 PREFERRED = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)  # ISO 3, series R10
 GRID_SCALES = (0.0, 0.3, 0.6, 0.9, 1.2)  # [-]
@@ -122,7 +122,7 @@ class TuningProblem:
         """Settings at a point of the search; the settings outside the search are unchanged."""
         return replace(
             self.axis.pipeline.feedforward,
-            coulomb_scale=bounded('coulomb_scale', round(point.scale * SCALE_STEP, 10)),
+            scale=bounded('scale', round(point.scale * SCALE_STEP, 10)),
             lead_time=bounded('lead_time', round(point.lead * self.lead_step, 10)),
             smoothing_velocity=bounded('smoothing_velocity', preferred(point.smoothing)),
             slew_limit=bounded('slew_limit', preferred(point.slew)),

@@ -8,7 +8,7 @@ import heapq
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -58,8 +58,7 @@ def read_in_bulk(path: Path, kind_of: KindOf) -> Iterator[Messages]:
 
 def compile_now() -> None:
     """Compile in this process, so that worker processes inherit the compiled code."""
-    messages, times = _pool_of(bytes(1), 0)
-    _walk(*messages, times, 0, 0, 0, 0, 0, np.zeros(1, np.uint8))
+    _walk(*_room_for(bytes(1), 0), 0, 0, 0, 0, 0, np.zeros(1, np.uint8))
 
 
 def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
@@ -69,23 +68,17 @@ def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messa
         kinds = np.array([kind_of(message.topic, message.type_name) for message in block], np.uint8)
         sizes = np.array([len(message.data) for message in block], np.int64)
         data = np.frombuffer(b''.join(message.data for message in block), np.uint8)
-        yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes)
+        times = np.array([message.log_time for message in block], np.int64)
+        yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, times)
 
 
-class _Pool(NamedTuple):
-    """Messages with their log times [ns]."""
-
-    messages: Messages
-    times: Integers
-
-
-def _pool_of(data: bytes, count: int) -> _Pool:
-    """Pool with space for ``count`` messages."""
+def _room_for(data: bytes, count: int) -> Messages:
+    """Space for ``count`` messages in ``data``."""
     columns: Integers = np.empty((3, count), np.int64)
-    return _Pool(Messages(np.frombuffer(data, np.uint8), np.empty(count, np.uint8), *columns[:2]), columns[2])
+    return Messages(np.frombuffer(data, np.uint8), np.empty(count, np.uint8), *columns)
 
 
-_EMPTY = _pool_of(b'', 0)
+_NONE = _room_for(b'', 0)
 
 
 def _of_file(file: BinaryIO, layout: Layout, kind_of: KindOf) -> Iterator[Messages]:
@@ -94,19 +87,19 @@ def _of_file(file: BinaryIO, layout: Layout, kind_of: KindOf) -> Iterator[Messag
     blocks = sorted(layout.blocks, key=lambda block: block.first) if layout.channels else layout.blocks
     earliest = mcap_reader.earliest_times(blocks)
     _check_overlap(blocks, earliest)
-    kept = _EMPTY
+    kept = _NONE
     begin = size = 0
     for end, block in enumerate(blocks, start=1):
         size += block.unpacked_size
         if size < _AT_ONCE and end < len(blocks):
             continue
-        pool = _sorted(_read(file, blocks[begin:end], channels, kept))
+        messages = _sorted(_read(file, blocks[begin:end], channels, kept))
         begin, size = end, 0
-        sure = len(pool.times)
+        sure = len(messages.received)
         if end < len(blocks):
-            sure = int(np.searchsorted(pool.times, min(earliest[end], _LAST_TIME), side='right'))
-        yield pool.messages.taken(0, sure)
-        kept = _copied(pool, sure)
+            sure = int(np.searchsorted(messages.received, min(earliest[end], _LAST_TIME), side='right'))
+        yield messages.taken(0, sure)
+        kept = _copied(messages, sure)
 
 
 def _check_overlap(blocks: Sequence[Block], earliest: Sequence[int]) -> None:
@@ -126,22 +119,24 @@ def _check_overlap(blocks: Sequence[Block], earliest: Sequence[int]) -> None:
             raise UnsuitedError('chunks overlap by much')
 
 
-def _sorted(pool: _Pool) -> _Pool:
-    (data, kinds, offsets, sizes), times = pool
+def _sorted(messages: Messages) -> Messages:
+    times = messages.received
     if (times[:-1] <= times[1:]).all():
-        return pool
+        return messages
     order = np.argsort(times, kind='stable')
-    return _Pool(Messages(data, kinds[order], offsets[order], sizes[order]), times[order])
+    data, kinds, offsets, sizes, _ = messages
+    return Messages(data, kinds[order], offsets[order], sizes[order], times[order])
 
 
-def _copied(pool: _Pool, first: int) -> _Pool:
+def _copied(messages: Messages, first: int) -> Messages:
     """Messages from number ``first`` on: they wait, since a following chunk begins before them."""
-    if first == len(pool.times):
-        return _EMPTY
-    (_, kinds, _, sizes), times = pool
-    data = b''.join(pool.messages.message(number) for number in range(first, len(times)))
-    kept = sizes[first:]
-    return _Pool(Messages(np.frombuffer(data, np.uint8), kinds[first:], np.cumsum(kept) - kept, kept), times[first:])
+    count = len(messages.received)
+    if first == count:
+        return _NONE
+    data = b''.join(messages.message(number) for number in range(first, count))
+    sizes = messages.sizes[first:]
+    offsets = np.cumsum(sizes) - sizes
+    return Messages(np.frombuffer(data, np.uint8), messages.kinds[first:], offsets, sizes, messages.received[first:])
 
 
 class _Channels:
@@ -164,13 +159,13 @@ class _Channels:
             self.kinds[number] = self._kind_of(channel.topic, channel.type_name)
 
 
-def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: _Pool) -> _Pool:
+def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: Messages) -> Messages:
     """The kept messages, then those of the blocks.
 
     Raises:
         UnsuitedError: A block cannot be read.
     """
-    parts, ends = [kept.messages.data.tobytes()], []
+    parts, ends = [kept.data.tobytes()], []
     size = len(parts[0])
     try:
         for block in blocks:
@@ -180,27 +175,25 @@ def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: _P
         data = b''.join(parts)
         start = len(parts[0])
         del parts
-        count = len(kept.times)
+        count = len(kept.received)
         most = count + (size - start) // _SMALLEST
-        pool = _pool_of(data, most)
-        pool.messages.kinds[:count] = kept.messages.kinds
-        pool.messages.offsets[:count] = kept.messages.offsets
-        pool.messages.sizes[:count] = kept.messages.sizes
-        pool.times[:count] = kept.times
+        messages = _room_for(data, most)
+        messages.kinds[:count], messages.offsets[:count] = kept.kinds, kept.offsets
+        messages.sizes[:count], messages.received[:count] = kept.sizes, kept.received
         for block, end in ends:
-            count = _index(pool, count, start, end, block, channels)
+            count = _index(messages, count, start, end, block, channels)
             start = end
     except mcap_reader.ERRORS as error:
         raise UnsuitedError(str(error)) from None
-    return _Pool(pool.messages.taken(0, count), pool.times[:count])
+    return messages.taken(0, count)
 
 
-def _index(pool: _Pool, count: int, start: int, end: int, block: Block, channels: _Channels) -> int:
+def _index(messages: Messages, count: int, start: int, end: int, block: Block, channels: _Channels) -> int:
     """Index the messages of a block; return the number of all messages so far."""
-    data = pool.messages.data
+    data = messages.data
     first, last = min(block.first, _LAST_TIME + 1), min(block.last, _LAST_TIME)
     while start < end:
-        start, count, opcode = _walk(*pool.messages, pool.times, count, start, end, first, last, channels.kinds)
+        start, count, opcode = _walk(*messages, count, start, end, first, last, channels.kinds)
         if opcode < 0:
             raise UnsuitedError(f'a record at byte {start}')
         if opcode in (_SCHEMA, _CHANNEL):

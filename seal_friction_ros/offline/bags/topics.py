@@ -22,6 +22,7 @@ class Topics(NamedTuple):
     estimate: str
     feedforward: str
     configuration: str
+    tick: str
 
     @property
     def answers(self) -> dict[str, str]:
@@ -38,6 +39,7 @@ TYPES = Topics(
     estimate=messages.ESTIMATE_TYPE,
     feedforward=messages.FEEDFORWARD_TYPE,
     configuration=messages.CONFIGURATION_TYPE,
+    tick=messages.TICK_TYPE,
 )
 """Message type of each topic."""
 

@@ -78,7 +78,7 @@ def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: 
 def compile_now() -> None:
     """Compile in this process, so that worker processes inherit the compiled code."""
     parameters = default_configuration().parameters()
-    none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((2, 0), np.int64))
+    none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((3, 0), np.int64))
     _, answers = receive_all(parameters, init(parameters), none)
     _compare(0, 0, False, (answers.data, none.offsets, none.sizes), (none.data, none.offsets, none.sizes), none.sizes)
     block_reader.compile_now()
@@ -115,7 +115,7 @@ def _answered(blocks: Iterator[Messages], override: Configuration | None) -> Ite
         for first, end in pairwise([0, *changes, len(block.kinds)]):
             messages = block.taken(first, end)
             if end > first and messages.kinds[0] == Kind.CONFIGURATION:
-                configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))
+                configuration, state, _ = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))
                 parameters = parameters if override else configuration.parameters()
             state, answers = receive_all(parameters, state, messages)
             yield messages, answers

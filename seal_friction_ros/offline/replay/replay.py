@@ -73,7 +73,7 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
     configuration = override or default_configuration()
     parameters = configuration.parameters()
     state = init(parameters)
-    inputs = {topics.pressure, topics.velocity, topics.force, topics.reference} - {''}
+    inputs = {topics.pressure, topics.velocity, topics.force, topics.reference, topics.tick} - {''}
     if not topics.configuration:
         data = encode_text(snapshot_text(first_snapshot(configuration)))
         yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, data), ())
@@ -82,9 +82,10 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
         used = message
         try:
             if message.topic in inputs:
-                state, answers = answered(parameters, state, DECODERS[message.type_name](message.data))
+                record = DECODERS[message.type_name](message.data)
+                state, answers = answered(parameters, state, record, message.log_time)
             elif message.topic == topics.configuration:
-                configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](message.data))
+                configuration, state, _ = parse_snapshot(DECODERS[CONFIGURATION_TYPE](message.data))
                 if override:
                     used = message._replace(data=encode_text(snapshot_text(Snapshot(override, state))))
                 else:

@@ -115,16 +115,14 @@ def _tracking_table(stretches: Sequence[TrackingStretch]) -> Table:
 
 def _feedforward_table(stretches: Sequence[TrackingStretch]) -> Table:
     heads = (
-        'time [s]', 'left out before [s]', 'samples', 'reference', 'largest feed-forward [N]', 'Coulomb scale',
-        'Stribeck scale', 'viscous friction [N s/m]', 'smoothing velocity [mm/s]', 'lead time [ms]',
+        'time [s]', 'left out before [s]', 'samples', 'reference', 'largest feed-forward [N]', 'scale',
+        'smoothing velocity [mm/s]', 'lead time [ms]',
     )  # fmt: skip
     rows = []
     for stretch in stretches:
         known = stretch.settings
         settings = known and (
-            known.coulomb_scale,
-            known.stribeck_scale,
-            known.viscous_scale * known.viscous_friction,
+            known.scale,
             known.smoothing_velocity / MM,
             known.lead_time / MS,
         )

@@ -48,7 +48,7 @@ def stretch_name(stretch: TrackingStretch) -> str:
         return 'without feed-forward'
     if stretch.settings is None:
         return 'with feed-forward'
-    return f'with feed-forward, Coulomb scale {stretch.settings.coulomb_scale:.3g}'
+    return f'with feed-forward, Coulomb scale {stretch.settings.scale:.3g}'
 
 
 def shown_part(run: RecordedRun, stretch: TrackingStretch) -> slice:

@@ -289,9 +289,9 @@ def recorded_law_figure(tuning: BagTuning) -> Plot:
     ax.scatter(velocity, share, s=5.0, lw=0, color=style.SKY, rasterized=True, label='sliding, measured')
     reach = 1.1 * float(np.abs(velocity).max())
     line = np.linspace(-reach, reach, 1001)
-    height = settings.coulomb_scale * np.tanh(line * MM / settings.smoothing_velocity)
+    height = settings.scale * np.tanh(line * MM / settings.smoothing_velocity)
     ax.plot(line, height, color=style.BLUE, label='feed-forward')
-    most = 1.4 * max(float(np.quantile(np.abs(share), 0.99)), settings.coulomb_scale, 0.1)
+    most = 1.4 * max(float(np.quantile(np.abs(share), 0.99)), settings.scale, 0.1)
     ylabel = 'friction / Coulomb friction\nof the model [-]'
     ax.set(xlim=(-reach, reach), ylim=(-most, most), xlabel='rod velocity [mm/s]', ylabel=ylabel)
     style.zero_lines(ax, vertical=True)

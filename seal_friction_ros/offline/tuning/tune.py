@@ -4,6 +4,7 @@ The file holds every parameter of the feed-forward and nothing else. It does not
 axis gives the same bytes.
 """
 
+import math
 import os
 import textwrap
 from dataclasses import asdict, dataclass
@@ -14,7 +15,7 @@ import numpy as np
 import yaml
 
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Motion
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     DECODERS,
@@ -26,6 +27,7 @@ from seal_friction_ros.core.estimation.messages import (
     decode_text,
 )
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
+from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, Reference, condition_reference
 from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Position, ServoReference, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
@@ -33,7 +35,7 @@ from seal_friction_ros.core.foundation.units import MM, MS
 from seal_friction_ros.core.servo.closed_loop import Axis
 from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
-from seal_friction_ros.core.tuning.recorded_axis import RecordedTuning, Recording, tune_recorded_axis
+from seal_friction_ros.core.tuning.recorded_axis import RecordedMotion, RecordedTuning, Recording, tune_recorded_axis
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration
@@ -47,7 +49,7 @@ CONTROL_PERIOD, INNER_STEP = 1e-3, 1e-4  # [s] of the simulated servo, as in ser
 NOISE_LENGTH = 8192  # samples of noise, which then repeats
 MADE_BY = '# Feed-forward of friction_estimator, made by seal_friction tune.'
 NODE = '/**/friction_estimator'  # in every namespace
-TUNED = ('coulomb_scale', 'lead_time', 'smoothing_velocity', 'slew_limit')
+TUNED = ('scale', 'lead_time', 'smoothing_velocity', 'slew_limit')
 PERFORMANCE = ('tracking_rms', 'tracking_peak', 'dwell', 'overshoot', 'limit_cycle_reversals')
 
 
@@ -91,7 +93,7 @@ class SimulatorTuning:
     def summary(self) -> str:
         """Result as a sentence."""
         was, now = self.found.without, self.found.nominal
-        if not self.found.feedforward.coulomb_scale:
+        if not self.found.feedforward.scale:
             return 'No feed-forward is better than none on this plant.'
         worst = self.found.cases[-1]
         better = 'better than none, and at rest,'
@@ -271,6 +273,7 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
     configuration = override or default_configuration()
     held: dict[type, Any] = {Force: Force(0, np.nan), Position: Position(0, np.nan)}
     estimates: list[FrictionEstimate] = []
+    conditioned = NO_REFERENCE
     motions, rows = [], []
     total = sum(info.message_count for info in bag_topics(bag).values())
     with progress(f'read {bag.name}', total) as advance:
@@ -285,6 +288,7 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
                 continue
             sample = DECODERS[message.type_name](message.data)
             held[type(sample)] = sample
+            conditioned = _with_reference(conditioned, sample)
             reference = held.get(ServoReference)
             if not isinstance(sample, Velocity) or reference is None:
                 continue
@@ -292,13 +296,22 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
                 (data,) = (data for type_name, data in step.answers if type_name == ESTIMATE_TYPE)
                 estimates.append(decode(ESTIMATE_TYPE, data))
                 age = (sample.stamp - reference.stamp) * 1e-9
-                motions.append(Motion(reference.velocity, reference.acceleration, sample.velocity, age))
+                given = conditioned.velocity
+                motions.append(
+                    RecordedMotion(given.velocity, conditioned.acceleration, sample.velocity, age, given.ripple)
+                )
                 rows.append((held[Force].force, reference.position, held[Position].position))
     if len(estimates) < 2:
         raise BagError(f'{bag}: fewer than two velocity samples after the first reference')
     force, reference_position, position = np.array(rows).T
     track = RecordedTrack(reference_position, position)
     return RecordedAxis(Recording(estimates, motions, force), track, configuration)
+
+
+def _with_reference(conditioned: Reference, sample: Any) -> Reference:
+    """What the node keeps of the references, after one more sample of any kind."""
+    is_new = isinstance(sample, ServoReference) and math.isfinite(sample.velocity)
+    return condition_reference(conditioned, sample) if is_new else conditioned
 
 
 # -- parameter file ---------------------------------------------------------------------------------------------------

@@ -9,11 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.estimation.feedforward import (
+    FADED_IN,
+    FADED_OUT,
     FeedForwardSettings,
     Limited,
     WantedMotion,
     compensation,
-    init,
     step,
     usable,
     wanted_velocity,
@@ -28,7 +29,7 @@ SHARP = FeedForwardSettings(slew_limit=1e9, lead_time=0.0)
 
 def run(settings, n, friction=42.0, velocity=0.1, *, state=None, start=0, step_time=MS):
     """Take n steps of ``step_time`` [ns], by default faded in; the state and all outputs."""
-    state, rows = state or init(settings)._replace(fade=1.0), []
+    state, rows = state or FADED_IN, []
     for i in range(start, start + n):
         state, out = step(settings, state, i * step_time, i * step_time, friction, velocity)
         rows.append(out)
@@ -138,7 +139,7 @@ def test_while_the_force_fades_it_follows_the_wanted_direction():
 
 
 def test_the_first_force_fades_in():
-    _, rows = run(SHARP, 400, state=init(SHARP))
+    _, rows = run(SHARP, 400, state=FADED_OUT)
     assert rows[0].force == 0.0
     assert rows[100].force == pytest.approx(37.8 / 2, rel=0.02)
     assert rows[-1].force == pytest.approx(37.8)
@@ -173,7 +174,7 @@ def test_an_estimate_is_usable_with_a_good_pressure_and_by_measured_velocity_wit
 )
 def test_finite_bounded_and_slow_whatever_comes(events):
     settings = FeedForwardSettings()
-    state, received, last = init(settings), 0, 0.0
+    state, received, last = FADED_OUT, 0, 0.0
     for change, friction, velocity in events:
         received += change
         state, out = step(settings, state, 0, received, friction, velocity)

@@ -6,10 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Motion
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.tuning.recorded_axis import (
+    RecordedMotion,
     Recording,
     acceleration,
     delayed,
@@ -46,7 +47,7 @@ def recording(
         )
         for t, c, v in zip(TIME, pressure_part, velocity, strict=True)
     ]  # fmt: skip
-    motions = [Motion(float(v), float(a), float(v)) for v, a in zip(velocity, slope, strict=True)]
+    motions = [RecordedMotion(float(v), float(a), float(v)) for v, a in zip(velocity, slope, strict=True)]
     return Recording(tuple(estimates), tuple(motions), force)
 
 
@@ -130,9 +131,9 @@ def test_reference_that_does_not_reverse_is_rejected():
 
 def test_tuning_takes_the_scale_and_most_of_the_friction():
     found = tune_recorded_axis(recording(noise=1.0), SETTINGS, KNOWN)
-    assert found.feedforward.coulomb_scale == 0.8
+    assert found.feedforward.scale == 0.8
     assert found.identified == {
-        'coulomb_scale': True, 'lead_time': False, 'smoothing_velocity': True, 'slew_limit': True
+        'scale': True, 'lead_time': False, 'smoothing_velocity': True, 'slew_limit': True
     }  # fmt: skip
     assert found.without.sliding == pytest.approx(32.0, rel=0.05)
     assert found.nominal.sliding < 0.1 * found.without.sliding
@@ -181,8 +182,8 @@ def test_given_delay_is_the_lead_time_and_else_it_stays():
 
 def test_friction_against_the_model_is_not_taken_for_a_scale():
     found = tune_recorded_axis(recording(scale=-0.5), SETTINGS, KNOWN)
-    assert not found.identified['coulomb_scale']
-    assert found.feedforward.coulomb_scale == SETTINGS.coulomb_scale
+    assert not found.identified['scale']
+    assert found.feedforward.scale == SETTINGS.scale
     assert not found.better_in_every_case
 
 

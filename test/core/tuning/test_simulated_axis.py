@@ -160,7 +160,7 @@ def test_default_feedforward_with_a_wrong_model_is_better_than_none_and_does_not
 
 def test_limit_cycle_is_seen():
     """From the rod's own velocity, too large a force closes a loop that never comes to rest."""
-    looped = dataclasses.replace(PIPELINE.feedforward, use_measured_velocity=True, coulomb_scale=2.0)
+    looped = dataclasses.replace(PIPELINE.feedforward, use_measured_velocity=True, scale=2.0)
     cycling = DEFAULT.case(looped, 0.3, 0.0, 0.2)
     assert cycling.outcome.limit_cycle_reversals > 5
     nominal = RobustnessCase(0.0, 0.0, case())
@@ -230,7 +230,7 @@ def test_force_is_no_sharper_than_it_must_be():
 
 
 def test_other_settings_are_unchanged():
-    tuned = {'coulomb_scale', 'lead_time', 'smoothing_velocity', 'slew_limit'}
+    tuned = {'scale', 'lead_time', 'smoothing_velocity', 'slew_limit'}
     for field in dataclasses.fields(FeedForwardSettings):
         if field.name not in tuned:
             assert getattr(found().feedforward, field.name) == getattr(PIPELINE.feedforward, field.name)
@@ -263,6 +263,6 @@ def test_preferred_numbers_are_found_again():
 
 
 def test_bounds_of_the_settings_are_kept():
-    assert bounded('coulomb_scale', 7.0) == 2.0
+    assert bounded('scale', 7.0) == 2.0
     assert bounded('slew_limit', 0.0) == 1e-3
     assert bounded('lead_time', 0.1) == 0.1

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from harness.closed_loop_bags import with_coulomb_scale, write_closed_loop
+from harness.closed_loop_bags import with_scale, write_closed_loop
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
@@ -28,7 +28,7 @@ RATE = 1000  # [Hz]
 PERIOD = 0.2  # [s]
 AMPLITUDE = 0.001  # [m]
 SETTLED = 0.2 + SETTLING_TIME  # [s] with the default fade_time
-TEXTS = {scale: snapshot_text(first_snapshot(with_coulomb_scale(scale))) for scale in (0.0, 0.5, 0.9)}
+TEXTS = {scale: snapshot_text(first_snapshot(with_scale(scale))) for scale in (0.0, 0.5, 0.9)}
 
 
 def recorded_run(seconds=2.0, scales=(), **columns) -> RecordedRun:
@@ -88,7 +88,7 @@ def test_known_error_and_rest_are_found():
 
 
 def test_standstill_is_the_stick_velocity_of_the_configuration():
-    configuration = dataclasses.replace(with_coulomb_scale(0.0), settings=EstimatorSettings(stick_velocity=0.0005))
+    configuration = dataclasses.replace(with_scale(0.0), settings=EstimatorSettings(stick_velocity=0.0005))
     velocity = np.where(resting_velocity(2000, 30) == 0.0, 0.0007, resting_velocity(2000, 30))
     (still,) = evaluate_tracking(recorded_run(velocity=velocity)).stretches
     text = snapshot_text(first_snapshot(configuration))
@@ -116,7 +116,7 @@ def test_stretches_are_compared_with_the_first_one_without_feedforward():
     run = recorded_run(6.0, (0.0, 0.5, 0.9), feedforward_force=force, velocity=velocity)
     found = evaluate_tracking(dataclasses.replace(run, position=run.reference - error))
     first, second, third = found.stretches
-    assert [s.settings.coulomb_scale for s in found.stretches] == [0.0, 0.5, 0.9]
+    assert [s.settings.scale for s in found.stretches] == [0.0, 0.5, 0.9]
     assert (first.rms_change, first.dwell_change) == (None, None)
     assert second.rms_change == pytest.approx(-60.0)
     assert second.dwell_change == pytest.approx(-75.0)
@@ -270,7 +270,7 @@ def test_the_simulated_servo_rests_at_each_reversal_without_feedforward(closed_l
     assert without.dwell > 0.05 / Sine().frequency
     assert without.period == pytest.approx(1.0 / Sine().frequency, rel=1e-6)
     assert without.reference_dwell < 0.02 / Sine().frequency
-    assert without.settings.coulomb_scale == 0.0
+    assert without.settings.scale == 0.0
 
 
 def test_feedforward_cuts_its_error_by_60_and_its_dwell_by_80_percent(closed_loop):

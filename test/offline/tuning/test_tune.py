@@ -141,7 +141,7 @@ def test_report_stands_alone_and_shows_every_case(simulated: Path):
     assert without['dwell [ms]'] == number(1e3 * numbers['dwell_without'])
     assert shown['reversals at rest'] == page.tiles['reversals at rest, all cases'] == '0'
     now = {row['parameter']: row['now'] for row in page.table('parameter')}
-    assert float(now['coulomb_scale']) == numbers['parameters']['coulomb_scale']
+    assert float(now['scale']) == numbers['parameters']['scale']
 
 
 def test_json_has_every_number_without_and_with_feedforward(simulated: Path):
@@ -200,7 +200,7 @@ def test_scale_mass_and_offset_are_identified_from_a_bag(axis: Path, tmp_path: P
     assert numbers['mass'] == pytest.approx(TRUE_MASS, rel=0.1)
     assert numbers['force_offset'] == pytest.approx(OFFSET, abs=0.5)
     assert numbers['residual_with']['sliding'] < 0.15 * numbers['residual_without']['sliding']
-    assert load_parameter_file(tmp_path / 'f.yaml')[2].coulomb_scale == pytest.approx(TRUE_SCALE, abs=0.01)
+    assert load_parameter_file(tmp_path / 'f.yaml')[2].scale == pytest.approx(TRUE_SCALE, abs=0.01)
 
 
 def test_parameters_that_a_bag_does_not_identify_are_named(axis: Path, tmp_path: Path, capsys):
