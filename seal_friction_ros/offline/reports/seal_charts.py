@@ -15,7 +15,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, PSI
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, Seal, actuator_friction
-from seal_friction_ros.core.friction.geometry import SealGeometry, contact_length, projected_area, squeeze, stretch
+from seal_friction_ros.core.friction.geometry import contact_length, projected_area, squeeze, stretch
 from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
@@ -106,7 +106,9 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
     except ValueError as error:
         raise ValueError(str(error) if str(error).startswith(str(seal)) else f'{seal}: {error}') from None
     pressures, measured = _compared(shown)
-    law = shown.seal.coulomb_law
+    law, dimensions = shown.seal.coulomb_law, None
+    if isinstance(law, PhysicsBased | PriorArtChart):
+        dimensions = {f.__name__: f(law.geometry) for f in (squeeze, stretch, projected_area, contact_length)}
     figures = write_page(
         out,
         'seal',
@@ -114,7 +116,7 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
         shown=shown,
         source=document.get('source', ''),
         is_physics_based=isinstance(law, PhysicsBased),
-        dimensions=_dimensions(law.geometry) if isinstance(law, PhysicsBased | PriorArtChart) else None,
+        dimensions=dimensions,
         normal_without_pressure=_normal_without_pressure(shown),
         state_pressure_of_thesis=STATE_PRESSURE,
         friction_table=_friction_table(shown),
@@ -162,11 +164,6 @@ def _normal_without_pressure(shown: ChartedSeal) -> tuple[float, float] | None:
         return None
     (normal,) = thesis_columns('normal_force', normal_force_lbf=LBF)
     return law.normal_force_law.normal_force(0.0, law.projected_area), float(normal[0])
-
-
-def _dimensions(geometry: SealGeometry) -> dict[str, float]:
-    """Squeeze and stretch [-], projected area [m^2] and contact length [m]."""
-    return {f.__name__: f(geometry) for f in (squeeze, stretch, projected_area, contact_length)}
 
 
 def _friction_table(shown: ChartedSeal) -> Table:
@@ -252,8 +249,8 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     ax.plot(pressures / BAR, breakaway / size, color=style.ORANGE, ls='--', label='breakaway force, model')
     if shown.is_thesis_seal:
         _draw_readings(ax, size)
-    ax.set(xlim=(-0.01 * pressures[-1] / BAR, None), ylim=(0.0, None))
-    ax.set(xlabel=PRESSURE_LABEL, ylabel=f'friction of {shown.count_text} [{unit}]')
+    ylabel = f'friction of {shown.count_text} [{unit}]'
+    ax.set(xlim=(-0.01 * pressures[-1] / BAR, None), ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel=ylabel)
     ax.legend(loc='upper left' if coulomb[-1] > coulomb[0] else 'best')
     return Plot('fig24_model_over_pressure', figure)
 
@@ -298,9 +295,8 @@ def rest_state_figure(shown: ChartedSeal) -> Plot:
     for threshold in (-coulomb, coulomb):
         ax.axvline(threshold / size, color=style.VERMILLION, lw=0.9, ls=':')
     style.zero_lines(ax, vertical=True)
-    ax.set(xlabel=f'force sum [{unit}]', ylabel=f'friction of {shown.count_text} [{unit}]')
-    style.legend_above(ax)
-    return Plot('fig23_states_2_and_3', figure)
+    labels = {'xlabel': f'force sum [{unit}]', 'ylabel': f'friction of {shown.count_text} [{unit}]'}
+    return finished('fig23_states_2_and_3', figure, ax, **labels)
 
 
 def prior_art_table_figure() -> Plot:
@@ -309,7 +305,8 @@ def prior_art_table_figure() -> Plot:
     figure, ax = style.new_figure('Prior art: friction of one seal read from charts', 3.6)
     ax.plot(pressure / BAR, friction, 'o-', color=style.VERMILLION, ms=5.0, label='Table 3')
     ax.plot(pressure / BAR, part, 's--', color=style.ORANGE, ms=4.0, label='share due to pressure')
-    return finished('fig12_prior_art', figure, ax, PRESSURE_LABEL, 'friction of one seal [N]')
+    labels = {'xlabel': PRESSURE_LABEL, 'ylabel': 'friction of one seal [N]'}
+    return finished('fig12_prior_art', figure, ax, ylim=(0.0, None), **labels)
 
 
 def prior_art_tests_figure() -> Plot:

@@ -9,12 +9,14 @@ from seal_friction_ros.core.foundation.units import MM
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation, SpoolFriction, evaluate_cycles
 from seal_friction_ros.offline.identification.sources import column_in_si, table_rows
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.page import ReportSummary, write_page
 
-TIME_UNITS = {'s': 's', 'ms': 'ms'}
-LENGTH_UNITS = {'m': 'm', 'mm': 'mm', 'um': 'um'}
-FORCE_UNITS = {'n': 'N', 'kn': 'kN', 'lbf': 'lbf'}
+COLUMN_UNITS = {
+    'time': {'s': 's', 'ms': 'ms'},
+    'displacement': {'m': 'm', 'mm': 'mm', 'um': 'um'},
+    'force': {'n': 'N', 'kn': 'kN', 'lbf': 'lbf'},
+}
 
 
 @house_style()
@@ -37,9 +39,7 @@ def write_spool_report(
     names = list(rows[0]) if rows else []
     if len(rows) < 100:
         raise ValueError(f'{table}: {len(rows)} rows are too few for {settings.cycles} cycles')
-    time = column_in_si(table, rows, names, 'time', TIME_UNITS)
-    displacement = column_in_si(table, rows, names, 'displacement', LENGTH_UNITS)
-    force = column_in_si(table, rows, names, 'force', FORCE_UNITS)
+    time, displacement, force = (column_in_si(table, rows, names, *column) for column in COLUMN_UNITS.items())
     steps = np.diff(time)
     if not (np.isfinite(steps).all() and steps.min() > 0.5 * np.median(steps) and steps.max() < 1.5 * np.median(steps)):
         raise ValueError(
@@ -50,14 +50,8 @@ def write_spool_report(
     except ValueError as error:
         raise ValueError(f'{table}: {error}') from None
     numbers = spool_numbers(found)
-    figures = write_page(
-        out,
-        'spool_evaluation',
-        [displacement_figure(found, settings)],
-        name=table.name,
-        numbers=numbers,
-        settings=settings,
-    )
+    plots = [displacement_figure(found, settings)]
+    figures = write_page(out, 'spool_evaluation', plots, name=table.name, numbers=numbers, settings=settings)
     return ReportSummary(out, figures, numbers)
 
 
@@ -85,8 +79,6 @@ def displacement_figure(found: SpoolFriction, settings: SpoolEvaluation) -> Plot
     top.plot(x, found.normalised, color=style.BLUE, lw=1.8, label='filtered and averaged')
     top.axvspan(-half, half, color=style.GREY, alpha=0.12, lw=0, label='range of the reference force')
     style.zero_lines(top)
-    top.set_ylabel('normalised friction [-]')
-    style.legend_above(top)
     bottom.plot(x, found.velocity / MM, color=style.ORANGE)
     bottom.set(ylabel='speed [mm/s]', xlabel='displacement from the middle of the stroke [mm]')
-    return Plot('friction_over_displacement', figure)
+    return finished('friction_over_displacement', figure, top, ylabel='normalised friction [-]')

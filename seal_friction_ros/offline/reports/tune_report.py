@@ -1,5 +1,6 @@
 """Report of a tuning, to check before use of the parameters on a machine."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,10 @@ from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import MM, MS, UM
 from seal_friction_ros.core.servo import closed_loop
-from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS, AxisRun, Performance
-from seal_friction_ros.core.tuning.recorded_axis import NEAR_REVERSAL, Residual
+from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS, AxisRun
+from seal_friction_ros.core.tuning.recorded_axis import NEAR_REVERSAL
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number, relative_change, signed_percent
 from seal_friction_ros.offline.reports.page import Table, write_page
 from seal_friction_ros.offline.tuning.tune import BagTuning, SimulatorTuning
@@ -23,8 +24,20 @@ SHOWN_PERIODS = 2  # of the sine
 SHOWN_REVERSALS = 6  # of a bag
 DOTS = 8000  # in the scatter
 SHADES = (style.SKY, style.BLUE, style.BLACK)  # delay too small, right, too large
-RESIDUALS = (('sliding', 'while sliding'), ('reversal', 'near reversals'))
+_ROBUSTNESS: dict[type, Any] = {  # title if better in every case, and of each panel the value, its unit and label
+    SimulatorTuning: (
+        'Better than none with every model and delay tried',
+        ('tracking_rms', UM, 'tracking RMS [µm]'),
+        ('dwell', MS, 'dwell per reversal [ms]'),
+    ),
+    BagTuning: (
+        'Less friction left in every case',
+        ('sliding', 1.0, 'RMS friction left while sliding [N]'),
+        ('reversal', 1.0, 'RMS friction left near reversals [N]'),
+    ),
+}
 TIME_LABEL = 'time since the first reference [s]'
+_REFERENCE: dict[str, Any] = {'color': style.GREY, 'lw': 2.2, 'alpha': 0.6, 'label': 'reference'}
 
 
 @house_style()
@@ -75,46 +88,36 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
 
 
 def _parameter_table(tuning: SimulatorTuning | BagTuning) -> Table:
-    before, now = tuning.task.before, tuning.found.feedforward
-    rows = [
-        (
-            name,
-            f'{getattr(before, name):g}',
-            f'{getattr(now, name):g}',
-            meaning.unit,
-            'tuned' if name in tuning.task.tuned else '',
-            meaning.description,
-        )
-        for name, meaning in meanings(now).items()
-    ]
+    before, now, tuned = tuning.task.before, tuning.found.feedforward, tuning.task.tuned
+    rows = []
+    for name, meaning in meanings(now).items():
+        values = (f'{getattr(settings, name):g}' for settings in (before, now))
+        rows.append((name, *values, meaning.unit, 'tuned' if name in tuned else '', meaning.description))
     return Table(('parameter', 'before', 'now', 'unit', '', 'meaning'), rows, (0, 3, 4, 5))
 
 
+# head of a column -> its value in the result of a case, unit, decimals
+_PERFORMANCE_COLUMNS = {
+    'tracking RMS [µm]': ('tracking_rms', UM, 1),
+    'peak [µm]': ('tracking_peak', UM, 1),
+    'dwell [ms]': ('dwell', MS, 2),
+    'overshoot [µm]': ('overshoot', UM, 1),
+    'reversals at rest': ('limit_cycle_reversals', 1, 0),
+    'largest force [N]': ('largest_force', 1.0, 1),
+    'largest rate [N/ms]': ('largest_force_rate', 1.0 / MS, 1),
+}
+_RESIDUAL_COLUMNS = {'left while sliding [N]': ('sliding', 1.0, 2), 'left near reversals [N]': ('reversal', 1.0, 2)}
+
+
 def _case_table(tuning: SimulatorTuning | BagTuning) -> Table:
-    heads: tuple[str, ...] = ('left while sliding [N]', 'left near reversals [N]')
-    if isinstance(tuning, SimulatorTuning):
-        heads = (
-            'tracking RMS [µm]', 'peak [µm]', 'dwell [ms]', 'overshoot [µm]', 'reversals at rest', 'largest force [N]',
-            'largest rate [N/ms]',
-        )  # fmt: skip
-
-    def cells(outcome: Performance | Residual) -> tuple[Any, ...]:
-        if isinstance(outcome, Residual):
-            return tuple(number(value) for value in outcome)
-        return (
-            number(outcome.tracking_rms / UM, 1),
-            number(outcome.tracking_peak / UM, 1),
-            number(outcome.dwell / MS),
-            number(outcome.overshoot / UM, 1),
-            outcome.limit_cycle_reversals,
-            number(outcome.largest_force, 1),
-            number(outcome.largest_force_rate * MS, 1),
-        )
-
-    rows = [('without', DASH, *cells(tuning.found.without))]
-    for friction_error, delay_error, outcome in tuning.found.cases:
-        rows.append((signed_percent(friction_error), signed_percent(delay_error), *cells(outcome)))
-    return Table(('friction model', 'delay', *heads), rows)
+    columns = _PERFORMANCE_COLUMNS if isinstance(tuning, SimulatorTuning) else _RESIDUAL_COLUMNS
+    rows = [('without', DASH, tuning.found.without)]
+    rows += [(signed_percent(case[0]), signed_percent(case[1]), case.outcome) for case in tuning.found.cases]
+    cells = [
+        (*errors, *(number(getattr(outcome, name) / size, digits) for name, size, digits in columns.values()))
+        for *errors, outcome in rows
+    ]
+    return Table(('friction model', 'delay', *columns), cells)
 
 
 # -- figures of the simulated servo -----------------------------------------------------------------------------------
@@ -148,19 +151,16 @@ def _line_between(ax: Axes, span: tuple[float, float], time: FloatArray, values:
 def tuned_tracking_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> Plot:
     """Figure 25 of the thesis with and without feed-forward: two periods, one reversal, the error."""
     was, now = tuning.found.without, tuning.found.nominal
-    title = (
-        f'With feed-forward: error {relative_change(was.tracking_rms, now.tracking_rms)}, '
-        f'dwell {relative_change(was.dwell, now.dwell)}'
-    )
-    figure, axes = style.new_figure(title, 7.4, nrows=3, gridspec_kw={'height_ratios': [4.0, 4.0, 2.8]})
+    error, dwell = relative_change(was.tracking_rms, now.tracking_rms), relative_change(was.dwell, now.dwell)
+    title, heights = f'With feed-forward: error {error}, dwell {dwell}', {'height_ratios': [4.0, 4.0, 2.8]}
+    figure, axes = style.new_figure(title, 7.4, nrows=3, gridspec_kw=heights)
     span, period = _shown_time(tuning), 1.0 / tuning.problem.settings.frequency
     peak = span[0] + 0.25 * period
     zoom = (peak - ZOOM * period, peak + ZOOM * period)
     axes[0].axvspan(*zoom, color=style.BLACK, alpha=0.08, lw=0)
-    reference = {'color': style.GREY, 'lw': 3.0, 'alpha': 0.5, 'label': 'reference'}
     runs = ((without, style.VERMILLION, 'without feed-forward'), (with_it, style.BLUE, 'with feed-forward'))
     for ax, shown in ((axes[0], span), (axes[1], zoom)):
-        _line_between(ax, shown, without.time, without.reference / MM, **reference)
+        _line_between(ax, shown, without.time, without.reference / MM, **{**_REFERENCE, 'lw': 3.0, 'alpha': 0.5})
         for run, colour, label in runs:
             _line_between(ax, shown, run.time, run.position / MM, color=colour, label=label)
         ax.set_ylabel('rod position [mm]')
@@ -168,10 +168,9 @@ def tuned_tracking_figure(tuning: SimulatorTuning, without: AxisRun, with_it: Ax
         _line_between(axes[2], span, run.time, (run.position - run.reference) / UM, color=colour)
     style.zero_lines(axes[2])
     axes[2].set(ylabel='error [µm]', xlabel='time [s]')
-    axes[1].set_title('Shaded part: a reversal')
-    style.legend_above(axes[0])
     figure.align_ylabels(axes)
-    return Plot('tracking', figure)
+    axes[1].set_title('Shaded part: a reversal')
+    return finished('tracking', figure, axes[0])
 
 
 def tuned_force_figure(tuning: SimulatorTuning, run: AxisRun) -> Plot:
@@ -181,9 +180,7 @@ def tuned_force_figure(tuning: SimulatorTuning, run: AxisRun) -> Plot:
     _line_between(ax, span, run.time, run.friction_force, color=style.BLACK, lw=1.2, label='friction of the seals')
     _line_between(ax, span, run.time, run.feedforward, color=style.BLUE, label='feed-forward at the controller')
     style.zero_lines(ax)
-    ax.set(ylabel='force [N]', xlabel='time [s]')
-    style.legend_above(ax)
-    return Plot('force', figure)
+    return finished('force', figure, ax, ylabel='force [N]', xlabel='time [s]')
 
 
 def move_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> Plot:
@@ -193,8 +190,7 @@ def move_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> 
     over = max(case.outcome.overshoot for case in tuning.found.cases)
     title = f'Largest overshoot of the move in all cases: {over / UM:.3g} µm'
     figure, axes = style.new_figure(title, 4.8, nrows=2, sharex=True)
-    reference = {'color': style.GREY, 'lw': 2.2, 'alpha': 0.6, 'label': 'reference'}
-    axes[0].plot(without.time, without.reference / MM, **reference)
+    axes[0].plot(without.time, without.reference / MM, **_REFERENCE)
     for run, colour, label in (
         (without, style.VERMILLION, 'without feed-forward'),
         (with_it, style.BLUE, 'with'),
@@ -202,30 +198,20 @@ def move_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> 
     ):
         axes[0].plot(run.time, run.position / MM, color=colour, lw=1.0)
         axes[1].plot(run.time, (run.position - run.reference) / UM, color=colour, label=label)
-    axes[0].set_ylabel('rod position [mm]')
     axes[1].set(ylabel='error [µm]', xlabel='time [s]', xlim=(0.0, without.time[-1]))
     style.zero_lines(axes[1])
-    for ax in axes:
-        style.legend_above(ax)
     figure.align_ylabels(axes)
-    return Plot('move', figure)
+    return finished('move', figure, *axes, ylabel='rod position [mm]')
 
 
 def robustness_figure(tuning: SimulatorTuning | BagTuning) -> Plot:
     """Error and dwell, or the friction left to the controller, in all cases."""
-    found, title = tuning.found, 'NOT better in every case'
-    panels = tuple((name, 1.0, f'RMS friction left {text} [N]') for name, text in RESIDUALS)
-    if isinstance(tuning, SimulatorTuning):
-        panels = (('tracking_rms', UM, 'tracking RMS [µm]'), ('dwell', MS, 'dwell per reversal [ms]'))
-    if found.better_in_every_case:
-        simulated = isinstance(tuning, SimulatorTuning)
-        title = 'Better than none with every model and delay tried' if simulated else 'Less friction left in every case'
-    figure, axes = style.new_figure(title, 3.8, ncols=2)
+    found, (title, *panels) = tuning.found, _ROBUSTNESS[type(tuning)]
+    figure, axes = style.new_figure(title if found.better_in_every_case else 'NOT better in every case', 3.8, ncols=2)
     for ax, (name, size, label) in zip(axes, panels, strict=True):
         values = {case[:2]: getattr(case.outcome, name) / size for case in found.cases}
         _draw_cases(ax, values, getattr(found.without, name) / size, label)
-    style.legend_above(axes[1])
-    return Plot('robustness', figure)
+    return finished('robustness', figure, axes[1])
 
 
 def _draw_cases(ax: Axes, values: dict[tuple[float, float], float], without: float, label: str) -> None:
@@ -254,28 +240,36 @@ def recorded_axis_figures(tuning: BagTuning) -> list[Plot]:
     return plots
 
 
+def _prepare_time_axes(tuning: BagTuning, axes: Sequence[Axes]) -> tuple[slice, FloatArray]:
+    """Shade the reversals on two time axes; returns the shown samples and their times [s]."""
+    part = _shown_reversals(tuning.found.reversal)
+    time = tuning.recording.time[part]
+    for ax in axes:
+        style.shade(ax, time, tuning.found.reversal[part])
+    axes[1].set(xlabel=TIME_LABEL, xlim=(time[0], time[-1]))
+    return part, time
+
+
 def recorded_friction_figure(tuning: BagTuning) -> Plot:
     """Friction of the axis, and the feed-forward along its recorded reference."""
     found = tuning.found
     change = relative_change(found.without.sliding, found.nominal.sliding)
-    figure, axes = style.new_figure(
-        f'Friction left to the controller while sliding: {change}', 5.6, nrows=2, sharex=True
-    )
-    part = _shown_reversals(found.reversal)
-    time, friction, force = tuning.recording.time[part], found.law.friction[part], found.force[part]
+    title = f'Friction left to the controller while sliding: {change}'
+    figure, axes = style.new_figure(title, 5.6, nrows=2, sharex=True)
+    part, time = _prepare_time_axes(tuning, axes)
+    friction, force = found.law.friction[part], found.force[part]
     unit, size = force_unit(float(np.nanmax(np.abs(friction), initial=0.0)))
-    label = 'friction: force sum less inertia'
-    style.thin_line(axes[0], time, friction / size, color=style.BLACK, lw=1.0, label=label)
-    style.thin_line(axes[0], time, force / size, color=style.BLUE, label='feed-forward')
-    style.thin_line(axes[1], time, friction / size, color=style.VERMILLION, lw=1.0, label='without')
-    style.thin_line(axes[1], time, (friction - force) / size, color=style.BLUE, lw=1.0, label='with feed-forward')
+    for ax, values, look in (
+        (axes[0], friction, {'color': style.BLACK, 'lw': 1.0, 'label': 'friction: force sum less inertia'}),
+        (axes[0], force, {'color': style.BLUE, 'label': 'feed-forward'}),
+        (axes[1], friction, {'color': style.VERMILLION, 'lw': 1.0, 'label': 'without'}),
+        (axes[1], friction - force, {'color': style.BLUE, 'lw': 1.0, 'label': 'with feed-forward'}),
+    ):
+        style.thin_line(ax, time, values / size, **look)
     for ax in axes:
         style.zero_lines(ax)
-        style.legend_above(ax)
-        style.shade(ax, time, found.reversal[part])
-    axes[0].set_ylabel(f'force [{unit}]')
-    axes[1].set(ylabel=f'left to the controller [{unit}]', xlabel=TIME_LABEL, xlim=(time[0], time[-1]))
-    return Plot('match', figure)
+    axes[1].set_ylabel(f'left to the controller [{unit}]')
+    return finished('match', figure, *axes, ylabel=f'force [{unit}]')
 
 
 def recorded_law_figure(tuning: BagTuning) -> Plot:
@@ -293,27 +287,22 @@ def recorded_law_figure(tuning: BagTuning) -> Plot:
     ax.plot(line, height, color=style.BLUE, label='feed-forward')
     most = 1.4 * max(float(np.quantile(np.abs(share), 0.99)), settings.coulomb_scale, 0.1)
     ylabel = 'friction / Coulomb friction\nof the model [-]'
-    ax.set(xlim=(-reach, reach), ylim=(-most, most), xlabel='rod velocity [mm/s]', ylabel=ylabel)
     style.zero_lines(ax, vertical=True)
-    style.legend_above(ax)
-    return Plot('law', figure)
+    limits = {'xlim': (-reach, reach), 'ylim': (-most, most)}
+    return finished('law', figure, ax, xlabel='rod velocity [mm/s]', ylabel=ylabel, **limits)
 
 
 def recorded_tracking_figure(tuning: BagTuning) -> Plot:
     """Tracking as recorded."""
     figure, axes = style.new_figure('Tracking as recorded', 4.4, nrows=2, sharex=True)
-    part = _shown_reversals(tuning.found.reversal)
-    time, reference, position = tuning.recording.time[part], tuning.track.reference[part], tuning.track.position[part]
-    style.thin_line(axes[0], time, reference / MM, color=style.GREY, lw=2.2, alpha=0.6, label='reference')
+    part, time = _prepare_time_axes(tuning, axes)
+    reference, position = tuning.track.reference[part], tuning.track.position[part]
+    style.thin_line(axes[0], time, reference / MM, **_REFERENCE)
     style.thin_line(axes[0], time, position / MM, color=style.VERMILLION, label='rod')
     style.thin_line(axes[1], time, (position - reference) / UM, color=style.VERMILLION)
     style.zero_lines(axes[1])
-    for ax in axes:
-        style.shade(ax, time, tuning.found.reversal[part])
-    axes[0].set_ylabel('position [mm]')
-    axes[1].set(ylabel='error [µm]', xlabel=TIME_LABEL, xlim=(time[0], time[-1]))
-    style.legend_above(axes[0])
-    return Plot('recorded', figure)
+    axes[1].set_ylabel('error [µm]')
+    return finished('recorded', figure, axes[0], ylabel='position [mm]')
 
 
 def _shown_reversals(reversal: BoolArray) -> slice:
