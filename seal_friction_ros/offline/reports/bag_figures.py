@@ -16,7 +16,7 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, Event, PressureLevel, worst_level
+from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel, worst_level
 from seal_friction_ros.offline.reports.figure_style import Plot, finished
 from seal_friction_ros.offline.reports.formatting import force_unit, number, speed_unit
 
@@ -93,7 +93,10 @@ def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[in
         level = levels[len(levels) // 2]
         events = sorted(level.events, key=lambda event: event.first)
         pairs = [(a, b) for a, b in pairwise(events) if a.direction != b.direction]
-        one, other = _nearest(pairs) if pairs else (events[0], events[0])
+        gaps = [b.first - a.last for a, b in pairs]
+        near = [pair for pair, gap in zip(pairs, gaps, strict=True) if gap <= 2 * min(gaps) + 1]
+        # The pair with the shortest gap; of equal ones the middle one, since the first may be a run-in.
+        one, other = near[len(near) // 2] if near else (events[0], events[0])
         first = one.first
         while first > 0 and run.state[first - 1] != FrictionState.SLIDING:
             first -= 1
@@ -102,13 +105,6 @@ def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[in
     half = max(len(run.time) // 200, 100)
     middle = int(np.argmax(np.abs(run.friction_force)))
     return max(middle - half, 0), min(middle + half, len(run.time) - 1), None
-
-
-def _nearest(pairs: Sequence[tuple[Event, Event]]) -> tuple[Event, Event]:
-    """Pair with the shortest gap between its strokes; the middle one of equals, since the first may be a run-in."""
-    gaps = [b.first - a.last for a, b in pairs]
-    near = [pair for pair, gap in zip(pairs, gaps, strict=True) if gap <= 2 * min(gaps) + 1]
-    return near[len(near) // 2]
 
 
 def _offset_matters(level: PressureLevel) -> bool:

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
@@ -15,7 +15,7 @@ from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, Pres
 from seal_friction_ros.offline.reports.bag_figures import friction_summary, run_figures
 from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, number
-from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, ReportSummary, Table, table_of, write_page
+from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Columns, ReportSummary, Table, table_of, write_page
 from seal_friction_ros.offline.reports.tracking_evaluation import TrackingStretch
 from seal_friction_ros.offline.reports.tracking_figures import stretch_name, tracking_plots, tracking_summary
 
@@ -57,7 +57,7 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         tracking=tracking,
         tracking_limits=tracking_evaluation,
         tracking_summary=tracking_summary(tracking) if tracking else '',
-        tracking_table=_tracking_table(stretches),
+        tracking_table=table_of(stretches, _TRACKING_COLUMNS, (0,)),
         feedforward_table=table_of(stretches, _FEEDFORWARD_COLUMNS),
     )
     numbers = bag_evaluation.evaluation_numbers(evaluation)
@@ -66,57 +66,61 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
 
 def _level_table(levels: Sequence[PressureLevel], events: str) -> Table:
     unit, size = force_unit(max((abs(level.estimated) for level in levels), default=0.0))
-    columns: dict[str, Callable[[PressureLevel], Any]] = {
-        'pressure [bar]': lambda level: number(level.pressure, unit=BAR),
-        f'measured [{unit}]': lambda level: number(level.measured, unit=size) + ('' if level.both_directions else ' *'),
-        f'spread [{unit}]': lambda level: number(level.measured_spread, unit=size),
-        f'estimated [{unit}]': lambda level: number(level.estimated, unit=size),
-        f'std [{unit}]': lambda level: number(level.estimated_std, unit=size),
-        f'deviation [{unit}]': lambda level: number(level.deviation, unit=size, signed=True),
-        'deviation [%]': lambda level: number(level.deviation_percent, 1, signed=True),
-        'in 95 % band': lambda level: f'{level.in_band} of {len(level.events)} {events}',
-        'samples': lambda level: level.samples,
-        f'offset of the force sum [{unit}]': lambda level: number(level.offset, unit=size, signed=True),
-    }
+    columns: Columns = (
+        ('pressure [bar]', lambda level: number(level.pressure, unit=BAR)),
+        (
+            f'measured [{unit}]',
+            lambda level: number(level.measured, unit=size) + ('' if level.both_directions else ' *'),
+        ),
+        (f'spread [{unit}]', lambda level: number(level.measured_spread, unit=size)),
+        (f'estimated [{unit}]', lambda level: number(level.estimated, unit=size)),
+        (f'std [{unit}]', lambda level: number(level.estimated_std, unit=size)),
+        (f'deviation [{unit}]', lambda level: number(level.deviation, unit=size, signed=True)),
+        ('deviation [%]', lambda level: number(level.deviation_percent, 1, signed=True)),
+        ('in 95 % band', lambda level: f'{level.in_band} of {len(level.events)} {events}'),
+        ('samples', lambda level: level.samples),
+        (f'offset of the force sum [{unit}]', lambda level: number(level.offset, unit=size, signed=True)),
+    )
     return table_of(levels, columns)
 
 
-def _tracking_table(stretches: Sequence[TrackingStretch]) -> Table:
-    heads = (
-        'stretch', 'time [s]', 'RMS error [µm]', 'change [%]', 'peak error [µm]', 'dwell per reversal [ms]',
-        'change [%]', 'dwell of the reference [ms]', 'not sliding [%]',
-    )  # fmt: skip
-    rows = [
-        (
-            stretch_name(s),
-            f'{s.start:.1f} to {s.end:.1f}',
-            number(s.rms, 1, unit=UM),
-            number(s.rms_change, 1, signed=True),
-            number(s.peak, 1, unit=UM),
-            'no reversal' if s.dwell is None else number(s.dwell, 1, unit=MS),
-            number(s.dwell_change, 1, signed=True),
-            number(s.reference_dwell, 1, unit=MS),
-            number(s.not_sliding, 1, unit=0.01),
-        )
-        for s in stretches
-    ]
-    return Table(heads, rows, (0,))
+def _time_span(stretch: TrackingStretch) -> str:
+    return f'{stretch.start:.1f} to {stretch.end:.1f}'
 
 
-_FEEDFORWARD_COLUMNS: dict[str, Callable[[TrackingStretch], Any]] = {
-    'time [s]': lambda s: f'{s.start:.1f} to {s.end:.1f}',
-    'left out before [s]': lambda s: number(s.settling),
-    'samples': lambda s: s.samples,
-    'reference': lambda s: f'± {length_text(s.amplitude)}' + (f', {1.0 / s.period:.3g} Hz' if s.period else ''),
-    'largest feed-forward [N]': lambda s: number(s.feedforward_peak),
-    'Coulomb scale': lambda s: number(s.settings.coulomb_scale if s.settings else None),
-    'Stribeck scale': lambda s: number(s.settings.stribeck_scale if s.settings else None),
-    'viscous friction [N s/m]': lambda s: number(
-        s.settings.viscous_scale * s.settings.viscous_friction if s.settings else None
+_TRACKING_COLUMNS: Columns = (
+    ('stretch', stretch_name),
+    ('time [s]', _time_span),
+    ('RMS error [µm]', lambda s: number(s.rms, 1, unit=UM)),
+    ('change [%]', lambda s: number(s.rms_change, 1, signed=True)),
+    ('peak error [µm]', lambda s: number(s.peak, 1, unit=UM)),
+    ('dwell per reversal [ms]', lambda s: 'no reversal' if s.dwell is None else number(s.dwell, 1, unit=MS)),
+    ('change [%]', lambda s: number(s.dwell_change, 1, signed=True)),
+    ('dwell of the reference [ms]', lambda s: number(s.reference_dwell, 1, unit=MS)),
+    ('not sliding [%]', lambda s: number(s.not_sliding, 1, unit=0.01)),
+)
+
+
+def _setting(name: str, unit: float = 1.0) -> Callable[[TrackingStretch], str]:
+    """Cell with a setting of the feed-forward; a dash where the settings are unknown."""
+    return lambda stretch: number(getattr(stretch.settings, name, None), unit=unit)
+
+
+_FEEDFORWARD_COLUMNS: Columns = (
+    ('time [s]', _time_span),
+    ('left out before [s]', lambda s: number(s.settling)),
+    ('samples', lambda s: s.samples),
+    ('reference', lambda s: f'± {length_text(s.amplitude)}' + (f', {1.0 / s.period:.3g} Hz' if s.period else '')),
+    ('largest feed-forward [N]', lambda s: number(s.feedforward_peak)),
+    ('Coulomb scale', _setting('coulomb_scale')),
+    ('Stribeck scale', _setting('stribeck_scale')),
+    (
+        'viscous friction [N s/m]',
+        lambda s: number(s.settings and s.settings.viscous_scale * s.settings.viscous_friction),
     ),
-    'smoothing velocity [mm/s]': lambda s: number(s.settings.smoothing_velocity if s.settings else None, unit=MM),
-    'lead time [ms]': lambda s: number(s.settings.lead_time if s.settings else None, unit=MS),
-}
+    ('smoothing velocity [mm/s]', _setting('smoothing_velocity', MM)),
+    ('lead time [ms]', _setting('lead_time', MS)),
+)
 
 
 def _run_tables(run: RecordedRun, evaluation: BagEvaluation) -> dict[str, Table]:

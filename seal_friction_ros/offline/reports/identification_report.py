@@ -1,8 +1,6 @@
 """Report of an identification: measured friction, fitted law, and the out-of-sample error of each law."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,12 +20,11 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.document import worst_left_out
 from seal_friction_ros.offline.identification.pipeline import fitted_readings
-from seal_friction_ros.offline.identification.results import Identification, PressureLevel, Ring
-from seal_friction_ros.offline.identification.sources import DataFile
+from seal_friction_ros.offline.identification.results import Identification, Ring
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number
-from seal_friction_ros.offline.reports.page import Table, table_of, write_page
+from seal_friction_ros.offline.reports.page import Columns, Table, table_of, write_page
 from seal_friction_ros.offline.work.seal_writer import seal_text
 
 PRIOR_ART_SEAL = 'ms28775_114_prior_art'  # the only ring with known charts
@@ -38,14 +35,7 @@ _DIRECTIONS = ((1.0, style.BLUE, 'extending'), (-1.0, style.ORANGE, 'retracting'
 
 @house_style()
 def write_identification_report(found: Identification, out: Path) -> tuple[Path, ...]:
-    """Write the report of an identification; see `write_page`.
-
-    Returns:
-        Paths of the figures.
-
-    Raises:
-        ValueError: The page cannot be written.
-    """
+    """Write the report of an identification; result and errors as of `write_page`."""
     plots = identification_figures(found)
     return write_page(
         out,
@@ -69,20 +59,20 @@ def write_identification_report(found: Identification, out: Path) -> tuple[Path,
 
 
 def _level_table(found: Identification) -> Table:
-    columns: dict[str, Callable[[PressureLevel], Any]] = {
-        'pressure [bar]': lambda level: number(level.pressure / BAR) + ('' if level.is_used else ' *'),
-        'speed [mm/s]': lambda level: number(level.speed / MM, 1),
-        'measured [N]': lambda level: number(level.measured),
-        'law [N]': lambda level: number(level.fitted),
-        'residual [N]': lambda level: number(level.measured - level.fitted, signed=True),
-        'residual [%]': lambda level: number(100.0 * (1.0 - level.fitted / level.measured), 1, signed=True),
-        'std [N]': lambda level: number(level.std),
-        'predicted unseen [N]': lambda level: number(level.left_out),
-        'off [%]': lambda level: number(100.0 * (level.left_out / level.measured - 1.0), 1, signed=True),
-        'offset of the force sum [N]': lambda level: number(level.offset, signed=True),
-        'drift in the run [%]': lambda level: number(100.0 * level.drift, 1, signed=True),
-        'readings': lambda level: level.readings,
-    }
+    columns: Columns = (
+        ('pressure [bar]', lambda level: number(level.pressure / BAR) + ('' if level.is_used else ' *')),
+        ('speed [mm/s]', lambda level: number(level.speed / MM, 1)),
+        ('measured [N]', lambda level: number(level.measured)),
+        ('law [N]', lambda level: number(level.fitted)),
+        ('residual [N]', lambda level: number(level.measured - level.fitted, signed=True)),
+        ('residual [%]', lambda level: number(100.0 * (1.0 - level.fitted / level.measured), 1, signed=True)),
+        ('std [N]', lambda level: number(level.std)),
+        ('predicted unseen [N]', lambda level: number(level.left_out)),
+        ('off [%]', lambda level: number(100.0 * (level.left_out / level.measured - 1.0), 1, signed=True)),
+        ('offset of the force sum [N]', lambda level: number(level.offset, signed=True)),
+        ('drift in the run [%]', lambda level: number(100.0 * level.drift, 1, signed=True)),
+        ('readings', lambda level: level.readings),
+    )
     return table_of(found.levels, columns)
 
 
@@ -127,15 +117,11 @@ def _correlation_table(found: Identification) -> Table:
 
 
 def _data_table(found: Identification) -> Table:
-    used, total = found.data.prepared.used, found.data.prepared.total
-    columns: dict[str, Callable[[DataFile], str]] = {
-        'source': lambda file: file.name,
-        'samples used': lambda file: (
-            f'{used[file.name]} of {total[file.name]}' if file.name in used else 'not used: see the warnings'
-        ),
-        'SHA-256': lambda file: file.sha256,
-    }
-    return table_of(found.data.sources.files, columns, (0, 1, 2))
+    total = found.data.prepared.total
+    used = {name: f'{count} of {total[name]}' for name, count in found.data.prepared.used.items()}
+    files = found.data.sources.files
+    rows = [(file.name, used.get(file.name, 'not used: see the warnings'), file.sha256) for file in files]
+    return Table(('source', 'samples used', 'SHA-256'), rows, (0, 1, 2))
 
 
 # -- figures ----------------------------------------------------------------------------------------------------------

@@ -22,6 +22,8 @@ from seal_friction_ros.offline.work.atomic_file import write_whole
 
 TEMPLATES = Path(__file__).with_name('templates')
 PARAMETER_HEADS = ('parameter', 'value', 'unit', 'meaning')
+Columns = Sequence[tuple[str, Callable[[Any], Any]]]
+"""head of each column, and the function that gives its cell of a record"""
 
 
 class Table(NamedTuple):
@@ -33,11 +35,10 @@ class Table(NamedTuple):
     """columns that hold text, which is aligned left; the others hold numbers"""
 
 
-def table_of(
-    records: Iterable[Any], columns: dict[str, Callable[[Any], Any]], text_columns: Sequence[int] = ()
-) -> Table:
-    """Table with a row for each record; ``columns``: head of a column -> function that gives the cell of a record."""
-    return Table(list(columns), [[cell(record) for cell in columns.values()] for record in records], text_columns)
+def table_of(records: Iterable[Any], columns: Columns, text_columns: Sequence[int] = ()) -> Table:
+    """Table with a row for each record."""
+    heads, cells = zip(*columns, strict=True)
+    return Table(heads, [[cell(record) for cell in cells] for record in records], text_columns)
 
 
 @dataclass(frozen=True)

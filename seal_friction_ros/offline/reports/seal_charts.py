@@ -105,8 +105,10 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
         shown = charted_seal(parse_seal(document := read_yaml(seal)))
     except ValueError as error:
         raise ValueError(str(error) if str(error).startswith(str(seal)) else f'{seal}: {error}') from None
-    pressures, measured = _compared(shown)
-    law, dimensions = shown.seal.coulomb_law, None
+    law, normal, dimensions = shown.seal.coulomb_law, None, None
+    if isinstance(law, PhysicsBased):  # normal force of one seal without pressure [N]: of the law, and of Table 4
+        of_table = thesis_columns('normal_force', normal_force_lbf=LBF)[0]
+        normal = law.normal_force_law.normal_force(0.0, law.projected_area), float(of_table[0])
     if isinstance(law, PhysicsBased | PriorArtChart):
         dimensions = {f.__name__: f(law.geometry) for f in (squeeze, stretch, projected_area, contact_length)}
     figures = write_page(
@@ -117,11 +119,12 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
         source=document.get('source', ''),
         is_physics_based=isinstance(law, PhysicsBased),
         dimensions=dimensions,
-        normal_without_pressure=_normal_without_pressure(shown),
+        normal_without_pressure=normal,
         state_pressure_of_thesis=STATE_PRESSURE,
         friction_table=_friction_table(shown),
         document=seal_text(document),
     )
+    pressures, measured = _compared(shown)
     frictions = tuple(shown.friction(pressure).coulomb_friction for pressure in pressures)
     return ChartsSummary(out, figures, shown.seal.name, len(shown.mounted), pressures, frictions, measured)
 
@@ -155,15 +158,6 @@ def _compared(shown: ChartedSeal) -> tuple[tuple[float, ...], tuple[float, ...]]
         return tuple(np.linspace(shown.seal.pressure_min, shown.seal.pressure_max, 11).tolist()), ()
     levels, means = mean_dynamic_friction()
     return tuple(levels.tolist()), tuple(means.tolist())
-
-
-def _normal_without_pressure(shown: ChartedSeal) -> tuple[float, float] | None:
-    """Normal force of one seal without pressure [N]: of the law, and of Table 4; None for another seal or law."""
-    law = shown.seal.coulomb_law
-    if not (shown.is_thesis_seal and isinstance(law, PhysicsBased)):
-        return None
-    (normal,) = thesis_columns('normal_force', normal_force_lbf=LBF)
-    return law.normal_force_law.normal_force(0.0, law.projected_area), float(normal[0])
 
 
 def _friction_table(shown: ChartedSeal) -> Table:
@@ -232,8 +226,8 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     """Law over pressure with its band, and the readings of the thesis (Figure 24)."""
     pressures = shown.chart_pressures
     frictions = [shown.friction(p) for p in pressures]
-    coulomb = np.array([f.coulomb_friction for f in frictions])
-    half = BAND_95 * np.array([f.coulomb_friction_std for f in frictions])
+    values = np.array([(f.coulomb_friction, f.coulomb_friction_std, f.stiction) for f in frictions])
+    coulomb, std, stiction = values.T
     unit, size = force_unit(float(coulomb[-1]))
     compared, measured = _compared(shown)
     if measured:
@@ -243,10 +237,9 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     else:
         title = f'Coulomb friction reaches {coulomb[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
     figure, ax = style.new_figure(title, 4.4)
-    style.fill_band(ax, pressures / BAR, coulomb / size, half / size, label=f'95 % band (± {BAND_95} std)')
+    style.fill_band(ax, pressures / BAR, coulomb / size, BAND_95 * std / size, label=f'95 % band (± {BAND_95} std)')
     ax.plot(pressures / BAR, coulomb / size, color=style.BLUE, lw=1.8, label='Coulomb friction, model')
-    breakaway = coulomb + np.array([f.stiction for f in frictions])
-    ax.plot(pressures / BAR, breakaway / size, color=style.ORANGE, ls='--', label='breakaway force, model')
+    ax.plot(pressures / BAR, (coulomb + stiction) / size, color=style.ORANGE, ls='--', label='breakaway force, model')
     if shown.is_thesis_seal:
         _draw_readings(ax, size)
     ylabel = f'friction of {shown.count_text} [{unit}]'
@@ -274,8 +267,7 @@ def sliding_state_figure(shown: ChartedSeal) -> Plot:
     ax.plot(velocity / INCH, friction / size, color=style.BLUE, lw=1.8, drawstyle='steps-mid')
     style.zero_lines(ax, vertical=True)
     ax.set(xlabel='rod velocity [in/s]', ylabel=f'friction of {shown.count_text} [{unit}]')
-    above = ax.secondary_xaxis('top', functions=(lambda inch: inch * 25.4, lambda mm: mm / 25.4))
-    above.set_xlabel('[mm/s]')
+    ax.secondary_xaxis('top', functions=(lambda inch: inch * 25.4, lambda mm: mm / 25.4)).set_xlabel('[mm/s]')
     return Plot('fig22_state_1', figure)
 
 

@@ -24,64 +24,35 @@ SHOWN_PERIODS = 2  # of the sine
 SHOWN_REVERSALS = 6  # of a bag
 DOTS = 8000  # in the scatter
 SHADES = (style.SKY, style.BLUE, style.BLACK)  # delay too small, right, too large
-_ROBUSTNESS: dict[type, Any] = {  # title if better in every case, and of each panel the value, its unit and label
-    SimulatorTuning: (
-        'Better than none with every model and delay tried',
-        ('tracking_rms', UM, 'tracking RMS [µm]'),
-        ('dwell', MS, 'dwell per reversal [ms]'),
-    ),
-    BagTuning: (
-        'Less friction left in every case',
-        ('sliding', 1.0, 'RMS friction left while sliding [N]'),
-        ('reversal', 1.0, 'RMS friction left near reversals [N]'),
-    ),
-}
 TIME_LABEL = 'time since the first reference [s]'
 _REFERENCE: dict[str, Any] = {'color': style.GREY, 'lw': 2.2, 'alpha': 0.6, 'label': 'reference'}
 
 
 @house_style()
 def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[Path, ...]:
-    """Write the page of a tuning; see `write_page`.
-
-    Returns:
-        Paths of the figures.
-
-    Raises:
-        ValueError: The page cannot be written.
-    """
-    shared = {
-        'tuning': tuning,
-        'found': tuning.found,
-        'was': tuning.found.without,
-        'now': tuning.found.nominal,
-        'parameter_table': _parameter_table(tuning),
-        'case_table': _case_table(tuning),
-    }
+    """Write the page of a tuning; result and errors as of `write_page`."""
+    found = tuning.found
     if isinstance(tuning, SimulatorTuning):
-        problem = tuning.problem
-        performances = [case.outcome for case in tuning.found.cases]
-        return write_page(
-            out,
-            'simulator_tuning',
-            tuning_figures(tuning),
-            worst={name: max(getattr(p, name) for p in performances) for name in ('tracking_rms', 'overshoot')},
-            reversals=sum(p.limit_cycle_reversals for p in performances),
-            settings=problem.settings,
-            whole_delay=problem.whole_delay,
-            loop=closed_loop,
-            **shared,
-        )
-    return write_page(
-        out,
-        'bag_tuning',
-        recorded_axis_figures(tuning),
-        recorded=tuning.track.numbers(),
-        sliding_samples=int(np.count_nonzero(tuning.found.law.sliding)),
-        offset_is_known=bool(np.isfinite(tuning.found.law.offset)),
-        NEAR_REVERSAL=NEAR_REVERSAL,
-        **shared,
-    )
+        outcomes = [case.outcome for case in tuning.found.cases]
+        template, plots = 'simulator_tuning', tuning_figures(tuning)
+        special: dict[str, Any] = {
+            'worst': {name: max(getattr(o, name) for o in outcomes) for name in ('tracking_rms', 'overshoot')},
+            'reversals': sum(o.limit_cycle_reversals for o in outcomes),
+            'settings': tuning.problem.settings,
+            'whole_delay': tuning.problem.whole_delay,
+            'loop': closed_loop,
+        }
+    else:
+        template, plots = 'bag_tuning', recorded_axis_figures(tuning)
+        special = {
+            'recorded': tuning.track.numbers(),
+            'sliding_samples': int(np.count_nonzero(tuning.found.law.sliding)),
+            'offset_is_known': bool(np.isfinite(tuning.found.law.offset)),
+            'NEAR_REVERSAL': NEAR_REVERSAL,
+        }
+    tables = {'parameter_table': _parameter_table(tuning), 'case_table': _case_table(tuning)}
+    shared = {'tuning': tuning, 'found': found, 'was': found.without, 'now': found.nominal, **tables}
+    return write_page(out, template, plots, **shared, **special)
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------
@@ -127,16 +98,11 @@ def tuning_figures(tuning: SimulatorTuning) -> list[Plot]:
     """Tracking, forces, move and robustness."""
     sine, move, _ = tuning.problem.runs(closed_loop.without_feedforward(tuning.found.feedforward))
     tuned_sine, tuned_move, _ = tuning.problem.runs(tuning.found.feedforward)
-    return [
-        tuned_tracking_figure(tuning, sine, tuned_sine),
-        tuned_force_figure(tuning, tuned_sine),
-        move_figure(tuning, move, tuned_move),
-        robustness_figure(tuning),
-    ]
+    plots = [tuned_tracking_figure(tuning, sine, tuned_sine), tuned_force_figure(tuning, tuned_sine)]
+    return [*plots, move_figure(tuning, move, tuned_move), robustness_figure(tuning)]
 
 
 def _shown_time(tuning: SimulatorTuning) -> tuple[float, float]:
-    """Start and end of the shown periods of the sine [s]."""
     period = 1.0 / tuning.problem.settings.frequency
     return SETTLING_PERIODS * period, (SETTLING_PERIODS + SHOWN_PERIODS) * period
 
@@ -206,8 +172,14 @@ def move_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> 
 
 def robustness_figure(tuning: SimulatorTuning | BagTuning) -> Plot:
     """Error and dwell, or the friction left to the controller, in all cases."""
-    found, (title, *panels) = tuning.found, _ROBUSTNESS[type(tuning)]
-    figure, axes = style.new_figure(title if found.better_in_every_case else 'NOT better in every case', 3.8, ncols=2)
+    found = tuning.found
+    if isinstance(tuning, SimulatorTuning):
+        better = 'Better than none with every model and delay tried'
+        panels = (('tracking_rms', UM, 'tracking RMS [µm]'), ('dwell', MS, 'dwell per reversal [ms]'))
+    else:
+        better, label = 'Less friction left in every case', 'RMS friction left'
+        panels = (('sliding', 1.0, f'{label} while sliding [N]'), ('reversal', 1.0, f'{label} near reversals [N]'))
+    figure, axes = style.new_figure(better if found.better_in_every_case else 'NOT better in every case', 3.8, ncols=2)
     for ax, (name, size, label) in zip(axes, panels, strict=True):
         values = {case[:2]: getattr(case.outcome, name) / size for case in found.cases}
         _draw_cases(ax, values, getattr(found.without, name) / size, label)
@@ -259,13 +231,11 @@ def recorded_friction_figure(tuning: BagTuning) -> Plot:
     part, time = _prepare_time_axes(tuning, axes)
     friction, force = found.law.friction[part], found.force[part]
     unit, size = force_unit(float(np.nanmax(np.abs(friction), initial=0.0)))
-    for ax, values, look in (
-        (axes[0], friction, {'color': style.BLACK, 'lw': 1.0, 'label': 'friction: force sum less inertia'}),
-        (axes[0], force, {'color': style.BLUE, 'label': 'feed-forward'}),
-        (axes[1], friction, {'color': style.VERMILLION, 'lw': 1.0, 'label': 'without'}),
-        (axes[1], friction - force, {'color': style.BLUE, 'lw': 1.0, 'label': 'with feed-forward'}),
-    ):
-        style.thin_line(ax, time, values / size, **look)
+    label = 'friction: force sum less inertia'
+    style.thin_line(axes[0], time, friction / size, color=style.BLACK, lw=1.0, label=label)
+    style.thin_line(axes[0], time, force / size, color=style.BLUE, label='feed-forward')
+    style.thin_line(axes[1], time, friction / size, color=style.VERMILLION, lw=1.0, label='without')
+    style.thin_line(axes[1], time, (friction - force) / size, color=style.BLUE, lw=1.0, label='with feed-forward')
     for ax in axes:
         style.zero_lines(ax)
     axes[1].set_ylabel(f'left to the controller [{unit}]')

@@ -13,18 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
+from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Motion
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    DECODERS,
-    ESTIMATE_TYPE,
-    FORCE_TYPE,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-    decode,
-    decode_text,
-)
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
 from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Position, ServoReference, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
@@ -72,11 +63,9 @@ class RecordedTrack(NamedTuple):
     def numbers(self) -> dict[str, float | None]:
         """Tracking error as recorded [m], with any compensation active at that time; None without positions."""
         known = np.isfinite(self.reference) & np.isfinite(self.position)
+        errors = {'recorded_tracking_rms': tracking_rms, 'recorded_tracking_peak': tracking_peak}
         pair = self.reference[known], self.position[known]
-        return {
-            'recorded_tracking_rms': tracking_rms(*pair) if known.any() else None,
-            'recorded_tracking_peak': tracking_peak(*pair) if known.any() else None,
-        }
+        return {name: error(*pair) if known.any() else None for name, error in errors.items()}
 
 
 @dataclass(frozen=True)
@@ -93,17 +82,15 @@ class SimulatorTuning:
         was, now = self.found.without, self.found.nominal
         if not self.found.feedforward.coulomb_scale:
             return 'No feed-forward is better than none on this plant.'
-        worst = self.found.cases[-1]
-        better = 'better than none, and at rest,'
+        worst, better, end = self.found.cases[-1], 'better than none, and at rest,', '.'
         if not self.found.better_in_every_case:
-            better = 'NOT better than none, or not at rest,'
-        text = (
+            better, end = 'NOT better than none, or not at rest,', ': see the robustness cases.'
+        return (
             f'Tracking RMS {was.tracking_rms / MM:.3g} to {now.tracking_rms / MM:.3g} mm, '
             f'dwell per reversal {was.dwell / MS:.3g} to {now.dwell / MS:.3g} ms; '
             f'{better} in every case with a model error up to {100.0 * worst.friction_error:.3g} % and a delay error '
-            f'up to {100.0 * worst.delay_error:.3g} %'
+            f'up to {100.0 * worst.delay_error:.3g} %{end}'
         )
-        return f'{text}.' if self.found.better_in_every_case else f'{text}: see the robustness cases.'
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -237,9 +224,8 @@ def sensor_noise(settings: TuningSettings) -> FloatArray:
 
 
 def _seals_text(configuration: Configuration) -> str:
-    names = [str(document.get('name', 'no name')) for document in configuration.seal_documents]
-    chambers = configuration.selection.seal_chambers
-    return ', '.join(f'{name} on chamber {chamber}' for name, chamber in zip(names, chambers, strict=True))
+    mounted = zip(configuration.seal_documents, configuration.selection.seal_chambers, strict=True)
+    return ', '.join(f'{seal.get("name", "no name")} on chamber {chamber}' for seal, chamber in mounted)
 
 
 class RecordedAxis(NamedTuple):
@@ -261,9 +247,9 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
     """
     topics = find_topics(bag, namespace)
     needed = {
-        REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
-        FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
-        PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
+        messages.REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
+        messages.FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
+        messages.PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
     }
     for type_name, (topic, reason) in needed.items():
         if not topic:
@@ -278,27 +264,26 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
             if count % 1000 == 0:
                 advance(1000)
             message = step.message
-            if message.type_name == CONFIGURATION_TYPE:
-                configuration = parse_snapshot(decode_text(message.data)).configuration
+            if message.type_name == messages.CONFIGURATION_TYPE:
+                configuration = parse_snapshot(messages.decode_text(message.data)).configuration
                 continue
             if message.topic not in topics:
                 continue
-            sample = DECODERS[message.type_name](message.data)
+            sample = messages.DECODERS[message.type_name](message.data)
             held[type(sample)] = sample
             reference = held.get(ServoReference)
             if not isinstance(sample, Velocity) or reference is None:
                 continue
             if not estimates or sample.stamp > estimates[-1].stamp:
-                (data,) = (data for type_name, data in step.answers if type_name == ESTIMATE_TYPE)
-                estimates.append(decode(ESTIMATE_TYPE, data))
+                (data,) = (data for type_name, data in step.answers if type_name == messages.ESTIMATE_TYPE)
+                estimates.append(messages.decode(messages.ESTIMATE_TYPE, data))
                 age = (sample.stamp - reference.stamp) * 1e-9
                 motions.append(Motion(reference.velocity, reference.acceleration, sample.velocity, age))
                 rows.append((held[Force].force, reference.position, held[Position].position))
     if len(estimates) < 2:
         raise BagError(f'{bag}: fewer than two velocity samples after the first reference')
-    force, reference_position, position = np.array(rows).T
-    track = RecordedTrack(reference_position, position)
-    return RecordedAxis(Recording(estimates, motions, force), track, configuration)
+    force, *track = np.array(rows).T
+    return RecordedAxis(Recording(estimates, motions, force), RecordedTrack(*track), configuration)
 
 
 # -- parameter file ---------------------------------------------------------------------------------------------------
@@ -310,7 +295,7 @@ def page_of(out: Path) -> Path:
 
 
 def check_target(out: Path) -> None:
-    """Check before the computation that parameter file and page can be written.
+    """Check that parameter file and page can be written; called before the computation.
 
     Raises:
         ValueError: A file is not from an earlier tuning, or the folder cannot be written to.
@@ -320,10 +305,10 @@ def check_target(out: Path) -> None:
     parent = next(parent for parent in out.absolute().parents if parent.exists())
     if out.is_dir() or not parent.is_dir() or not os.access(parent, os.W_OK):
         raise ValueError(f'{out}: cannot write a file there')
-    if out.exists() and not out.read_text(encoding='utf-8', errors='replace').startswith(MADE_BY):
-        raise ValueError(f'{out} exists already and is not from tune: not overwriting')
-    if page_of(out).exists() and not out.exists():
-        raise ValueError(f'{page_of(out)} exists already and is not from tune: not overwriting')
+    is_own = out.exists() and out.read_text(encoding='utf-8', errors='replace').startswith(MADE_BY)
+    for path in (out, page_of(out)):
+        if path.exists() and not is_own:
+            raise ValueError(f'{path} exists already and is not from tune: not overwriting')
 
 
 def parameter_text(tuning: SimulatorTuning | BagTuning) -> str:
