@@ -252,22 +252,19 @@ def deviation_figure(levels: Sequence[PressureLevel]) -> Plot:
     return finished('deviation', figure, ax, xlabel=PRESSURE_LABEL, ylabel='deviation [%]', **limits)
 
 
-def _velocity_title(levels: Sequence[PressureLevel]) -> str:
+def sliding_velocity_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
+    """Friction over velocity, measured and estimated, coloured by pressure."""
+    title = 'Friction over velocity, measured and estimated'
     if len(levels) >= 2 and levels[-1].measured > levels[0].measured > 0.0:
         unit, size = force_unit(levels[-1].measured)
         low, high = (f'{x.measured / size:.3g} {unit} at {x.pressure / BAR:.1f} bar' for x in (levels[0], levels[-1]))
-        return f'Sliding friction grows from {low} to {high}'
-    if levels and all(level.both_directions and level.measured > 0.0 for level in levels):
-        return 'Friction changes its sign with the direction of motion'
-    return 'Friction over velocity, measured and estimated'
-
-
-def sliding_velocity_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
-    """Friction over velocity, measured and estimated, coloured by pressure."""
+        title = f'Sliding friction grows from {low} to {high}'
+    elif levels and all(level.both_directions and level.measured > 0.0 for level in levels):
+        title = 'Friction changes its sign with the direction of motion'
     speed_name, speed_size = speed_unit(_largest(run.velocity))
     largest = max(_largest(run.force_sum), _largest(run.friction_force))
     unit, size = force_unit(largest)
-    figure, axes = style.new_figure(_velocity_title(levels), 4.2, ncols=2, sharex=True, sharey=True)
+    figure, axes = style.new_figure(title, 4.2, ncols=2, sharex=True, sharey=True)
     good: IntArray = np.flatnonzero(np.isfinite(run.velocity) & np.isfinite(run.force_sum) & np.isfinite(run.pressure))
     good = good[:: len(good) // _DOTS + 1]
     good = good[np.argsort(-run.pressure[good], kind='stable')]  # low pressures on top: they reach less far

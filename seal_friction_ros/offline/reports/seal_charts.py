@@ -273,8 +273,7 @@ def sliding_state_figure(shown: ChartedSeal) -> Plot:
 
 def rest_state_figure(shown: ChartedSeal) -> Plot:
     """Friction over force sum at rest (Figure 23)."""
-    pressure = shown.state_pressure
-    friction = shown.friction(pressure)
+    pressure, friction = shown.state_pressure, shown.friction(shown.state_pressure)
     coulomb = friction.coulomb_friction
     swept = np.linspace(-2.0 * coulomb, 2.0 * coulomb, 2001)
     unit, size = force_unit(coulomb)

@@ -1,7 +1,6 @@
 """Report of a measurement of several cycles, evaluated as in the spool-valve paper."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -49,16 +48,8 @@ def write_spool_report(
         found = evaluate_cycles(time, displacement, force, settings, reference)
     except ValueError as error:
         raise ValueError(f'{table}: {error}') from None
-    numbers = spool_numbers(found)
-    plots = [displacement_figure(found, settings)]
-    figures = write_page(out, 'spool_evaluation', plots, name=table.name, numbers=numbers, settings=settings)
-    return ReportSummary(out, figures, numbers)
-
-
-def spool_numbers(found: SpoolFriction) -> dict[str, Any]:
-    """The numbers for JSON."""
     up = found.velocity > 0.0
-    return {
+    numbers = {
         'reference_force_N': found.reference_force,
         'resonance_Hz': found.resonance,
         'stroke_m': float(np.ptp(found.displacement)),
@@ -66,6 +57,9 @@ def spool_numbers(found: SpoolFriction) -> dict[str, Any]:
         'highest_normalised': float(found.normalised[up].max()) if up.any() else None,
         'lowest_normalised': float(found.normalised[~up].min()) if (~up).any() else None,
     }
+    plots = [displacement_figure(found, settings)]
+    figures = write_page(out, 'spool_evaluation', plots, name=table.name, numbers=numbers, settings=settings)
+    return ReportSummary(out, figures, numbers)
 
 
 def displacement_figure(found: SpoolFriction, settings: SpoolEvaluation) -> Plot:

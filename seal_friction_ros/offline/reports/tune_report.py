@@ -32,9 +32,10 @@ _REFERENCE: dict[str, Any] = {'color': style.GREY, 'lw': 2.2, 'alpha': 0.6, 'lab
 def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[Path, ...]:
     """Write the page of a tuning; result and errors as of `write_page`."""
     found = tuning.found
+    tables = {'parameter_table': _parameter_table(tuning), 'case_table': _case_table(tuning)}
+    shared = {'tuning': tuning, 'found': found, 'was': found.without, 'now': found.nominal, **tables}
     if isinstance(tuning, SimulatorTuning):
         outcomes = [case.outcome for case in tuning.found.cases]
-        template, plots = 'simulator_tuning', tuning_figures(tuning)
         special: dict[str, Any] = {
             'worst': {name: max(getattr(o, name) for o in outcomes) for name in ('tracking_rms', 'overshoot')},
             'reversals': sum(o.limit_cycle_reversals for o in outcomes),
@@ -42,17 +43,14 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
             'whole_delay': tuning.problem.whole_delay,
             'loop': closed_loop,
         }
-    else:
-        template, plots = 'bag_tuning', recorded_axis_figures(tuning)
-        special = {
-            'recorded': tuning.track.numbers(),
-            'sliding_samples': int(np.count_nonzero(tuning.found.law.sliding)),
-            'offset_is_known': bool(np.isfinite(tuning.found.law.offset)),
-            'NEAR_REVERSAL': NEAR_REVERSAL,
-        }
-    tables = {'parameter_table': _parameter_table(tuning), 'case_table': _case_table(tuning)}
-    shared = {'tuning': tuning, 'found': found, 'was': found.without, 'now': found.nominal, **tables}
-    return write_page(out, template, plots, **shared, **special)
+        return write_page(out, 'simulator_tuning', tuning_figures(tuning), **shared, **special)
+    special = {
+        'recorded': tuning.track.numbers(),
+        'sliding_samples': int(np.count_nonzero(tuning.found.law.sliding)),
+        'offset_is_known': bool(np.isfinite(tuning.found.law.offset)),
+        'NEAR_REVERSAL': NEAR_REVERSAL,
+    }
+    return write_page(out, 'bag_tuning', recorded_axis_figures(tuning), **shared, **special)
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------

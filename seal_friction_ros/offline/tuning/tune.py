@@ -228,19 +228,13 @@ def _seals_text(configuration: Configuration) -> str:
     return ', '.join(f'{seal.get("name", "no name")} on chamber {chamber}' for seal, chamber in mounted)
 
 
-class RecordedAxis(NamedTuple):
-    """Contents of a bag for the tuning."""
+def read_recording(
+    bag: Path, override: Configuration | None = None, namespace: str = ''
+) -> tuple[Recording, RecordedTrack, Configuration]:
+    """Recording of an axis from the first reference on, its track, and the last configuration in the bag.
 
-    recording: Recording
-    track: RecordedTrack
-    configuration: Configuration
-    """the last one in the bag"""
-
-
-def read_recording(bag: Path, override: Configuration | None = None, namespace: str = '') -> RecordedAxis:
-    """Recording of an axis from the first reference on; the estimates are computed anew.
-
-    A velocity sample takes the newest other inputs. A sample with a stamp not after the previous one is left out.
+    The estimates are computed anew. A velocity sample takes the newest other inputs. A sample whose stamp is not after
+    the previous one is left out.
 
     Raises:
         BagError: The bag cannot be read, or an input is missing in it.
@@ -283,7 +277,7 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
     if len(estimates) < 2:
         raise BagError(f'{bag}: fewer than two velocity samples after the first reference')
     force, *track = np.array(rows).T
-    return RecordedAxis(Recording(estimates, motions, force), RecordedTrack(*track), configuration)
+    return Recording(estimates, motions, force), RecordedTrack(*track), configuration
 
 
 # -- parameter file ---------------------------------------------------------------------------------------------------
