@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass
 
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True)
-class SealGeometry:
+class SealGeometry(CheckedParameters):
     """An O-ring and the ring-shaped space it is squeezed into.
 
     The space lies between an inner wall (rod, or groove of a piston) and an outer wall (gland, or bore).
@@ -26,7 +26,7 @@ class SealGeometry:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.sliding_wall not in ('rod', 'bore'):
             raise ValueError(f'SealGeometry.sliding_wall = {self.sliding_wall!r} is neither rod nor bore')
         if self.gland_diameter <= self.rod_diameter:
