@@ -18,8 +18,7 @@ from seal_friction_ros.core.friction.laws.velocity_terms import (
 
 @dataclass(frozen=True)
 class Uncertainty(CheckedParameters):
-    """How far a new reading of the Coulomb friction of one seal may be off: std^2 = (relative f_c)^2 + absolute^2.
-    """
+    """How far a new reading of the Coulomb friction of one seal may be off: std^2 = (relative f_c)^2 + absolute^2."""
 
     relative_std: float = parameter(
         unit='1', lower=0.0, upper=10.0, description='Part that is a share of the friction.'

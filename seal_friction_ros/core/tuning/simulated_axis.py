@@ -92,11 +92,12 @@ class TuningProblem:
 
     def __post_init__(self) -> None:
         gains, s = self.axis.servo.gains, self.settings
-        speed = 2.0 * math.pi * s.frequency * s.amplitude
+        rate = 2.0 * math.pi * s.frequency
+        speed = rate * s.amplitude
         for name, value, most, unit in (
             ('way', s.amplitude, gains.reach, 'm'),
-            ('speed', speed, gains.speed_max, 'm/s'),
-            ('acceleration', 2.0 * math.pi * s.frequency * speed, gains.acceleration_max, 'm/s2'),
+            ('speed', speed, gains.controller.reference_speed_max, 'm/s'),
+            ('acceleration', rate * speed, gains.controller.reference_acceleration_max, 'm/s2'),
         ):
             if value > most:
                 raise ValueError(
