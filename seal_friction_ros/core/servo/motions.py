@@ -156,17 +156,6 @@ class Chirp(CheckedParameters):
         return Setpoint(self.offset + self.amplitude * sine, self.amplitude * rate * cosine, self.amplitude * bend)
 
 
-def spool_cycles(distance: float) -> Trapezoid:
-    """Cycles of the spool-valve paper: 3 Hz, 10 cycles, 34 mm/s; the paper evaluates the 9th.
-
-    Args:
-        distance: 1.8e-3 for a single ring, 2.7e-3 for a ring across the control edge and for the whole spool [m].
-
-    Source: spool-valve paper, chapter 4 and Figure 7. The paper gives no corners: 5 m/s^2 is our choice.
-    """
-    return Trapezoid(distance=distance, speed=0.034, frequency=3.0, acceleration=5.0, cycles=10)
-
-
 class PullCommand(NamedTuple):
     """Command of the pull-test rig at one moment."""
 

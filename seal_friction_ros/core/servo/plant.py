@@ -244,18 +244,6 @@ def chamber_pressures(c: Constants, y: Sequence[float]) -> tuple[float, float]:
 
 
 @compiled
-def holding_force(c: Constants, pressure_a: float, pressure_b: float, direction: int) -> float:
-    """Largest force that the seals hold at rest against a push in ``direction`` [N].
-
-    The breakaway force, or the friction at velocity 0 where this is larger (our choice: otherwise the rod would break
-    away and stop at once).
-    """
-    at_rest = friction_of_seals(c.seals, pressure_a, pressure_b, 0.0)
-    slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, direction)
-    return max(at_rest.coulomb_friction + at_rest.stiction, slowest)
-
-
-@compiled
 def active_force(c: Constants, y: Integrated, load_force: float) -> float:
     r"""Axial forces on the rod except seals and end stops [N].
 
@@ -374,11 +362,15 @@ def margin(c: Constants, y: Integrated, direction: int, load_force: float) -> fl
     """Distance of the friction state from its end: stuck ends below zero, sliding ends at zero.
 
     Stuck: holding force minus force sum [N]. Sliding: the smaller of speed [m/s] and distance to the stop ahead [m].
+    The holding force is the breakaway force, or the friction at velocity 0 where this is larger (our choice: otherwise
+    the rod would break away and stop at once).
     """
     if direction == 0:
         force = force_sum(c, y, load_force)
         pressure_a, pressure_b = chamber_pressures(c, y)
-        return holding_force(c, pressure_a, pressure_b, 1 if force > 0.0 else -1) - abs(force)
+        at_rest = friction_of_seals(c.seals, pressure_a, pressure_b, 0.0)
+        slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, 1 if force > 0.0 else -1)
+        return max(at_rest.coulomb_friction + at_rest.stiction, slowest) - abs(force)
     return min(y[1] * direction, c.cylinder.limit - y[0] * direction)
 
 
@@ -440,12 +432,6 @@ def time_of_event(c: Constants, y: Integrated, direction: int, command: float, l
 
 
 @compiled
-def creeps(before: Integrated, after: Integrated, direction: int) -> bool:
-    """Whether a sliding rod decelerates below `CREEP_SPEED`: it would come to rest only after infinite time."""
-    return direction != 0 and after[1] * direction < min(CREEP_SPEED, before[1] * direction)
-
-
-@compiled
 def lasts(margin_now: float, direction: int) -> bool:
     """Whether a friction state goes on: stuck also at a margin of exactly 0, sliding only above 0."""
     return margin_now > 0.0 or (direction == 0 and margin_now == 0.0)
@@ -466,7 +452,8 @@ def inner_step(c: Constants, state: PlantState, command: float, load_force: floa
         goes_on = lasts(margin(c, new, direction, load_force), direction)
         starts_inside = margin(c, y, direction, load_force) > 0.0
         if goes_on and (cavity_margin(c, y, new) > 0.0 or not starts_inside):
-            if not creeps(y, new, direction):
+            # A rod that decelerates below CREEP_SPEED would come to rest only after infinite time.
+            if direction == 0 or new[1] * direction >= min(CREEP_SPEED, y[1] * direction):
                 return PlantState(*new, direction, transitions)
             y, rest = new, 0.0
         elif starts_inside:
