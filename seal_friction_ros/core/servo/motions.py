@@ -28,7 +28,6 @@ class Wave(Protocol):
 
     def at(self, time: float) -> Setpoint:
         """Setpoint at ``time`` [s]."""
-        ...
 
 
 @dataclass(frozen=True)

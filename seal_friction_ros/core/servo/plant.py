@@ -18,11 +18,11 @@ Our choices, none of them in the sources:
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.foundation.units import INCH, PSI
@@ -207,12 +207,6 @@ def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[Mo
     supply, ret = (-beta * math.expm1(-p / beta) for p in (valve.supply_pressure, valve.return_pressure))
     plant = Constants(valve, cylinder, load, supply, ret, numbers_of_seals(seals) or NO_SEALS)
     return cast(Constants, for_compiler(plant))
-
-
-def init_plant(c: Constants, position: float = 0.0) -> PlantState:
-    """At rest at ``position`` [m], valve closed, both chambers at the mean of supply and return pressure."""
-    half = (c.valve.supply_pressure + c.valve.return_pressure) / 2.0
-    return PlantState(position, 0.0, half, half, 0.0, 0.0, 0.0, 0.0, 0, 0)
 
 
 @compiled
@@ -521,10 +515,7 @@ def steepest_friction(seals: tuple[MountedSeal, ...], highest_pressure: float) -
         return 0.0
     numbers, speeds = numbers_of_seals(seals), np.geomspace(1e-6, 10.0, 141)
     steepest = 0.0
-    for pressure in np.linspace(0.0, highest_pressure, 5).tolist():
-        for direction in (-1, 1):
-            friction: FloatArray = np.array(
-                [sliding_friction_of_seals(numbers, pressure, pressure, v, direction) for v in speeds.tolist()]
-            )
-            steepest = max(steepest, float(np.max(np.diff(friction) / np.diff(speeds))))
+    for p, direction in product(np.linspace(0.0, highest_pressure, 5).tolist(), (-1, 1)):
+        friction = [sliding_friction_of_seals(numbers, p, p, v, direction) for v in speeds.tolist()]
+        steepest = max(steepest, float(np.max(np.diff(friction) / np.diff(speeds))))
     return steepest

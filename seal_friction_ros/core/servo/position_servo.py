@@ -37,7 +37,6 @@ from seal_friction_ros.core.servo.plant import (
     constants,
     fastest_rate,
     force_sum,
-    init_plant,
     inner_step,
 )
 
@@ -73,7 +72,12 @@ class ServoParameters(CheckedParameters):
                 f'ServoParameters.control_period = {self.control_period} s is not a multiple of '
                 f'inner_step = {self.inner_step} s'
             )
-        self._check_inner_step()
+        rate, part = fastest_rate(self.valve, self.cylinder, self.load, self.seals)
+        if rate * self.inner_step > LARGEST_RATE_TIMES_STEP:
+            raise ValueError(
+                f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
+                f'{LARGEST_RATE_TIMES_STEP / rate:.3g} s for the fastest part, {part}'
+            )
         c = constants(self.valve, self.cylinder, self.load, self.seals)
         g = gains(self.controller, c, self.control_period)
         radius = spectral_radius(g, c)
@@ -84,14 +88,6 @@ class ServoParameters(CheckedParameters):
             )
         for name, value in (('constants', c), ('gains', g), ('kept', keep((c, g, self.inner_step, steps)))):
             object.__setattr__(self, name, value)  # frozen dataclass: derived fields
-
-    def _check_inner_step(self) -> None:
-        rate, part = fastest_rate(self.valve, self.cylinder, self.load, self.seals)
-        if rate * self.inner_step > LARGEST_RATE_TIMES_STEP:
-            raise ValueError(
-                f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
-                f'{LARGEST_RATE_TIMES_STEP / rate:.3g} s for the fastest part, {part}'
-            )
 
 
 class ServoState(NamedTuple):
@@ -141,7 +137,9 @@ def init(parameters: ServoParameters, position: float = 0.0) -> ServoState:
     """
     if not abs(position) <= parameters.cylinder.limit:
         raise ValueError(f'position = {position} m is not within the stroke, +-{parameters.cylinder.limit} m')
-    return ServoState(init_plant(parameters.constants, position), ControllerState(position, 0.0))
+    mean = (parameters.valve.supply_pressure + parameters.valve.return_pressure) / 2.0
+    plant = PlantState(position, 0.0, mean, mean, 0.0, 0.0, 0.0, 0.0, 0, 0)
+    return ServoState(plant, ControllerState(position, 0.0))
 
 
 @compiled
