@@ -69,8 +69,10 @@ def parse_seal(document: Any) -> Seal:
     if not isinstance(about, Mapping) or not _can_be_recorded(about):
         raise ValueError(f'{where}: identification is not a mapping of texts, finite numbers, and lists of them')
     uncertainty = from_mapping(Uncertainty, document.get('uncertainty'), f'{where}: uncertainty')
-    pressure_min, pressure_max = _range(document, where)
-    numbers = {'pressure_min': pressure_min, 'pressure_max': pressure_max}
+    pressures = document.get('identified_pressure')
+    if not isinstance(pressures, list | tuple) or len(pressures) != 2:
+        raise ValueError(f'{where}: identified_pressure = {pressures!r} is not a list of two pressures [Pa]')
+    numbers = {'pressure_min': pressures[0], 'pressure_max': pressures[1]}
     numbers |= {key: document[key] for key in ('stiction', 'stiction_ratio') if key in document}
     made = {'name': name, 'coulomb_law': law, 'uncertainty': uncertainty, 'velocity_terms': terms}
     return from_mapping(Seal, numbers, where, **made)
@@ -168,10 +170,3 @@ def _choice(document: Mapping[str, Any], key: str, choices: Any, where: str) -> 
     if value not in tuple(choices):
         raise ValueError(f'{where}: {key} = {value!r} is not one of {", ".join(choices)}')
     return str(value)
-
-
-def _range(document: Mapping[str, Any], where: str) -> tuple[Any, Any]:
-    value = document.get('identified_pressure')
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise ValueError(f'{where}: identified_pressure = {value!r} is not a list of two pressures [Pa]')
-    return value[0], value[1]

@@ -141,14 +141,14 @@ class Chirp(CheckedParameters):
         """Setpoint at ``time`` [s]."""
         if time < 0.0:
             return Setpoint(self.offset)
-        if time < self.duration:
-            sweep = (self.end_frequency - self.start_frequency) / self.duration
-            frequency = self.start_frequency + sweep * time
-            turns = (self.start_frequency + frequency) / 2.0 * time
+        start, end, duration = self.start_frequency, self.end_frequency, self.duration
+        if time < duration:
+            sweep = (end - start) / duration
+            frequency = start + sweep * time
+            turns = (start + frequency) / 2.0 * time
         else:
-            sweep, frequency = 0.0, self.end_frequency
-            mean = 0.5 * (self.start_frequency + self.end_frequency)
-            turns = mean * self.duration + self.end_frequency * (time - self.duration)
+            sweep, frequency = 0.0, end
+            turns = 0.5 * (start + end) * duration + end * (time - duration)
         rate = 2.0 * math.pi * frequency
         sine, cosine = math.sin(2.0 * math.pi * turns), math.cos(2.0 * math.pi * turns)
         bend = 2.0 * math.pi * sweep * cosine - rate * rate * sine
