@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import Bound, compilable, evaluate, unrolled
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import (
@@ -17,20 +17,13 @@ from seal_friction_ros.core.friction.laws.velocity_terms import (
 
 
 @dataclass(frozen=True)
-class Uncertainty:
-    """How far a new reading of the Coulomb friction of one seal may be off: std^2 = (relative f_c)^2 + absolute^2.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class Uncertainty(CheckedParameters):
+    """How far a new reading of the Coulomb friction of one seal may be off: std^2 = (relative f_c)^2 + absolute^2."""
 
     relative_std: float = parameter(
         unit='1', lower=0.0, upper=10.0, description='Part that is a share of the friction.'
     )
     absolute_std: float = parameter(0.0, unit='N', lower=0.0, upper=1e6, description='Part that does not scale.')
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def std(self, friction: float) -> float:
         """Standard deviation [N] at a Coulomb friction of ``friction`` [N]."""
@@ -38,7 +31,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seal:
+class Seal(CheckedParameters):
     """One seal: its friction law, its breakaway force, its uncertainty, and the range in which it was identified.
 
     Breakaway force is (1 + ``stiction_ratio``) f_c + ``stiction``.
@@ -62,7 +55,7 @@ class Seal:
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.coulomb_law.depends_on_speed and self.velocity_terms:
             raise ValueError(
                 f'Seal {self.name}: its {self.coulomb_law.NAME} has the velocity in it: leave out velocity_terms'

@@ -78,17 +78,6 @@ def without_feedforward(settings: FeedForwardSettings) -> FeedForwardSettings:
     return replace(settings, coulomb_scale=0.0, stribeck_scale=0.0, viscous_scale=0.0)
 
 
-def whole_delay(parameters: ServoParameters, delay: float) -> float:
-    r"""Time from a velocity sample to the force of its feed-forward on the rod [s].
-
-    .. math:: T = T_d + 1 / \omega_F + \tau
-
-    with the delay T_d = ``delay`` [s] to the controller, and the delays of force loop, spool and sampling (see
-    `controller`).
-    """
-    return delay + 1.0 / parameters.controller.force_bandwidth + parameters.gains.valve_delay
-
-
 def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: FloatArray | None = None) -> AxisRun:
     """Run the loop from rest at the start of the wave.
 

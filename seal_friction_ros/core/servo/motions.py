@@ -28,7 +28,6 @@ class Wave(Protocol):
 
     def at(self, time: float) -> Setpoint:
         """Setpoint at ``time`` [s]."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -142,29 +141,18 @@ class Chirp(CheckedParameters):
         """Setpoint at ``time`` [s]."""
         if time < 0.0:
             return Setpoint(self.offset)
-        if time < self.duration:
-            sweep = (self.end_frequency - self.start_frequency) / self.duration
-            frequency = self.start_frequency + sweep * time
-            turns = (self.start_frequency + frequency) / 2.0 * time
+        start, end, duration = self.start_frequency, self.end_frequency, self.duration
+        if time < duration:
+            sweep = (end - start) / duration
+            frequency = start + sweep * time
+            turns = (start + frequency) / 2.0 * time
         else:
-            sweep, frequency = 0.0, self.end_frequency
-            mean = 0.5 * (self.start_frequency + self.end_frequency)
-            turns = mean * self.duration + self.end_frequency * (time - self.duration)
+            sweep, frequency = 0.0, end
+            turns = 0.5 * (start + end) * duration + end * (time - duration)
         rate = 2.0 * math.pi * frequency
         sine, cosine = math.sin(2.0 * math.pi * turns), math.cos(2.0 * math.pi * turns)
         bend = 2.0 * math.pi * sweep * cosine - rate * rate * sine
         return Setpoint(self.offset + self.amplitude * sine, self.amplitude * rate * cosine, self.amplitude * bend)
-
-
-def spool_cycles(distance: float) -> Trapezoid:
-    """Cycles of the spool-valve paper: 3 Hz, 10 cycles, 34 mm/s; the paper evaluates the 9th.
-
-    Args:
-        distance: 1.8e-3 for a single ring, 2.7e-3 for a ring across the control edge and for the whole spool [m].
-
-    Source: spool-valve paper, chapter 4 and Figure 7. The paper gives no corners: 5 m/s^2 is our choice.
-    """
-    return Trapezoid(distance=distance, speed=0.034, frequency=3.0, acceleration=5.0, cycles=10)
 
 
 class PullCommand(NamedTuple):

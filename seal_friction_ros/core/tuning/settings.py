@@ -55,7 +55,6 @@ class Outcome(Protocol):
 
     def better_than(self, other: Any) -> bool:
         """Whether this outcome is better than another one."""
-        ...
 
 
 OutcomeType = TypeVar('OutcomeType', bound=Outcome)

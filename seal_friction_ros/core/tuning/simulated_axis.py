@@ -27,7 +27,6 @@ from seal_friction_ros.core.servo.closed_loop import (
     EvaluationMotions,
     Performance,
     performance_of,
-    whole_delay,
     with_wrong_friction,
     without_feedforward,
 )
@@ -92,11 +91,12 @@ class TuningProblem:
 
     def __post_init__(self) -> None:
         gains, s = self.axis.servo.gains, self.settings
-        speed = 2.0 * math.pi * s.frequency * s.amplitude
+        rate = 2.0 * math.pi * s.frequency
+        speed = rate * s.amplitude
         for name, value, most, unit in (
             ('way', s.amplitude, gains.reach, 'm'),
-            ('speed', speed, gains.speed_max, 'm/s'),
-            ('acceleration', 2.0 * math.pi * s.frequency * speed, gains.acceleration_max, 'm/s2'),
+            ('speed', speed, gains.controller.reference_speed_max, 'm/s'),
+            ('acceleration', rate * speed, gains.controller.reference_acceleration_max, 'm/s2'),
         ):
             if value > most:
                 raise ValueError(
@@ -106,8 +106,14 @@ class TuningProblem:
 
     @property
     def whole_delay(self) -> float:
-        """Time from a velocity sample to the force of its feed-forward on the rod [s]."""
-        return whole_delay(self.axis.servo, self.settings.delay)
+        r"""Time from a velocity sample to the force of its feed-forward on the rod [s].
+
+        .. math:: T = T_d + 1 / \omega_F + \tau
+
+        with the delay T_d to the controller, and the delays of force loop, spool and sampling (see `controller`).
+        """
+        gains = self.axis.servo.gains
+        return self.settings.delay + 1.0 / gains.controller.force_bandwidth + gains.valve_delay
 
     @property
     def lead_step(self) -> float:

@@ -18,8 +18,8 @@ from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.laws.normal_force import squeeze_force
-from seal_friction_ros.core.friction.seal_file import parse_normal_force, parse_seal
+from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
+from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, candidate_laws, normal_forces
 from seal_friction_ros.core.identification.diagnostics import (
     CHANGED,
@@ -146,7 +146,7 @@ def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
         gain = read_yaml(config_path('seals', REFERENCE_SEAL))['normal_force']['area_deformation_gain']
         force = rounded_value(squeeze_force(geometry))
         normal_force = {'law': 'area_deformation_gain', 'area_deformation_gain': gain, 'radial_force': force}
-    return Ring(geometry, parse_normal_force({'normal_force': normal_force}, 'seal'))
+    return Ring(geometry, parse_part(NormalForceLaw, {'normal_force': normal_force}, 'seal'))
 
 
 def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> FrictionReadings:

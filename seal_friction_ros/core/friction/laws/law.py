@@ -9,18 +9,15 @@ from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import Bound, bound
-from seal_friction_ros.core.foundation.parameters import check
+from seal_friction_ros.core.foundation.parameters import CheckedParameters
 
 
 @dataclasses.dataclass(frozen=True)
-class Law:
+class Law(CheckedParameters):
     """Parameters of a law, each a field made by `parameter`, and its function.
 
     A subclass sets ``function``. It takes parameters named after attributes of the record (a number, a tuple of
     numbers, another law, a table), and then its two arguments.
-
-    Raises:
-        ValueError: A parameter is out of bounds.
     """
 
     function: ClassVar[Callable[..., float]]
@@ -28,7 +25,7 @@ class Law:
     """the function of the two arguments alone"""
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         self.check_together()
         object.__setattr__(self, 'bound', bound(type(self).function, self))
 
