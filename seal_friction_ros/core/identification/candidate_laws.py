@@ -104,10 +104,7 @@ class CandidateLaw:
         return {**{p.name: float(x) for p, x in zip(self.parameters, vector, strict=True)}, **self.fixed}
 
     def friction_law(self, values: ParameterValues) -> FrictionLaw:
-        """The friction law of one seal, without velocity terms.
-
-        Args:
-            values: Parameters by name; parameters of other laws are ignored.
+        """The friction law of one seal, without velocity terms; parameters of other laws are ignored.
 
         Raises:
             ValueError: A value is out of bounds.
@@ -178,8 +175,8 @@ def candidate_laws(
     """Laws that the data can identify: constant, pressure-dependent, physics-based, each with velocity terms if any.
 
     Args:
-        geometry: Of the ring; without it, laws that need it are left out.
-        normal_force_law: Likewise.
+        geometry: Geometry of the ring; laws that need it are left out without it and without its normal force.
+        normal_force_law: Normal force of the ring.
         with_speeds: The readings differ in speed, so velocity terms are identifiable.
         with_exponent: There are enough pressures to identify the pressure exponent; otherwise it is 2/3.
     """

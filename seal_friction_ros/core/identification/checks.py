@@ -7,8 +7,6 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification.readings import FrictionReadings, ManualReadings, RecordedLog
 from seal_friction_ros.core.identification.signal_preparation import (
     LONGEST_GAP,
-    HalfRange,
-    Signals,
     clipped_share,
     even_sliding,
     longest_stretch,
@@ -45,7 +43,7 @@ def check_log(log: RecordedLog) -> None:
             f'{name}: samples are {step:.4g} s apart, too far to see starts and stops: record at 20 Hz at least (or is '
             'the unit of the time wrong?)'
         )
-    for what, column in zip(Signals._fields[1:], signals[1:], strict=True):
+    for what, column in signals._asdict().items():
         _check_finite(name, what.replace('_', ' '), signals.time, column)
     pressures = np.concatenate((signals.pressure_a, signals.pressure_b))
     _check_bounds(name, pressures, np.abs(signals.velocity), signals.force_sum)
@@ -69,18 +67,13 @@ def check_log(log: RecordedLog) -> None:
             'friction and offset cannot be separated: drive strokes in both directions, at several speeds'
         )
     moving = np.abs(signals.velocity) > sliding.slowest
-    columns = signals.force_sum, signals.pressure_a, signals.pressure_b
-    for what, column in zip(('force sum', 'pressure of chamber a', 'pressure of chamber b'), columns, strict=True):
-        check_clipping(name, what, column[moving])
+    check_clipping(name, 'force sum', signals.force_sum[moving])
+    check_clipping(name, 'pressure of chamber a', signals.pressure_a[moving])
+    check_clipping(name, 'pressure of chamber b', signals.pressure_b[moving])
 
 
 def check_clipping(name: str, what: str, column: FloatArray) -> None:
-    """Check that a sensor is not clipped.
-
-    Args:
-        name: Of the source, for the error message.
-        what: Of the signal, for the error message.
-        column: Samples while the rod moves, shape (n,): at rest every signal may be constant.
+    """Check the signal ``what`` of the source ``name``: samples while the rod moves, shape (n,).
 
     Raises:
         ValueError: The sensor is clipped.
@@ -165,26 +158,20 @@ def check_readings(readings: FrictionReadings) -> None:
             f'{where}: measured at {len(levels)} pressures ({at} bar), which any law fits: measure at '
             f'{FEWEST_PRESSURES} at least, better at five'
         )
-    found = [readings.half_range(inside) for inside in levels.values()]
-    _check_signs(where, readings, found)
-    _check_sizes(where, readings, found)
+    _check_sizes(where, readings)
 
 
-def _check_signs(where: str, readings: FrictionReadings, found: list[HalfRange]) -> None:
-    negative = [index for index, half_range in enumerate(found) if half_range.friction <= 0.0]
-    if len(negative) > 0.2 * len(found):
-        last = negative[-1]
-        raise ValueError(
-            f'{where}: the friction is {found[last].friction:.4g} N at {readings.level_pressures[last] / BAR:.4g} bar, '
-            'so it would drive the rod: the sign of force sum or velocity is wrong (both are positive on extension), '
-            'or a unit in the force sum'
-        )
-
-
-def _check_sizes(where: str, readings: FrictionReadings, found: list[HalfRange]) -> None:
+def _check_sizes(where: str, readings: FrictionReadings) -> None:
     """Check whether friction, offset and pressure can belong to one seal."""
-    friction, offsets = np.array(found).T
+    friction, offsets = np.array([readings.half_range(inside) for inside in readings.levels.values()]).T
     pressure = readings.level_pressures
+    negative = np.flatnonzero(friction <= 0.0)
+    if len(negative) > 0.2 * len(friction):
+        raise ValueError(
+            f'{where}: the friction is {friction[negative[-1]]:.4g} N at {pressure[negative[-1]] / BAR:.4g} bar, so it '
+            'would drive the rod: the sign of force sum or velocity is wrong (both are positive on extension), or a '
+            'unit in the force sum'
+        )
     spanned, strongest = float(np.ptp(pressure)), float(friction.max())
     area_error = float(np.polyfit(pressure, offsets, 1)[0])
     if not readings.are_samples and abs(area_error) * spanned > LARGEST_AREA_ERROR * float(friction.mean()):
@@ -206,7 +193,7 @@ def _check_sizes(where: str, readings: FrictionReadings, found: list[HalfRange])
             f'{1e6 * area:.2g} mm2: force or pressure is in a wrong unit (N for kN, Pa for kPa)'
         )
     highest = np.count_nonzero(friction >= (1.0 - 1e-9) * strongest)
-    if not readings.are_samples and not readings.samples and 3 <= highest < len(found):
+    if not readings.are_samples and not readings.samples and 3 <= highest < len(friction):
         raise ValueError(
             f'{where}: the friction is exactly {strongest:.6g} N at {highest} pressures and lower at the others: the '
             'scale or sensor is clipped: use one with a larger range'

@@ -26,11 +26,7 @@ def repeatability(readings: FrictionReadings, offsets: FloatArray) -> float:
     """Scatter of readings under the same conditions over the friction [-]: a lower bound for the error of any law.
 
     Same conditions are one pressure level, or for samples one cell of a grid (quantiles) of 12 speeds, 6 pressures of
-    each seal, and the direction. NaN if no condition was repeated.
-
-    Args:
-        readings: The readings.
-        offsets: Offset of the force sum of each source [N].
+    each seal, and the direction. NaN if no condition was repeated. ``offsets`` [N] are those of each source.
     """
     measured = readings.magnitudes(offsets)
     if not readings.are_samples:
@@ -89,10 +85,7 @@ def collinear_regressors(readings: FrictionReadings, chamber_pressures: FloatArr
 
     Speed and seal pressure determine viscous and pressure-dependent friction; velocity and pressure difference
     determine viscous friction and an area error. Readings at held pressures are averaged over each pressure first.
-
-    Args:
-        readings: The readings.
-        chamber_pressures: [Pa] of chambers a and b, shape (n, 2).
+    ``chamber_pressures`` [Pa] are those of chambers a and b, shape (n, 2).
     """
     velocity = readings.at.velocity
     if not np.isfinite(velocity).all():
@@ -140,11 +133,12 @@ def outlying_level(
     Each level is left out and the law is fitted to the rest. The standard deviation of the deviation contains the
     residuals of the rest, the repeatability, and the leverage of the level. An outlier also disturbs the law of the
     rest when another level is left out; only without the outlier do the rest agree. A level at which the law of the
-    rest gives 0 N has no relative deviation: it is not assessed and has no residual.
+    rest gives 0 N has no relative deviation: it is not assessed and has no residual. Fewer than four levels have no
+    outlier.
 
     Args:
         law: The law.
-        readings: At held pressures; fewer than four levels have no outlier.
+        readings: At held pressures.
         near: Parameters of the fit to all readings, as start values.
         floor: Relative standard deviation of repeated readings.
     """
@@ -206,15 +200,10 @@ class FrictionChange(NamedTuple):
 
 
 def compare_with_law(found: LawFit, fitted: FrictionReadings, other: FrictionReadings) -> FrictionChange:
-    """Compare the friction of another source with a law fitted without it.
+    """Compare the samples of another source with a law that was fitted to the readings ``fitted``.
 
     The ratio comes from least squares, offset eliminated, over the samples up to the highest pressure and speed of the
     fit; its standard error is that of the jackknife over groups.
-
-    Args:
-        found: The law.
-        fitted: Readings that it was fitted to.
-        other: Samples of the other source.
 
     Raises:
         ValueError: Fewer than 10 % of the samples are at pressures and speeds of the fit.

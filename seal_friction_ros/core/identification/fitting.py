@@ -148,13 +148,9 @@ class CrossValidation:
 def cross_validate(
     law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, tick: Ticks = lambda _: None
 ) -> CrossValidation:
-    """Predict each group by the law fitted to all other groups.
+    """Predict each group (of two at least) by the law fitted to all other groups.
 
-    Args:
-        law: The law.
-        readings: At least two groups.
-        near: Parameters of the fit to all readings, as start values.
-        tick: Called with 1 after each fit.
+    The fits start ``near`` the parameters of the fit to all readings. ``tick`` is called with 1 after each fit.
     """
     predicted, deviation = np.empty(readings.count), np.empty(readings.count)
     parameters = []
@@ -212,12 +208,9 @@ def _group_losses(readings: FrictionReadings, deviation: FloatArray) -> FloatArr
 
 
 def jackknife_errors(estimates: FloatArray) -> FloatArray:
-    """Standard error of each estimate by the jackknife over groups, shape (parameters,).
+    """Standard error by the jackknife, from ``estimates`` without each group, shape (groups, parameters).
 
     An error that all readings of a group share (a test, a pressure, a minute) counts once, not once for each reading.
-
-    Args:
-        estimates: Computed without each group, shape (groups, parameters).
 
     Source: [Efron1982]_.
     """
@@ -238,12 +231,10 @@ class LawScore:
 def score_laws(
     laws: Sequence[CandidateLaw], readings: FrictionReadings, tick: Ticks = lambda _: None
 ) -> tuple[LawScore, ...]:
-    """Fit and cross-validate every law.
+    """Fit and cross-validate every law on readings of at least two groups.
 
-    Args:
-        laws: From simple to complex; results of simpler laws are start values for the others.
-        readings: At least two groups.
-        tick: Called with 1 after each of the (groups + 1) fits for each law.
+    The laws go from simple to complex; results of simpler laws are start values for the others. ``tick`` is called with
+    1 after each of the (groups + 1) fits of a law.
     """
     scores: list[LawScore] = []
     known: dict[str, float] = {}
@@ -282,13 +273,10 @@ def recommended(scores: Sequence[LawScore]) -> LawScore:
 
 
 def is_beaten(losses: FloatArray, others: FloatArray) -> bool:
-    """Whether ``others`` are lower than ``losses`` beyond the noise, and by enough to justify a term.
+    """Whether the losses of another law are lower beyond the noise, and by enough to justify a term.
 
     Beyond the noise: by a one-sided paired t-test at `BEATEN_CONFIDENCE`. Enough: `WORTHWHILE` of the mean loss.
-
-    Args:
-        losses: Of each group, shape (groups,), groups >= 2.
-        others: Of the same groups by another law.
+    Losses are those of each group, shape (groups >= 2,).
     """
     difference = losses - others
     groups = len(difference)

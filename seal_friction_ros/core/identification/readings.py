@@ -103,18 +103,15 @@ class FrictionReadings:
 
         For a source in one direction only, the friction is its mean magnitude and the offset is 0.
         """
-        found: list[HalfRange] = []
-        weights = []
+        found, weights = [], []
         for source in np.unique(self.source[inside]):
             index = np.flatnonzero(inside & (self.source == source))
-            direction = self.at.direction[index].astype(np.int64)
-            force = self.force[index]
+            direction, force = self.at.direction[index].astype(np.int64), self.force[index]
             if len(np.unique(direction)) < 2:
                 found.append(HalfRange(float(np.mean(direction * force)), 0.0))
             elif self.samples:
                 parts = [self.samples[i] for i in index]
-                sides = np.repeat(direction, [len(part) for part in parts])
-                found.append(half_range(np.concatenate(parts), sides))
+                found.append(half_range(np.concatenate(parts), np.repeat(direction, [len(part) for part in parts])))
             else:
                 found.append(half_range(force, direction, of_medians=False))
             weights.append(len(index))

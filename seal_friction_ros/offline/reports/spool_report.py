@@ -34,12 +34,11 @@ def write_spool_report(
         ValueError: The table cannot be read or evaluated, or the page cannot be written.
     """
     rows = table_rows(table)
-    names = list(rows[0]) if rows else []
     if len(rows) < 100:
         raise ValueError(f'{table}: {len(rows)} rows are too few for {settings.cycles} cycles')
-    time = column_in_si(table, rows, names, 'time', TIME_UNITS)
-    displacement = column_in_si(table, rows, names, 'displacement', LENGTH_UNITS)
-    force = column_in_si(table, rows, names, 'force', FORCE_UNITS)
+    time = column_in_si(table, rows, 'time', TIME_UNITS)
+    displacement = column_in_si(table, rows, 'displacement', LENGTH_UNITS)
+    force = column_in_si(table, rows, 'force', FORCE_UNITS)
     steps = np.diff(time)
     if not (np.isfinite(steps).all() and steps.min() > 0.5 * np.median(steps) and steps.max() < 1.5 * np.median(steps)):
         raise ValueError(

@@ -158,7 +158,7 @@ def test_a_level_at_which_the_law_of_the_others_gives_no_friction_is_no_outlier(
 
 
 def test_readings_without_scatter_have_no_outlier(tmp_path):
-    run = Run(tmp_path, readings_table(tmp_path / 'table.csv', 0.0, lambda bar, speed: 5.0))
+    run = Run(tmp_path, readings_table(tmp_path / 'table.csv', 0.0, lambda *_: 5.0))
     assert run.code == 0, run.errors
     assert run.figures['is_outlier'] == [False] * 8
 
