@@ -10,32 +10,24 @@ from dataclasses import replace
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.identification import signal_preparation
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
-from seal_friction_ros.core.identification.checks import check_log, check_manual_readings, check_readings
 from seal_friction_ros.core.identification.readings import (
     FrictionReadings,
     ManualReadings,
     PreparedReadings,
     RecordedLog,
-)
-from seal_friction_ros.core.identification.signal_preparation import (
-    SignalReading,
-    Signals,
-    breakaways,
-    even_sliding,
-    pressure_levels,
-    strokes,
+    check_log,
+    check_manual_readings,
+    check_readings,
 )
 
 BLOCKS = 10  # contiguous parts of a swept log, each predicted from the others
 HELD_LOG = 0.8  # of the even samples in strokes at held speed and pressure: each stroke is a reading (our choice)
 FEWEST_SWEPT = 200  # samples of even sliding, so that a block has 20 (our choice)
 
-_Rows = Sequence[tuple[int, SignalReading]]
+_Rows = Sequence[tuple[int, signal_preparation.SignalReading]]
 """number of the log and reading, each"""
-
-
-# -- logs -------------------------------------------------------------------------------------------------------------
 
 
 def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> PreparedReadings:
@@ -46,8 +38,8 @@ def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> Prepar
     """
     for log in logs:
         check_log(log)
-    of_strokes = [(number, stroke) for number, log in enumerate(logs) for stroke in strokes(log.signals, log.sliding)]
-    even = [even_sliding(log.signals, log.sliding) for log in logs]
+    of_strokes = [(i, stroke) for i, log in enumerate(logs) for stroke in signal_preparation.strokes(*log[1:])]
+    even = [signal_preparation.even_sliding(*log[1:]) for log in logs]
     held = [sum(len(stroke.samples) for source, stroke in of_strokes if source == i) for i in range(len(logs))]
     counts = [int(part.sum()) for part in even]
     if sum(held) < HELD_LOG * sum(counts):
@@ -74,17 +66,13 @@ def _columns(rows: _Rows, chambers: Sequence[str]) -> tuple[OperatingConditions,
     columns = [(r.velocity, r.direction, r.force_sum, r.pressure_a, r.pressure_b) for _, r in rows]
     velocity, direction, force, *both = np.array(columns, dtype=np.float64).T
     pressures = np.column_stack(both)
-    return (
-        OperatingConditions(_seal_pressures(pressures, chambers), None, velocity, direction),
-        pressures,
-        force,
-        source,
-    )
+    at = OperatingConditions(_seal_pressures(pressures, chambers), None, velocity, direction)
+    return at, pressures, force, source
 
 
 def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> tuple[FrictionReadings, FloatArray]:
     at, pressures, force, source = _columns(rows, chambers)
-    level = pressure_levels(at.pressure.mean(axis=1))
+    level = signal_preparation.pressure_levels(at.pressure.mean(axis=1))
     group, by = _groups(level, source, 'file')
     names = tuple(log.name for log in logs)
     samples = tuple(logs[number].signals.force_sum[r.samples] for number, r in rows)
@@ -94,7 +82,7 @@ def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> 
 def _breakaway(
     logs: Sequence[RecordedLog], chambers: Sequence[str], dynamic: FrictionReadings
 ) -> FrictionReadings | None:
-    rows = [(number, peak) for number, log in enumerate(logs) for peak in breakaways(log.signals, log.sliding)]
+    rows = [(i, peak) for i, log in enumerate(logs) for peak in signal_preparation.breakaways(*log[1:])]
     if not rows:
         return None
     at, _, force, source = _columns(rows, chambers)
@@ -127,7 +115,7 @@ def _swept(
             f'{logs[int(np.argmin(counts))].name}: {min(counts)} samples of even sliding, {FEWEST_SWEPT} are needed: '
             'drive longer strokes at even speed, in both directions'
         )
-    joined = Signals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    joined = signal_preparation.Signals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     both = np.column_stack((joined.pressure_a, joined.pressure_b))
     pressure = _seal_pressures(both, chambers)
     mean = pressure.mean(axis=1)
@@ -157,9 +145,6 @@ def _left_out(logs: Sequence[RecordedLog], even: Sequence[BoolArray], used: int)
     return {reason: count for reason, count in counts.items() if count}
 
 
-# -- manual readings --------------------------------------------------------------------------------------------------
-
-
 def prepare_manual_readings(
     dynamic: Sequence[ManualReadings], static: Sequence[ManualReadings], seals: int
 ) -> PreparedReadings:
@@ -186,7 +171,7 @@ def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
     test, pressure, direction, friction, velocity = (np.concatenate(column) for column in columns)
     of_seals = np.repeat(np.maximum(pressure, 0.0)[:, np.newaxis], seals, axis=1)
     source = np.repeat(np.arange(len(sources)), [len(manual.friction) for manual in sources])
-    level = pressure_levels(of_seals[:, 0])
+    level = signal_preparation.pressure_levels(of_seals[:, 0])
     tests = np.unique(np.column_stack((source, test)), axis=0, return_inverse=True)[1].reshape(-1)
     group, by = _groups(level, tests, 'test')
     at = OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64))

@@ -17,14 +17,12 @@ import numpy as np
 from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import UNITS, unit_size
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.identification.checks import FEWEST_PRESSURES
-from seal_friction_ros.core.identification.readings import ManualReadings
+from seal_friction_ros.core.identification.readings import FEWEST_PRESSURES, ManualReadings
 from seal_friction_ros.files import config_path, read_yaml
 
 TITLE = 'seal friction data sheet'
 PRESSURE_UNITS = ('psi', 'bar', 'MPa', 'kPa')
 FORCE_UNITS = ('lbf', 'N', 'kN')
-LENGTH_UNITS = ('in', 'mm')
 KINDS = ('static', 'dynamic')
 DIRECTIONS = {'retract': -1, 'extend': 1}
 DIMENSIONS = {
@@ -138,9 +136,6 @@ def geometry_of_seal_file(seal: str) -> tuple[SealGeometry, Mapping[str, Any]]:
     return from_mapping(SealGeometry, document['geometry'], f'{path}: geometry'), document
 
 
-# -- the empty sheet --------------------------------------------------------------------------------------------------
-
-
 def sheet_text(plan: FrictionTestPlan) -> str:
     """CSV of an empty sheet."""
     geometry = plan.geometry
@@ -177,9 +172,6 @@ def write_sheet(plan: FrictionTestPlan, out: Path) -> None:
         raise ValueError(f'{out} exists already and may be filled in: not overwriting') from None
     except OSError as error:
         raise ValueError(f'{out}: cannot write it: {error.strerror}') from None
-
-
-# -- the filled sheet -------------------------------------------------------------------------------------------------
 
 
 class _Reading(NamedTuple):

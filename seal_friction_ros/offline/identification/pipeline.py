@@ -95,8 +95,12 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
     ring = _ring(sources, options)
     prepared, changes, kept = _one_state(sources)
     readings = _with_normal_force(prepared.readings, ring)
-    outlier = _outlier(readings)
-    used = readings
+    outlier, used = None, readings
+    if not readings.are_samples and len(readings.levels) >= 4:
+        law = next(law for law in _candidates(readings) if law.name == 'pressure_power_law')
+        found = fitting.fit(law, readings)
+        floor = diagnostics.repeatability(readings, found.offsets)
+        outlier = diagnostics.outlying_level(law, readings, found.values, floor if math.isfinite(floor) else 0.0)
     if outlier is not None:  # number the levels, and the groups that are levels, without a gap
         used = readings.taken(readings.level != outlier.level)
         level = np.unique(used.level, return_inverse=True)[1]
@@ -148,9 +152,8 @@ def _one_state(sources: Sources) -> tuple[PreparedReadings, tuple[diagnostics.Fr
         return together, (), numbers
     laws = {law.name: law for law in _candidates(first.readings)}
     found = fitting.fit(laws.get('pressure_power_law_viscous', laws['pressure_power_law']), first.readings)
-    changes = tuple(
-        diagnostics.compare_with_law(found, first.readings, sources.prepare([i]).readings) for i in numbers[1:]
-    )
+    others = (sources.prepare([i]).readings for i in numbers[1:])
+    changes = tuple(diagnostics.compare_with_law(found, first.readings, other) for other in others)
     kept = (0, *(i for i, change in zip(numbers[1:], changes, strict=True) if not change.is_change))
     return (sources.prepare(kept) if len(kept) > 1 else first), changes, kept
 
@@ -175,16 +178,6 @@ def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[C
         with_speeds=bool(np.isfinite(speed).all()) and float(speed.max()) > SPEEDS_DIFFER * float(speed.min()),
         with_exponent=readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
-
-
-def _outlier(readings: FrictionReadings) -> diagnostics.Outlier | None:
-    """Pressure that disagrees with the law of all others; None if there are too few pressures to tell."""
-    if readings.are_samples or len(readings.levels) < 4:
-        return None
-    law = next(law for law in _candidates(readings) if law.name == 'pressure_power_law')
-    found = fitting.fit(law, readings)
-    floor = diagnostics.repeatability(readings, found.offsets)
-    return diagnostics.outlying_level(law, readings, found.values, floor if math.isfinite(floor) else 0.0)
 
 
 def select_law(data: IdentificationData, name: str | None) -> LawSelection:

@@ -17,9 +17,8 @@ from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, decode, decode_text
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import UNITS
-from seal_friction_ros.core.identification.checks import check_clipping
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
-from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog
+from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
@@ -175,9 +174,6 @@ def _sliding(base: Sliding, options: SourceOptions) -> Sliding:
     return replace(base, **{name: value for name, value in values.items() if value is not None})
 
 
-# -- logs -------------------------------------------------------------------------------------------------------------
-
-
 def _read_log(path: Path, options: SourceOptions) -> Source:
     rig, remarks = _recognised(path) if options.rig is None else (read_rig(config_path('rigs', options.rig)), ())
     log = read_samples(path, rig)
@@ -220,9 +216,6 @@ def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
     )
 
 
-# -- bags -------------------------------------------------------------------------------------------------------------
-
-
 def _read_bag(path: Path, options: SourceOptions) -> Source:
     """Signals of a bag: one row for each velocity message, with the newest pressure and force before it."""
     topics = find_topics(path, options.namespace)
@@ -260,9 +253,6 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns).taken(kept)
     log = RecordedLog(path.resolve().name, signals, _sliding(Sliding(), options))
     return Source(_data_file(path), chambers, log, seal_document=document)
-
-
-# -- tables -----------------------------------------------------------------------------------------------------------
 
 
 def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
