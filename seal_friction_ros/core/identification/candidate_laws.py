@@ -134,11 +134,6 @@ def friction_of_seals(seal: SealNumbers, at: OperatingConditions) -> FloatArray:
     return np.array([sum(sliding_friction_of_seals((seal,), p, p, v, d) for p in each) for each, v, d in rows])
 
 
-@cache
-def _compiled_sum() -> Callable[..., FloatArray]:
-    return compiled(_sum_over_seals)
-
-
 def _sum_over_seals(seal: Any, pressure: FloatArray, speed: FloatArray, direction: IntArray) -> FloatArray:
     """Compilable part of `friction_of_seals`; ``seal`` as compiled code takes it, ``pressure`` of shape (n, k)."""
     total = np.zeros(len(speed))
@@ -147,6 +142,9 @@ def _sum_over_seals(seal: Any, pressure: FloatArray, speed: FloatArray, directio
             p = pressure[i, k]
             total[i] += sliding_friction_of_seals(seal, p, p, speed[i], direction[i])
     return total
+
+
+_compiled_sum = cache(lambda: compiled(_sum_over_seals))
 
 
 def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForceLaw) -> FloatArray:
@@ -174,11 +172,9 @@ def candidate_laws(
 ) -> tuple[CandidateLaw, ...]:
     """Laws that the data can identify: constant, pressure-dependent, physics-based, each with velocity terms if any.
 
-    Args:
-        geometry: Geometry of the ring; laws that need it are left out without it and without its normal force.
-        normal_force_law: Normal force of the ring.
-        with_speeds: The readings differ in speed, so velocity terms are identifiable.
-        with_exponent: There are enough pressures to identify the pressure exponent; otherwise it is 2/3.
+    Laws that need geometry and normal force of the ring are left out without them. ``with_speeds``: the readings differ
+    in speed, so velocity terms are identifiable. ``with_exponent``: there are enough pressures to identify the pressure
+    exponent; otherwise it is 2/3.
     """
     parts = {'geometry': geometry, 'normal_force_law': normal_force_law} if geometry and normal_force_law else {}
     bases = [_base(law_type, parts, with_speeds, with_exponent) for law_type in FRICTION_LAWS]

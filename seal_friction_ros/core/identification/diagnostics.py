@@ -134,13 +134,8 @@ def outlying_level(
     residuals of the rest, the repeatability, and the leverage of the level. An outlier also disturbs the law of the
     rest when another level is left out; only without the outlier do the rest agree. A level at which the law of the
     rest gives 0 N has no relative deviation: it is not assessed and has no residual. Fewer than four levels have no
-    outlier.
-
-    Args:
-        law: The law.
-        readings: At held pressures.
-        near: Parameters of the fit to all readings, as start values.
-        floor: Relative standard deviation of repeated readings.
+    outlier. The fits start ``near`` the parameters of the fit to all readings; ``floor`` is the relative standard
+    deviation of repeated readings.
     """
     if len(readings.levels) < 4:
         return None

@@ -80,13 +80,8 @@ def fit(
     """Least-squares fit of a law, with one offset of the force sum for each source.
 
     The offsets are linear and are eliminated. The sum of squares has local minima over the Stribeck velocity: the fit
-    starts from several velocities and the best result counts.
-
-    Args:
-        law: The law.
-        readings: The readings.
-        known: Start values, from a fit of a simpler law or to similar readings.
-        is_close: ``known`` is complete and near the result, so the fit starts from it alone.
+    starts from several velocities and the best result counts. ``known`` are start values from a simpler law or similar
+    readings; if ``is_close``, they are complete and near the result, and the fit starts from them alone.
 
     Raises:
         ValueError: The result is not finite.
@@ -306,13 +301,8 @@ def prediction_uncertainty(
     Non-negative least squares of the squared deviations over squared friction and 1, iteratively weighted with the
     resulting variance (ten times), gives the ratio of the two parts. The size is such that 1.96 std holds 95 % of the
     deviations, counted for one more reading [Vovk2005]_. The factor (1 + 1 / groups) on the variance accounts for a new
-    group.
-
-    Args:
-        predicted: Friction [N], shape (n,).
-        deviation: Measured - predicted [N], shape (n,).
-        groups: Number of groups that were left out.
-        in_addition: Relative standard deviation that these data cannot show, added in square.
+    group. ``in_addition`` is a relative standard deviation that these data cannot show, added in square. ``deviation``
+    is measured - ``predicted`` friction [N], shape (n,).
     """
     friction = np.maximum(np.abs(predicted), 0.05 * float(np.abs(predicted).mean()))
     raw = PredictionUncertainty(0.0, max(root_mean_square(deviation), 1e-12))
@@ -369,10 +359,7 @@ class BreakawayFit(NamedTuple):
 def fit_breakaway(readings: FrictionReadings, friction: FloatArray, offsets: FloatArray) -> BreakawayFit:
     """Constant or load-dependent stiction, by cross-validation; the constant one unless it is beaten.
 
-    Args:
-        readings: Breakaway readings, of all seals.
-        friction: Coulomb friction of the law at each reading [N], shape (n,).
-        offsets: Offset of the force sum of each source [N].
+    ``friction`` is the Coulomb friction of the law at each breakaway reading [N]; ``offsets`` are those of the sources.
 
     Source: thesis, section 5.2 (static above dynamic friction by about 0.5 lbf for each seal); the share of the Coulomb
     friction is our choice, after the rise of the stiction over pressure in Tables A-1 to A-3.

@@ -204,7 +204,17 @@ def check_log(log: RecordedLog) -> None:
             'the unit of the time wrong?)'
         )
     for what, column in signals._asdict().items():
-        _check_finite(name, what.replace('_', ' '), signals.time, column)
+        wrong = ~np.isfinite(column)
+        if wrong.all():
+            raise ValueError(f'{name}: no {what.replace("_", " ")} is a number: record it')
+        first, length = longest_stretch(wrong)
+        missing = float(signals.time[first + length - 1] - signals.time[first]) if length else 0.0  # [s]
+        if missing > LONGEST_NAN or float(wrong.mean()) > LARGEST_NAN_SHARE:
+            raise ValueError(
+                f'{name}: {int(wrong.sum())} of {len(wrong)} samples have no {what.replace("_", " ")}, {missing:.3g} s '
+                f'in a row from {float(signals.time[first]):.6g} s on: repair the sensor or the log and measure again, '
+                'or cut that part out'
+            )
     pressures = np.concatenate((signals.pressure_a, signals.pressure_b))
     _check_bounds(name, pressures, np.abs(signals.velocity), signals.force_sum)
     fastest = float(np.nanquantile(np.abs(signals.velocity), 0.99))
@@ -268,19 +278,6 @@ def check_manual_readings(manual: ManualReadings) -> None:
             'direction in a column of its own'
         )
     _check_bounds(manual.name, manual.pressure, np.abs(manual.velocity), manual.friction)
-
-
-def _check_finite(name: str, what: str, time: FloatArray, column: FloatArray) -> None:
-    wrong = ~np.isfinite(column)
-    if wrong.all():
-        raise ValueError(f'{name}: no {what} is a number: record it')
-    first, length = longest_stretch(wrong)
-    duration = float(time[first + length - 1] - time[first]) if length else 0.0
-    if duration > LONGEST_NAN or float(wrong.mean()) > LARGEST_NAN_SHARE:
-        raise ValueError(
-            f'{name}: {int(wrong.sum())} of {len(wrong)} samples have no {what}, {duration:.3g} s in a row from '
-            f'{float(time[first]):.6g} s on: repair the sensor or the log and measure again, or cut that part out'
-        )
 
 
 def _check_bounds(name: str, pressure: FloatArray, speed: FloatArray, force: FloatArray) -> None:

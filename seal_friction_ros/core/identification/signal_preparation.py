@@ -114,14 +114,8 @@ def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArra
     each segment (samples without a pause longer than ``largest_gap``) is interpolated to as many equidistant times as
     it has samples, filtered, and interpolated back.
 
-    Args:
-        time: [s], increasing, shape (n,).
-        values: Signal to differentiate, shape (n,); samples that are not finite are left out.
-        law: Window, order and largest gap.
-
-    Returns:
-        Slope in units of ``values`` per second, shape (n,); NaN where the value is not finite or the segment is shorter
-        than the window.
+    Samples of ``values`` that are not finite are left out. The slope, in units of ``values`` per second, shape (n,), is
+    NaN there and in segments shorter than the window.
 
     Raises:
         ValueError: No segment is as long as the window, or the window holds too few samples for the order.

@@ -161,13 +161,9 @@ def evaluate_cycles(
 ) -> SpoolFriction:
     """Normalised friction over displacement of one cycle out of several.
 
-    Args:
-        time: [s], even steps, shape (n,).
-        displacement: [m], shape (n,).
-        force: [N], shape (n,), positive with the velocity.
-        law: How it is evaluated.
-        reference: Reference force [N] of another measurement (the paper normalises all seals by the outer one without
-            pressure); None: that of this cycle.
+    ``time`` [s], ``displacement`` [m] and ``force`` [N] (positive with the velocity) have the shape (n,), in even steps.
+    ``reference`` is the reference force [N] of another measurement (the paper normalises all seals by the outer one
+    without pressure); None: that of this cycle.
 
     Raises:
         ValueError: A sample is not finite, there are too few cycles or samples, or the reference force is zero.

@@ -4,11 +4,10 @@ A fit that fails or predicts nothing is an error and gives no file. The computat
 number is rounded to six digits before another number is computed from it: the same sources give the same bytes.
 """
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +51,7 @@ REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is
 class IdentifyOptions:
     """Options of an identification."""
 
-    sources: SourceOptions = dataclasses.field(default_factory=SourceOptions)
+    sources: SourceOptions = field(default_factory=SourceOptions)
     seal: str | None = None
     """seal file with the geometry of the ring and its normal force: a path, or the name of one in config/seals"""
     squeeze_force: bool = False
@@ -105,7 +104,7 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
         used = readings.taken(readings.level != outlier.level)
         level = np.unique(used.level, return_inverse=True)[1]
         group = level if used.left_out_by == 'pressure' else used.group
-        used = dataclasses.replace(used, level=level, group=group)
+        used = replace(used, level=level, group=group)
     return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, changes, kept)
 
 
@@ -131,7 +130,7 @@ def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> Frictio
     if ring is None:
         return readings
     forces = normal_forces(readings.at.pressure, *ring)
-    return dataclasses.replace(readings, at=readings.at._replace(normal_force=forces))
+    return replace(readings, at=readings.at._replace(normal_force=forces))
 
 
 def _one_state(sources: Sources) -> tuple[PreparedReadings, tuple[diagnostics.FrictionChange, ...], tuple[int, ...]]:
@@ -173,8 +172,7 @@ def _check_unchanged(readings: FrictionReadings) -> None:
 def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[CandidateLaw, ...]:
     speed = np.abs(readings.at.velocity)
     return candidate_laws(
-        geometry=ring.geometry if ring else None,
-        normal_force_law=ring.normal_force_law if ring else None,
+        **(ring._asdict() if ring else {}),
         with_speeds=bool(np.isfinite(speed).all()) and float(speed.max()) > SPEEDS_DIFFER * float(speed.min()),
         with_exponent=readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
@@ -190,9 +188,10 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
     with progress('fit and leave out', len(laws) * (len(data.used.groups) + 1)) as advance:
         scores = fitting.score_laws(laws, data.used, advance)
     best = fitting.recommended(scores)
-    selected = next((score for score in scores if score.law.name == name), None) if name is not None else best
-    if selected is None:
+    by_name = {None: best} | {score.law.name: score for score in scores}
+    if name not in by_name:
         raise ValueError(f'law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
+    selected = by_name[name]
     if selected.fit is None or selected.validation is None:
         raise ValueError(f'law {name} was not fitted: {selected.why_not}')
     if not selected.validation.error <= LARGEST_ERROR:

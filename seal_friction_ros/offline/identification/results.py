@@ -1,9 +1,8 @@
 """Records of an identification, and its documents: the seal file and the numbers for JSON."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -153,7 +152,7 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
         f'squares over {data.used.count} readings, uncertainty from readings left out.',
     }
     if data.ring is not None:
-        document['geometry'] = dataclasses.asdict(data.ring.geometry)
+        document['geometry'] = asdict(data.ring.geometry)
     document |= law_document(law.friction_law(values))
     terms = {key: values[key] for key in law.velocity_terms}
     if terms:
@@ -162,14 +161,9 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
         (terms.get('stribeck_friction', 0.0), 0.0) if quality.breakaway is None else quality.breakaway[1:3]
     )
     uncertainty = {'relative_std': quality.uncertainty.relative, 'absolute_std': quality.uncertainty.absolute / seals}
-    document |= _json_value(
-        {
-            'stiction': stiction,
-            'stiction_ratio': ratio,
-            'uncertainty': uncertainty,
-            'identified_pressure': [float(pressure.min()), float(pressure.max())],
-        }
-    )
+    identified = [float(pressure.min()), float(pressure.max())]
+    numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
+    document |= _json_value({**numbers, 'identified_pressure': identified})
     parse_seal(document)
     return document
 
@@ -223,7 +217,6 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
     """Numbers for JSON."""
     data, selection, quality, levels = found.data, found.selection, found.quality, found.levels
     reference, line = selection.reference, quality.offset_line
-    line_names = ('constant_N', 'area_error_m2', 'rms_N')
     numbers: dict[str, Any] = found.document['identification'] | _json_value(
         {
             'std_N': [level.std for level in levels],
@@ -237,7 +230,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'condition_number': selection.fit.condition_number,
             'correlation': selection.fit.correlation.tolist(),
             'offset_N': [level.offset for level in levels],
-            'offset_line': line and dict(zip(line_names, line, strict=True)),
+            'offset_line': line and {'constant_N': line.constant, 'area_error_m2': line.area_error, 'rms_N': line.rms},
             'drift': [level.drift for level in levels],
         }
     )

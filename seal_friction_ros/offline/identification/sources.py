@@ -170,8 +170,8 @@ def _data_file(path: Path) -> DataFile:
 
 
 def _sliding(base: Sliding, options: SourceOptions) -> Sliding:
-    values = {name: getattr(options, name) for name in ('slowest', 'largest_acceleration')}
-    return replace(base, **{name: value for name, value in values.items() if value is not None})
+    given = {'slowest': options.slowest, 'largest_acceleration': options.largest_acceleration}
+    return replace(base, **{name: value for name, value in given.items() if value is not None})
 
 
 def _read_log(path: Path, options: SourceOptions) -> Source:
