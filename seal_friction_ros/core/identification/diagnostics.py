@@ -130,12 +130,11 @@ def outlying_level(
 ) -> Outlier | None:
     """The pressure level that deviates most from the law of the others, if by more than `OUTLIER`; else None.
 
-    Each level is left out and the law is fitted to the rest. The standard deviation of the deviation contains the
-    residuals of the rest, the repeatability, and the leverage of the level. An outlier also disturbs the law of the
-    rest when another level is left out; only without the outlier do the rest agree. A level at which the law of the
-    rest gives 0 N has no relative deviation: it is not assessed and has no residual. Fewer than four levels have no
-    outlier. The fits start ``near`` the parameters of the fit to all readings; ``floor`` is the relative standard
-    deviation of repeated readings.
+    Each level is left out and the law is fitted to the rest, from start values ``near``. The standard deviation of the
+    deviation contains the residuals of the rest, the repeatability ``floor`` [-], and the leverage of the level. An
+    outlier also disturbs the law of the rest when another level is left out; only without the outlier do the rest
+    agree. A level at which the law of the rest gives 0 N has no relative deviation: it is not assessed and has no
+    residual. Fewer than four levels have no outlier.
     """
     if len(readings.levels) < 4:
         return None

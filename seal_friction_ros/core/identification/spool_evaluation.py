@@ -161,9 +161,9 @@ def evaluate_cycles(
 ) -> SpoolFriction:
     """Normalised friction over displacement of one cycle out of several.
 
-    ``time`` [s], ``displacement`` [m] and ``force`` [N] (positive with the velocity) have the shape (n,), in even steps.
-    ``reference`` is the reference force [N] of another measurement (the paper normalises all seals by the outer one
-    without pressure); None: that of this cycle.
+    ``time`` [s] has even steps; ``force`` [N] is positive with the velocity; all have the shape (n,). ``reference`` is
+    the reference force [N] of another measurement (the paper normalises all seals by the outer one without pressure);
+    None: that of this cycle.
 
     Raises:
         ValueError: A sample is not finite, there are too few cycles or samples, or the reference force is zero.
