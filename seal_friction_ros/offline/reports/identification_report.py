@@ -18,9 +18,8 @@ from seal_friction_ros.core.identification.candidate_laws import normal_forces
 from seal_friction_ros.core.identification.fitting import CrossValidation, offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.identification.document import worst_left_out
 from seal_friction_ros.offline.identification.pipeline import fitted_readings
-from seal_friction_ros.offline.identification.results import Identification, Ring
+from seal_friction_ros.offline.identification.results import Identification, Ring, worst_left_out
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number

@@ -35,10 +35,9 @@ def write_spool_report(
         ValueError: The table cannot be read or evaluated, or the page cannot be written.
     """
     rows = table_rows(table)
-    names = list(rows[0]) if rows else []
     if len(rows) < 100:
         raise ValueError(f'{table}: {len(rows)} rows are too few for {settings.cycles} cycles')
-    time, displacement, force = (column_in_si(table, rows, names, *column) for column in COLUMN_UNITS.items())
+    time, displacement, force = (column_in_si(table, rows, *column) for column in COLUMN_UNITS.items())
     steps = np.diff(time)
     if not (np.isfinite(steps).all() and steps.min() > 0.5 * np.median(steps) and steps.max() < 1.5 * np.median(steps)):
         raise ValueError(
