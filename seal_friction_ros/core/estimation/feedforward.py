@@ -110,44 +110,30 @@ class FeedForwardSettings:
 class Motion(NamedTuple):
     """The motion that is asked for, and the one that is."""
 
-    reference_velocity: float
-    """[m/s]"""
-    reference_acceleration: float = 0.0
-    """[m/s^2] for ``lead_time``; 0 if it is not known"""
-    measured_velocity: float = 0.0
-    """[m/s]"""
-    reference_age: float = 0.0
-    """[s] how long ago the reference was for"""
-    velocity_friction: float = 0.0
-    """[N] f_v, at `wanted_velocity`"""
+    reference_velocity: float  # [m/s]
+    reference_acceleration: float = 0.0  # [m/s^2] for ``lead_time``; 0 if it is not known
+    measured_velocity: float = 0.0  # [m/s]
+    reference_age: float = 0.0  # [s] how long ago the reference was for
+    velocity_friction: float = 0.0  # [N] f_v, at `wanted_velocity`
 
 
 class FeedForwardState(NamedTuple):
     """What one step leaves for the next."""
 
-    stamp: int
-    """[ns] of the last step; `NEVER` before the first"""
-    force: float
-    """[N]"""
-    fade: float
-    """[-] 0: faded out, 1: not faded"""
-    estimate: FrictionEstimate
-    """last usable estimate; `NO_ESTIMATE` before the first"""
-    velocity: float
-    """[m/s] last usable velocity"""
+    stamp: int  # [ns] of the last step; `NEVER` before the first
+    force: float  # [N]
+    fade: float  # [-] 0: faded out, 1: not faded
+    estimate: FrictionEstimate  # last usable estimate; `NO_ESTIMATE` before the first
+    velocity: float  # [m/s] last usable velocity
 
 
 class FeedForward(NamedTuple):
     """Compensation at one moment. Every number is finite, whatever came in."""
 
-    stamp: int
-    """[ns]"""
-    force: float
-    """[N] positive on extension"""
-    scale: float
-    """[-] share of the estimated Coulomb friction that is compensated"""
-    limited: int
-    """bits of `Limited`"""
+    stamp: int  # [ns]
+    force: float  # [N] positive on extension
+    scale: float  # [-] share of the estimated Coulomb friction that is compensated
+    limited: int  # bits of `Limited`
 
 
 def init(settings: FeedForwardSettings) -> FeedForwardState:

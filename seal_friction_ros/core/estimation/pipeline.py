@@ -55,12 +55,9 @@ class PipelineParameters(NamedTuple):
 class WantedMotion(NamedTuple):
     """Motion that the rod shall make."""
 
-    stamp: int
-    """[ns] the moment it is for"""
-    velocity: float
-    """[m/s]"""
-    acceleration: float
-    """[m/s^2]"""
+    stamp: int  # [ns] the moment it is for
+    velocity: float  # [m/s]
+    acceleration: float  # [m/s^2]
 
 
 NO_REFERENCE = WantedMotion(NEVER, 0.0, 0.0)
@@ -74,8 +71,7 @@ class PipelineState(NamedTuple):
     pressure: Pressure = NO_PRESSURE
     force: Force = NO_FORCE
     reference: WantedMotion = NO_REFERENCE
-    refused: bool = False
-    """whether an input has several publishers"""
+    refused: bool = False  # whether an input has several publishers
 
 
 def init(parameters: PipelineParameters) -> PipelineState:

@@ -23,12 +23,9 @@ class Meaning:
     lower: float | None = None
     upper: float | None = None
     live: bool = True
-    symbol: str = ''
-    """in an equation"""
-    start: Callable[[Any], float] | None = None
-    """first guess of a fit, from a `TypicalReading`; None: never fitted"""
-    fit_bounds: tuple[float, float] | None = None
-    """bounds of a fit, where they are narrower"""
+    symbol: str = ''  # in an equation
+    start: Callable[[Any], float] | None = None  # first guess of a fit, from a `TypicalReading`; None: never fitted
+    fit_bounds: tuple[float, float] | None = None  # bounds of a fit, where they are narrower
 
     def bounds_text(self) -> str:
         """Bounds as text, for example ``0.0 to 1.0``; empty without bounds."""
@@ -49,10 +46,8 @@ class ParameterGroup(NamedTuple):
     """Parameters of a node that one dataclass declares."""
 
     record_type: type
-    prefix: str = ''
-    """start of each parameter name, with its dot"""
-    live: bool = True
-    """False: no parameter of the group can change while the node is configured"""
+    prefix: str = ''  # start of each parameter name, with its dot
+    live: bool = True  # False: no parameter of the group can change while the node is configured
 
     def names(self) -> dict[str, str]:
         """Name of each parameter -> field of the dataclass."""

@@ -86,28 +86,21 @@ class SealNumbers(NamedTuple):
     """A mounted seal as numbers."""
 
     law: Bound
-    coulomb_speed: float
-    """[m/s] at which the Coulomb friction is taken"""
+    coulomb_speed: float  # [m/s] at which the Coulomb friction is taken
     law_depends_on_speed: bool
     velocity_terms: VelocityTermNumbers = NO_VELOCITY_TERMS
-    depends_on_velocity: bool = False
-    """whether the sliding friction differs from the Coulomb friction"""
+    depends_on_velocity: bool = False  # whether the sliding friction differs from the Coulomb friction
     is_on_chamber_a: bool = True
-    scale: float = 1.0
-    """[-] factor on all friction of the seal"""
-    stiction: float = 0.0
-    """[N]"""
+    scale: float = 1.0  # [-] factor on all friction of the seal
+    stiction: float = 0.0  # [N]
     stiction_ratio: float = 0.0
     relative_std: float = 0.0
-    absolute_variance: float = 0.0
-    """[N^2]"""
+    absolute_variance: float = 0.0  # [N^2]
     square: float = 2.0
     """the exponent of a square: a constant one the compiler turns into a product, which rounds differently from ``pow``
     in 1 of 1000 cases"""
-    pressure_low: float = -math.inf
-    """[Pa] ends of the identified range with its margin"""
-    pressure_high: float = math.inf
-    """[Pa]"""
+    pressure_low: float = -math.inf  # [Pa] ends of the identified range with its margin
+    pressure_high: float = math.inf  # [Pa]
 
 
 def numbers_of_law(law: FrictionLaw, terms: VelocityTerms | None = None) -> SealNumbers:
@@ -135,8 +128,7 @@ class MountedSeal:
 
     seal: Seal
     chamber: str
-    friction_scale: float = 1.0
-    """[-] factor on all friction of the seal, breakaway included"""
+    friction_scale: float = 1.0  # [-] factor on all friction of the seal, breakaway included
     numbers: SealNumbers = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -160,15 +152,11 @@ class MountedSeal:
 class ActuatorFriction(NamedTuple):
     """Friction of all seals of an actuator together."""
 
-    coulomb_friction: float
-    """[N]"""
-    coulomb_friction_std: float
-    """[N]"""
-    stiction: float
-    """[N]"""
+    coulomb_friction: float  # [N]
+    coulomb_friction_std: float  # [N]
+    stiction: float  # [N]
     in_identified_range: bool
-    velocity_friction: float
-    """[N] what sliding at the velocity adds to the magnitude; 0 at rest"""
+    velocity_friction: float  # [N] what sliding at the velocity adds to the magnitude; 0 at rest
 
 
 @compilable

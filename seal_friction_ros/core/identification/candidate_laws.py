@@ -31,14 +31,10 @@ COMPILED_FROM = 100  # pressures from which compiled code is faster: compiling a
 class OperatingConditions(NamedTuple):
     """Operating conditions of n readings with k seals."""
 
-    pressure: FloatArray
-    """[Pa, gauge, >= 0] of each seal, shape (n, k)"""
-    normal_force: FloatArray | None
-    """[N] of each seal, shape (n, k); None without geometry"""
-    velocity: FloatArray
-    """[m/s] shape (n,); NaN if not measured"""
-    direction: FloatArray
-    """-1.0 or 1.0, shape (n,)"""
+    pressure: FloatArray  # [Pa, gauge, >= 0] of each seal, shape (n, k)
+    normal_force: FloatArray | None  # [N] of each seal, shape (n, k); None without geometry
+    velocity: FloatArray  # [m/s] shape (n,); NaN if not measured
+    direction: FloatArray  # -1.0 or 1.0, shape (n,)
 
     def taken(self, index: IntArray) -> 'OperatingConditions':
         """The readings in ``index``."""
@@ -62,8 +58,7 @@ class FittedParameter(NamedTuple):
     unit: str
     lower: float
     upper: float
-    start: Callable[[TypicalReading], float]
-    """first guess"""
+    start: Callable[[TypicalReading], float]  # first guess
     symbol: str
 
 
@@ -83,8 +78,7 @@ class CandidateLaw:
     formula: str
     law_type: type[FrictionLaw]
     parameters: tuple[FittedParameter, ...]
-    fixed: ParameterValues = field(default_factory=dict)
-    """parameters that are not fitted"""
+    fixed: ParameterValues = field(default_factory=dict)  # parameters that are not fitted
     parts: Mapping[str, Any] = field(default_factory=dict)
     """known fields of the law: geometry and normal force; empty if it needs neither"""
 

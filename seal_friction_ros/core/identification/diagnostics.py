@@ -118,10 +118,8 @@ class Outlier(NamedTuple):
     """A pressure level whose friction disagrees with the law of the other levels."""
 
     level: int
-    measured: float
-    """[N]"""
-    expected: float
-    """[N] by the law fitted to the other levels"""
+    measured: float  # [N]
+    expected: float  # [N] by the law fitted to the other levels
     standard_deviations: float
 
 
@@ -178,14 +176,10 @@ class FrictionChange(NamedTuple):
     """Friction of another source relative to a law."""
 
     name: str
-    ratio: float
-    """friction of the source over friction by the law [-]"""
-    standard_error: float
-    """of the ratio [-]"""
-    rms: float
-    """[N] residual of the law on the source, offset removed"""
-    own_rms: float
-    """[N] residual of the same law fitted to the source"""
+    ratio: float  # friction of the source over friction by the law [-]
+    standard_error: float  # of the ratio [-]
+    rms: float  # [N] residual of the law on the source, offset removed
+    own_rms: float  # [N] residual of the same law fitted to the source
 
     @property
     def is_change(self) -> bool:
@@ -230,14 +224,11 @@ def compare_with_law(found: LawFit, fitted: FrictionReadings, other: FrictionRea
 class LevelChange(NamedTuple):
     """Two sources that disagree at one pressure."""
 
-    pressure: float
-    """[Pa]"""
+    pressure: float  # [Pa]
     name: str
-    friction: float
-    """[N]"""
+    friction: float  # [N]
     other_name: str
-    other_friction: float
-    """[N]"""
+    other_friction: float  # [N]
 
 
 def changed_levels(readings: FrictionReadings) -> list[LevelChange]:

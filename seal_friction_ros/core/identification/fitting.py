@@ -32,10 +32,8 @@ class LawFit:
     """A law fitted to readings."""
 
     law: CandidateLaw
-    values: dict[str, float]
-    """parameters of one seal"""
-    offsets: FloatArray
-    """[N] offset of the force sum of each source, shape (sources,)"""
+    values: dict[str, float]  # parameters of one seal
+    offsets: FloatArray  # [N] offset of the force sum of each source, shape (sources,)
     jacobian: FloatArray
     """derivative of the weighted deviations by the parameters, offsets eliminated, shape (n, parameters)"""
 
@@ -115,14 +113,10 @@ def fit(
 class CrossValidation:
     """Prediction of each group of readings from all others."""
 
-    predicted: FloatArray
-    """[N] shape (n,)"""
-    deviation: FloatArray
-    """[N] measured - predicted, shape (n,)"""
-    losses: FloatArray
-    """root mean square of the weighted deviation in each group [-], shape (groups,)"""
-    parameters: FloatArray
-    """fitted without each group, shape (groups, parameters)"""
+    predicted: FloatArray  # [N] shape (n,)
+    deviation: FloatArray  # [N] measured - predicted, shape (n,)
+    losses: FloatArray  # root mean square of the weighted deviation in each group [-], shape (groups,)
+    parameters: FloatArray  # fitted without each group, shape (groups, parameters)
 
     @property
     def rms(self) -> float:
@@ -283,10 +277,8 @@ def is_beaten(losses: FloatArray, others: FloatArray) -> bool:
 class PredictionUncertainty(NamedTuple):
     """Standard deviation of a new reading of all seals: std^2 = (relative f)^2 + absolute^2."""
 
-    relative: float
-    """[-]"""
-    absolute: float
-    """[N]"""
+    relative: float  # [-]
+    absolute: float  # [N]
 
     def std(self, friction: FloatArray) -> FloatArray:
         """Standard deviation [N] at a friction [N], shape (n,)."""
@@ -344,16 +336,11 @@ def band_coverage(
 class BreakawayFit(NamedTuple):
     """Breakaway force of one seal above its Coulomb friction: stiction + ratio * f_c."""
 
-    law: str
-    """constant or load_dependent"""
-    stiction: float
-    """[N] of one seal"""
-    ratio: float
-    """[-]"""
-    standard_error: float
-    """of the value that is not zero"""
-    cross_validation_rms: dict[str, float]
-    """[N] all seals: law -> root mean square of the left-out deviations"""
+    law: str  # constant or load_dependent
+    stiction: float  # [N] of one seal
+    ratio: float  # [-]
+    standard_error: float  # of the value that is not zero
+    cross_validation_rms: dict[str, float]  # [N] all seals: law -> root mean square of the left-out deviations
 
 
 def fit_breakaway(readings: FrictionReadings, friction: FloatArray, offsets: FloatArray) -> BreakawayFit:

@@ -48,14 +48,10 @@ class ManualReadings(NamedTuple):
 
     name: str
     test: IntArray
-    pressure: FloatArray
-    """[Pa, gauge]"""
-    direction: IntArray
-    """-1 or 1"""
-    friction: FloatArray
-    """[N] magnitude, of all seals"""
-    velocity: FloatArray
-    """[m/s] magnitude; NaN if not measured"""
+    pressure: FloatArray  # [Pa, gauge]
+    direction: IntArray  # -1 or 1
+    friction: FloatArray  # [N] magnitude, of all seals
+    velocity: FloatArray  # [m/s] magnitude; NaN if not measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,22 +59,14 @@ class FrictionReadings:
     """n friction readings of one rig, from one or several sources."""
 
     at: OperatingConditions
-    force: FloatArray
-    """[N] force sum, signed, shape (n,)"""
-    source: IntArray
-    """index into ``names``, shape (n,)"""
-    group: IntArray
-    """readings of one group are left out together in cross-validation, shape (n,)"""
-    level: IntArray
-    """pressure level, 0 for the lowest, shape (n,)"""
-    names: tuple[str, ...]
-    """of the sources"""
-    left_out_by: str
-    """meaning of ``group``: test, pressure, file or block"""
-    are_samples: bool
-    """samples of a swept log; otherwise strokes or manual readings at held pressures"""
-    samples: tuple[FloatArray, ...] = ()
-    """[N] force sums behind each reading; empty if there is only the reading"""
+    force: FloatArray  # [N] force sum, signed, shape (n,)
+    source: IntArray  # index into ``names``, shape (n,)
+    group: IntArray  # readings of one group are left out together in cross-validation, shape (n,)
+    level: IntArray  # pressure level, 0 for the lowest, shape (n,)
+    names: tuple[str, ...]  # of the sources
+    left_out_by: str  # meaning of ``group``: test, pressure, file or block
+    are_samples: bool  # samples of a swept log; otherwise strokes or manual readings at held pressures
+    samples: tuple[FloatArray, ...] = ()  # [N] force sums behind each reading; empty if there is only the reading
 
     @property
     def count(self) -> int:
@@ -172,16 +160,11 @@ class PreparedReadings(NamedTuple):
     """Readings of all sources."""
 
     readings: FrictionReadings
-    chamber_pressures: FloatArray
-    """[Pa] of chambers a and b at each reading, shape (n, 2)"""
-    breakaway: FrictionReadings | None
-    """None if no motion starts from rest"""
-    used: dict[str, int]
-    """source -> number of samples behind the readings"""
-    total: dict[str, int]
-    """source -> number of its samples"""
-    left_out: dict[str, int]
-    """reason -> number of samples not used"""
+    chamber_pressures: FloatArray  # [Pa] of chambers a and b at each reading, shape (n, 2)
+    breakaway: FrictionReadings | None  # None if no motion starts from rest
+    used: dict[str, int]  # source -> number of samples behind the readings
+    total: dict[str, int]  # source -> number of its samples
+    left_out: dict[str, int]  # reason -> number of samples not used
 
 
 def check_log(log: RecordedLog) -> None:

@@ -53,16 +53,11 @@ class Sliding(CheckedParameters):
 class Signals(NamedTuple):
     """Signals of a log; arrays of shape (n,), NaN for a missing value."""
 
-    time: FloatArray
-    """[s] increasing"""
-    velocity: FloatArray
-    """[m/s] positive on extension"""
-    pressure_a: FloatArray
-    """[Pa, gauge]"""
-    pressure_b: FloatArray
-    """[Pa, gauge]"""
-    force_sum: FloatArray
-    """[N] positive on extension"""
+    time: FloatArray  # [s] increasing
+    velocity: FloatArray  # [m/s] positive on extension
+    pressure_a: FloatArray  # [Pa, gauge]
+    pressure_b: FloatArray  # [Pa, gauge]
+    force_sum: FloatArray  # [N] positive on extension
 
     def taken(self, index: IntArray | BoolArray) -> 'Signals':
         """The rows in ``index``."""
@@ -72,38 +67,27 @@ class Signals(NamedTuple):
 class SignalReading(NamedTuple):
     """One reading from a log: a stroke at held speed and pressure (medians), or the peak of a breakaway."""
 
-    direction: int
-    """-1 or 1"""
-    samples: IntArray
-    """indices of the samples behind the reading"""
-    velocity: float
-    """[m/s]; 0 for a breakaway"""
-    pressure_a: float
-    """[Pa, gauge]"""
-    pressure_b: float
-    """[Pa, gauge]"""
-    force_sum: float
-    """[N]"""
+    direction: int  # -1 or 1
+    samples: IntArray  # indices of the samples behind the reading
+    velocity: float  # [m/s]; 0 for a breakaway
+    pressure_a: float  # [Pa, gauge]
+    pressure_b: float  # [Pa, gauge]
+    force_sum: float  # [N]
 
 
 class HalfRange(NamedTuple):
     """Friction and offset of a force measured in both directions."""
 
-    friction: float
-    """[N]"""
-    offset: float
-    """[N]"""
+    friction: float  # [N]
+    offset: float  # [N]
 
 
 class OffsetLine(NamedTuple):
     """Offset of the force sum over pressure: constant + area_error * pressure."""
 
-    constant: float
-    """[N] of the load cell"""
-    area_error: float
-    """[m^2] error of the area in the pressure force"""
-    rms: float
-    """[N] of the residuals"""
+    constant: float  # [N] of the load cell
+    area_error: float  # [m^2] error of the area in the pressure force
+    rms: float  # [N] of the residuals
 
 
 def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArray:

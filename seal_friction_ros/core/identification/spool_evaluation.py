@@ -54,20 +54,13 @@ class SpoolEvaluation(CheckedParameters):
 class SpoolFriction(NamedTuple):
     """Friction of one cycle over displacement."""
 
-    displacement: FloatArray
-    """[m] from the middle of the stroke, shape (n,)"""
-    velocity: FloatArray
-    """[m/s] shape (n,)"""
-    force: FloatArray
-    """[N] as measured, shape (n,)"""
-    filtered: FloatArray
-    """[N] resonance notched, then averaged, shape (n,)"""
-    normalised: FloatArray
-    """[-] ``filtered`` over the reference force, shape (n,)"""
-    reference_force: float
-    """[N]"""
-    resonance: float | None
-    """[Hz] of the measuring chain; None if there is none"""
+    displacement: FloatArray  # [m] from the middle of the stroke, shape (n,)
+    velocity: FloatArray  # [m/s] shape (n,)
+    force: FloatArray  # [N] as measured, shape (n,)
+    filtered: FloatArray  # [N] resonance notched, then averaged, shape (n,)
+    normalised: FloatArray  # [-] ``filtered`` over the reference force, shape (n,)
+    reference_force: float  # [N]
+    resonance: float | None  # [Hz] of the measuring chain; None if there is none
 
 
 def cycle_starts(displacement: FloatArray) -> IntArray:

@@ -42,11 +42,9 @@ _KEYS = (
 class SealFriction:
     """Friction data of a seal file besides geometry and normal force."""
 
-    friction_coefficient: Mapping[str, Any]
-    """mapping as in a seal file"""
+    friction_coefficient: Mapping[str, Any]  # mapping as in a seal file
     law: FrictionCoefficientLaw
-    stiction: float
-    """[N]"""
+    stiction: float  # [N]
     uncertainty: Uncertainty
 
 
@@ -81,8 +79,7 @@ class OringCaseFile:
     """Content of a case file."""
 
     case: OringCase
-    pressures: tuple[float, ...]
-    """[Pa, gauge], increasing"""
+    pressures: tuple[float, ...]  # [Pa, gauge], increasing
     source: str
     friction: SealFriction | None
     measured: MeasuredFriction | None

@@ -75,16 +75,11 @@ class Gains(NamedTuple):
     """Gains and limits for compiled code."""
 
     controller: ServoController
-    pressure: float
-    """G [m^3/(s Pa)]"""
-    valve_delay: float
-    """tau [s]"""
-    force_max: float
-    """[N] of the supply pressure"""
-    reach: float
-    """largest reference position [m]"""
-    period: float
-    """sample time [s]"""
+    pressure: float  # G [m^3/(s Pa)]
+    valve_delay: float  # tau [s]
+    force_max: float  # [N] of the supply pressure
+    reach: float  # largest reference position [m]
+    period: float  # sample time [s]
 
 
 class Measurement(NamedTuple):
@@ -99,21 +94,16 @@ class Measurement(NamedTuple):
 class ControllerState(NamedTuple):
     """State of the controller between two samples."""
 
-    reference: float
-    """[m] last limited reference position"""
-    integral: float
-    """[N]"""
+    reference: float  # [m] last limited reference position
+    integral: float  # [N]
 
 
 class Command(NamedTuple):
     """Outputs of the controller."""
 
-    spool: float
-    """[-] -1 to 1"""
-    force: float
-    """[N] force command of the position loop, with feed-forward"""
-    limited: int
-    """bits of `Limited`"""
+    spool: float  # [-] -1 to 1
+    force: float  # [N] force command of the position loop, with feed-forward
+    limited: int  # bits of `Limited`
 
 
 def gains(controller: ServoController, c: Constants, period: float) -> Gains:

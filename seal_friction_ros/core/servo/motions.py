@@ -15,12 +15,9 @@ from seal_friction_ros.core.foundation.units import PSI
 class Setpoint(NamedTuple):
     """Reference of the position controller at one moment."""
 
-    position: float
-    """[m]"""
-    velocity: float = 0.0
-    """[m/s]"""
-    acceleration: float = 0.0
-    """[m/s^2]"""
+    position: float  # [m]
+    velocity: float = 0.0  # [m/s]
+    acceleration: float = 0.0  # [m/s^2]
 
 
 class Wave(Protocol):
@@ -158,14 +155,10 @@ class Chirp(CheckedParameters):
 class PullCommand(NamedTuple):
     """Command of the pull-test rig at one moment."""
 
-    pressure: float
-    """[Pa, gauge] on both ports"""
-    carriage: float
-    """[m] position of the far end of the spring scale"""
-    test: int
-    """index of the test from 0, over all pressures and repetitions; each test gives one reading of each kind"""
-    direction: int
-    """1: extending, -1: retracting, 0: resting"""
+    pressure: float  # [Pa, gauge] on both ports
+    carriage: float  # [m] position of the far end of the spring scale
+    test: int  # index of the test from 0, over all pressures and repetitions; each test gives one reading of each kind
+    direction: int  # 1: extending, -1: retracting, 0: resting
 
 
 @dataclass(frozen=True)

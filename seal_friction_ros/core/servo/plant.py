@@ -164,37 +164,25 @@ class Constants(NamedTuple):
     valve: ServoValve
     cylinder: Cylinder
     load: Load
-    supply_enthalpy: float
-    """[Pa] -H(p), see `rates`"""
-    return_enthalpy: float
-    """[Pa] the same at return pressure"""
-    seals: Any
-    """from `numbers_of_seals`"""
+    supply_enthalpy: float  # [Pa] -H(p), see `rates`
+    return_enthalpy: float  # [Pa] the same at return pressure
+    seals: Any  # from `numbers_of_seals`
 
 
 class PlantState(NamedTuple):
     """State of valve, chambers and rod."""
 
-    position: float
-    """[m]"""
-    velocity: float
-    """[m/s] exactly 0.0 while stuck"""
+    position: float  # [m]
+    velocity: float  # [m/s] exactly 0.0 while stuck
     charge_a: float
     """[Pa, gauge] pressure of chamber a; below vapour pressure a measure of the cavity, see `chamber_pressures`"""
-    charge_b: float
-    """[Pa, gauge] the same of chamber b"""
-    spool: float
-    """[-] -1 to 1; positive opens supply to chamber a"""
-    spool_rate: float
-    """[1/s]"""
-    energy_in: float
-    """[J] from supply, return and load force since the start"""
-    energy_dissipated: float
-    """[J] in valve, leakage, viscous load, seals and end stops"""
-    direction: int
-    """-1 or 1: sliding that way; 0: stuck"""
-    transitions: int
-    """number of times that the rod came to rest or broke away since the start"""
+    charge_b: float  # [Pa, gauge] the same of chamber b
+    spool: float  # [-] -1 to 1; positive opens supply to chamber a
+    spool_rate: float  # [1/s]
+    energy_in: float  # [J] from supply, return and load force since the start
+    energy_dissipated: float  # [J] in valve, leakage, viscous load, seals and end stops
+    direction: int  # -1 or 1: sliding that way; 0: stuck
+    transitions: int  # number of times that the rod came to rest or broke away since the start
 
 
 Integrated = tuple[float, float, float, float, float, float, float, float]

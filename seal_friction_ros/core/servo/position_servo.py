@@ -100,30 +100,18 @@ class ServoState(NamedTuple):
 class ServoOutputs(NamedTuple):
     """True values at the end of a step, without noise or delay."""
 
-    position: float
-    """[m]"""
-    velocity: float
-    """[m/s] exactly 0.0 at rest"""
-    pressure_a: float
-    """[Pa, gauge]"""
-    pressure_b: float
-    """[Pa, gauge]"""
-    spool: float
-    """[-] -1 to 1"""
-    force_sum: float
-    """[N] every axial force on the moving mass except seal friction"""
-    friction_force: float
-    """[N] ``m a = force_sum - friction_force``"""
-    coulomb_friction: float
-    """[N]"""
-    breakaway_force: float
-    """[N]"""
-    friction_state: int
-    """a `FrictionState`"""
-    direction: int
-    """-1, 0 or 1"""
-    command: Command
-    """outputs of the controller at the start of the step"""
+    position: float  # [m]
+    velocity: float  # [m/s] exactly 0.0 at rest
+    pressure_a: float  # [Pa, gauge]
+    pressure_b: float  # [Pa, gauge]
+    spool: float  # [-] -1 to 1
+    force_sum: float  # [N] every axial force on the moving mass except seal friction
+    friction_force: float  # [N] ``m a = force_sum - friction_force``
+    coulomb_friction: float  # [N]
+    breakaway_force: float  # [N]
+    friction_state: int  # a `FrictionState`
+    direction: int  # -1, 0 or 1
+    command: Command  # outputs of the controller at the start of the step
 
 
 NO_COMMAND = Command(0.0, 0.0, 0)

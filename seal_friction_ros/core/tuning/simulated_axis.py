@@ -50,10 +50,8 @@ SEARCH_HOLD = 0.2  # [s] of rest after each motion during the search; the result
 class Tuning(TunedFeedForward[Performance]):
     """Result of the search."""
 
-    merit: float
-    """[-] J"""
-    candidates: int
-    """number of evaluated settings"""
+    merit: float  # [-] J
+    candidates: int  # number of evaluated settings
 
 
 class SearchPoint(NamedTuple):
@@ -86,8 +84,7 @@ class TuningProblem:
 
     axis: Axis
     settings: TuningSettings
-    noise: FloatArray | None = None
-    """as of `run_closed_loop`"""
+    noise: FloatArray | None = None  # as of `run_closed_loop`
 
     def __post_init__(self) -> None:
         gains, s = self.axis.servo.gains, self.settings

@@ -57,20 +57,15 @@ class FrictionTestPlan:
     """
 
     seal_name: str
-    lowest: float
-    """pressure in ``pressure_unit``"""
-    highest: float
-    """pressure in ``pressure_unit``"""
-    steps: int
-    """between the pressures"""
+    lowest: float  # pressure in ``pressure_unit``
+    highest: float  # pressure in ``pressure_unit``
+    steps: int  # between the pressures
     tests: int
-    seals: int
-    """number of seals that share the pressure and whose friction is measured together"""
+    seals: int  # number of seals that share the pressure and whose friction is measured together
     pressure_unit: str = 'psi'
     force_unit: str = 'lbf'
     length_unit: str = 'in'
-    geometry: SealGeometry | None = None
-    """filled in, if known"""
+    geometry: SealGeometry | None = None  # filled in, if known
 
     def __post_init__(self) -> None:
         low, high, name = self.lowest, self.highest, self.seal_name
@@ -98,10 +93,8 @@ class DataSheet(NamedTuple):
 
     dynamic: ManualReadings
     static: ManualReadings
-    chambers: tuple[str, ...]
-    """of each seal; they alternate, since both chambers have the same pressure"""
-    seal_document: Mapping[str, Any]
-    """name and geometry"""
+    chambers: tuple[str, ...]  # of each seal; they alternate, since both chambers have the same pressure
+    seal_document: Mapping[str, Any]  # name and geometry
     remarks: tuple[str, ...]
 
 
@@ -177,8 +170,7 @@ def write_sheet(plan: FrictionTestPlan, out: Path) -> None:
 class _Reading(NamedTuple):
     """One filled cell; pressure and force in the units of the sheet."""
 
-    place: str
-    """file and line"""
+    place: str  # file and line
     pressure: float
     column: SheetColumn
     force: float

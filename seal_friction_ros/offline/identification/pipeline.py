@@ -54,14 +54,10 @@ class IdentifyOptions:
     sources: SourceOptions = field(default_factory=SourceOptions)
     seal: str | None = None
     """seal file with the geometry of the ring and its normal force: a path, or the name of one in config/seals"""
-    squeeze_force: bool = False
-    """compute the normal force from the geometry, even if the seal file has one"""
-    law: str | None = None
-    """law to save instead of the recommended one"""
-    run_to_run: float | None = None
-    """[-] relative standard deviation between runs, if known from elsewhere"""
-    name: str = ''
-    """of the seal; empty: the name of the seal file"""
+    squeeze_force: bool = False  # compute the normal force from the geometry, even if the seal file has one
+    law: str | None = None  # law to save instead of the recommended one
+    run_to_run: float | None = None  # [-] relative standard deviation between runs, if known from elsewhere
+    name: str = ''  # of the seal; empty: the name of the seal file
 
 
 def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Identification:

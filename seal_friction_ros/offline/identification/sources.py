@@ -38,16 +38,11 @@ VELOCITY_UNITS = {'m_per_s': 'm/s', 'mm_per_s': 'mm/s', 'in_per_s': 'in/s'}
 class SourceOptions:
     """Options on the sources; None leaves a value to the sources."""
 
-    rig: str | None = None
-    """rig file of the logs: a path, or the name of one in config/rigs"""
-    chambers: tuple[str, ...] | None = None
-    """chamber of each seal"""
-    namespace: str = ''
-    """of a bag: use only topics below it"""
-    slowest: float | None = None
-    """[m/s] see `Sliding`"""
-    largest_acceleration: float | None = None
-    """[m/s^2] see `Sliding`"""
+    rig: str | None = None  # rig file of the logs: a path, or the name of one in config/rigs
+    chambers: tuple[str, ...] | None = None  # chamber of each seal
+    namespace: str = ''  # of a bag: use only topics below it
+    slowest: float | None = None  # [m/s] see `Sliding`
+    largest_acceleration: float | None = None  # [m/s^2] see `Sliding`
 
 
 class DataFile(NamedTuple):
@@ -61,15 +56,11 @@ class Source(NamedTuple):
     """Contents of one source: either a log, or manual readings."""
 
     file: DataFile
-    chambers: tuple[str, ...] | None
-    """chamber of each seal; None if unknown"""
+    chambers: tuple[str, ...] | None  # chamber of each seal; None if unknown
     log: RecordedLog | None = None
-    manual: tuple[ManualReadings, ManualReadings] | None = None
-    """running and breakaway friction"""
-    seal_document: Mapping[str, Any] | None = None
-    """seal file inside a bag or a data sheet"""
-    remarks: tuple[str, ...] = ()
-    """assumptions that neither the source nor an option states"""
+    manual: tuple[ManualReadings, ManualReadings] | None = None  # running and breakaway friction
+    seal_document: Mapping[str, Any] | None = None  # seal file inside a bag or a data sheet
+    remarks: tuple[str, ...] = ()  # assumptions that neither the source nor an option states
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +68,7 @@ class Sources:
     """Contents of all sources."""
 
     each: tuple[Source, ...]
-    chambers: tuple[str, ...]
-    """chamber of each seal"""
+    chambers: tuple[str, ...]  # chamber of each seal
     remarks: tuple[str, ...]
 
     @property

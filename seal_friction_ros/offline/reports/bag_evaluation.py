@@ -40,45 +40,29 @@ _HARMLESS = int(Status.OUTSIDE_IDENTIFIED_RANGE)  # the inputs are good, the law
 class Event(NamedTuple):
     """One steady stroke, or one start from rest."""
 
-    direction: int
-    """-1 or 1"""
-    pressure: float
-    """[Pa, gauge]"""
-    force_sum: float
-    """[N] signed: mean of a stroke, peak of a start"""
-    estimated: float
-    """[N] Coulomb friction of a stroke, breakaway force of a start"""
-    std: float
-    """[N] one standard deviation of the Coulomb friction"""
+    direction: int  # -1 or 1
+    pressure: float  # [Pa, gauge]
+    force_sum: float  # [N] signed: mean of a stroke, peak of a start
+    estimated: float  # [N] Coulomb friction of a stroke, breakaway force of a start
+    std: float  # [N] one standard deviation of the Coulomb friction
     samples: int
-    first: int
-    """index of the first estimate"""
-    last: int
-    """index of the last estimate"""
+    first: int  # index of the first estimate
+    last: int  # index of the last estimate
 
 
 @dataclass(frozen=True)
 class PressureLevel:
     """Measured against estimated friction at one pressure: sliding or breakaway."""
 
-    pressure: float
-    """[Pa, gauge] mean"""
-    measured: float
-    """[N]"""
-    measured_spread: float | None
-    """[N] standard deviation between events, offset removed; None with too few events"""
-    offset: float | None
-    """[N] removed offset: mean force sum of the two directions; None with one direction"""
-    estimated: float
-    """[N]"""
-    estimated_std: float
-    """[N]"""
-    deviation: float
-    """[N] estimated minus measured"""
-    deviation_percent: float | None
-    """[%] of the measured friction; None where this is not above 0 N"""
-    in_band: int
-    """events with their own reading in the 95 % band of the estimate"""
+    pressure: float  # [Pa, gauge] mean
+    measured: float  # [N]
+    measured_spread: float | None  # [N] standard deviation between events, offset removed; None with too few events
+    offset: float | None  # [N] removed offset: mean force sum of the two directions; None with one direction
+    estimated: float  # [N]
+    estimated_std: float  # [N]
+    deviation: float  # [N] estimated minus measured
+    deviation_percent: float | None  # [%] of the measured friction; None where this is not above 0 N
+    in_band: int  # events with their own reading in the 95 % band of the estimate
     samples: int
     events: tuple[Event, ...]
 
@@ -107,20 +91,13 @@ class BagEvaluation:
 
     friction: FrictionByPressure
     estimates: int
-    start: int
-    """[ns]"""
-    duration: float
-    """[s] from the first stamp to the last"""
-    rates: dict[str, float]
-    """topic -> messages per second of this duration"""
-    state_shares: dict[str, float]
-    """state -> share of the time"""
-    status_counts: dict[str, int]
-    """bit -> number of estimates with it"""
-    flagged: int
-    """number of estimates with any status bit"""
-    input_age: dict[str, float]
-    """quantiles [s] of the age of the inputs; empty if an input is missing throughout"""
+    start: int  # [ns]
+    duration: float  # [s] from the first stamp to the last
+    rates: dict[str, float]  # topic -> messages per second of this duration
+    state_shares: dict[str, float]  # state -> share of the time
+    status_counts: dict[str, int]  # bit -> number of estimates with it
+    flagged: int  # number of estimates with any status bit
+    input_age: dict[str, float]  # quantiles [s] of the age of the inputs; empty if an input is missing throughout
 
 
 # -- evaluation -------------------------------------------------------------------------------------------------------

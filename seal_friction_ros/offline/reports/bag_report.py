@@ -142,13 +142,11 @@ def _run_tables(run: RecordedRun, evaluation: BagEvaluation) -> dict[str, Table]
 class _ShownConfiguration(NamedTuple):
     """One configuration of the bag; only ``text`` if it cannot be parsed."""
 
-    time: float
-    """[s] since the first estimate"""
+    time: float  # [s] since the first estimate
     text: str
     seal_table: Table | None = None
     setting_table: Table | None = None
-    seals: Sequence[str] = ()
-    """JSON of each different seal"""
+    seals: Sequence[str] = ()  # JSON of each different seal
 
 
 def _shown_configurations(run: RecordedRun) -> Iterator[_ShownConfiguration]:

@@ -52,8 +52,7 @@ _STYLE = {
 class Plot(NamedTuple):
     """One figure of a page."""
 
-    name: str
-    """file name without suffix, and id on the page"""
+    name: str  # file name without suffix, and id on the page
     figure: Figure
 
 

@@ -31,8 +31,7 @@ class Table(NamedTuple):
 
     heads: Sequence[str]
     rows: Sequence[Sequence[Any]]
-    text_columns: Sequence[int] = ()
-    """columns that hold text, which is aligned left; the others hold numbers"""
+    text_columns: Sequence[int] = ()  # columns that hold text, which is aligned left; the others hold numbers
 
 
 def table_of(records: Iterable[Any], columns: Columns, text_columns: Sequence[int] = ()) -> Table:
@@ -47,8 +46,7 @@ class ReportSummary:
 
     page: Path
     figures: tuple[Path, ...]
-    numbers: dict[str, Any]
-    """plain types for JSON; None for a missing number"""
+    numbers: dict[str, Any]  # plain types for JSON; None for a missing number
 
 
 def parameter_rows(record: Any, prefix: str = '') -> list[tuple[Any, ...]]:

@@ -47,10 +47,8 @@ class ChartsSummary:
     figures: tuple[Path, ...]
     seal: str
     seal_count: int
-    pressures: tuple[float, ...]
-    """[Pa, gauge]"""
-    coulomb_friction: tuple[float, ...]
-    """[N] of all ``seal_count`` seals, at each of ``pressures``"""
+    pressures: tuple[float, ...]  # [Pa, gauge]
+    coulomb_friction: tuple[float, ...]  # [N] of all ``seal_count`` seals, at each of ``pressures``
     measured: tuple[float, ...]
     """[N] mean dynamic friction of the tests of the thesis at each of ``pressures``; empty for another seal"""
 

@@ -29,16 +29,11 @@ SHOWN_PERIODS = 2  # in the figures
 class ServoTracking:
     """Tracking of one servo."""
 
-    rms: float
-    """[m] root mean square of the tracking error"""
-    peak: float
-    """[m] largest tracking error"""
-    reached: float
-    """[m] amplitude of the rod"""
-    dwell: float
-    """[s] mean rest per reversal; the simulated rod rests at exactly 0 m/s"""
-    dwell_share: float
-    """[-] of a period"""
+    rms: float  # [m] root mean square of the tracking error
+    peak: float  # [m] largest tracking error
+    reached: float  # [m] amplitude of the rod
+    dwell: float  # [s] mean rest per reversal; the simulated rod rests at exactly 0 m/s
+    dwell_share: float  # [-] of a period
 
 
 @dataclass(frozen=True)
@@ -47,10 +42,8 @@ class ServoChartsSummary:
 
     page: Path
     figures: tuple[Path, ...]
-    amplitude: float
-    """[m] of the reference"""
-    frequency: float
-    """[Hz] of the reference"""
+    amplitude: float  # [m] of the reference
+    frequency: float  # [Hz] of the reference
     seals: int
     with_friction: ServoTracking
     without_friction: ServoTracking
@@ -59,10 +52,8 @@ class ServoChartsSummary:
 class FollowedWave(NamedTuple):
     """A settled servo that follows a wave; all arrays of shape (n,)."""
 
-    time: FloatArray
-    """[s] since the first sample"""
-    reference: FloatArray
-    """[m]"""
+    time: FloatArray  # [s] since the first sample
+    reference: FloatArray  # [m]
     trajectory: Trajectory
     tracking: ServoTracking
 

@@ -30,54 +30,33 @@ SAME = 0.05  # periods, amplitudes and shapes that differ by a smaller share are
 class Periodicity(NamedTuple):
     """Period of a reference."""
 
-    period: float
-    """[s]"""
-    crossings: FloatArray
-    """[s] since the first sample: upward crossings of a level slightly above the middle"""
+    period: float  # [s]
+    crossings: FloatArray  # [s] since the first sample: upward crossings of a level slightly above the middle
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingStretch:
     """Tracking over a stretch of unchanged configuration, without the settling time."""
 
-    first: int
-    """index of the first evaluated estimate"""
-    last: int
-    """index of the last evaluated estimate"""
-    start: float
-    """[s] time of the first, since the first estimate of the bag"""
-    end: float
-    """[s] time of the last"""
-    settling: float
-    """[s] left out before"""
-    settings: FeedForwardSettings | None
-    """None if they are not in the bag"""
-    standstill: float
-    """[m/s] speed at and below which the rod rests: ``stick_velocity`` of the estimator"""
-    samples: int
-    """evaluated estimates: those with reference and position"""
-    amplitude: float
-    """[m] of the reference, half peak to peak"""
-    period: float | None
-    """[s] of the reference; None if it is not periodic"""
-    rms: float
-    """[m] root mean square of the tracking error"""
-    peak: float
-    """[m] largest tracking error"""
-    reversals: int
-    """changes of direction of the rod"""
-    dwell: float | None
-    """[s] mean rest per reversal of the rod; None if it does not reverse"""
-    reference_dwell: float | None
-    """[s] the same of the reference, which also passes through standstill"""
-    not_sliding: float | None
-    """[-] share of the estimates of known state that do not slide"""
-    feedforward_peak: float
-    """[N] largest feed-forward; 0.0 without"""
-    rms_change: float | None = None
-    """[%] against the first stretch without feed-forward; None if the reference differs"""
-    dwell_change: float | None = None
-    """[%] the same of the dwell"""
+    first: int  # index of the first evaluated estimate
+    last: int  # index of the last evaluated estimate
+    start: float  # [s] time of the first, since the first estimate of the bag
+    end: float  # [s] time of the last
+    settling: float  # [s] left out before
+    settings: FeedForwardSettings | None  # None if they are not in the bag
+    standstill: float  # [m/s] speed at and below which the rod rests: ``stick_velocity`` of the estimator
+    samples: int  # evaluated estimates: those with reference and position
+    amplitude: float  # [m] of the reference, half peak to peak
+    period: float | None  # [s] of the reference; None if it is not periodic
+    rms: float  # [m] root mean square of the tracking error
+    peak: float  # [m] largest tracking error
+    reversals: int  # changes of direction of the rod
+    dwell: float | None  # [s] mean rest per reversal of the rod; None if it does not reverse
+    reference_dwell: float | None  # [s] the same of the reference, which also passes through standstill
+    not_sliding: float | None  # [-] share of the estimates of known state that do not slide
+    feedforward_peak: float  # [N] largest feed-forward; 0.0 without
+    rms_change: float | None = None  # [%] against the first stretch without feed-forward; None if the reference differs
+    dwell_change: float | None = None  # [%] the same of the dwell
 
     @property
     def has_feedforward(self) -> bool:
@@ -90,8 +69,7 @@ class TrackingEvaluation:
     """Tracking in every stretch of a bag."""
 
     stretches: tuple[TrackingStretch, ...]
-    notes: tuple[str, ...]
-    """notes for the reader"""
+    notes: tuple[str, ...]  # notes for the reader
 
     @property
     def without(self) -> TrackingStretch | None:

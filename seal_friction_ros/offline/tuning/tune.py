@@ -48,10 +48,8 @@ class TuningTask(NamedTuple):
     source: str
     motion: str
     seals: str
-    before: FeedForwardSettings
-    """settings before the tuning"""
-    tuned: tuple[str, ...]
-    """names of the tuned parameters; the others are unchanged"""
+    before: FeedForwardSettings  # settings before the tuning
+    tuned: tuple[str, ...]  # names of the tuned parameters; the others are unchanged
 
 
 class RecordedTrack(NamedTuple):
@@ -118,8 +116,7 @@ class SimulatorTuning:
 class BagTuning:
     """Result of a tuning on a bag of a real axis."""
 
-    bag: str
-    """name of the bag"""
+    bag: str  # name of the bag
     task: TuningTask
     recording: Recording
     track: RecordedTrack

@@ -21,8 +21,7 @@ class Law(CheckedParameters):
     """
 
     function: ClassVar[Callable[..., float]]
-    bound: Bound = dataclasses.field(init=False, repr=False, compare=False)
-    """the function of the two arguments alone"""
+    bound: Bound = dataclasses.field(init=False, repr=False, compare=False)  # the function of the two arguments alone
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -44,14 +43,10 @@ class Law(CheckedParameters):
 class TypicalReading(NamedTuple):
     """Sizes that occur in a set of readings, for the first guess of a fit."""
 
-    friction: float
-    """[N] mean, of one seal"""
-    pressure: float
-    """[Pa] highest"""
-    speed: float
-    """[m/s] highest"""
-    normal_force: float
-    """[N] mean, of one seal; NaN where the geometry is not known"""
+    friction: float  # [N] mean, of one seal
+    pressure: float  # [Pa] highest
+    speed: float  # [m/s] highest
+    normal_force: float  # [N] mean, of one seal; NaN where the geometry is not known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,12 +57,9 @@ class FrictionLaw(Law):
     speed, and a seal with such a law has no velocity terms.
     """
 
-    NAME: ClassVar[str]
-    """name in a seal file"""
-    FORMULA: ClassVar[str]
-    """for people"""
-    PART: ClassVar[str] = ''
-    """key of the seal file that holds its parameters; empty: the name of the law"""
+    NAME: ClassVar[str]  # name in a seal file
+    FORMULA: ClassVar[str]  # for people
+    PART: ClassVar[str] = ''  # key of the seal file that holds its parameters; empty: the name of the law
     FITTED_PART: ClassVar[tuple[str, type[Law]] | None] = None
     """field that identification fits, and the law that it fits there; None: the parameters of the law itself"""
 
