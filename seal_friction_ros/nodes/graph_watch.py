@@ -16,14 +16,10 @@ from seal_friction_ros.nodes import qos
 class GraphFindings(NamedTuple):
     """State of the graph; the texts name topic, node and reason."""
 
-    publisher_counts: dict[str, int]
-    """input -> number of its publishers"""
-    duplicates: list[str]
-    """topics with several publishers"""
-    unheard: list[str]
-    """publishers and subscribers that cannot exchange messages with this node"""
-    best_effort: dict[str, str]
-    """input received with best effort -> node that publishes it"""
+    publisher_counts: dict[str, int]  # input -> number of its publishers
+    duplicates: list[str]  # topics with several publishers
+    unheard: list[str]  # publishers and subscribers that cannot exchange messages with this node
+    best_effort: dict[str, str]  # input received with best effort -> node that publishes it
 
 
 class GraphWatch:

@@ -105,16 +105,11 @@ class UnsuitedError(Exception):
 class Messages(NamedTuple):
     """Serialised messages in order of receipt, n of them."""
 
-    data: Bytes
-    """all their bytes, and others between them"""
-    kinds: Bytes
-    """`Kind` of each, shape (n,)"""
-    offsets: Integers
-    """where each begins in ``data``, shape (n,)"""
-    sizes: Integers
-    """[bytes] shape (n,)"""
-    received: Integers
-    """[ns] log time of each, shape (n,)"""
+    data: Bytes  # all their bytes, and others between them
+    kinds: Bytes  # `Kind` of each, shape (n,)
+    offsets: Integers  # where each begins in ``data``, shape (n,)
+    sizes: Integers  # [bytes] shape (n,)
+    received: Integers  # [ns] log time of each, shape (n,)
 
     def taken(self, first: int, end: int) -> 'Messages':
         """The messages from number ``first`` to before number ``end``."""
@@ -143,15 +138,11 @@ class _Outbox(NamedTuple):
     small: Any
     words: Any
     numbers: Any
-    offsets: Any
-    """of the estimate and the feed-forward to each message, shape (2, n); likewise"""
+    offsets: Any  # of the estimate and the feed-forward to each message, shape (2, n); likewise
     sizes: Any
-    cursor: Any
-    """[bytes] used so far, shape (1,)"""
-    row: Any
-    """an answer as numbers, shape (16,)"""
-    data: Any
-    """the messages, whose stamps and frame names the answers take over"""
+    cursor: Any  # [bytes] used so far, shape (1,)
+    row: Any  # an answer as numbers, shape (16,)
+    data: Any  # the messages, whose stamps and frame names the answers take over
     message_offsets: Any
     received: Any
 

@@ -35,32 +35,19 @@ SHORT_WAY = 8.0  # [-] a reversal after a way of less than this multiple of h wi
 class ConditionedVelocity(NamedTuple):
     """Result and memory of `condition_velocity`."""
 
-    stamp: int
-    """[ns] of the last sample; `NEVER` before the first"""
-    velocity: float
-    """[m/s] the result"""
-    half_width: float
-    """[m] h; 0.0 for a clean signal"""
-    ripple: float
-    """[m/s] of the velocity as it was given, in one sample; 0.0 for a clean signal"""
-    smoothing: float
-    """[s] time constant with which the velocity was smoothed"""
-    is_waiting: bool
-    """whether the speed is falling because no push has come: the signal slows down or is at rest"""
-    last_velocity: float
-    """[m/s] of the last sample, as given"""
-    last_change: float
-    """[m/s] last change of the given velocity"""
-    last_ripple: float
-    """[m] last half-width that a ripple asked for"""
-    slack: float
-    """[m] place in the play, between -h and h"""
-    last_push: int
-    """[ns] stamp of the last push"""
-    way: float
-    """[m] pushed since the last reversal, with its sign"""
-    samples: int
-    """number of samples, counted up to `SETTLING`"""
+    stamp: int  # [ns] of the last sample; `NEVER` before the first
+    velocity: float  # [m/s] the result
+    half_width: float  # [m] h; 0.0 for a clean signal
+    ripple: float  # [m/s] of the velocity as it was given, in one sample; 0.0 for a clean signal
+    smoothing: float  # [s] time constant with which the velocity was smoothed
+    is_waiting: bool  # whether the speed is falling because no push has come: the signal slows down or is at rest
+    last_velocity: float  # [m/s] of the last sample, as given
+    last_change: float  # [m/s] last change of the given velocity
+    last_ripple: float  # [m] last half-width that a ripple asked for
+    slack: float  # [m] place in the play, between -h and h
+    last_push: int  # [ns] stamp of the last push
+    way: float  # [m] pushed since the last reversal, with its sign
+    samples: int  # number of samples, counted up to `SETTLING`
 
 
 NOT_CONDITIONED = ConditionedVelocity(NEVER, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0.0, 0.0, NEVER, 0.0, 0)

@@ -85,8 +85,7 @@ class Snapshot(NamedTuple):
 
     configuration: Configuration
     state: PipelineState
-    version: int = ALGORITHM_VERSION
-    """of the algorithm that recorded it"""
+    version: int = ALGORITHM_VERSION  # of the algorithm that recorded it
 
 
 def first_snapshot(configuration: Configuration) -> Snapshot:

@@ -144,10 +144,8 @@ class EstimatorParameters:
 class Speed(NamedTuple):
     """One rod velocity."""
 
-    stamp: int
-    """[ns]"""
-    velocity: float
-    """[m/s]"""
+    stamp: int  # [ns]
+    velocity: float  # [m/s]
 
 
 NO_SPEED = Speed(NEVER, 0.0)
@@ -156,36 +154,24 @@ NO_SPEED = Speed(NEVER, 0.0)
 class EstimatorState(NamedTuple):
     """What one step leaves for the next."""
 
-    stamp: int
-    """[ns] of the last velocity sample; `NEVER` before the first"""
+    stamp: int  # [ns] of the last velocity sample; `NEVER` before the first
     at_rest: bool
-    pressure: Pressure
-    """last usable pressure"""
-    force: Force
-    """last usable force sum"""
-    velocity: Speed
-    """last usable velocity"""
-    leapt_pressure: Pressure
-    """newest pressure, if it jumped away from the last usable one"""
-    leapt_force: Force
-    """likewise"""
-    leapt_velocity: Speed
-    """likewise"""
-    motion: ConditionedVelocity
-    """of the usable velocities"""
+    pressure: Pressure  # last usable pressure
+    force: Force  # last usable force sum
+    velocity: Speed  # last usable velocity
+    leapt_pressure: Pressure  # newest pressure, if it jumped away from the last usable one
+    leapt_force: Force  # likewise
+    leapt_velocity: Speed  # likewise
+    motion: ConditionedVelocity  # of the usable velocities
 
 
 class Observation(NamedTuple):
     """One sample after the checks, before any friction is computed."""
 
-    stamp: int
-    """[ns]"""
-    velocity: float
-    """[m/s] at which the seals slide, conditioned; 0.0 at rest and where it is not known"""
-    status: int
-    """bits of `Status`"""
-    input_age: float
-    """[s] as in `FrictionEstimate`"""
+    stamp: int  # [ns]
+    velocity: float  # [m/s] at which the seals slide, conditioned; 0.0 at rest and where it is not known
+    status: int  # bits of `Status`
+    input_age: float  # [s] as in `FrictionEstimate`
 
 
 def init(parameters: EstimatorParameters) -> EstimatorState:

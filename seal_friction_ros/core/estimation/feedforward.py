@@ -103,12 +103,9 @@ class FeedForwardSettings:
 class WantedMotion(NamedTuple):
     """Motion of the rod that the feed-forward compensates for, conditioned."""
 
-    velocity: float
-    """[m/s] NaN: not known"""
-    acceleration: float
-    """[m/s^2] for ``lead_time``; 0.0 if it is not known"""
-    ripple: float
-    """[m/s] ripple of the velocity as it was given; 0.0 for a clean signal"""
+    velocity: float  # [m/s] NaN: not known
+    acceleration: float  # [m/s^2] for ``lead_time``; 0.0 if it is not known
+    ripple: float  # [m/s] ripple of the velocity as it was given; 0.0 for a clean signal
 
 
 NO_MOTION = WantedMotion(math.nan, 0.0, 0.0)
@@ -117,29 +114,20 @@ NO_MOTION = WantedMotion(math.nan, 0.0, 0.0)
 class FeedForwardState(NamedTuple):
     """What one step leaves for the next."""
 
-    received: int
-    """[ns] time of the last step; `NEVER` before the first"""
-    force: float
-    """[N] before the fade"""
-    fade: float
-    """[-] 0: faded out, 1: not faded"""
-    friction: float
-    """[N] f of the last usable estimate; negative before the first"""
-    velocity: float
-    """[m/s] last usable wanted velocity"""
+    received: int  # [ns] time of the last step; `NEVER` before the first
+    force: float  # [N] before the fade
+    fade: float  # [-] 0: faded out, 1: not faded
+    friction: float  # [N] f of the last usable estimate; negative before the first
+    velocity: float  # [m/s] last usable wanted velocity
 
 
 class FeedForward(NamedTuple):
     """Compensation at one moment. Every number is finite, whatever came in."""
 
-    stamp: int
-    """[ns]"""
-    force: float
-    """[N] positive on extension"""
-    scale: float
-    """[-] share of the estimated friction that is compensated"""
-    limited: int
-    """bits of `Limited`"""
+    stamp: int  # [ns]
+    force: float  # [N] positive on extension
+    scale: float  # [-] share of the estimated friction that is compensated
+    limited: int  # bits of `Limited`
 
 
 FADED_OUT = FeedForwardState(NEVER, 0.0, 0.0, -1.0, 0.0)

@@ -58,12 +58,9 @@ class Layout(NamedTuple):
     """A message with a header: stamp and frame name, then numbers."""
 
     message_type: str
-    record: type
-    """named tuple: the stamp [ns], the numbers in the order of the message, and for some the frame name"""
-    codes: str
-    """type of each number as of `struct`: d float64, I uint32, B uint8, b int8"""
-    check: Callable[[Any], object] = bool
-    """raises ValueError for a record that is not valid"""
+    record: type  # named tuple: the stamp [ns], the numbers in the order of the message, and for some the frame name
+    codes: str  # type of each number as of `struct`: d float64, I uint32, B uint8, b int8
+    check: Callable[[Any], object] = bool  # raises ValueError for a record that is not valid
 
     @property
     def fields(self) -> tuple[str, ...]:

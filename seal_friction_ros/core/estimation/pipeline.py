@@ -77,10 +77,8 @@ class Reference(NamedTuple):
     """What is kept of the references."""
 
     velocity: ConditionedVelocity
-    acceleration: float
-    """[m/s^2] smoothed like the velocity"""
-    last_acceleration: float
-    """[m/s^2] of the last reference, as given"""
+    acceleration: float  # [m/s^2] smoothed like the velocity
+    last_acceleration: float  # [m/s^2] of the last reference, as given
 
 
 NO_REFERENCE = Reference(NOT_CONDITIONED, 0.0, 0.0)
@@ -100,16 +98,13 @@ class PipelineState(NamedTuple):
 
     estimator: EstimatorState
     feedforward: FeedForwardState
-    friction: float = -1.0
-    """[N] of the newest usable estimate; negative: the newest is not usable"""
+    friction: float = -1.0  # [N] of the newest usable estimate; negative: the newest is not usable
     pressure: Pressure = NO_PRESSURE
     force: Force = NO_FORCE
     reference: Reference = NO_REFERENCE
     receipt: ReceiptTimes = ReceiptTimes()
-    refused: bool = False
-    """whether no input may act: one has several publishers, or the node is stopping"""
-    clock_offset: int = 0
-    """[ns] what the clock of the stamps shows after the clock of receipt"""
+    refused: bool = False  # whether no input may act: one has several publishers, or the node is stopping
+    clock_offset: int = 0  # [ns] what the clock of the stamps shows after the clock of receipt
 
 
 def init(parameters: PipelineParameters) -> PipelineState:

@@ -39,21 +39,16 @@ class Status(IntFlag):
 class Pressure(NamedTuple):
     """One cylinder-pressure sample."""
 
-    stamp: int
-    """[ns]"""
-    chamber_a: float
-    """[Pa, gauge]"""
-    chamber_b: float
-    """[Pa, gauge]"""
+    stamp: int  # [ns]
+    chamber_a: float  # [Pa, gauge]
+    chamber_b: float  # [Pa, gauge]
 
 
 class Force(NamedTuple):
     """One force-sum sample: every axial force on the moving mass except seal friction."""
 
-    stamp: int
-    """[ns]"""
-    force: float
-    """[N] positive on extension"""
+    stamp: int  # [ns]
+    force: float  # [N] positive on extension
 
 
 NO_PRESSURE = Pressure(NEVER, 0.0, 0.0)
@@ -63,85 +58,59 @@ NO_FORCE = Force(NEVER, 0.0)
 class Velocity(NamedTuple):
     """One rod-velocity sample."""
 
-    stamp: int
-    """[ns]"""
-    velocity: float
-    """[m/s] positive on extension"""
-    frame_id: Any = b''
-    """bytes; in compiled code the number of the message"""
+    stamp: int  # [ns]
+    velocity: float  # [m/s] positive on extension
+    frame_id: Any = b''  # bytes; in compiled code the number of the message
 
 
 class Position(NamedTuple):
     """One rod-position sample."""
 
-    stamp: int
-    """[ns]"""
-    position: float
-    """[m]"""
+    stamp: int  # [ns]
+    position: float  # [m]
 
 
 class ServoReference(NamedTuple):
     """Motion that the servo shall make at one moment."""
 
-    stamp: int
-    """[ns]"""
-    position: float
-    """[m]"""
-    velocity: float
-    """[m/s]"""
-    acceleration: float
-    """[m/s^2] 0.0 if it is not known"""
-    frame_id: Any = b''
-    """bytes; in compiled code the number of the message"""
+    stamp: int  # [ns]
+    position: float  # [m]
+    velocity: float  # [m/s]
+    acceleration: float  # [m/s^2] 0.0 if it is not known
+    frame_id: Any = b''  # bytes; in compiled code the number of the message
 
 
 class WatchdogTick(NamedTuple):
     """The watchdog of the node acts: there is a force, and no velocity sample has renewed it."""
 
-    stamp: int
-    """[ns] when it acts, on the clock of receipt"""
-    idle_time: float
-    """[s] since the last feed-forward"""
-    frame_id: Any = b''
-    """bytes; in compiled code the number of the message"""
+    stamp: int  # [ns] when it acts, on the clock of receipt
+    idle_time: float  # [s] since the last feed-forward
+    frame_id: Any = b''  # bytes; in compiled code the number of the message
 
 
 class RodSample(NamedTuple):
     """One rod-velocity sample with the newest pressure and force sum received before it."""
 
-    stamp: int
-    """[ns]"""
-    velocity: float
-    """[m/s] positive on extension"""
+    stamp: int  # [ns]
+    velocity: float  # [m/s] positive on extension
     pressure: Pressure
     force: Force
-    refused: bool = False
-    """whether an input has several publishers, so that none may act"""
-    stamp_age: float = 0.0
-    """[s] time of receipt after the stamp; negative for a stamp in the future"""
+    refused: bool = False  # whether an input has several publishers, so that none may act
+    stamp_age: float = 0.0  # [s] time of receipt after the stamp; negative for a stamp in the future
 
 
 class FrictionEstimate(NamedTuple):
     """Friction of the seals at one rod-velocity sample. Every number is finite for any input."""
 
-    stamp: int
-    """[ns] of the velocity sample"""
-    coulomb_friction: float
-    """[N] magnitude of the friction of all seals while sliding"""
-    coulomb_friction_std: float
-    """[N] one standard deviation, for a new reading"""
-    breakaway_force: float
-    """[N] at least ``coulomb_friction``"""
-    friction_force: float
-    """[N] ``m a = force_sum - friction_force``"""
-    state: int
-    """a `FrictionState`"""
-    direction: int
-    """-1, 0 or 1"""
-    status: int
-    """bits of `Status`"""
-    input_age: float
-    """[s] age of the older of pressure and force in use; -1.0 while one is missing"""
+    stamp: int  # [ns] of the velocity sample
+    coulomb_friction: float  # [N] magnitude of the friction of all seals while sliding
+    coulomb_friction_std: float  # [N] one standard deviation, for a new reading
+    breakaway_force: float  # [N] at least ``coulomb_friction``
+    friction_force: float  # [N] ``m a = force_sum - friction_force``
+    state: int  # a `FrictionState`
+    direction: int  # -1, 0 or 1
+    status: int  # bits of `Status`
+    input_age: float  # [s] age of the older of pressure and force in use; -1.0 while one is missing
 
 
 NO_ESTIMATE = FrictionEstimate(NEVER, 0.0, 0.0, 0.0, 0.0, UNKNOWN, 0, 0, -1.0)

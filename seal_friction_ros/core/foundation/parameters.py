@@ -9,7 +9,7 @@ import difflib
 import math
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 Record = TypeVar('Record')
 
@@ -23,33 +23,18 @@ class Meaning:
     lower: float | None = None
     upper: float | None = None
     live: bool = True
-    symbol: str = ''
-    """in an equation"""
-    start: Callable[[Any], float] | None = None
-    """first guess of a fit, from a `TypicalReading`; None: never fitted"""
-    fit_bounds: tuple[float, float] | None = None
-    """bounds of a fit, where they are narrower"""
+    symbol: str = ''  # in an equation
+    start: Callable[[Any], float] | None = None  # first guess of a fit, from a `TypicalReading`; None: never fitted
+    fit_bounds: tuple[float, float] | None = None  # bounds of a fit, where they are narrower
 
     def bounds_text(self) -> str:
         """Bounds as text, for example ``0.0 to 1.0``; empty without bounds."""
         return '' if self.lower is None and self.upper is None else f'{self.lower} to {self.upper}'
 
 
-def parameter(
-    default: Any = dataclasses.MISSING,
-    *,
-    unit: str,
-    description: str,
-    lower: float | None = None,
-    upper: float | None = None,
-    live: bool = True,
-    symbol: str = '',
-    start: Callable[[Any], float] | None = None,
-    fit_bounds: tuple[float, float] | None = None,
-) -> Any:
-    """Dataclass field with its `Meaning`; both bounds are included."""
-    meaning = Meaning(unit, description, lower, upper, live, symbol, start, fit_bounds)
-    return dataclasses.field(default=default, metadata={'meaning': meaning})
+def parameter(default: Any = dataclasses.MISSING, **meaning: Any) -> Any:
+    """Dataclass field with its `Meaning`, whose fields are the keyword arguments; both bounds are included."""
+    return dataclasses.field(default=default, metadata={'meaning': Meaning(**meaning)})
 
 
 def meanings(record: Any) -> dict[str, Meaning]:
@@ -61,10 +46,8 @@ class ParameterGroup(NamedTuple):
     """Parameters of a node that one dataclass declares."""
 
     record_type: type
-    prefix: str = ''
-    """start of each parameter name, with its dot"""
-    live: bool = True
-    """False: no parameter of the group can change while the node is configured"""
+    prefix: str = ''  # start of each parameter name, with its dot
+    live: bool = True  # False: no parameter of the group can change while the node is configured
 
     def names(self) -> dict[str, str]:
         """Name of each parameter -> field of the dataclass."""
@@ -131,7 +114,7 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
     """
     if not isinstance(values, Mapping):
         raise ValueError(f'{where} is not a mapping of names to values but {values!r}')
-    fields = {f.name: f for f in _fields(record_type) if f.init and f.name not in made}
+    fields = {f.name: f for f in dataclasses.fields(cast(Any, record_type)) if f.init and f.name not in made}
     check_names(values, fields, where)
     missing = [n for n, f in fields.items() if n not in values and f.default is dataclasses.MISSING]
     if missing:
@@ -196,10 +179,6 @@ def printable(name: Any) -> str:
     """An untrusted name as text without line breaks and control characters, for a one-line error message."""
     text = str(name)
     return text if text.isprintable() else repr(text)
-
-
-def _fields(record_type: Any) -> tuple[dataclasses.Field[Any], ...]:
-    return dataclasses.fields(record_type)
 
 
 _TYPE_NAMES = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text'}

@@ -7,31 +7,14 @@ BAR, MPA = 1.0e5, 1.0e6  # [Pa]
 MM, UM = 1e-3, 1e-6  # [m]
 MS = 1e-3  # [s]
 
-UNITS: dict[str, float] = {
-    '1': 1.0,
-    's': 1.0,
-    'ms': MS,
-    'us': 1e-6,
-    'ns': 1e-9,
-    'm': 1.0,
-    'mm': MM,
-    'um': UM,
-    'in': INCH,
-    'm/s': 1.0,
-    'mm/s': MM,
-    'in/s': INCH,
-    'Pa': 1.0,
-    'kPa': 1e3,
-    'MPa': MPA,
-    'bar': BAR,
-    'psi': PSI,
-    'N': 1.0,
-    'kN': 1e3,
-    'lbf': LBF,
-    'm2': 1.0,
-    'mm2': MM**2,
-    'in2': INCH**2,
-}
+UNITS: dict[str, float] = (
+    {'1': 1.0, 's': 1.0, 'ms': MS, 'us': 1e-6, 'ns': 1e-9}
+    | {'m': 1.0, 'mm': MM, 'um': UM, 'in': INCH}
+    | {'m/s': 1.0, 'mm/s': MM, 'in/s': INCH}
+    | {'Pa': 1.0, 'kPa': 1e3, 'MPa': MPA, 'bar': BAR, 'psi': PSI}
+    | {'N': 1.0, 'kN': 1e3, 'lbf': LBF}
+    | {'m2': 1.0, 'mm2': MM**2, 'in2': INCH**2}
+)
 """Name of a unit -> its size in SI."""
 
 

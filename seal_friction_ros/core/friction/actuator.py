@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import Bound, compilable, evaluate, unrolled
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import (
@@ -17,20 +17,13 @@ from seal_friction_ros.core.friction.laws.velocity_terms import (
 
 
 @dataclass(frozen=True)
-class Uncertainty:
-    """How far a new reading of the Coulomb friction of one seal may be off: std^2 = (relative f_c)^2 + absolute^2.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class Uncertainty(CheckedParameters):
+    """How far a new reading of the Coulomb friction of one seal may be off: std^2 = (relative f_c)^2 + absolute^2."""
 
     relative_std: float = parameter(
         unit='1', lower=0.0, upper=10.0, description='Part that is a share of the friction.'
     )
     absolute_std: float = parameter(0.0, unit='N', lower=0.0, upper=1e6, description='Part that does not scale.')
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def std(self, friction: float) -> float:
         """Standard deviation [N] at a Coulomb friction of ``friction`` [N]."""
@@ -38,7 +31,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seal:
+class Seal(CheckedParameters):
     """One seal: its friction law, its breakaway force, its uncertainty, and the range in which it was identified.
 
     Breakaway force is (1 + ``stiction_ratio``) f_c + ``stiction``.
@@ -62,7 +55,7 @@ class Seal:
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.coulomb_law.depends_on_speed and self.velocity_terms:
             raise ValueError(
                 f'Seal {self.name}: its {self.coulomb_law.NAME} has the velocity in it: leave out velocity_terms'
@@ -93,28 +86,21 @@ class SealNumbers(NamedTuple):
     """A mounted seal as numbers."""
 
     law: Bound
-    coulomb_speed: float
-    """[m/s] at which the Coulomb friction is taken"""
+    coulomb_speed: float  # [m/s] at which the Coulomb friction is taken
     law_depends_on_speed: bool
     velocity_terms: VelocityTermNumbers = NO_VELOCITY_TERMS
-    depends_on_velocity: bool = False
-    """whether the sliding friction differs from the Coulomb friction"""
+    depends_on_velocity: bool = False  # whether the sliding friction differs from the Coulomb friction
     is_on_chamber_a: bool = True
-    scale: float = 1.0
-    """[-] factor on all friction of the seal"""
-    stiction: float = 0.0
-    """[N]"""
+    scale: float = 1.0  # [-] factor on all friction of the seal
+    stiction: float = 0.0  # [N]
     stiction_ratio: float = 0.0
     relative_std: float = 0.0
-    absolute_variance: float = 0.0
-    """[N^2]"""
+    absolute_variance: float = 0.0  # [N^2]
     square: float = 2.0
     """the exponent of a square: a constant one the compiler turns into a product, which rounds differently from ``pow``
     in 1 of 1000 cases"""
-    pressure_low: float = -math.inf
-    """[Pa] ends of the identified range with its margin"""
-    pressure_high: float = math.inf
-    """[Pa]"""
+    pressure_low: float = -math.inf  # [Pa] ends of the identified range with its margin
+    pressure_high: float = math.inf  # [Pa]
 
 
 def numbers_of_law(law: FrictionLaw, terms: VelocityTerms | None = None) -> SealNumbers:
@@ -142,8 +128,7 @@ class MountedSeal:
 
     seal: Seal
     chamber: str
-    friction_scale: float = 1.0
-    """[-] factor on all friction of the seal, breakaway included"""
+    friction_scale: float = 1.0  # [-] factor on all friction of the seal, breakaway included
     numbers: SealNumbers = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -167,15 +152,11 @@ class MountedSeal:
 class ActuatorFriction(NamedTuple):
     """Friction of all seals of an actuator together."""
 
-    coulomb_friction: float
-    """[N]"""
-    coulomb_friction_std: float
-    """[N]"""
-    stiction: float
-    """[N]"""
+    coulomb_friction: float  # [N]
+    coulomb_friction_std: float  # [N]
+    stiction: float  # [N]
     in_identified_range: bool
-    velocity_friction: float
-    """[N] what sliding at the velocity adds to the magnitude; 0 at rest"""
+    velocity_friction: float  # [N] what sliding at the velocity adds to the magnitude; 0 at rest
 
 
 @compilable

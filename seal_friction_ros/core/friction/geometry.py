@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass
 
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True)
-class SealGeometry:
+class SealGeometry(CheckedParameters):
     """An O-ring and the ring-shaped space it is squeezed into.
 
     The space lies between an inner wall (rod, or groove of a piston) and an outer wall (gland, or bore).
@@ -26,7 +26,7 @@ class SealGeometry:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.sliding_wall not in ('rod', 'bore'):
             raise ValueError(f'SealGeometry.sliding_wall = {self.sliding_wall!r} is neither rod nor bore')
         if self.gland_diameter <= self.rod_diameter:
@@ -42,9 +42,7 @@ class SealGeometry:
 
 
 def squeeze(seal: SealGeometry) -> float:
-    """Compression of the ring section as a share of its diameter [-].
-
-    squeeze = (d - (D_gland - D_rod) / 2) / d.
+    """Compression of the ring section as a share of its diameter [-]: (d - (D_gland - D_rod) / 2) / d.
 
     Source: thesis, section 4.1.
     """
@@ -53,9 +51,7 @@ def squeeze(seal: SealGeometry) -> float:
 
 
 def projected_area(seal: SealGeometry) -> float:
-    """Area the pressure acts on in axial direction [m^2].
-
-    A_r = pi/4 (D_gland^2 - D_rod^2).
+    """Area on which the pressure acts in axial direction [m^2]: A_r = pi/4 (D_gland^2 - D_rod^2).
 
     Source: thesis, Table 1 and chapter 7.
     """
@@ -63,9 +59,7 @@ def projected_area(seal: SealGeometry) -> float:
 
 
 def contact_length(seal: SealGeometry) -> float:
-    """Circumference of the wall the ring slides on [m].
-
-    L_r = pi D_rod for a rod seal; pi D_gland where the ring slides in a bore.
+    """Circumference of the sliding wall [m]: L_r = pi D_rod, or pi D_gland where the ring slides in a bore.
 
     Source: thesis, Table 1; the bore is our addition.
     """
@@ -73,31 +67,8 @@ def contact_length(seal: SealGeometry) -> float:
 
 
 def stretch(seal: SealGeometry) -> float:
-    """Hoop strain of the ring on the inner wall [-]; negative if the ring is loose on it.
-
-    eps = (D_rod - d_i) / d_i.
+    """Hoop strain of the ring on the inner wall [-]: eps = (D_rod - d_i) / d_i; negative for a loose ring.
 
     Source: thesis, section 4.1.
     """
     return (seal.rod_diameter - seal.ring_inner_diameter) / seal.ring_inner_diameter
-
-
-def hoop_force(seal: SealGeometry) -> float:
-    """Tension along the stretched ring [N]; a loose ring has none.
-
-    T = E eps A_section, A_section = pi d^2 / 4.
-
-    Source: thesis, section 4.1 and Figure 13; no tension in a loose ring is our addition.
-    """
-    section = math.pi / 4.0 * seal.section_diameter**2
-    return seal.elastic_modulus * max(stretch(seal), 0.0) * section
-
-
-def stretch_radial_force(seal: SealGeometry) -> float:
-    """Radial force the stretched ring adds on the inner wall, summed over the circumference [N].
-
-    2 pi T, as for a hoop under internal pressure.
-
-    Source: thesis, section 4.1 and Figure 13.
-    """
-    return 2.0 * math.pi * hoop_force(seal)

@@ -69,8 +69,10 @@ def parse_seal(document: Any) -> Seal:
     if not isinstance(about, Mapping) or not _can_be_recorded(about):
         raise ValueError(f'{where}: identification is not a mapping of texts, finite numbers, and lists of them')
     uncertainty = from_mapping(Uncertainty, document.get('uncertainty'), f'{where}: uncertainty')
-    pressure_min, pressure_max = _range(document, where)
-    numbers = {'pressure_min': pressure_min, 'pressure_max': pressure_max}
+    pressures = document.get('identified_pressure')
+    if not isinstance(pressures, list | tuple) or len(pressures) != 2:
+        raise ValueError(f'{where}: identified_pressure = {pressures!r} is not a list of two pressures [Pa]')
+    numbers = {'pressure_min': pressures[0], 'pressure_max': pressures[1]}
     numbers |= {key: document[key] for key in ('stiction', 'stiction_ratio') if key in document}
     made = {'name': name, 'coulomb_law': law, 'uncertainty': uncertainty, 'velocity_terms': terms}
     return from_mapping(Seal, numbers, where, **made)
@@ -85,26 +87,6 @@ def law_document(law: FrictionLaw) -> dict[str, Any]:
     if meanings(law):
         document[law.PART or law.NAME] = _parameters(law)
     return document
-
-
-def parse_friction_coefficient(document: Mapping[str, Any], where: str) -> FrictionCoefficientLaw:
-    """Law under ``friction_coefficient`` of a document; ``where`` names the document in the error message.
-
-    Raises:
-        ValueError: It is missing or not valid.
-    """
-    law: FrictionCoefficientLaw = _part(FrictionCoefficientLaw, document, where)
-    return law
-
-
-def parse_normal_force(document: Mapping[str, Any], where: str) -> NormalForceLaw:
-    """Law under ``normal_force`` of a document; likewise.
-
-    Raises:
-        ValueError: It is missing or not valid.
-    """
-    law: NormalForceLaw = _part(NormalForceLaw, document, where)
-    return law
 
 
 def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:
@@ -131,17 +113,26 @@ def keys_of_law(law_type: type[FrictionLaw]) -> set[str]:
 
 
 def _friction_law(law_type: type[FrictionLaw], document: Mapping[str, Any], where: str) -> FrictionLaw:
-    parts = {f.name: _part(f.type, document, where) for f in _fields(law_type) if f.type in _PARTS}
+    parts = {f.name: parse_part(f.type, document, where) for f in _fields(law_type) if f.type in _PARTS}
     if 'geometry' in document and 'geometry' not in parts:  # the law does not use it, but a wrong one is still wrong
-        _part(SealGeometry, document, where)
+        parse_part(SealGeometry, document, where)
     if not meanings(law_type):
         return law_type(**parts)
     key = law_type.PART or law_type.NAME
     return from_mapping(law_type, document.get(key), f'{where}: {key}', **parts)
 
 
-def _part(part_type: Any, document: Mapping[str, Any], where: str) -> Any:
-    """Geometry, or the law that ``law`` names, from its key of a seal file."""
+def parse_part(part_type: Any, document: Mapping[str, Any], where: str) -> Any:
+    """Geometry, or the law that ``law`` names, from its key of a document.
+
+    Args:
+        part_type: `SealGeometry`, `NormalForceLaw` or `FrictionCoefficientLaw`.
+        document: Document of a seal file.
+        where: Name of the document in error messages.
+
+    Raises:
+        ValueError: The part is missing or not valid.
+    """
     key = _PARTS[part_type]
     part, where = document.get(key), f'{where}: {key}'
     if part_type not in _LAWS_OF_PART:
@@ -154,7 +145,7 @@ def _part(part_type: Any, document: Mapping[str, Any], where: str) -> Any:
 
 
 def _part_document(part: Any) -> dict[str, Any]:
-    """Inverse of `_part`."""
+    """Inverse of `parse_part`."""
     names = {law: name for laws in _LAWS_OF_PART.values() for name, law in laws.items()}
     chosen = {'law': names[type(part)]} if type(part) in names else {}
     return chosen | _parameters(part)
@@ -179,10 +170,3 @@ def _choice(document: Mapping[str, Any], key: str, choices: Any, where: str) -> 
     if value not in tuple(choices):
         raise ValueError(f'{where}: {key} = {value!r} is not one of {", ".join(choices)}')
     return str(value)
-
-
-def _range(document: Mapping[str, Any], where: str) -> tuple[Any, Any]:
-    value = document.get('identified_pressure')
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise ValueError(f'{where}: identified_pressure = {value!r} is not a list of two pressures [Pa]')
-    return value[0], value[1]

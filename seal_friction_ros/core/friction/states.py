@@ -21,12 +21,9 @@ UNKNOWN, SLIDING, BREAKAWAY, STUCK = (int(state) for state in FrictionState)
 class StateFriction(NamedTuple):
     """Friction that acts on the rod, and why."""
 
-    state: int
-    """a `FrictionState`"""
-    direction: int
-    """-1, 0 or 1"""
-    friction_force: float
-    """[N] ``m a = force_sum - friction_force``"""
+    state: int  # a `FrictionState`
+    direction: int  # -1, 0 or 1
+    friction_force: float  # [N] ``m a = force_sum - friction_force``
 
 
 @compilable

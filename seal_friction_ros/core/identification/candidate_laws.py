@@ -1,18 +1,19 @@
 """Candidate laws of an identification: friction laws with and without velocity terms, ordered from simple to complex.
 
-Fit and live node evaluate the same function of the law. The parameters are those of one seal; the friction is that of
-all seals of the rig.
+Fit and live node evaluate the same function of the law. Parameters are those of one seal; friction is the sum over all
+seals of the rig.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.compiled import for_compiler
+from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.friction.actuator import SealNumbers, numbers_of_law, sliding_friction_of_seals
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
@@ -30,14 +31,10 @@ COMPILED_FROM = 100  # pressures from which compiled code is faster: compiling a
 class OperatingConditions(NamedTuple):
     """Operating conditions of n readings with k seals."""
 
-    pressure: FloatArray
-    """[Pa, gauge, >= 0] of each seal, shape (n, k)"""
-    normal_force: FloatArray | None
-    """[N] of each seal, shape (n, k); None without geometry"""
-    velocity: FloatArray
-    """[m/s] shape (n,); NaN if not measured"""
-    direction: FloatArray
-    """-1.0 or 1.0, shape (n,)"""
+    pressure: FloatArray  # [Pa, gauge, >= 0] of each seal, shape (n, k)
+    normal_force: FloatArray | None  # [N] of each seal, shape (n, k); None without geometry
+    velocity: FloatArray  # [m/s] shape (n,); NaN if not measured
+    direction: FloatArray  # -1.0 or 1.0, shape (n,)
 
     def taken(self, index: IntArray) -> 'OperatingConditions':
         """The readings in ``index``."""
@@ -46,12 +43,9 @@ class OperatingConditions(NamedTuple):
 
     def typical(self, friction: float) -> TypicalReading:
         """Magnitudes that occur in the readings; ``friction`` is the mean of one seal [N]."""
-        return TypicalReading(
-            friction,
-            float(self.pressure.max()),
-            float(np.nanmax(np.abs(self.velocity), initial=0.0)),
-            math.nan if self.normal_force is None else float(self.normal_force.mean()),
-        )
+        speed = float(np.nanmax(np.abs(self.velocity), initial=0.0))
+        normal_force = math.nan if self.normal_force is None else float(self.normal_force.mean())
+        return TypicalReading(friction, float(self.pressure.max()), speed, normal_force)
 
 
 ParameterValues = Mapping[str, float]
@@ -64,20 +58,16 @@ class FittedParameter(NamedTuple):
     unit: str
     lower: float
     upper: float
-    start: Callable[[TypicalReading], float]
-    """first guess"""
+    start: Callable[[TypicalReading], float]  # first guess
     symbol: str
 
 
 def fitted_parameters(record_type: type) -> tuple[FittedParameter, ...]:
     """Parameters of a law, or of the velocity terms, that have a first guess."""
-    return tuple(
-        FittedParameter(
-            name, m.unit, *(m.fit_bounds or (float(m.lower or 0.0), float(m.upper or 0.0))), m.start, m.symbol
-        )
-        for name, m in meanings(record_type).items()
-        if m.start is not None
-    )
+    fitted = [(name, m, m.start) for name, m in meanings(record_type).items() if m.start is not None]
+    bounds = [m.fit_bounds or (float(m.lower or 0.0), float(m.upper or 0.0)) for _, m, _ in fitted]
+    rows = zip(fitted, bounds, strict=True)
+    return tuple(FittedParameter(name, m.unit, *both, start, m.symbol) for (name, m, start), both in rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +78,7 @@ class CandidateLaw:
     formula: str
     law_type: type[FrictionLaw]
     parameters: tuple[FittedParameter, ...]
-    fixed: ParameterValues = field(default_factory=dict)
-    """parameters that are not fitted"""
+    fixed: ParameterValues = field(default_factory=dict)  # parameters that are not fitted
     parts: Mapping[str, Any] = field(default_factory=dict)
     """known fields of the law: geometry and normal force; empty if it needs neither"""
 
@@ -109,10 +98,7 @@ class CandidateLaw:
         return {**{p.name: float(x) for p, x in zip(self.parameters, vector, strict=True)}, **self.fixed}
 
     def friction_law(self, values: ParameterValues) -> FrictionLaw:
-        """The friction law of one seal, without velocity terms.
-
-        Args:
-            values: Parameters by name; parameters of other laws are ignored.
+        """The friction law of one seal, without velocity terms; parameters of other laws are ignored.
 
         Raises:
             ValueError: A value is out of bounds.
@@ -137,11 +123,22 @@ def friction_of_seals(seal: SealNumbers, at: OperatingConditions) -> FloatArray:
     """Magnitude of the sliding friction [N] of k equal seals, shape (n,). An unknown speed counts as 0."""
     speed, direction = np.nan_to_num(np.abs(at.velocity)), at.direction.astype(np.int64)
     if at.pressure.size >= COMPILED_FROM:
-        from seal_friction_ros.core.identification.compiled_friction import sum_over_seals  # noqa: PLC0415
-
-        return np.asarray(sum_over_seals(for_compiler((seal,)), at.pressure, speed, direction))
+        return np.asarray(_compiled_sum()(for_compiler((seal,)), at.pressure, speed, direction))
     rows = zip(at.pressure.tolist(), speed.tolist(), direction.tolist(), strict=True)
     return np.array([sum(sliding_friction_of_seals((seal,), p, p, v, d) for p in each) for each, v, d in rows])
+
+
+def _sum_over_seals(seal: Any, pressure: FloatArray, speed: FloatArray, direction: IntArray) -> FloatArray:
+    """Compilable part of `friction_of_seals`; ``seal`` as compiled code takes it, ``pressure`` of shape (n, k)."""
+    total = np.zeros(len(speed))
+    for i in range(pressure.shape[0]):
+        for k in range(pressure.shape[1]):
+            p = pressure[i, k]
+            total[i] += sliding_friction_of_seals(seal, p, p, speed[i], direction[i])
+    return total
+
+
+_compiled_sum = cache(lambda: compiled(_sum_over_seals))
 
 
 def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForceLaw) -> FloatArray:
@@ -152,13 +149,10 @@ def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForce
     return np.asarray(forces[back].reshape(pressure.shape))
 
 
-# -- the list of candidates -------------------------------------------------------------------------------------------
-
-_VISCOUS, _STRIBECK = ('viscous_friction',), ('stribeck_friction', 'stribeck_velocity')
-_WITH_SPEEDS = (
-    ('viscous', 'viscous', _VISCOUS),
-    ('stribeck', 'viscous + Stribeck', (*_VISCOUS, *_STRIBECK)),
-    ('asymmetric', 'viscous + asymmetry', (*_VISCOUS, 'asymmetry')),
+_WITH_SPEEDS = (  # suffix of the name, text of the formula, names of the velocity terms
+    ('viscous', 'viscous', ('viscous_friction',)),
+    ('stribeck', 'viscous + Stribeck', ('viscous_friction', 'stribeck_friction', 'stribeck_velocity')),
+    ('asymmetric', 'viscous + asymmetry', ('viscous_friction', 'asymmetry')),
 )
 _WITHOUT_SPEEDS = (('asymmetric', 'asymmetry', ('asymmetry',)),)
 
@@ -172,19 +166,29 @@ def candidate_laws(
 ) -> tuple[CandidateLaw, ...]:
     """Laws that the data can identify: constant, pressure-dependent, physics-based, each with velocity terms if any.
 
-    Args:
-        geometry: Of the ring; without it, laws that need it are left out.
-        normal_force_law: Likewise.
-        with_speeds: The readings differ in speed, so velocity terms are identifiable.
-        with_exponent: There are enough pressures to identify the pressure exponent; otherwise it is 2/3.
+    Laws that need geometry and normal force of the ring are left out without them. ``with_speeds``: the readings differ
+    in speed, so velocity terms are identifiable. ``with_exponent``: there are enough pressures to identify the pressure
+    exponent; otherwise it is 2/3.
     """
     parts = {'geometry': geometry, 'normal_force_law': normal_force_law} if geometry and normal_force_law else {}
     bases = [_base(law_type, parts, with_speeds, with_exponent) for law_type in FRICTION_LAWS]
     constant, *laws = [base for base in bases if base is not None]
     highest = next(base for base in laws if base.law_type is (PhysicsBased if parts else PressurePowerLaw))
-    on_constant = _with_velocity_terms(constant, 'coulomb', _WITH_SPEEDS) if with_speeds else ()
-    on_highest = _with_velocity_terms(highest, highest.name, _WITH_SPEEDS if with_speeds else _WITHOUT_SPEEDS)
-    return (constant, *on_constant, *laws, *on_highest)
+
+    def extended(base: CandidateLaw, prefix: str) -> list[CandidateLaw]:
+        """The law with each group of velocity terms."""
+        return [
+            replace(
+                base,
+                name=f'{prefix}_{suffix}',
+                formula=f'{base.formula} + {terms}',
+                parameters=(*base.parameters, *(p for p in fitted_parameters(VelocityTerms) if p.name in names)),
+            )
+            for suffix, terms, names in (_WITH_SPEEDS if with_speeds else _WITHOUT_SPEEDS)
+        ]
+
+    on_constant = extended(constant, 'coulomb') if with_speeds else ()
+    return (constant, *on_constant, *laws, *extended(highest, highest.name))
 
 
 def _base(
@@ -200,18 +204,3 @@ def _base(
     fixed = {'pressure_exponent': ELASTIC_EXPONENT} if law_type is PressurePowerLaw and not with_exponent else {}
     parameters = tuple(p for p in parameters if p.name not in fixed)
     return CandidateLaw(law_type.NAME, law_type.FORMULA, law_type, parameters, fixed, {n: parts[n] for n in needed})
-
-
-def _with_velocity_terms(
-    base: CandidateLaw, prefix: str, extensions: Sequence[tuple[str, str, tuple[str, ...]]]
-) -> list[CandidateLaw]:
-    """The law with each extension: suffix of its name, text of its formula, names of its velocity terms."""
-    return [
-        replace(
-            base,
-            name=f'{prefix}_{suffix}',
-            formula=f'{base.formula} + {terms}',
-            parameters=(*base.parameters, *(p for p in fitted_parameters(VelocityTerms) if p.name in names)),
-        )
-        for suffix, terms, names in extensions
-    ]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, ParameterValues
 from seal_friction_ros.core.identification.fitting import LawFit, fit, jackknife_errors, offsets_of, root_mean_square
 from seal_friction_ros.core.identification.readings import FrictionReadings
@@ -16,30 +16,26 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 COLLINEAR = 0.9  # correlation above which two regressors are called collinear (our choice)
 TRADED_OFF = 0.95  # correlation above which two fitted parameters cannot be determined separately (our choice)
 ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
+SMALLEST_NOISE = 1e-6  # relative; a smaller residual is rounding (our choice)
 OUTLIER = 3.0  # standard deviations from the law of the other pressures (our choice)
 CHANGED = 0.2  # relative difference of two files that are two states; runs on a rig repeat within 10 to 15 %
 SETTLED = 0.1  # relative change of the friction over one run above which the seal has not settled (our choice)
-
-
-# -- scatter ----------------------------------------------------------------------------------------------------------
 
 
 def repeatability(readings: FrictionReadings, offsets: FloatArray) -> float:
     """Scatter of readings under the same conditions over the friction [-]: a lower bound for the error of any law.
 
     Same conditions are one pressure level, or for samples one cell of a grid (quantiles) of 12 speeds, 6 pressures of
-    each seal, and the direction. NaN if no condition was repeated.
-
-    Args:
-        readings: The readings.
-        offsets: Offset of the force sum of each source [N].
+    each seal, and the direction. NaN if no condition was repeated. ``offsets`` [N] are those of each source.
     """
     measured = readings.magnitudes(offsets)
     if not readings.are_samples:
         return _pooled_std(measured[inside] for inside in readings.levels.values())
-    cells = _cells(readings)
-    mean = float(measured.mean())
-    return _pooled_std((measured[cells == cell] for cell in np.unique(cells)), mean)
+    cells = (readings.at.direction > 0.0).astype(np.int64)
+    for column, parts in [(np.abs(readings.at.velocity), 12), *((column, 6) for column in readings.at.pressure.T)]:
+        edges = np.quantile(column, np.linspace(0.0, 1.0, parts + 1)[1:-1])
+        cells = cells * parts + np.searchsorted(edges, column)
+    return _pooled_std((measured[cells == cell] for cell in np.unique(cells)), float(measured.mean()))
 
 
 def _pooled_std(parts: Iterable[FloatArray], unit: float | None = None) -> float:
@@ -50,15 +46,6 @@ def _pooled_std(parts: Iterable[FloatArray], unit: float | None = None) -> float
         squares += float(np.sum((part - mean) ** 2)) / (max(mean**2, 1e-24) if unit is None else 1.0)
         freedom += len(part) - 1
     return math.sqrt(squares / freedom) / (unit or 1.0) if freedom else math.nan
-
-
-def _cells(readings: FrictionReadings) -> IntArray:
-    """Number of the cell of each sample, in a grid of quantiles of speed and of each pressure."""
-    cells = (readings.at.direction > 0.0).astype(np.int64)
-    for column, parts in [(np.abs(readings.at.velocity), 12), *((column, 6) for column in readings.at.pressure.T)]:
-        edges = np.quantile(column, np.linspace(0.0, 1.0, parts + 1)[1:-1])
-        cells = cells * parts + np.searchsorted(edges, column)
-    return cells
 
 
 def run_drift(readings: FrictionReadings, offsets: FloatArray) -> dict[int, float]:
@@ -85,9 +72,6 @@ def between_runs(readings: FrictionReadings) -> float:
     return _pooled_std(np.array(list(of_source.values())) for of_source in frictions)
 
 
-# -- collinearity -----------------------------------------------------------------------------------------------------
-
-
 class CorrelatedPair(NamedTuple):
     """Two correlated regressors or parameters."""
 
@@ -101,10 +85,7 @@ def collinear_regressors(readings: FrictionReadings, chamber_pressures: FloatArr
 
     Speed and seal pressure determine viscous and pressure-dependent friction; velocity and pressure difference
     determine viscous friction and an area error. Readings at held pressures are averaged over each pressure first.
-
-    Args:
-        readings: The readings.
-        chamber_pressures: [Pa] of chambers a and b, shape (n, 2).
+    ``chamber_pressures`` [Pa] are those of chambers a and b, shape (n, 2).
     """
     velocity = readings.at.velocity
     if not np.isfinite(velocity).all():
@@ -133,17 +114,12 @@ def traded_off(found: LawFit) -> list[CorrelatedPair]:
     return [pair for pair in pairs if abs(pair.correlation) > TRADED_OFF]
 
 
-# -- outliers ---------------------------------------------------------------------------------------------------------
-
-
 class Outlier(NamedTuple):
     """A pressure level whose friction disagrees with the law of the other levels."""
 
     level: int
-    measured: float
-    """[N]"""
-    expected: float
-    """[N] by the law fitted to the other levels"""
+    measured: float  # [N]
+    expected: float  # [N] by the law fitted to the other levels
     standard_deviations: float
 
 
@@ -152,70 +128,58 @@ def outlying_level(
 ) -> Outlier | None:
     """The pressure level that deviates most from the law of the others, if by more than `OUTLIER`; else None.
 
-    Each level is left out and the law is fitted to the rest. The standard deviation of the deviation contains the
-    residuals of the rest, the repeatability, and the leverage of the level. An outlier also disturbs the law of the
-    rest when another level is left out; only without the outlier do the rest agree.
-
-    Args:
-        law: The law.
-        readings: At held pressures; fewer than four levels have no outlier.
-        near: Parameters of the fit to all readings, as start values.
-        floor: Relative standard deviation of repeated readings.
+    Each level is left out and the law is fitted to the rest, from start values ``near``. The standard deviation of the
+    deviation contains the residuals of the rest, the repeatability ``floor`` [-], and the leverage of the level. An
+    outlier also disturbs the law of the rest when another level is left out; only without the outlier do the rest
+    agree. A level at which the law of the rest gives 0 N has no relative deviation: it is not assessed and has no
+    residual. Fewer than four levels have no outlier.
     """
     if len(readings.levels) < 4:
         return None
+    measured = np.array([readings.half_range(inside).friction for inside in readings.levels.values()])
     found: list[Outlier] = []
-    for level, out in readings.levels.items():
-        rest = readings.taken(~out)
-        of_rest = fit(law, rest, near, is_close=True)
-        expected, measured = _mean_friction(of_rest, readings, out), readings.half_range(out).friction
-        others = rest.levels.values()
-        residuals = [
-            rest.half_range(inside).friction / _mean_friction(of_rest, rest, inside) - 1.0 for inside in others
-        ]
-        freedom = max(len(residuals) - len(law.parameters), 1)
-        noise = math.hypot(math.sqrt(sum(r**2 for r in residuals) / freedom), floor)
-        slopes = np.array([_relative_slope(of_rest, rest, inside) for inside in others])
-        slope = _relative_slope(of_rest, readings, out)
-        leverage = float(slope @ np.linalg.pinv(slopes.T @ slopes) @ slope)
-        size = abs(measured / expected - 1.0) / (noise * math.sqrt(1.0 + leverage))
-        found.append(Outlier(level, measured, expected, size))
-    worst = max(found, key=lambda outlier: outlier.standard_deviations)
-    return worst if worst.standard_deviations > OUTLIER else None
+    for index, (level, out) in enumerate(readings.levels.items()):
+        of_rest = fit(law, readings.taken(~out), near, is_close=True)
+        expected = _level_means(of_rest, readings)
+        rest = (expected > 0.0) & (np.arange(len(expected)) != index)
+        if expected[index] == 0.0 or not rest.any():
+            continue
+        deviation = measured / np.where(expected > 0.0, expected, np.inf) - 1.0
+        residual = math.hypot(*deviation[rest]) / math.sqrt(max(rest.sum() - len(law.parameters), 1))
+        noise = max(math.hypot(residual, floor), SMALLEST_NOISE)
+        slopes = _relative_slopes(of_rest, readings, expected)
+        leverage = float(slopes[index] @ np.linalg.pinv(slopes[rest].T @ slopes[rest]) @ slopes[index])
+        size = abs(float(deviation[index])) / (noise * math.sqrt(1.0 + leverage))
+        found.append(Outlier(level, float(measured[index]), float(expected[index]), size))
+    worst = max(found, key=lambda outlier: outlier.standard_deviations, default=None)
+    return worst if worst is not None and worst.standard_deviations > OUTLIER else None
 
 
-def _mean_friction(found: LawFit, readings: FrictionReadings, inside: BoolArray) -> float:
-    """Mean friction of a law over the readings ``inside`` [N]."""
-    return float(found.friction(readings.at.taken(np.flatnonzero(inside))).mean())
+def _level_means(found: LawFit, readings: FrictionReadings) -> FloatArray:
+    """Mean friction of a law at each pressure level [N], shape (levels,)."""
+    friction = found.friction(readings.at)
+    return np.array([friction[inside].mean() for inside in readings.levels.values()])
 
 
-def _relative_slope(found: LawFit, readings: FrictionReadings, inside: BoolArray) -> FloatArray:
-    """Relative change of `_mean_friction` by a relative change of each parameter, by differences; (parameters,)."""
-    middle = _mean_friction(found, readings, inside)
-    result = np.empty(len(found.law.parameters))
+def _relative_slopes(found: LawFit, readings: FrictionReadings, means: FloatArray) -> FloatArray:
+    """Relative change of ``means`` > 0 by a relative change of each parameter, by differences; (levels, parameters)."""
+    result = np.empty((len(means), len(found.law.parameters)))
     for i, parameter in enumerate(found.law.parameters):
         value = found.values[parameter.name]
         share = 1e-4 if value + 1e-4 * (abs(value) or 1.0) <= parameter.upper else -1e-4
         moved = replace(found, values=found.values | {parameter.name: value + share * (abs(value) or 1.0)})
-        result[i] = (_mean_friction(moved, readings, inside) / middle - 1.0) / share
+        result[:, i] = (_level_means(moved, readings) / np.where(means > 0.0, means, np.inf) - 1.0) / share
     return result
-
-
-# -- changes between sources ------------------------------------------------------------------------------------------
 
 
 class FrictionChange(NamedTuple):
     """Friction of another source relative to a law."""
 
     name: str
-    ratio: float
-    """friction of the source over friction by the law [-]"""
-    standard_error: float
-    """of the ratio [-]"""
-    rms: float
-    """[N] residual of the law on the source, offset removed"""
-    own_rms: float
-    """[N] residual of the same law fitted to the source"""
+    ratio: float  # friction of the source over friction by the law [-]
+    standard_error: float  # of the ratio [-]
+    rms: float  # [N] residual of the law on the source, offset removed
+    own_rms: float  # [N] residual of the same law fitted to the source
 
     @property
     def is_change(self) -> bool:
@@ -224,15 +188,10 @@ class FrictionChange(NamedTuple):
 
 
 def compare_with_law(found: LawFit, fitted: FrictionReadings, other: FrictionReadings) -> FrictionChange:
-    """Compare the friction of another source with a law fitted without it.
+    """Compare the samples of another source with a law that was fitted to the readings ``fitted``.
 
     The ratio comes from least squares, offset eliminated, over the samples up to the highest pressure and speed of the
     fit; its standard error is that of the jackknife over groups.
-
-    Args:
-        found: The law.
-        fitted: Readings that it was fitted to.
-        other: Samples of the other source.
 
     Raises:
         ValueError: Fewer than 10 % of the samples are at pressures and speeds of the fit.
@@ -265,25 +224,18 @@ def compare_with_law(found: LawFit, fitted: FrictionReadings, other: FrictionRea
 class LevelChange(NamedTuple):
     """Two sources that disagree at one pressure."""
 
-    pressure: float
-    """[Pa]"""
+    pressure: float  # [Pa]
     name: str
-    friction: float
-    """[N]"""
+    friction: float  # [N]
     other_name: str
-    other_friction: float
-    """[N]"""
+    other_friction: float  # [N]
 
 
 def changed_levels(readings: FrictionReadings) -> list[LevelChange]:
     """Pressures at which a source differs by more than `CHANGED` from the first source there."""
-    found = []
+    found, names = [], readings.names
     for inside, pressure in zip(readings.levels.values(), readings.level_pressures.tolist(), strict=True):
         (first, friction), *others = readings.frictions_of_sources(inside).items()
-        names = readings.names
-        found += [
-            LevelChange(pressure, names[first], friction, names[source], of_source)
-            for source, of_source in others
-            if abs(of_source / friction - 1.0) > CHANGED
-        ]
+        pairs = [LevelChange(pressure, names[first], friction, names[i], of_source) for i, of_source in others]
+        found += [pair for pair in pairs if abs(pair.other_friction / friction - 1.0) > CHANGED]
     return found

@@ -6,7 +6,7 @@ random numbers: the same readings give the same result.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 from scipy.stats import t as student_t
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, OperatingConditions, ParameterValues
 from seal_friction_ros.core.identification.readings import FrictionReadings
@@ -27,18 +27,13 @@ _START_FACTORS = (0.2, 1.0, 4.0)  # on the first guess of the Stribeck velocity,
 Ticks = Callable[[int], None]
 
 
-# -- one fit ----------------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class LawFit:
     """A law fitted to readings."""
 
     law: CandidateLaw
-    values: dict[str, float]
-    """parameters of one seal"""
-    offsets: FloatArray
-    """[N] offset of the force sum of each source, shape (sources,)"""
+    values: dict[str, float]  # parameters of one seal
+    offsets: FloatArray  # [N] offset of the force sum of each source, shape (sources,)
     jacobian: FloatArray
     """derivative of the weighted deviations by the parameters, offsets eliminated, shape (n, parameters)"""
 
@@ -83,65 +78,45 @@ def fit(
     """Least-squares fit of a law, with one offset of the force sum for each source.
 
     The offsets are linear and are eliminated. The sum of squares has local minima over the Stribeck velocity: the fit
-    starts from several velocities and the best result counts.
-
-    Args:
-        law: The law.
-        readings: The readings.
-        known: Start values, from a fit of a simpler law or to similar readings.
-        is_close: ``known`` is complete and near the result, so the fit starts from it alone.
+    starts from several velocities and the best result counts. ``known`` are start values from a simpler law or similar
+    readings; if ``is_close``, they are complete and near the result, and the fit starts from them alone.
 
     Raises:
         ValueError: The result is not finite.
     """
-    lower = np.array([p.lower for p in law.parameters])
-    upper = np.array([p.upper for p in law.parameters])
-    scale = readings.scale
+    lower, upper = np.array([(p.lower, p.upper) for p in law.parameters]).T
 
     def residuals(vector: FloatArray) -> FloatArray:
         friction = law.friction(readings.at, law.named(vector))
-        return np.asarray((readings.magnitudes(offsets_of(readings, friction)) - friction) / scale)
+        return np.asarray((readings.magnitudes(offsets_of(readings, friction)) - friction) / readings.scale)
 
-    best: Any = None
     mean_friction = float(np.abs(readings.force).mean() / readings.at.pressure.shape[1])  # [N] of one seal
     typical = readings.at.typical(mean_friction)
     first_guess = {p.name: p.start(typical) for p in law.parameters}
     start = first_guess | {name: value for name, value in (known or {}).items() if name in first_guess}
-    for guess in [start] if is_close else _starts(start):
-        inside = np.clip([guess[p.name] for p in law.parameters], lower, upper)
+    best: Any = None
+    for factor in (1.0,) if is_close or 'stribeck_velocity' not in start else _START_FACTORS:
+        guess = [value * (factor if name == 'stribeck_velocity' else 1.0) for name, value in start.items()]
+        inside = np.clip(guess, lower, upper)
         size = np.maximum(np.abs(inside), 1e-3 * np.minimum(upper, 1.0))
         found = least_squares(residuals, inside, bounds=(lower, upper), x_scale=size, xtol=1e-9, ftol=1e-9, gtol=1e-9)
         if best is None or found.cost < best.cost * (1.0 - 1e-9):
             best = found
-    if best is None or not np.isfinite(best.x).all():
+    if not np.isfinite(best.x).all():
         raise ValueError(f'{law.name}: the result of the fit is not finite')
     at_zero = (lower == 0.0) & (np.abs(best.x) < 1e-6 * np.abs(list(first_guess.values())))
     values = law.named(np.where(at_zero, 0.0, best.x))  # exactly 0 for a term without effect, instead of about 1e-18
     return LawFit(law, values, offsets_of(readings, law.friction(readings.at, values)), np.asarray(best.jac))
 
 
-def _starts(start: dict[str, float]) -> Iterator[dict[str, float]]:
-    """First guesses that differ in the Stribeck velocity, if the law has one."""
-    name = 'stribeck_velocity'
-    for factor in _START_FACTORS if name in start else (1.0,):
-        yield start | ({name: factor * start[name]} if name in start else {})
-
-
-# -- cross-validation -------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class CrossValidation:
     """Prediction of each group of readings from all others."""
 
-    predicted: FloatArray
-    """[N] shape (n,)"""
-    deviation: FloatArray
-    """[N] measured - predicted, shape (n,)"""
-    losses: FloatArray
-    """root mean square of the weighted deviation in each group [-], shape (groups,)"""
-    parameters: FloatArray
-    """fitted without each group, shape (groups, parameters)"""
+    predicted: FloatArray  # [N] shape (n,)
+    deviation: FloatArray  # [N] measured - predicted, shape (n,)
+    losses: FloatArray  # root mean square of the weighted deviation in each group [-], shape (groups,)
+    parameters: FloatArray  # fitted without each group, shape (groups, parameters)
 
     @property
     def rms(self) -> float:
@@ -162,31 +137,28 @@ class CrossValidation:
 def cross_validate(
     law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, tick: Ticks = lambda _: None
 ) -> CrossValidation:
-    """Predict each group by the law fitted to all other groups.
+    """Predict each group (of two at least) by the law fitted to all other groups.
 
-    Args:
-        law: The law.
-        readings: At least two groups.
-        near: Parameters of the fit to all readings, as start values.
-        tick: Called with 1 after each fit.
+    The fits start ``near`` the parameters of the fit to all readings. ``tick`` is called with 1 after each fit.
     """
     predicted, deviation = np.empty(readings.count), np.empty(readings.count)
     parameters = []
     for out in readings.groups:
-        trained = readings.taken(~out)
-        found = fit(law, trained, near, is_close=True)
-        predicted[out], deviation[out] = _predict(found, trained, readings.taken(out))
-        parameters.append([found.values[p.name] for p in law.parameters])
+        values, predicted[out], deviation[out] = _predict(law, readings.taken(~out), readings.taken(out), near)
+        parameters.append([values[p.name] for p in law.parameters])
         tick(1)
     return CrossValidation(predicted, deviation, _group_losses(readings, deviation), np.array(parameters))
 
 
-def _predict(found: LawFit, trained: FrictionReadings, tested: FrictionReadings) -> tuple[FloatArray, FloatArray]:
-    """Friction of ``tested`` by a law fitted to ``trained``, and measured less predicted friction [N], shape (n,) each.
+def _predict(
+    law: CandidateLaw, trained: FrictionReadings, tested: FrictionReadings, near: ParameterValues
+) -> tuple[ParameterValues, FloatArray, FloatArray]:
+    """Law fitted to ``trained``: parameters, friction of ``tested``, and measured less predicted friction [N].
 
     The offset of a source comes from ``trained``. A source that is not in ``trained`` gets its offset from its own
     readings in both directions, in which the friction cancels.
     """
+    found = fit(law, trained, near, is_close=True)
     friction = found.friction(tested.at)
     signed = tested.force - tested.at.direction * friction
     offsets = found.offsets.copy()
@@ -194,7 +166,7 @@ def _predict(found: LawFit, trained: FrictionReadings, tested: FrictionReadings)
         index = tested.two_sided[source]
         direction = tested.at.direction[index].astype(np.int64)
         offsets[source] = half_range(signed[index], direction, of_medians=False).offset if len(index) else 0.0
-    return friction, tested.magnitudes(offsets) - friction
+    return found.values, friction, tested.magnitudes(offsets) - friction
 
 
 def plain_mean(readings: FrictionReadings) -> CrossValidation | None:
@@ -225,20 +197,14 @@ def _group_losses(readings: FrictionReadings, deviation: FloatArray) -> FloatArr
 
 
 def jackknife_errors(estimates: FloatArray) -> FloatArray:
-    """Standard error of each estimate by the jackknife over groups, shape (parameters,).
+    """Standard error by the jackknife, from ``estimates`` without each group, shape (groups, parameters).
 
     An error that all readings of a group share (a test, a pressure, a minute) counts once, not once for each reading.
-
-    Args:
-        estimates: Computed without each group, shape (groups, parameters).
 
     Source: [Efron1982]_.
     """
     groups = len(estimates)
     return np.asarray(np.sqrt((groups - 1) / groups * np.sum((estimates - estimates.mean(axis=0)) ** 2, axis=0)))
-
-
-# -- choice of the law ------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,33 +220,29 @@ class LawScore:
 def score_laws(
     laws: Sequence[CandidateLaw], readings: FrictionReadings, tick: Ticks = lambda _: None
 ) -> tuple[LawScore, ...]:
-    """Fit and cross-validate every law.
+    """Fit and cross-validate every law on readings of at least two groups.
 
-    Args:
-        laws: From simple to complex; results of simpler laws are start values for the others.
-        readings: At least two groups.
-        tick: Called with 1 after each of the (groups + 1) fits for each law.
+    The laws go from simple to complex; results of simpler laws are start values for the others. ``tick`` is called with
+    1 after each of the (groups + 1) fits of a law.
     """
     scores: list[LawScore] = []
     known: dict[str, float] = {}
     for law in laws:
-        scores.append(_score(law, readings, known, tick))
-        known |= scores[-1].fit.values if scores[-1].fit is not None else {}
+        levels, count = len(readings.levels), len(law.parameters)
+        needed = count + (readings.left_out_by == 'pressure')
+        if not readings.are_samples and levels < needed:
+            tick(len(readings.groups) + 1)
+            scores.append(LawScore(law, why_not=f'{count} parameters need {needed} pressures, there are {levels}'))
+            continue
+        try:
+            found = fit(law, readings, known)
+            tick(1)
+            scores.append(LawScore(law, found, cross_validate(law, readings, found.values, tick)))
+        except ValueError as error:
+            scores.append(LawScore(law, why_not=str(error)))
+        else:
+            known |= found.values
     return tuple(scores)
-
-
-def _score(law: CandidateLaw, readings: FrictionReadings, known: ParameterValues, tick: Ticks) -> LawScore:
-    levels = len(readings.levels)
-    needed = len(law.parameters) + (readings.left_out_by == 'pressure')
-    if not readings.are_samples and levels < needed:
-        tick(len(readings.groups) + 1)
-        return LawScore(law, why_not=f'{len(law.parameters)} parameters need {needed} pressures, there are {levels}')
-    try:
-        found = fit(law, readings, known)
-        tick(1)
-        return LawScore(law, found, cross_validate(law, readings, found.values, tick))
-    except ValueError as error:
-        return LawScore(law, why_not=str(error))
 
 
 def recommended(scores: Sequence[LawScore]) -> LawScore:
@@ -300,13 +262,10 @@ def recommended(scores: Sequence[LawScore]) -> LawScore:
 
 
 def is_beaten(losses: FloatArray, others: FloatArray) -> bool:
-    """Whether ``others`` are lower than ``losses`` beyond the noise, and by enough to justify a term.
+    """Whether the losses of another law are lower beyond the noise, and by enough to justify a term.
 
     Beyond the noise: by a one-sided paired t-test at `BEATEN_CONFIDENCE`. Enough: `WORTHWHILE` of the mean loss.
-
-    Args:
-        losses: Of each group, shape (groups,), groups >= 2.
-        others: Of the same groups by another law.
+    Losses are those of each group, shape (groups >= 2,).
     """
     difference = losses - others
     groups = len(difference)
@@ -315,16 +274,11 @@ def is_beaten(losses: FloatArray, others: FloatArray) -> bool:
     return float(difference.mean()) > max(noise, WORTHWHILE * float(losses.mean()))
 
 
-# -- uncertainty ------------------------------------------------------------------------------------------------------
-
-
 class PredictionUncertainty(NamedTuple):
     """Standard deviation of a new reading of all seals: std^2 = (relative f)^2 + absolute^2."""
 
-    relative: float
-    """[-]"""
-    absolute: float
-    """[N]"""
+    relative: float  # [-]
+    absolute: float  # [N]
 
     def std(self, friction: FloatArray) -> FloatArray:
         """Standard deviation [N] at a friction [N], shape (n,)."""
@@ -339,13 +293,8 @@ def prediction_uncertainty(
     Non-negative least squares of the squared deviations over squared friction and 1, iteratively weighted with the
     resulting variance (ten times), gives the ratio of the two parts. The size is such that 1.96 std holds 95 % of the
     deviations, counted for one more reading [Vovk2005]_. The factor (1 + 1 / groups) on the variance accounts for a new
-    group.
-
-    Args:
-        predicted: Friction [N], shape (n,).
-        deviation: Measured - predicted [N], shape (n,).
-        groups: Number of groups that were left out.
-        in_addition: Relative standard deviation that these data cannot show, added in square.
+    group. ``in_addition`` is a relative standard deviation that these data cannot show, added in square. ``deviation``
+    is measured - ``predicted`` friction [N], shape (n,).
     """
     friction = np.maximum(np.abs(predicted), 0.05 * float(np.abs(predicted).mean()))
     raw = PredictionUncertainty(0.0, max(root_mean_square(deviation), 1e-12))
@@ -379,60 +328,48 @@ def band_coverage(
         trained = readings.taken(~out) if len(readings.groups) >= 3 else readings
         inner = cross_validate(law, trained, near, tick)
         band = prediction_uncertainty(inner.predicted, inner.deviation, len(readings.groups) - 1, in_addition)
-        found = fit(law, trained, near, is_close=True)
-        friction, deviation = _predict(found, trained, readings.taken(out))
+        _, friction, deviation = _predict(law, trained, readings.taken(out), near)
         inside += int(np.count_nonzero(np.abs(deviation) <= BAND_95 * band.std(friction)))
     return inside / readings.count
-
-
-# -- breakaway --------------------------------------------------------------------------------------------------------
 
 
 class BreakawayFit(NamedTuple):
     """Breakaway force of one seal above its Coulomb friction: stiction + ratio * f_c."""
 
-    law: str
-    """constant or load_dependent"""
-    stiction: float
-    """[N] of one seal"""
-    ratio: float
-    """[-]"""
-    standard_error: float
-    """of the value that is not zero"""
-    cross_validation_rms: dict[str, float]
-    """[N] all seals: law -> root mean square of the left-out deviations"""
+    law: str  # constant or load_dependent
+    stiction: float  # [N] of one seal
+    ratio: float  # [-]
+    standard_error: float  # of the value that is not zero
+    cross_validation_rms: dict[str, float]  # [N] all seals: law -> root mean square of the left-out deviations
 
 
 def fit_breakaway(readings: FrictionReadings, friction: FloatArray, offsets: FloatArray) -> BreakawayFit:
     """Constant or load-dependent stiction, by cross-validation; the constant one unless it is beaten.
 
-    Args:
-        readings: Breakaway readings, of all seals.
-        friction: Coulomb friction of the law at each reading [N], shape (n,).
-        offsets: Offset of the force sum of each source [N].
+    ``friction`` is the Coulomb friction of the law at each breakaway reading [N]; ``offsets`` are those of the sources.
 
     Source: thesis, section 5.2 (static above dynamic friction by about 0.5 lbf for each seal); the share of the Coulomb
     friction is our choice, after the rise of the stiction over pressure in Tables A-1 to A-3.
     """
-    seals = readings.at.pressure.shape[1]
     excess = readings.magnitudes(offsets) - friction
     regressors = {'constant': np.ones(readings.count), 'load_dependent': friction}
+
+    def slope(regressor: FloatArray, inside: BoolArray | slice) -> float:
+        """Non-negative least-squares slope of the excess through the origin."""
+        x = regressor[inside]
+        return max(float(np.sum(x * excess[inside])) / float(np.sum(x**2)), 0.0)
+
     slopes, losses, rms = {}, {}, {}
     for name, regressor in regressors.items():
-        slopes[name] = np.array([_slope(regressor[~out], excess[~out]) for out in readings.groups])
+        slopes[name] = np.array([slope(regressor, ~out) for out in readings.groups])
         residuals = np.empty(readings.count)
-        for out, slope in zip(readings.groups, slopes[name], strict=True):
-            residuals[out] = excess[out] - slope * regressor[out]
-        losses[name] = _group_losses(readings, residuals)
-        rms[name] = root_mean_square(residuals)
+        for out, of_others in zip(readings.groups, slopes[name], strict=True):
+            residuals[out] = excess[out] - of_others * regressor[out]
+        losses[name], rms[name] = _group_losses(readings, residuals), root_mean_square(residuals)
     best = min(losses.values(), key=np.mean)
     chosen = next(name for name, values in losses.items() if not is_beaten(values, best))
-    slope, error = _slope(regressors[chosen], excess), float(jackknife_errors(slopes[chosen]))
+    found, error = slope(regressors[chosen], slice(None)), float(jackknife_errors(slopes[chosen]))
     if chosen == 'load_dependent':
-        return BreakawayFit(chosen, 0.0, slope, error, rms)
-    return BreakawayFit(chosen, slope / seals, 0.0, error / seals, rms)
-
-
-def _slope(regressor: FloatArray, excess: FloatArray) -> float:
-    """Non-negative least-squares slope through the origin."""
-    return max(float(np.sum(regressor * excess)) / float(np.sum(regressor**2)), 0.0)
+        return BreakawayFit(chosen, 0.0, found, error, rms)
+    seals = readings.at.pressure.shape[1]
+    return BreakawayFit(chosen, found / seals, 0.0, error / seals, rms)

@@ -10,54 +10,41 @@ from dataclasses import replace
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.identification import signal_preparation
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
-from seal_friction_ros.core.identification.checks import check_log, check_manual_readings, check_readings
 from seal_friction_ros.core.identification.readings import (
     FrictionReadings,
     ManualReadings,
     PreparedReadings,
     RecordedLog,
-)
-from seal_friction_ros.core.identification.signal_preparation import (
-    SignalReading,
-    Signals,
-    breakaways,
-    even_sliding,
-    pressure_levels,
-    strokes,
+    check_log,
+    check_manual_readings,
+    check_readings,
 )
 
 BLOCKS = 10  # contiguous parts of a swept log, each predicted from the others
 HELD_LOG = 0.8  # of the even samples in strokes at held speed and pressure: each stroke is a reading (our choice)
 FEWEST_SWEPT = 200  # samples of even sliding, so that a block has 20 (our choice)
 
-_Row = tuple[int, SignalReading]
-"""number of the log, reading"""
-
-
-# -- logs -------------------------------------------------------------------------------------------------------------
+_Rows = Sequence[tuple[int, signal_preparation.SignalReading]]
+"""number of the log and reading, each"""
 
 
 def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> PreparedReadings:
-    """Readings from logs.
-
-    Args:
-        logs: One for each source.
-        chambers: Chamber (a or b) of each seal.
+    """Readings from logs, one for each source; ``chambers`` (a or b) are those of the seals.
 
     Raises:
         ValueError: A log is unfit for identification; one line with the reason and what to measure instead.
     """
     for log in logs:
         check_log(log)
-    of_strokes = [(number, stroke) for number, log in enumerate(logs) for stroke in strokes(log.signals, log.sliding)]
-    even = [even_sliding(log.signals, log.sliding) for log in logs]
+    of_strokes = [(i, stroke) for i, log in enumerate(logs) for stroke in signal_preparation.strokes(*log[1:])]
+    even = [signal_preparation.even_sliding(*log[1:]) for log in logs]
     held = [sum(len(stroke.samples) for source, stroke in of_strokes if source == i) for i in range(len(logs))]
-    are_samples = sum(held) < HELD_LOG * sum(int(part.sum()) for part in even)
-    if are_samples:
+    counts = [int(part.sum()) for part in even]
+    if sum(held) < HELD_LOG * sum(counts):
         readings, chamber_pressures = _swept(logs, even, chambers)
         breakaway = None
-        counts = [int(part.sum()) for part in even]
     else:
         readings, chamber_pressures = _held(logs, of_strokes, chambers)
         breakaway = _breakaway(logs, chambers, readings)
@@ -73,44 +60,34 @@ def _seal_pressures(chamber_pressures: FloatArray, chambers: Sequence[str]) -> F
     return np.maximum(chamber_pressures[:, ['ab'.index(chamber) for chamber in chambers]], 0.0)
 
 
-def _columns(rows: Sequence[_Row], chambers: Sequence[str]) -> tuple[OperatingConditions, FloatArray, IntArray]:
-    """Operating conditions, chamber pressures [Pa], shape (n, 2), and number of the log of each reading."""
-    both = np.array([(r.pressure_a, r.pressure_b) for _, r in rows])
-    velocity, direction = np.array([(r.velocity, r.direction) for _, r in rows], dtype=np.float64).T
-    at = OperatingConditions(_seal_pressures(both, chambers), None, velocity, direction)
-    return at, both, np.array([number for number, _ in rows])
+def _columns(rows: _Rows, chambers: Sequence[str]) -> tuple[OperatingConditions, FloatArray, FloatArray, IntArray]:
+    """Operating conditions, chamber pressures [Pa], shape (n, 2), force sum [N], number of the log; of each reading."""
+    source = np.array([number for number, _ in rows])
+    columns = [(r.velocity, r.direction, r.force_sum, r.pressure_a, r.pressure_b) for _, r in rows]
+    velocity, direction, force, *both = np.array(columns, dtype=np.float64).T
+    pressures = np.column_stack(both)
+    at = OperatingConditions(_seal_pressures(pressures, chambers), None, velocity, direction)
+    return at, pressures, force, source
 
 
-def _held(
-    logs: Sequence[RecordedLog], rows: Sequence[_Row], chambers: Sequence[str]
-) -> tuple[FrictionReadings, FloatArray]:
-    at, both, source = _columns(rows, chambers)
-    level = pressure_levels(at.pressure.mean(axis=1))
+def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> tuple[FrictionReadings, FloatArray]:
+    at, pressures, force, source = _columns(rows, chambers)
+    level = signal_preparation.pressure_levels(at.pressure.mean(axis=1))
     group, by = _groups(level, source, 'file')
-    readings = FrictionReadings(
-        at=at,
-        force=np.array([r.force_sum for _, r in rows]),
-        source=source,
-        group=group,
-        level=level,
-        names=tuple(log.name for log in logs),
-        left_out_by=by,
-        are_samples=False,
-        samples=tuple(logs[number].signals.force_sum[r.samples] for number, r in rows),
-    )
-    return readings, both
+    names = tuple(log.name for log in logs)
+    samples = tuple(logs[number].signals.force_sum[r.samples] for number, r in rows)
+    return FrictionReadings(at, force, source, group, level, names, by, are_samples=False, samples=samples), pressures
 
 
 def _breakaway(
     logs: Sequence[RecordedLog], chambers: Sequence[str], dynamic: FrictionReadings
 ) -> FrictionReadings | None:
-    rows = [(number, peak) for number, log in enumerate(logs) for peak in breakaways(log.signals, log.sliding)]
+    rows = [(i, peak) for i, log in enumerate(logs) for peak in signal_preparation.breakaways(*log[1:])]
     if not rows:
         return None
-    at, _, source = _columns(rows, chambers)
+    at, _, force, source = _columns(rows, chambers)
     level = _nearest_level(at.pressure.mean(axis=1), dynamic)
     group = source if dynamic.left_out_by == 'file' else level
-    force = np.array([r.force_sum for _, r in rows])
     return replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=())
 
 
@@ -138,7 +115,7 @@ def _swept(
             f'{logs[int(np.argmin(counts))].name}: {min(counts)} samples of even sliding, {FEWEST_SWEPT} are needed: '
             'drive longer strokes at even speed, in both directions'
         )
-    joined = Signals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    joined = signal_preparation.Signals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     both = np.column_stack((joined.pressure_a, joined.pressure_b))
     pressure = _seal_pressures(both, chambers)
     mean = pressure.mean(axis=1)
@@ -157,31 +134,21 @@ def _swept(
 
 
 def _left_out(logs: Sequence[RecordedLog], even: Sequence[BoolArray], used: int) -> dict[str, int]:
-    missing = slow = accelerated = 0
+    """Reason -> number of samples not used."""
+    counts = {'not finite': 0, 'at rest': 0, 'accelerated': 0, 'in no even stroke': -used}
     for log, index in zip(logs, even, strict=True):
-        finite = np.logical_and.reduce([np.isfinite(column) for column in log.signals])
+        finite = np.isfinite(log.signals).all(axis=0)
         with np.errstate(invalid='ignore'):
             moving = np.abs(log.signals.velocity) > log.sliding.slowest
-        missing += int((~finite).sum())
-        slow += int((finite & ~moving).sum())
-        accelerated += int((finite & moving & ~index).sum())
-    in_no_stroke = sum(int(index.sum()) for index in even) - used
-    counts = {'not finite': missing, 'at rest': slow, 'accelerated': accelerated, 'in no even stroke': in_no_stroke}
+        masks = (~finite, finite & ~moving, finite & moving & ~index, index)
+        counts = {reason: counts[reason] + int(mask.sum()) for reason, mask in zip(counts, masks, strict=True)}
     return {reason: count for reason, count in counts.items() if count}
-
-
-# -- manual readings --------------------------------------------------------------------------------------------------
 
 
 def prepare_manual_readings(
     dynamic: Sequence[ManualReadings], static: Sequence[ManualReadings], seals: int
 ) -> PreparedReadings:
-    """Readings from manual readings.
-
-    Args:
-        dynamic: Running friction, one for each source.
-        static: Breakaway friction, one for each source; may be empty.
-        seals: Number of seals that share the pressure.
+    """Readings from manual readings of seals that share the pressure: running friction, and breakaway friction if any.
 
     Raises:
         ValueError: The readings are unfit for identification; one line with the reason and what to do.
@@ -204,16 +171,8 @@ def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
     test, pressure, direction, friction, velocity = (np.concatenate(column) for column in columns)
     of_seals = np.repeat(np.maximum(pressure, 0.0)[:, np.newaxis], seals, axis=1)
     source = np.repeat(np.arange(len(sources)), [len(manual.friction) for manual in sources])
-    level = pressure_levels(of_seals[:, 0])
+    level = signal_preparation.pressure_levels(of_seals[:, 0])
     tests = np.unique(np.column_stack((source, test)), axis=0, return_inverse=True)[1].reshape(-1)
     group, by = _groups(level, tests, 'test')
-    return FrictionReadings(
-        at=OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64)),
-        force=direction * friction,
-        source=source,
-        group=group,
-        level=level,
-        names=names,
-        left_out_by=by,
-        are_samples=False,
-    )
+    at = OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64))
+    return FrictionReadings(at, direction * friction, source, group, level, names, by, are_samples=False)

@@ -1,4 +1,7 @@
-"""Friction readings of one rig, to which a law is fitted, and the records that they are made from."""
+"""Friction readings of one rig, to which a law is fitted, the records that they are made from, and checks of both.
+
+Each error of a check is one line: source, fault, and what to do.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -7,8 +10,29 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
-from seal_friction_ros.core.identification.signal_preparation import HalfRange, Signals, Sliding, half_range
+from seal_friction_ros.core.identification.signal_preparation import (
+    LONGEST_GAP,
+    HalfRange,
+    Signals,
+    Sliding,
+    clipped_share,
+    even_sliding,
+    half_range,
+    longest_stretch,
+)
+
+FEWEST_PRESSURES = 3  # any line fits two points; a third one tests it
+LONGEST_NAN = 0.5  # [s] a longer stretch without a value is a sensor fault (our choice)
+LARGEST_NAN_SHARE = 0.01  # of the samples (our choice)
+NARROWEST_PRESSURES = 5e4  # [Pa] from the lowest to the highest; less is one pressure (our choice)
+PRESSURE_BOUNDS = (-1.2e5, 4.5e7)  # [Pa] default of the estimator; beyond them a sensor or a unit is wrong
+LARGEST_SPEED = 10.0  # [m/s] likewise
+LARGEST_FORCE = 1e6  # [N] likewise
+LARGEST_SEAL_AREA = 2e-3  # [m^2] friction over pressure: no seal is larger (our choice)
+SMALLEST_SEAL_AREA = 6e-8  # [m^2] friction over pressure: no seal is smaller (our choice)
+LARGEST_AREA_ERROR = 5.0  # of the friction: largest change of the offset over the pressures (our choice)
 
 
 class RecordedLog(NamedTuple):
@@ -24,14 +48,10 @@ class ManualReadings(NamedTuple):
 
     name: str
     test: IntArray
-    pressure: FloatArray
-    """[Pa, gauge]"""
-    direction: IntArray
-    """-1 or 1"""
-    friction: FloatArray
-    """[N] magnitude, of all seals"""
-    velocity: FloatArray
-    """[m/s] magnitude; NaN if not measured"""
+    pressure: FloatArray  # [Pa, gauge]
+    direction: IntArray  # -1 or 1
+    friction: FloatArray  # [N] magnitude, of all seals
+    velocity: FloatArray  # [m/s] magnitude; NaN if not measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,22 +59,14 @@ class FrictionReadings:
     """n friction readings of one rig, from one or several sources."""
 
     at: OperatingConditions
-    force: FloatArray
-    """[N] force sum, signed, shape (n,)"""
-    source: IntArray
-    """index into ``names``, shape (n,)"""
-    group: IntArray
-    """readings of one group are left out together in cross-validation, shape (n,)"""
-    level: IntArray
-    """pressure level, 0 for the lowest, shape (n,)"""
-    names: tuple[str, ...]
-    """of the sources"""
-    left_out_by: str
-    """meaning of ``group``: test, pressure, file or block"""
-    are_samples: bool
-    """samples of a swept log; otherwise strokes or manual readings at held pressures"""
-    samples: tuple[FloatArray, ...] = ()
-    """[N] force sums behind each reading; empty if there is only the reading"""
+    force: FloatArray  # [N] force sum, signed, shape (n,)
+    source: IntArray  # index into ``names``, shape (n,)
+    group: IntArray  # readings of one group are left out together in cross-validation, shape (n,)
+    level: IntArray  # pressure level, 0 for the lowest, shape (n,)
+    names: tuple[str, ...]  # of the sources
+    left_out_by: str  # meaning of ``group``: test, pressure, file or block
+    are_samples: bool  # samples of a swept log; otherwise strokes or manual readings at held pressures
+    samples: tuple[FloatArray, ...] = ()  # [N] force sums behind each reading; empty if there is only the reading
 
     @property
     def count(self) -> int:
@@ -103,18 +115,15 @@ class FrictionReadings:
 
         For a source in one direction only, the friction is its mean magnitude and the offset is 0.
         """
-        found: list[HalfRange] = []
-        weights = []
+        found, weights = [], []
         for source in np.unique(self.source[inside]):
             index = np.flatnonzero(inside & (self.source == source))
-            direction = self.at.direction[index].astype(np.int64)
-            force = self.force[index]
+            direction, force = self.at.direction[index].astype(np.int64), self.force[index]
             if len(np.unique(direction)) < 2:
                 found.append(HalfRange(float(np.mean(direction * force)), 0.0))
             elif self.samples:
                 parts = [self.samples[i] for i in index]
-                sides = np.repeat(direction, [len(part) for part in parts])
-                found.append(half_range(np.concatenate(parts), sides))
+                found.append(half_range(np.concatenate(parts), np.repeat(direction, [len(part) for part in parts])))
             else:
                 found.append(half_range(force, direction, of_medians=False))
             weights.append(len(index))
@@ -151,13 +160,181 @@ class PreparedReadings(NamedTuple):
     """Readings of all sources."""
 
     readings: FrictionReadings
-    chamber_pressures: FloatArray
-    """[Pa] of chambers a and b at each reading, shape (n, 2)"""
-    breakaway: FrictionReadings | None
-    """None if no motion starts from rest"""
-    used: dict[str, int]
-    """source -> number of samples behind the readings"""
-    total: dict[str, int]
-    """source -> number of its samples"""
-    left_out: dict[str, int]
-    """reason -> number of samples not used"""
+    chamber_pressures: FloatArray  # [Pa] of chambers a and b at each reading, shape (n, 2)
+    breakaway: FrictionReadings | None  # None if no motion starts from rest
+    used: dict[str, int]  # source -> number of samples behind the readings
+    total: dict[str, int]  # source -> number of its samples
+    left_out: dict[str, int]  # reason -> number of samples not used
+
+
+def check_log(log: RecordedLog) -> None:
+    """Check a log.
+
+    Raises:
+        ValueError: Too few samples, missing or impossible values, no motion, motion in one direction only, or a clipped
+            sensor.
+    """
+    name, signals, sliding = log
+    if len(signals.time) < 20:
+        raise ValueError(
+            f'{name}: {len(signals.time)} samples are too few: record several strokes in both directions, at '
+            f'{FEWEST_PRESSURES} pressures at least'
+        )
+    step = float(np.median(np.diff(signals.time)))
+    if step > LONGEST_GAP:
+        raise ValueError(
+            f'{name}: samples are {step:.4g} s apart, too far to see starts and stops: record at 20 Hz at least (or is '
+            'the unit of the time wrong?)'
+        )
+    for what, column in signals._asdict().items():
+        wrong = ~np.isfinite(column)
+        if wrong.all():
+            raise ValueError(f'{name}: no {what.replace("_", " ")} is a number: record it')
+        first, length = longest_stretch(wrong)
+        missing = float(signals.time[first + length - 1] - signals.time[first]) if length else 0.0  # [s]
+        if missing > LONGEST_NAN or float(wrong.mean()) > LARGEST_NAN_SHARE:
+            raise ValueError(
+                f'{name}: {int(wrong.sum())} of {len(wrong)} samples have no {what.replace("_", " ")}, {missing:.3g} s '
+                f'in a row from {float(signals.time[first]):.6g} s on: repair the sensor or the log and measure again, '
+                'or cut that part out'
+            )
+    pressures = np.concatenate((signals.pressure_a, signals.pressure_b))
+    _check_bounds(name, pressures, np.abs(signals.velocity), signals.force_sum)
+    fastest = float(np.nanquantile(np.abs(signals.velocity), 0.99))
+    if not fastest > sliding.slowest:
+        raise ValueError(
+            f'{name}: the rod does not move: 99 % of the speeds are below {1e3 * fastest:.3g} mm/s, and sliding begins '
+            f'at {1e3 * sliding.slowest:.3g} mm/s: drive strokes in both directions (or is the velocity not in m/s?)'
+        )
+    velocity = signals.velocity[even_sliding(signals, sliding)]
+    sides = [int(np.count_nonzero(side * velocity > 0.0)) for side in (1, -1)]
+    if not sum(sides):
+        raise ValueError(
+            f'{name}: the rod always accelerates by more than {sliding.largest_acceleration:.3g} m/s2, so the force '
+            'contains its inertia: drive strokes at even speed'
+        )
+    if min(sides) < 0.01 * sum(sides):
+        spread = f'{1e3 * float(velocity.min()):.4g} to {1e3 * float(velocity.max()):.4g} mm/s'
+        raise ValueError(
+            f'{name}: the rod moves one way only ({spread}, {min(sides)} of {sum(sides)} samples the other way), so '
+            'friction and offset cannot be separated: drive strokes in both directions, at several speeds'
+        )
+    moving = np.abs(signals.velocity) > sliding.slowest
+    check_clipping(name, 'force sum', signals.force_sum[moving])
+    check_clipping(name, 'pressure of chamber a', signals.pressure_a[moving])
+    check_clipping(name, 'pressure of chamber b', signals.pressure_b[moving])
+
+
+def check_clipping(name: str, what: str, column: FloatArray) -> None:
+    """Check the signal ``what`` of the source ``name``: samples while the rod moves, shape (n,).
+
+    Raises:
+        ValueError: The sensor is clipped.
+    """
+    share = clipped_share(column)
+    if share:
+        ends = f'{float(np.nanmin(column)):.6g} or {float(np.nanmax(column)):.6g}'
+        raise ValueError(
+            f'{name}: the {what} stays at its extreme ({ends}) in {100.0 * share:.2g} % of the samples: the sensor is '
+            'clipped: use one with a larger range'
+        )
+
+
+def check_manual_readings(manual: ManualReadings) -> None:
+    """Check manual readings.
+
+    Raises:
+        ValueError: Missing values, too few readings, negative friction, or impossible values.
+    """
+    for what, column in (('pressure', manual.pressure), ('friction', manual.friction)):
+        wrong = int(np.count_nonzero(~np.isfinite(column)))
+        if wrong:
+            raise ValueError(f'{manual.name}: {wrong} readings have no {what}: measure them, or delete their rows')
+    if len(manual.friction) < 4:
+        raise ValueError(
+            f'{manual.name}: {len(manual.friction)} readings are too few: measure the friction in both directions, at '
+            f'{FEWEST_PRESSURES} pressures at least'
+        )
+    if (manual.friction < 0.0).any():
+        raise ValueError(
+            f'{manual.name}: friction of {float(manual.friction.min()):.6g} N is negative: give its magnitude, and the '
+            'direction in a column of its own'
+        )
+    _check_bounds(manual.name, manual.pressure, np.abs(manual.velocity), manual.friction)
+
+
+def _check_bounds(name: str, pressure: FloatArray, speed: FloatArray, force: FloatArray) -> None:
+    for what, values, (low, high), unit, size, advice in (
+        ('pressure', pressure, PRESSURE_BOUNDS, 'bar (gauge)', BAR, 'sign and unit of the pressure, and the sensor'),
+        ('speed', speed, (0.0, LARGEST_SPEED * (1.0 - 1e-6)), 'm/s', 1.0, 'units of velocity or position, and time'),
+        ('force', np.abs(force), (0.0, LARGEST_FORCE), 'N', 1.0, 'unit of the force'),
+    ):
+        lowest, highest = float(np.nanmin(values, initial=high)), float(np.nanmax(values, initial=low))
+        if lowest < low or highest > high:
+            raise ValueError(
+                f'{name}: a {what} of {(lowest if lowest < low else highest) / size:.6g} {unit} is not between '
+                f'{low / size:.3g} and {high / size:.3g} {unit}: check the {advice}'
+            )
+
+
+def check_readings(readings: FrictionReadings) -> None:
+    """Check that a law can be fitted to readings.
+
+    Raises:
+        ValueError: Too few pressures, negative friction, or forces and pressures that do not belong to one seal.
+    """
+    where = ', '.join(readings.names)
+    pressures, levels = readings.seal_pressure, readings.levels
+    spanned = float(np.ptp(pressures))
+    if spanned < max(NARROWEST_PRESSURES, 0.1 * float(pressures.max())):
+        raise ValueError(
+            f'{where}: everything was measured at one pressure, {float(np.median(pressures)) / BAR:.4g} bar (within '
+            f'{spanned / BAR:.2g} bar), so the data do not show how friction depends on pressure: measure at '
+            f'{FEWEST_PRESSURES} pressures at least (or is the pressure not in Pa?)'
+        )
+    if not readings.are_samples and len(levels) < FEWEST_PRESSURES:
+        at = ', '.join(f'{pressure / BAR:.4g}' for pressure in readings.level_pressures)
+        raise ValueError(
+            f'{where}: measured at {len(levels)} pressures ({at} bar), which any law fits: measure at '
+            f'{FEWEST_PRESSURES} at least, better at five'
+        )
+    _check_sizes(where, readings)
+
+
+def _check_sizes(where: str, readings: FrictionReadings) -> None:
+    """Check whether friction, offset and pressure can belong to one seal."""
+    friction, offsets = np.array([readings.half_range(inside) for inside in readings.levels.values()]).T
+    pressure = readings.level_pressures
+    negative = np.flatnonzero(friction <= 0.0)
+    if len(negative) > 0.2 * len(friction):
+        raise ValueError(
+            f'{where}: the friction is {friction[negative[-1]]:.4g} N at {pressure[negative[-1]] / BAR:.4g} bar, so it '
+            'would drive the rod: the sign of force sum or velocity is wrong (both are positive on extension), or a '
+            'unit in the force sum'
+        )
+    spanned, strongest = float(np.ptp(pressure)), float(friction.max())
+    area_error = float(np.polyfit(pressure, offsets, 1)[0])
+    if not readings.are_samples and abs(area_error) * spanned > LARGEST_AREA_ERROR * float(friction.mean()):
+        raise ValueError(
+            f'{where}: the offset of the force sum changes by {area_error * spanned:.4g} N over the pressures, and the '
+            f'friction is {float(friction.mean()):.4g} N: sign, area or unit of the pressure force in the force sum is '
+            f'wrong (error {1e6 * area_error:.4g} mm2)'
+        )
+    area = float(friction[-1] - friction[0]) / spanned
+    if abs(area) > LARGEST_SEAL_AREA:
+        raise ValueError(
+            f'{where}: friction changes by {area * BAR:.4g} N per bar, as for a seal of {1e4 * area:.3g} cm2: force or '
+            'pressure is in a wrong unit (kN for N, kPa for Pa)'
+        )
+    area = strongest / float(pressure.max())
+    if area < SMALLEST_SEAL_AREA:
+        raise ValueError(
+            f'{where}: friction of {strongest:.4g} N at {float(pressure.max()) / BAR:.4g} bar, as for a seal of '
+            f'{1e6 * area:.2g} mm2: force or pressure is in a wrong unit (N for kN, Pa for kPa)'
+        )
+    highest = np.count_nonzero(friction >= (1.0 - 1e-9) * strongest)
+    if not readings.are_samples and not readings.samples and 3 <= highest < len(friction):
+        raise ValueError(
+            f'{where}: the friction is exactly {strongest:.6g} N at {highest} pressures and lower at the others: the '
+            'scale or sensor is clipped: use one with a larger range'
+        )

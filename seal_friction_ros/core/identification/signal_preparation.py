@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 LONGEST_GAP = 0.5  # [s] a longer pause in the log ends a stroke (our choice)
 SHORTEST_REST = 0.1  # [s] a shorter stop is no rest before a breakaway (our choice)
@@ -28,12 +28,8 @@ LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp and is div
 
 
 @dataclass(frozen=True, kw_only=True)
-class SavitzkyGolay:
-    """Savitzky-Golay differentiation: slope of a polynomial fitted to the samples around each sample.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class SavitzkyGolay(CheckedParameters):
+    """Savitzky-Golay differentiation: slope of a polynomial fitted to the samples around each sample."""
 
     window: float = parameter(unit='s', lower=1e-6, upper=3600.0, description='Width of the fit, centred.')
     order: int = parameter(2, unit='', lower=1, upper=6, description='Order of the polynomial.')
@@ -41,17 +37,10 @@ class SavitzkyGolay:
         unit='s', lower=1e-6, upper=3600.0, description='No fit reaches across a longer pause.'
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Sliding:
-    """Definition of even sliding.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
+class Sliding(CheckedParameters):
+    """Definition of even sliding."""
 
     slowest: float = parameter(
         3e-3, unit='m/s', lower=0.0, upper=10.0, description='A rod that is slower counts as at rest.'
@@ -60,23 +49,15 @@ class Sliding:
         0.05, unit='m/s2', lower=1e-6, upper=1e4, description='Beyond it inertia counts, and the sample does not.'
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 class Signals(NamedTuple):
     """Signals of a log; arrays of shape (n,), NaN for a missing value."""
 
-    time: FloatArray
-    """[s] increasing"""
-    velocity: FloatArray
-    """[m/s] positive on extension"""
-    pressure_a: FloatArray
-    """[Pa, gauge]"""
-    pressure_b: FloatArray
-    """[Pa, gauge]"""
-    force_sum: FloatArray
-    """[N] positive on extension"""
+    time: FloatArray  # [s] increasing
+    velocity: FloatArray  # [m/s] positive on extension
+    pressure_a: FloatArray  # [Pa, gauge]
+    pressure_b: FloatArray  # [Pa, gauge]
+    force_sum: FloatArray  # [N] positive on extension
 
     def taken(self, index: IntArray | BoolArray) -> 'Signals':
         """The rows in ``index``."""
@@ -86,61 +67,39 @@ class Signals(NamedTuple):
 class SignalReading(NamedTuple):
     """One reading from a log: a stroke at held speed and pressure (medians), or the peak of a breakaway."""
 
-    direction: int
-    """-1 or 1"""
-    samples: IntArray
-    """indices of the samples behind the reading"""
-    velocity: float
-    """[m/s]; 0 for a breakaway"""
-    pressure_a: float
-    """[Pa, gauge]"""
-    pressure_b: float
-    """[Pa, gauge]"""
-    force_sum: float
-    """[N]"""
+    direction: int  # -1 or 1
+    samples: IntArray  # indices of the samples behind the reading
+    velocity: float  # [m/s]; 0 for a breakaway
+    pressure_a: float  # [Pa, gauge]
+    pressure_b: float  # [Pa, gauge]
+    force_sum: float  # [N]
 
 
 class HalfRange(NamedTuple):
     """Friction and offset of a force measured in both directions."""
 
-    friction: float
-    """[N]"""
-    offset: float
-    """[N]"""
+    friction: float  # [N]
+    offset: float  # [N]
 
 
 class OffsetLine(NamedTuple):
     """Offset of the force sum over pressure: constant + area_error * pressure."""
 
-    constant: float
-    """[N] of the load cell"""
-    area_error: float
-    """[m^2] error of the area in the pressure force"""
-    rms: float
-    """[N] of the residuals"""
-
-
-# -- velocity ---------------------------------------------------------------------------------------------------------
+    constant: float  # [N] of the load cell
+    area_error: float  # [m^2] error of the area in the pressure force
+    rms: float  # [N] of the residuals
 
 
 def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArray:
     """Time derivative of a signal by a Savitzky-Golay filter, at the times of the samples.
 
-    The slope at a sample is that of the least-squares polynomial through the samples of the window centred there. In
-    the first and last half window of a segment it is the slope of the polynomial of the first or last window. The
-    centred window has no delay, but it is only possible offline.
+    The slope at a sample is that of the least-squares polynomial through the window centred there, which has no delay;
+    in the first and last half window of a segment, that of the first or last window. The filter needs a uniform grid:
+    each segment (samples without a pause longer than ``largest_gap``) is interpolated to as many equidistant times as
+    it has samples, filtered, and interpolated back.
 
-    The filter needs a uniform grid. Each segment (samples without a pause longer than ``largest_gap``) is interpolated
-    to as many equidistant times as it has samples, filtered, and interpolated back.
-
-    Args:
-        time: [s], increasing, shape (n,).
-        values: Signal to differentiate, shape (n,); samples that are not finite are left out.
-        law: Window, order and largest gap.
-
-    Returns:
-        Slope in units of ``values`` per second, shape (n,); NaN where the value is not finite or the segment is shorter
-        than the window.
+    Samples of ``values`` that are not finite are left out. The slope, in units of ``values`` per second, shape (n,), is
+    NaN there and in segments shorter than the window.
 
     Raises:
         ValueError: No segment is as long as the window, or the window holds too few samples for the order.
@@ -148,10 +107,21 @@ def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArra
     Source: [SavitzkyGolay1964]_; grid, gaps and edges are our choice.
     """
     result = np.full(len(time), np.nan)
-    usable = np.flatnonzero(np.isfinite(values))
-    for segment in _unbroken(time, usable, law.largest_gap):
-        if len(segment) > law.order + 1:
-            result[segment] = _segment_slope(time[segment], values[segment], law)
+    for segment in _unbroken(time, np.flatnonzero(np.isfinite(values)), law.largest_gap):
+        rows, at = len(segment), time[segment]
+        if rows <= law.order + 1:
+            continue
+        interval = (at[-1] - at[0]) / (rows - 1)
+        points = 2 * round(law.window / interval / 2.0) + 1
+        if points <= law.order:
+            raise ValueError(
+                f'SavitzkyGolay.window = {law.window} s holds {points} samples, {interval:.3g} s apart: '
+                f'order {law.order} needs {law.order + 1}'
+            )
+        if points <= rows:
+            grid = np.linspace(at[0], at[-1], rows)
+            even = np.interp(grid, at, values[segment])
+            result[segment] = np.interp(at, grid, savgol_filter(even, points, law.order, deriv=1, delta=interval))
     if np.isnan(result).all():
         raise ValueError(
             f'no stretch of rows without a pause above {law.largest_gap} s is long enough for '
@@ -165,31 +135,12 @@ def _unbroken(time: FloatArray, index: IntArray, longest_gap: float) -> list[Int
     return np.split(index, np.flatnonzero(np.diff(time[index]) > longest_gap) + 1)
 
 
-def _segment_slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArray:
-    rows = len(time)
-    interval = (time[-1] - time[0]) / (rows - 1)
-    points = 2 * round(law.window / interval / 2.0) + 1
-    if points <= law.order:
-        raise ValueError(
-            f'SavitzkyGolay.window = {law.window} s holds {points} samples, {interval:.3g} s apart: '
-            f'order {law.order} needs {law.order + 1}'
-        )
-    if points > rows:
-        return np.full(rows, np.nan)
-    grid = np.linspace(time[0], time[-1], rows)
-    slopes = savgol_filter(np.interp(grid, time, values), points, law.order, deriv=1, delta=interval, mode='interp')
-    return np.asarray(np.interp(time, grid, slopes))
-
-
-# -- even sliding, strokes, breakaways --------------------------------------------------------------------------------
-
-
 def even_sliding(signals: Signals, sliding: Sliding) -> BoolArray:
     """Which samples are even sliding: fast enough, small acceleration, every signal finite; shape (n,).
 
     The acceleration is the central difference of the velocity; it is not smoothed further.
     """
-    finite = np.logical_and.reduce([np.isfinite(column) for column in signals])
+    finite = np.isfinite(signals).all(axis=0)
     with np.errstate(invalid='ignore'):
         moving = np.abs(signals.velocity) > sliding.slowest
         even = np.abs(np.gradient(signals.velocity, signals.time)) < sliding.largest_acceleration
@@ -215,17 +166,17 @@ def motions(signals: Signals, sliding: Sliding) -> list[tuple[int, IntArray]]:
 def strokes(signals: Signals, sliding: Sliding) -> list[SignalReading]:
     """Every motion at held speed and pressure, each with the medians of its even samples.
 
-    Medians are insensitive to the transitions at both ends of a stroke, whose length is unknown. A stroke counts if it
+    Medians are insensitive to the transitions at both ends of a stroke. A stroke counts if it
     has `FEWEST_SAMPLES` even samples, of which `HELD_SHARE` are within `SPEED_TOLERANCE` of the median speed, and
     pressures within `PRESSURE_TOLERANCE`.
     """
     even = even_sliding(signals, sliding)
-    found = []
-    for direction, run in motions(signals, sliding):
-        samples = run[even[run]]
-        if direction != 0 and len(samples) >= FEWEST_SAMPLES and _is_held(signals, samples):
-            found.append(SignalReading(direction, samples, *(float(np.median(c[samples])) for c in signals[1:])))
-    return found
+    moved = [(direction, run[even[run]]) for direction, run in motions(signals, sliding) if direction != 0]
+    return [
+        SignalReading(direction, samples, *(float(np.median(column[samples])) for column in signals[1:]))
+        for direction, samples in moved
+        if len(samples) >= FEWEST_SAMPLES and _is_held(signals, samples)
+    ]
 
 
 def _is_held(signals: Signals, samples: IntArray) -> bool:
@@ -260,40 +211,24 @@ def breakaways(signals: Signals, sliding: Sliding) -> list[SignalReading]:
     return found
 
 
-# -- friction and offset ----------------------------------------------------------------------------------------------
-
-
 def half_range(force: FloatArray, direction: IntArray, *, of_medians: bool = True) -> HalfRange:
     """Friction and offset of a force that was measured in both directions.
 
-    friction = (F_extend - F_retract) / 2, offset = (F_extend + F_retract) / 2, with the median or mean of each
-    direction.
-
-    Args:
-        force: Force sums [N], shape (n,).
-        direction: -1 or 1, shape (n,).
-        of_medians: Use medians, for samples that include transitions; otherwise means, for single readings.
+    friction = (F_extend - F_retract) / 2, offset = (F_extend + F_retract) / 2 of the force [N], shape (n,), with the
+    median of each direction (-1 or 1) for samples that include transitions, or the mean for single readings.
 
     Raises:
         ValueError: One direction is missing.
     """
-    of = np.median if of_medians else np.mean
     both = [force[direction == side] for side in (1, -1)]
     if not all(len(side) for side in both):
         raise ValueError('the rod moved in one direction only: friction and offset of the force cannot be separated')
-    extend, retract = (float(of(side)) for side in both)
+    extend, retract = (float(np.median(side) if of_medians else np.mean(side)) for side in both)
     return HalfRange((extend - retract) / 2.0, (extend + retract) / 2.0)
 
 
 def offset_line(pressures: FloatArray, offsets: FloatArray) -> OffsetLine:
-    """Least-squares line through offsets of the force sum over pressure.
-
-    The constant part is an offset of the load cell; the part proportional to pressure is an area error.
-
-    Args:
-        pressures: [Pa, gauge], shape (n,), n >= 2, not all the same.
-        offsets: [N], shape (n,).
-    """
+    """Least-squares line through offsets [N] over pressures [Pa, gauge], shape (n,) each, n >= 2, not all the same."""
     area_error, constant = np.polyfit(pressures, offsets, 1)
     residuals = offsets - (constant + area_error * pressures)
     return OffsetLine(float(constant), float(area_error), float(np.sqrt(np.mean(residuals**2))))
@@ -320,9 +255,6 @@ def pressure_levels(pressures: FloatArray) -> IntArray:
         result[order[cluster]] = used + part
         used += int(part[-1]) + 1
     return result
-
-
-# -- signal faults ----------------------------------------------------------------------------------------------------
 
 
 def longest_stretch(wrong: BoolArray) -> tuple[int, int]:

@@ -1,8 +1,8 @@
 """Friction of a seal in reciprocating motion on a test rig, evaluated as in the spool-valve paper.
 
-The rig drives ten cycles; the ninth is evaluated, when the lubricant film has settled. The measuring chain (force
-transducer, joints, rod) has a resonance that does not depend on speed (157 Hz in the paper), which a notch filter
-removes. The force is normalised by its mean in the middle of the stroke, where the speed is constant.
+The rig drives ten cycles; the film has settled in the ninth, which is evaluated. A notch filter removes the resonance
+of the measuring chain (force transducer, joints, rod; 157 Hz in the paper), which does not depend on speed. The force
+is normalised by its mean in the middle of the stroke, where the speed is constant.
 
 Source: spool-valve paper, chapters 4 (cycles), 6 (resonance, normalisation) and 7.3 (moving average). Automatic
 detection and notch are our choice; the paper does both by eye.
@@ -16,15 +16,15 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import filtfilt, iirnotch
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpoolEvaluation:
-    """How a measurement of several cycles is evaluated; the defaults are the paper's.
+class SpoolEvaluation(CheckedParameters):
+    """Evaluation of a measurement of several cycles; the defaults are those of the paper.
 
     Raises:
-        ValueError: A value is out of bounds, or there are fewer cycles than the one to evaluate.
+        ValueError: A value is out of bounds, or ``evaluated_cycle`` is above ``cycles``.
     """
 
     cycles: int = parameter(10, unit='', lower=1, upper=10**6, description='Cycles that one measurement has.')
@@ -44,7 +44,7 @@ class SpoolEvaluation:
     )
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         if self.evaluated_cycle > self.cycles:
             raise ValueError(
                 f'SpoolEvaluation.evaluated_cycle = {self.evaluated_cycle} is above cycles = {self.cycles}'
@@ -54,36 +54,25 @@ class SpoolEvaluation:
 class SpoolFriction(NamedTuple):
     """Friction of one cycle over displacement."""
 
-    displacement: FloatArray
-    """[m] from the middle of the stroke, shape (n,)"""
-    velocity: FloatArray
-    """[m/s] shape (n,)"""
-    force: FloatArray
-    """[N] as measured, shape (n,)"""
-    filtered: FloatArray
-    """[N] resonance notched, then averaged, shape (n,)"""
-    normalised: FloatArray
-    """[-] ``filtered`` over the reference force, shape (n,)"""
-    reference_force: float
-    """[N]"""
-    resonance: float | None
-    """[Hz] of the measuring chain; None if there is none"""
+    displacement: FloatArray  # [m] from the middle of the stroke, shape (n,)
+    velocity: FloatArray  # [m/s] shape (n,)
+    force: FloatArray  # [N] as measured, shape (n,)
+    filtered: FloatArray  # [N] resonance notched, then averaged, shape (n,)
+    normalised: FloatArray  # [-] ``filtered`` over the reference force, shape (n,)
+    reference_force: float  # [N]
+    resonance: float | None  # [Hz] of the measuring chain; None if there is none
 
 
 def cycle_starts(displacement: FloatArray) -> IntArray:
-    """Index at which each cycle begins: a quarter cycle before the upward crossing of the middle of the stroke.
+    """Index at which each cycle begins, and the end of the last one, shape (cycles + 1,).
 
-    Args:
-        displacement: [m], shape (n,), of a reciprocating motion.
-
-    Returns:
-        Indices, including the end of the last cycle, shape (cycles + 1,).
+    A cycle begins a quarter cycle before the upward crossing of the middle of the stroke. ``displacement`` [m], shape
+    (n,), is that of a reciprocating motion.
 
     Raises:
         ValueError: There are not two crossings, so no cycle.
     """
-    middle = (float(displacement.max()) + float(displacement.min())) / 2.0
-    above = displacement > middle
+    above = displacement > (float(displacement.max()) + float(displacement.min())) / 2.0
     rising = np.flatnonzero(~above[:-1] & above[1:]) + 1
     if len(rising) < 2:
         raise ValueError(f'{len(rising)} crossings of the middle of the stroke: no cycle: drive in both directions')
@@ -97,8 +86,7 @@ def moving_average(values: FloatArray, width: int) -> FloatArray:
 
     Source: spool-valve paper, section 7.3: "a moving average filter with a step width of 50".
     """
-    result: FloatArray = uniform_filter1d(values, width, mode='nearest')
-    return result
+    return np.asarray(uniform_filter1d(values, width, mode='nearest'))
 
 
 def resonance_frequency(time: FloatArray, force: FloatArray, law: SpoolEvaluation) -> float | None:
@@ -108,11 +96,7 @@ def resonance_frequency(time: FloatArray, force: FloatArray, law: SpoolEvaluatio
     is a hump among them. The prominence is the ratio of the envelope (highest line within 10 Hz) to the larger of its
     values at two thirds and three halves of the frequency. The resonance is at the largest prominence, if that exceeds
     ``resonance_prominence``; its frequency is the mean of the lines under the hump, weighted by their power.
-
-    Args:
-        time: [s], even steps, shape (n,).
-        force: [N], shape (n,).
-        law: Lowest frequency and prominence.
+    ``time`` [s] has even steps, shape (n,).
 
     Source: spool-valve paper, section 6.2; the detection is our choice.
     """
@@ -142,9 +126,7 @@ def without_resonance(time: FloatArray, force: FloatArray, resonance: float, law
     rate = 1.0 / float(np.median(np.diff(time)))
     if not 0.0 < resonance < rate / 2.0:
         raise ValueError(f'a resonance of {resonance:.6g} Hz is not below half the sampling rate of {rate:.6g} Hz')
-    numerator, denominator = iirnotch(resonance, law.notch_quality, fs=rate)
-    result: FloatArray = filtfilt(numerator, denominator, force)
-    return result
+    return np.asarray(filtfilt(*iirnotch(resonance, law.notch_quality, fs=rate), force))
 
 
 def reference_force(displacement: FloatArray, force: FloatArray, half_width: float) -> float:
@@ -155,11 +137,11 @@ def reference_force(displacement: FloatArray, force: FloatArray, half_width: flo
     Raises:
         ValueError: The stroke is shorter, or the force there is zero.
     """
-    inside = np.abs(displacement) <= half_width
-    if not inside.any() or np.abs(displacement).max() < half_width:
+    inside, reach = np.abs(displacement) <= half_width, float(np.abs(displacement).max())
+    if not inside.any() or reach < half_width:
         raise ValueError(
-            f'the stroke of +/- {1e3 * float(np.abs(displacement).max()):.3g} mm does not reach '
-            f'+/- {1e3 * half_width:.3g} mm: choose a narrower reference_half_width'
+            f'the stroke of +/- {1e3 * reach:.3g} mm does not reach +/- {1e3 * half_width:.3g} mm: choose a narrower '
+            'reference_half_width'
         )
     mean = float(np.abs(force[inside]).mean())
     if not mean > 0.0:
@@ -172,13 +154,9 @@ def evaluate_cycles(
 ) -> SpoolFriction:
     """Normalised friction over displacement of one cycle out of several.
 
-    Args:
-        time: [s], even steps, shape (n,).
-        displacement: [m], shape (n,).
-        force: [N], shape (n,), positive with the velocity.
-        law: How it is evaluated.
-        reference: Reference force [N] of another measurement (the paper normalises all seals by the outer one without
-            pressure); None: that of this cycle.
+    ``time`` [s] has even steps; ``force`` [N] is positive with the velocity; all have the shape (n,). ``reference`` is
+    the reference force [N] of another measurement (the paper normalises all seals by the outer one without pressure);
+    None: that of this cycle.
 
     Raises:
         ValueError: A sample is not finite, there are too few cycles or samples, or the reference force is zero.
@@ -186,10 +164,10 @@ def evaluate_cycles(
     if not all(np.isfinite(column).all() for column in (time, displacement, force)):
         raise ValueError('time, displacement or force has samples that are not finite: cut them out')
     starts = cycle_starts(displacement)
-    if len(starts) - 1 < law.evaluated_cycle:
-        raise ValueError(
-            f'{len(starts) - 1} cycles, but cycle {law.evaluated_cycle} is to be evaluated: drive {law.cycles} cycles'
-        )
+    count = len(starts) - 1
+    if count < law.evaluated_cycle:
+        wanted = f'cycle {law.evaluated_cycle} is to be evaluated'
+        raise ValueError(f'{count} cycles, but {wanted}: drive {law.cycles} cycles')
     resonance = resonance_frequency(time, force, law)
     quiet = force if resonance is None else without_resonance(time, force, resonance, law)
     smooth = moving_average(quiet, law.moving_average)

@@ -49,22 +49,17 @@ _THINNEST = 1e-9  # [m] a gap below this flows like this
 class ContactState(NamedTuple):
     """Film and gap at one moment, each of shape (n,)."""
 
-    gap: FloatArray
-    """mean separation of the surfaces [m]"""
-    pressure: FloatArray
-    """film pressure above the cavitation pressure [Pa]"""
-    saturation: FloatArray
-    """share of the gap that is filled"""
+    gap: FloatArray  # mean separation of the surfaces [m]
+    pressure: FloatArray  # film pressure above the cavitation pressure [Pa]
+    saturation: FloatArray  # share of the gap that is filled
 
 
 class ContactStep(NamedTuple):
     """Result of one step."""
 
     state: ContactState
-    flow: FloatArray
-    """through the faces of the cells [m^2/s], shape (n + 1,), in the direction of x"""
-    iterations: int
-    """of Newton's method"""
+    flow: FloatArray  # through the faces of the cells [m^2/s], shape (n + 1,), in the direction of x
+    iterations: int  # of Newton's method
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,12 +26,9 @@ class HalfPlane:
     """
 
     cells: int
-    cell_width: float
-    """[m]"""
-    modulus: float
-    """plane-strain modulus E* = E / (1 - nu^2) [Pa]"""
-    depth: float
-    """[m]"""
+    cell_width: float  # [m]
+    modulus: float  # plane-strain modulus E* = E / (1 - nu^2) [Pa]
+    depth: float  # [m]
     influence: FloatArray = field(init=False, repr=False)
     """deflection of a cell by a unit pressure r cells away [m/Pa], shape (cells,)"""
     stiffness_band: FloatArray = field(init=False, repr=False)

@@ -20,18 +20,12 @@ SLOW_SHARE = 0.2
 class Findings(NamedTuple):
     """Numbers of the last cycle of a run; None where they do not apply."""
 
-    friction: float
-    """[N] mean magnitude within 0.5 mm of the middle"""
-    solid_share: float
-    """of solid and fluid friction there"""
-    solid_slow: float | None
-    """[N] solid friction while slowing down, at 0.2 of the highest speed; mean of both strokes"""
-    solid_fast: float
-    """[N] solid friction at the highest speed, where it is steadiest (smallest)"""
-    fluid_slow: float | None
-    """[N] like the solid one"""
-    fluid_fast: float
-    """[N] like the solid one"""
+    friction: float  # [N] mean magnitude within 0.5 mm of the middle
+    solid_share: float  # of solid and fluid friction there
+    solid_slow: float | None  # [N] solid friction while slowing down, at 0.2 of the highest speed; mean of both strokes
+    solid_fast: float  # [N] solid friction at the highest speed, where it is steadiest (smallest)
+    fluid_slow: float | None  # [N] like the solid one
+    fluid_fast: float  # [N] like the solid one
     rise_on_deceleration: float | None
     """friction at 0.2 of the highest speed, slowing down, over the last at the highest, less 1; mean of strokes"""
     assisted_length: float | None
@@ -40,14 +34,11 @@ class Findings(NamedTuple):
     """[m] the same from elasticity alone: friction at the reversal over the stiffness of the groove"""
     second_lobe: float | None
     """[m] position at which friction begins to fall while the seal still sticks; None with one seat"""
-    edge_peak: float | None
-    """largest friction at the control edge over the mean in the seat after it"""
-    edge_assist: float | None
-    """[N] largest force of the chamfer along the motion, on leaving the seat"""
+    edge_peak: float | None  # largest friction at the control edge over the mean in the seat after it
+    edge_assist: float | None  # [N] largest force of the chamfer along the motion, on leaving the seat
     friction_on_leaving: float | None
     """[N] lowest friction while that force is above half of its maximum; negative: it assists the motion"""
-    after_edge: float | None
-    """[N] mean friction well inside the seat, after the control edge"""
+    after_edge: float | None  # [N] mean friction well inside the seat, after the control edge
 
 
 def findings(result: TransientResult) -> Findings:

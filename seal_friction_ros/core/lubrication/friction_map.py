@@ -23,22 +23,17 @@ _LONG_PASSAGES = 250.0  # a step of so many is nearly one to the steady film
 class SteadyFriction(NamedTuple):
     """Steady sliding friction at one pressure, over the speeds of the grid."""
 
-    pressure: float
-    """[Pa, gauge] on one side"""
-    friction: FloatArray
-    """[N] mean of both directions"""
-    solid: FloatArray
-    """[N] mean of both directions"""
-    direction_difference: FloatArray
-    """[N] friction towards the pressure less that away from it"""
+    pressure: float  # [Pa, gauge] on one side
+    friction: FloatArray  # [N] mean of both directions
+    solid: FloatArray  # [N] mean of both directions
+    direction_difference: FloatArray  # [N] friction towards the pressure less that away from it
     retried_steps: int
 
 
 class MemoryLength(NamedTuple):
     """Travel over which friction follows a change of speed."""
 
-    length: float
-    """[m] of sliding"""
+    length: float  # [m] of sliding
     retried_steps: int
 
 

@@ -219,10 +219,8 @@ _PARTS: dict[str, Any] = {
 class SpoolSeal(CheckedParameters):
     """One seal of a spool with several."""
 
-    case: str
-    """name of its case"""
-    mirrored: bool = False
-    """mounted in the opposite direction: its case moves in the opposite direction"""
+    case: str  # name of its case
+    mirrored: bool = False  # mounted in the opposite direction: its case moves in the opposite direction
     shift: float = parameter(
         0.0, unit='m', lower=-1.0, upper=1.0, description='Where the spool stands when the case is at 0.'
     )

@@ -26,14 +26,10 @@ from seal_friction_ros.core.foundation.compiled import compiled
 class FilmEnds(NamedTuple):
     """Conditions beyond both ends of the film. Where the pressure is above 0 the saturation is 1."""
 
-    pressure_left: float = 0.0
-    """[Pa] above the cavitation pressure"""
-    pressure_right: float = 0.0
-    """[Pa] above the cavitation pressure"""
-    saturation_left: float = 1.0
-    """of the inflow"""
-    saturation_right: float = 1.0
-    """of the inflow"""
+    pressure_left: float = 0.0  # [Pa] above the cavitation pressure
+    pressure_right: float = 0.0  # [Pa] above the cavitation pressure
+    saturation_left: float = 1.0  # of the inflow
+    saturation_right: float = 1.0  # of the inflow
 
 
 @compiled

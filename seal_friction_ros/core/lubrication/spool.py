@@ -31,16 +31,11 @@ class SpoolSealMotion:
 class SpoolResult(NamedTuple):
     """Friction of a spool over its motion; arrays with one entry per step."""
 
-    time: FloatArray
-    """[s]"""
-    position: FloatArray
-    """of the spool [m]"""
-    friction: FloatArray
-    """of all seals [N], with the sign of the velocity it resists"""
-    members: FloatArray
-    """of each seal [N], shape (seals, steps)"""
-    last_cycle: BoolArray
-    """whether each step is in the last cycle"""
+    time: FloatArray  # [s]
+    position: FloatArray  # of the spool [m]
+    friction: FloatArray  # of all seals [N], with the sign of the velocity it resists
+    members: FloatArray  # of each seal [N], shape (seals, steps)
+    last_cycle: BoolArray  # whether each step is in the last cycle
 
 
 def superposed(members: Sequence[SpoolSeal], runs: Sequence[TransientResult]) -> SpoolResult:

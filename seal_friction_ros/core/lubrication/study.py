@@ -12,16 +12,11 @@ from seal_friction_ros.core.lubrication.transient import TransientResult, last_c
 class StudyTable(NamedTuple):
     """One entry per run, in order of tau_c."""
 
-    solid_shear_stress: tuple[float, ...]
-    """[Pa]"""
-    friction: tuple[float, ...]
-    """[N] mean magnitude within 0.5 mm of the middle"""
-    solid_share: tuple[float, ...]
-    """solid over solid and fluid friction there"""
-    deviation: tuple[float, ...]
-    """friction over tau_c, relative to the mean of all runs, less 1"""
-    curve_deviation: tuple[float, ...]
-    """largest of the same, position by position within 0.5 mm of the middle"""
+    solid_shear_stress: tuple[float, ...]  # [Pa]
+    friction: tuple[float, ...]  # [N] mean magnitude within 0.5 mm of the middle
+    solid_share: tuple[float, ...]  # solid over solid and fluid friction there
+    deviation: tuple[float, ...]  # friction over tau_c, relative to the mean of all runs, less 1
+    curve_deviation: tuple[float, ...]  # largest of the same, position by position within 0.5 mm of the middle
 
 
 def study_table(runs: list[TransientResult]) -> StudyTable:

@@ -49,14 +49,11 @@ class LubricationModel:
 
     case: LubricationCase
     contact: LubricatedContact = field(init=False)
-    place: FloatArray = field(init=False)
-    """cells along the seal from its crown [m], shape (n,)"""
-    ambient: FloatArray = field(init=False)
-    """pressure of the air along the seal [Pa], shape (n,)"""
+    place: FloatArray = field(init=False)  # cells along the seal from its crown [m], shape (n,)
+    ambient: FloatArray = field(init=False)  # pressure of the air along the seal [Pa], shape (n,)
     profile: FloatArray = field(init=False)
     """gap of the undeformed seal to a plain wall, less the deflection by the air [m], shape (n,)"""
-    circumference: float = field(init=False)
-    """[m]"""
+    circumference: float = field(init=False)  # [m]
 
     def __post_init__(self) -> None:
         case, numerics = self.case, self.case.numerics
@@ -86,17 +83,12 @@ class LubricationModel:
 class TransientState(NamedTuple):
     """State of a seal between two steps."""
 
-    time: float
-    """[s]"""
-    position: float
-    """of the spool [m]"""
-    lag: float
-    """of the contact behind the spool [m]"""
+    time: float  # [s]
+    position: float  # of the spool [m]
+    lag: float  # of the contact behind the spool [m]
     state: ContactState
-    wall_film: WallFilm | None
-    """film on the wall outside the seal; None where it is flooded"""
-    creep: FloatArray
-    """viscoelastic part of the deflection [m], shape (n,); zeros for an elastic seal"""
+    wall_film: WallFilm | None  # film on the wall outside the seal; None where it is flooded
+    creep: FloatArray  # viscoelastic part of the deflection [m], shape (n,); zeros for an elastic seal
 
     @property
     def contact_place(self) -> float:
@@ -107,50 +99,32 @@ class TransientState(NamedTuple):
 class SealForces(NamedTuple):
     """Forces of the wall on the seal at the end of a step [N]."""
 
-    friction: float
-    """solid + fluid + edge"""
+    friction: float  # solid + fluid + edge
     solid: float
     fluid: float
-    edge: float
-    """axial part of the pressure on the chamfer; it pushes the seal out of the seat"""
-    sliding_velocity: float
-    """of the contact over the wall [m/s]"""
+    edge: float  # axial part of the pressure on the chamfer; it pushes the seal out of the seat
+    sliding_velocity: float  # of the contact over the wall [m/s]
 
 
 class TransientResult(NamedTuple):
     """A run; arrays with one entry per step, the first after the first step."""
 
     case: LubricationCase
-    time: FloatArray
-    """[s]"""
-    position: FloatArray
-    """of the spool [m]"""
-    velocity: FloatArray
-    """of the spool [m/s]"""
-    sliding_velocity: FloatArray
-    """of the contact [m/s]"""
-    friction: FloatArray
-    """[N], with the sign of the velocity it resists"""
-    solid: FloatArray
-    """[N]"""
-    fluid: FloatArray
-    """[N]"""
-    edge: FloatArray
-    """[N]"""
-    lag: FloatArray
-    """[m]"""
-    place: FloatArray
-    """cells along the seal [m], shape (n,)"""
-    gap: FloatArray
-    """[m], shape (steps, n)"""
-    film_pressure: FloatArray
-    """[Pa], shape (steps, n)"""
-    contact_pressure: FloatArray
-    """[Pa], shape (steps, n)"""
-    saturation: FloatArray
-    """shape (steps, n)"""
-    retried_steps: int
-    """steps that did not converge and were repeated in halves"""
+    time: FloatArray  # [s]
+    position: FloatArray  # of the spool [m]
+    velocity: FloatArray  # of the spool [m/s]
+    sliding_velocity: FloatArray  # of the contact [m/s]
+    friction: FloatArray  # [N], with the sign of the velocity it resists
+    solid: FloatArray  # [N]
+    fluid: FloatArray  # [N]
+    edge: FloatArray  # [N]
+    lag: FloatArray  # [m]
+    place: FloatArray  # cells along the seal [m], shape (n,)
+    gap: FloatArray  # [m], shape (steps, n)
+    film_pressure: FloatArray  # [Pa], shape (steps, n)
+    contact_pressure: FloatArray  # [Pa], shape (steps, n)
+    saturation: FloatArray  # shape (steps, n)
+    retried_steps: int  # steps that did not converge and were repeated in halves
     newton_iterations: int
     mass_defect: float
     """largest difference between lubricant in and out and that in the film, over that in the film, of any step"""

@@ -17,10 +17,8 @@ class PathEnd(NamedTuple):
 
     state: OringState
     surroundings: Surroundings
-    newton_steps: int
-    """without those of failed steps"""
-    stride: float
-    """fraction of the path proposed for a next step"""
+    newton_steps: int  # without those of failed steps
+    stride: float  # fraction of the path proposed for a next step
 
 
 def follow_path(

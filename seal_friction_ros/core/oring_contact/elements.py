@@ -24,25 +24,18 @@ _UNDEFORMED = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
 class Elements(NamedTuple):
     """Quantities of the elements that do not depend on the displacements."""
 
-    freedoms: IntArray
-    """degrees of freedom of each element: r and z of its corners in turn, shape (e, 8)"""
-    gradient_rows: FloatArray
-    """B [1/m], shape (e, 4, 5, 8)"""
-    weights: FloatArray
-    """reference volume of each Gauss point over the full circumference [m^3], shape (e, 4)"""
+    freedoms: IntArray  # degrees of freedom of each element: r and z of its corners in turn, shape (e, 8)
+    gradient_rows: FloatArray  # B [1/m], shape (e, 4, 5, 8)
+    weights: FloatArray  # reference volume of each Gauss point over the full circumference [m^3], shape (e, 4)
 
 
 class ElementForces(NamedTuple):
     """Contributions of the elements to the balance of forces, in the order of `Elements.freedoms`."""
 
-    force: FloatArray
-    """[N], shape (e, 8)"""
-    stiffness: FloatArray
-    """[N/m], shape (e, 8, 8)"""
-    tension: FloatArray
-    """mean tension K (Theta - 1) [Pa], shape (e,)"""
-    tension_rows: FloatArray
-    """derivative of the tension by the displacements [Pa/m], shape (e, 8)"""
+    force: FloatArray  # [N], shape (e, 8)
+    stiffness: FloatArray  # [N/m], shape (e, 8, 8)
+    tension: FloatArray  # mean tension K (Theta - 1) [Pa], shape (e,)
+    tension_rows: FloatArray  # derivative of the tension by the displacements [Pa/m], shape (e, 8)
 
 
 def make_elements(mesh: Mesh) -> Elements:

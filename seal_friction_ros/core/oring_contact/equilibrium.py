@@ -33,47 +33,35 @@ class OringModel(NamedTuple):
     mesh: Mesh
     elements: Elements
     rubber: Rubber
-    force_scale: float
-    """2 pi R E d, R the radius of the ring [N]: reference of the residual forces"""
-    guide: tuple[int, int]
-    """inner and outer node of the guide against rolling"""
-    guide_stiffness: float
-    """force over difference of their axial displacements [N/m]"""
+    force_scale: float  # 2 pi R E d, R the radius of the ring [N]: reference of the residual forces
+    guide: tuple[int, int]  # inner and outer node of the guide against rolling
+    guide_stiffness: float  # force over difference of their axial displacements [N/m]
 
 
 class OringState(NamedTuple):
     """Displacements and tensions of the ring."""
 
-    displacement: FloatArray
-    """r and z of the nodes in turn [m], shape (2 n,)"""
-    tension: FloatArray
-    """mean tension of the elements [Pa], shape (e,)"""
+    displacement: FloatArray  # r and z of the nodes in turn [m], shape (2 n,)
+    tension: FloatArray  # mean tension of the elements [Pa], shape (e,)
 
 
 class Assembly(NamedTuple):
     """Places of the element, outline and guide entries in the sparse stiffness of the free displacements."""
 
-    free: IntArray
-    """free displacements, shape (f,)"""
+    free: IntArray  # free displacements, shape (f,)
     slots: IntArray
     """index of each entry in the stored values; entries of fixed displacements go to one extra place at the end"""
-    rows: IntArray
-    """row of each stored value"""
-    starts: IntArray
-    """first stored value of each column, shape (f + 1,)"""
+    rows: IntArray  # row of each stored value
+    starts: IntArray  # first stored value of each column, shape (f + 1,)
 
 
 class ForceBalance(NamedTuple):
     """Residual forces and stiffness of the whole ring."""
 
-    residual: FloatArray
-    """[N], shape (2 n,)"""
-    entries: FloatArray
-    """stiffness of elements, outline and guide, flat [N/m]"""
-    tension: FloatArray
-    """[Pa], shape (e,)"""
-    tension_rows: FloatArray
-    """[Pa/m], shape (e, 8)"""
+    residual: FloatArray  # [N], shape (2 n,)
+    entries: FloatArray  # stiffness of elements, outline and guide, flat [N/m]
+    tension: FloatArray  # [Pa], shape (e,)
+    tension_rows: FloatArray  # [Pa/m], shape (e, 8)
 
 
 def make_model(mesh: Mesh, rubber: Rubber, section_diameter: float, guide: float) -> OringModel:

@@ -40,12 +40,10 @@ _SEATING = 1e-3  # first penetration of the ring into the downstream wall, over 
 class LoadedRing(NamedTuple):
     """Equilibrium of the ring under one pressure."""
 
-    pressure: float
-    """[Pa, gauge]"""
+    pressure: float  # [Pa, gauge]
     surroundings: Surroundings
     state: OringState
-    newton_steps: int
-    """since the last requested pressure"""
+    newton_steps: int  # since the last requested pressure
 
 
 def oring_model(case: OringCase) -> OringModel:

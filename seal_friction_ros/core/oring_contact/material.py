@@ -81,12 +81,9 @@ def hardness_of_elastic_modulus(elastic_modulus: float) -> float:
 class MaterialResponse(NamedTuple):
     """An energy density W(F) with its derivatives by F, at points; components in the order rr, rz, zr, zz, t."""
 
-    energy: FloatArray
-    """W [Pa], shape (...)"""
-    stress: FloatArray
-    """dW/dF [Pa], shape (..., 5)"""
-    stiffness: FloatArray
-    """d2W/dF2 [Pa], shape (..., 5, 5)"""
+    energy: FloatArray  # W [Pa], shape (...)
+    stress: FloatArray  # dW/dF [Pa], shape (..., 5)
+    stiffness: FloatArray  # d2W/dF2 [Pa], shape (..., 5, 5)
 
 
 _DETERMINANT_HESSIAN = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], dtype=float)

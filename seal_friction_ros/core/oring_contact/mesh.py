@@ -22,12 +22,9 @@ AXIAL_SHARE = 0.6
 class Mesh(NamedTuple):
     """Quadrilaterals of the section of the undeformed ring, in the (r, z) half plane."""
 
-    nodes: FloatArray
-    """position (r, z) [m], shape (n, 2)"""
-    elements: IntArray
-    """corner nodes, counterclockwise with r to the right and z up, shape (e, 4)"""
-    surface: IntArray
-    """nodes of the outline, counterclockwise from the one nearest to the axis, shape (s,)"""
+    nodes: FloatArray  # position (r, z) [m], shape (n, 2)
+    elements: IntArray  # corner nodes, counterclockwise with r to the right and z up, shape (e, 4)
+    surface: IntArray  # nodes of the outline, counterclockwise from the one nearest to the axis, shape (s,)
 
 
 def o_grid(section_diameter: float, center_radius: float, lines: int) -> Mesh:

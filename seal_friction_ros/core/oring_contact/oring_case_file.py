@@ -29,7 +29,7 @@ from seal_friction_ros.core.foundation.parameters import (
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
-from seal_friction_ros.core.friction.seal_file import parse_friction_coefficient
+from seal_friction_ros.core.friction.seal_file import parse_part
 from seal_friction_ros.core.oring_contact.material import Rubber, elastic_modulus_of_hardness
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics, check_pressures
 
@@ -42,11 +42,9 @@ _KEYS = (
 class SealFriction:
     """Friction data of a seal file besides geometry and normal force."""
 
-    friction_coefficient: Mapping[str, Any]
-    """mapping as in a seal file"""
+    friction_coefficient: Mapping[str, Any]  # mapping as in a seal file
     law: FrictionCoefficientLaw
-    stiction: float
-    """[N]"""
+    stiction: float  # [N]
     uncertainty: Uncertainty
 
 
@@ -81,8 +79,7 @@ class OringCaseFile:
     """Content of a case file."""
 
     case: OringCase
-    pressures: tuple[float, ...]
-    """[Pa, gauge], increasing"""
+    pressures: tuple[float, ...]  # [Pa, gauge], increasing
     source: str
     friction: SealFriction | None
     measured: MeasuredFriction | None
@@ -155,7 +152,7 @@ def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
     allowed = ('friction_coefficient', 'stiction', 'uncertainty')
     if not isinstance(values, Mapping) or not set(values) <= set(allowed):
         raise ValueError(f'{where} = {values!r} is not a mapping of {", ".join(allowed)}')
-    law = parse_friction_coefficient(values, where)
+    law = parse_part(FrictionCoefficientLaw, values, where)
     stiction = from_mapping(_Stiction, {k: v for k, v in values.items() if k == 'stiction'}, where).stiction
     uncertainty = from_mapping(Uncertainty, values.get('uncertainty'), f'{where}: uncertainty')
     return SealFriction(values['friction_coefficient'], law, stiction, uncertainty)

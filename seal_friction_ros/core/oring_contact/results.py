@@ -27,16 +27,11 @@ _TOUCHING = 20.0  # distance from a wall, in transitions, beyond which the conta
 class WallContact(NamedTuple):
     """Contact on one wall; position is z, positive downstream, on rod and gland, and r on the downstream wall."""
 
-    position: FloatArray
-    """of the nodes in contact [m], increasing, shape (k,)"""
-    stress: FloatArray
-    """contact stress [Pa], shape (k,)"""
-    force: float
-    """contact force, over the full circumference [N]"""
-    peak_stress: float
-    """[Pa]"""
-    edges: tuple[float, float]
-    """begin and end of the contact [m]; equal without contact"""
+    position: FloatArray  # of the nodes in contact [m], increasing, shape (k,)
+    stress: FloatArray  # contact stress [Pa], shape (k,)
+    force: float  # contact force, over the full circumference [N]
+    peak_stress: float  # [Pa]
+    edges: tuple[float, float]  # begin and end of the contact [m]; equal without contact
 
     @property
     def width(self) -> float:
@@ -47,28 +42,21 @@ class WallContact(NamedTuple):
 class DeformedSection(NamedTuple):
     """Deformed section with its stress."""
 
-    nodes: FloatArray
-    """(r, z) [m], shape (n, 2)"""
-    elements: IntArray
-    """shape (e, 4)"""
-    von_mises: FloatArray
-    """mean von Mises stress of each element [Pa], shape (e,)"""
+    nodes: FloatArray  # (r, z) [m], shape (n, 2)
+    elements: IntArray  # shape (e, 4)
+    von_mises: FloatArray  # mean von Mises stress of each element [Pa], shape (e,)
 
 
 class OringResult(NamedTuple):
     """Contacts, forces and shape under one pressure."""
 
-    pressure: float
-    """[Pa, gauge]"""
+    pressure: float  # [Pa, gauge]
     rod: WallContact
     gland: WallContact
     wall: WallContact
-    axial_force: float
-    """axial force of the supports on the downstream side [N]; in equilibrium that of the fluid"""
-    volume_ratio: float
-    """volume of the ring over that of the undeformed ring [-]"""
-    expected_volume_ratio: float
-    """volume ratio that follows from mean tension and bulk modulus [-]"""
+    axial_force: float  # axial force of the supports on the downstream side [N]; in equilibrium that of the fluid
+    volume_ratio: float  # volume of the ring over that of the undeformed ring [-]
+    expected_volume_ratio: float  # volume ratio that follows from mean tension and bulk modulus [-]
     newton_steps: int
     shape: DeformedSection
 

@@ -32,40 +32,28 @@ _TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])  # tangent to outward normal of a co
 class Surroundings(NamedTuple):
     """Walls, fluid, penalty stiffness and width of the transition."""
 
-    rod_radius: float
-    """[m]"""
-    gland_radius: float
-    """[m]"""
-    wall_position: float
-    """z of the downstream wall [m]; infinity: no wall"""
-    pressure: float
-    """of the fluid [Pa, gauge]"""
-    wetted: BoolArray
-    """nodes of the outline on the upstream side, shape (s,)"""
-    penalty: float
-    """kappa [Pa/m]"""
-    transition: float
-    """delta [Pa]"""
-    friction: float = 0.0
-    """axial traction of rod and gland on the ring, directed upstream, over their share of q [-]"""
+    rod_radius: float  # [m]
+    gland_radius: float  # [m]
+    wall_position: float  # z of the downstream wall [m]; infinity: no wall
+    pressure: float  # of the fluid [Pa, gauge]
+    wetted: BoolArray  # nodes of the outline on the upstream side, shape (s,)
+    penalty: float  # kappa [Pa/m]
+    transition: float  # delta [Pa]
+    friction: float = 0.0  # axial traction of rod and gland on the ring, directed upstream, over their share of q [-]
 
 
 class SurfacePressure(NamedTuple):
     """Pressure on each node of the outline."""
 
-    total: FloatArray
-    """q [Pa], shape (s,)"""
-    shares: FloatArray
-    """w of fluid, rod, gland and downstream wall [-], shape (s, 4)"""
-    contact_stress: FloatArray
-    """sigma [Pa], shape (s,)"""
+    total: FloatArray  # q [Pa], shape (s,)
+    shares: FloatArray  # w of fluid, rod, gland and downstream wall [-], shape (s, 4)
+    contact_stress: FloatArray  # sigma [Pa], shape (s,)
 
 
 class SurfaceForces(NamedTuple):
     """Contributions of the surroundings to the balance of forces on the nodes of the outline."""
 
-    force: FloatArray
-    """minus the force (r, z) on each node, over the full circumference [N], shape (s, 2)"""
+    force: FloatArray  # minus the force (r, z) on each node, over the full circumference [N], shape (s, 2)
     stiffness: FloatArray
     """derivative by r and z of the previous node, the node and the next node [N/m], shape (s, 2, 6)"""
 

@@ -41,18 +41,12 @@ class Axis(NamedTuple):
 class AxisRun(NamedTuple):
     """Simulated motion of an axis; arrays of shape (n,), values at the end of each sample."""
 
-    time: FloatArray
-    """[s]"""
-    reference: FloatArray
-    """[m]"""
-    position: FloatArray
-    """[m]"""
-    velocity: FloatArray
-    """[m/s]"""
-    friction_force: FloatArray
-    """[N] true friction of the seals"""
-    feedforward: FloatArray
-    """[N] in the controller"""
+    time: FloatArray  # [s]
+    reference: FloatArray  # [m]
+    position: FloatArray  # [m]
+    velocity: FloatArray  # [m/s]
+    friction_force: FloatArray  # [N] true friction of the seals
+    feedforward: FloatArray  # [N] in the controller
 
 
 @dataclass(frozen=True)
@@ -76,17 +70,6 @@ def with_wrong_friction(parameters: PipelineParameters, error: float) -> Pipelin
 def without_feedforward(settings: FeedForwardSettings) -> FeedForwardSettings:
     """Settings with a feed-forward of 0 N."""
     return replace(settings, scale=0.0)
-
-
-def whole_delay(parameters: ServoParameters, delay: float) -> float:
-    r"""Time from a velocity sample to the force of its feed-forward on the rod [s].
-
-    .. math:: T = T_d + 1 / \omega_F + \tau
-
-    with the delay T_d = ``delay`` [s] to the controller, and the delays of force loop, spool and sampling (see
-    `controller`).
-    """
-    return delay + 1.0 / parameters.controller.force_bandwidth + parameters.gains.valve_delay
 
 
 def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: FloatArray | None = None) -> AxisRun:
@@ -146,8 +129,7 @@ class EvaluationMotions:
     """
 
     sine: Sine
-    hold_time: float
-    """[s] of rest after each motion in which reversals count"""
+    hold_time: float  # [s] of rest after each motion in which reversals count
 
     @property
     def stop_time(self) -> float:
@@ -191,20 +173,13 @@ class EvaluationMotions:
 class Performance(NamedTuple):
     """Tracking quality of an axis over the evaluation motions."""
 
-    tracking_rms: float
-    """[m] root mean square error over the evaluated part of the sine"""
-    tracking_peak: float
-    """[m] largest error over this part"""
-    dwell: float
-    """[s] time at rest per reversal over this part, see `dwell`"""
-    overshoot: float
-    """[m] of the move past its ends"""
-    limit_cycle_reversals: int
-    """reversals of direction while the reference rests, sum of the three motions"""
-    largest_force: float
-    """[N] of the feed-forward"""
-    largest_force_rate: float
-    """[N/s] of the feed-forward"""
+    tracking_rms: float  # [m] root mean square error over the evaluated part of the sine
+    tracking_peak: float  # [m] largest error over this part
+    dwell: float  # [s] time at rest per reversal over this part, see `dwell`
+    overshoot: float  # [m] of the move past its ends
+    limit_cycle_reversals: int  # reversals of direction while the reference rests, sum of the three motions
+    largest_force: float  # [N] of the feed-forward
+    largest_force_rate: float  # [N/s] of the feed-forward
 
     def better_than(self, other: 'Performance') -> bool:
         """Whether error and dwell are smaller, and the axis does not reverse more often at rest."""

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.servo.motions import Setpoint
 from seal_friction_ros.core.servo.plant import Constants
@@ -72,23 +72,14 @@ class ServoController(CheckedParameters):
 
 
 class Gains(NamedTuple):
-    """Gains and limits for compiled code, units as in `ServoController`."""
+    """Gains and limits for compiled code."""
 
-    position: float
-    velocity: float
-    integral: float
-    pressure: float
-    """G [m^3/(s Pa)]"""
-    compensation: float
-    valve_delay: float
-    """tau [s]"""
-    force_max: float
-    speed_max: float
-    acceleration_max: float
-    reach: float
-    """largest reference position [m]"""
-    period: float
-    """sample time [s]"""
+    controller: ServoController
+    pressure: float  # G [m^3/(s Pa)]
+    valve_delay: float  # tau [s]
+    force_max: float  # [N] of the supply pressure
+    reach: float  # largest reference position [m]
+    period: float  # sample time [s]
 
 
 class Measurement(NamedTuple):
@@ -103,36 +94,27 @@ class Measurement(NamedTuple):
 class ControllerState(NamedTuple):
     """State of the controller between two samples."""
 
-    reference: float
-    """[m] last limited reference position"""
-    integral: float
-    """[N]"""
+    reference: float  # [m] last limited reference position
+    integral: float  # [N]
 
 
 class Command(NamedTuple):
     """Outputs of the controller."""
 
-    spool: float
-    """[-] -1 to 1"""
-    force: float
-    """[N] force command of the position loop, with feed-forward"""
-    limited: int
-    """bits of `Limited`"""
+    spool: float  # [-] -1 to 1
+    force: float  # [N] force command of the position loop, with feed-forward
+    limited: int  # bits of `Limited`
 
 
 def gains(controller: ServoController, c: Constants, period: float) -> Gains:
     """Gains and limits for a plant and a sample time [s]."""
+    valve, cylinder = c.valve, c.cylinder
     return Gains(
-        position=controller.position_gain,
-        velocity=controller.velocity_gain,
-        integral=controller.integral_gain,
-        pressure=controller.force_bandwidth * c.mid_volume / (2.0 * c.bulk_modulus),
-        compensation=controller.velocity_compensation,
-        valve_delay=2.0 * c.spool_damping / c.spool_frequency + 0.5 * period,
-        force_max=c.area * (c.supply - c.ret),
-        speed_max=controller.reference_speed_max,
-        acceleration_max=controller.reference_acceleration_max,
-        reach=max(c.limit - controller.stop_distance, 0.0),
+        controller=for_compiler(controller),
+        pressure=controller.force_bandwidth * cylinder.mid_volume / (2.0 * cylinder.bulk_modulus),
+        valve_delay=2.0 * valve.damping_ratio / valve.natural_frequency + 0.5 * period,
+        force_max=cylinder.area * (valve.supply_pressure - valve.return_pressure),
+        reach=max(cylinder.limit - controller.stop_distance, 0.0),
         period=period,
     )
 
@@ -140,24 +122,20 @@ def gains(controller: ServoController, c: Constants, period: float) -> Gains:
 @compiled
 def limit_reference(g: Gains, last: float, reference: Setpoint) -> tuple[Setpoint, int]:
     """Reference within the limits, from the last position ``last`` [m], and bits of `Limited`."""
-    if not (
-        math.isfinite(reference.position)
-        and math.isfinite(reference.velocity)
-        and math.isfinite(reference.acceleration)
-    ):
+    position, velocity, acceleration = reference
+    if not (math.isfinite(position) and math.isfinite(velocity) and math.isfinite(acceleration)):
         return Setpoint(last, 0.0, 0.0), 1
-    if abs(reference.position) > g.reach:
-        position, velocity, acceleration, limited = math.copysign(g.reach, reference.position), 0.0, 0.0, 2
-    else:
-        position, limited = reference.position, 0
-        velocity = min(max(reference.velocity, -g.speed_max), g.speed_max)
-        acceleration = min(max(reference.acceleration, -g.acceleration_max), g.acceleration_max)
-        if velocity != reference.velocity or acceleration != reference.acceleration:
-            limited = 4
-    way = g.speed_max * g.period
+    speed_max, acceleration_max, limited = g.controller.reference_speed_max, g.controller.reference_acceleration_max, 0
+    if abs(position) > g.reach:
+        position, velocity, acceleration, limited = math.copysign(g.reach, position), 0.0, 0.0, 2
+    elif abs(velocity) > speed_max or abs(acceleration) > acceleration_max:
+        velocity = min(max(velocity, -speed_max), speed_max)
+        acceleration = min(max(acceleration, -acceleration_max), acceleration_max)
+        limited = 4
+    way = speed_max * g.period
     if abs(position - last) > way * (1.0 + 1e-9):
         direction = math.copysign(1.0, position - last)
-        return Setpoint(last + direction * way, direction * g.speed_max, 0.0), limited | 4
+        return Setpoint(last + direction * way, direction * speed_max, 0.0), limited | 4
     return Setpoint(position, velocity, acceleration), limited
 
 
@@ -178,30 +156,26 @@ def control(
     Returns:
         The next state and the spool command.
     """
+    valve, area, load, k = c.valve, c.cylinder.area, c.load, g.controller
     setpoint, limited = limit_reference(g, state.reference, reference)
     if not math.isfinite(feedforward):
         feedforward, limited = 0.0, limited | 8
     error = setpoint.position - measured.position
-    integral = state.integral + g.integral * error * g.period
-    load = (
-        c.mass * setpoint.acceleration
-        + c.damping * setpoint.velocity
-        + c.stiffness * (setpoint.position - c.spring_position)
-    )
-    unlimited = (
-        g.position * error + g.velocity * (setpoint.velocity - measured.velocity) + integral + load + feedforward
-    )
+    integral = state.integral + k.integral_gain * error * g.period
+    inertia, viscous = load.mass * setpoint.acceleration, load.viscous_damping * setpoint.velocity
+    known = inertia + viscous + load.spring_stiffness * (setpoint.position - load.spring_position)
+    damping = k.velocity_gain * (setpoint.velocity - measured.velocity)
+    unlimited = k.position_gain * error + damping + integral + known + feedforward
     force = min(max(unlimited, -g.force_max), g.force_max)
     if force != unlimited:
         limited |= 16
 
     load_pressure = measured.pressure_a - measured.pressure_b
-    speed = g.compensation * measured.velocity + (1.0 - g.compensation) * setpoint.velocity
-    speed += g.valve_delay * setpoint.acceleration
-    flow = c.area * speed + g.pressure * (force / c.area - load_pressure)
-    drop = c.supply - c.ret - math.copysign(load_pressure, flow * load_pressure)
-    drop = max(drop, 2.0 * c.transition)
-    opening = flow / (c.orifice_gain * math.sqrt(drop / 2.0))
+    alpha = k.velocity_compensation
+    speed = alpha * measured.velocity + (1.0 - alpha) * setpoint.velocity + g.valve_delay * setpoint.acceleration
+    flow = area * speed + g.pressure * (force / area - load_pressure)
+    drop = valve.supply_pressure - valve.return_pressure - math.copysign(load_pressure, flow * load_pressure)
+    opening = flow / (valve.orifice_gain * math.sqrt(max(drop, 2.0 * valve.transition_pressure) / 2.0))
     spool = min(max(opening, -1.0), 1.0)
     if spool != opening:
         limited |= 32
@@ -220,30 +194,30 @@ def transition_matrix(g: Gains, c: Constants, held: bool = False) -> FloatArray:
 
     Source: [Merritt1967]_ chapter 6, linearised.
     """
-    flow_gain = c.orifice_gain * math.sqrt(max(c.supply - c.ret, 2.0 * c.transition) / 2.0)
-    leakage = c.internal_leakage + 0.5 * c.external_leakage + c.null_leakage
-    stiffness = 2.0 * c.bulk_modulus / c.mid_volume
-    w = c.spool_frequency
+    valve, cylinder, load, k = c.valve, c.cylinder, c.load, g.controller
+    drop = max(valve.supply_pressure - valve.return_pressure, 2.0 * valve.transition_pressure)
+    flow_gain = valve.orifice_gain * math.sqrt(drop / 2.0)
+    leakage = cylinder.internal_leakage + 0.5 * cylinder.external_leakage + valve.null_leakage
+    stiffness = 2.0 * cylinder.bulk_modulus / cylinder.mid_volume
+    area, w = cylinder.area, valve.natural_frequency
     plant = np.zeros((6, 6))
     plant[0, 1] = 1.0
-    plant[1, :3] = -c.stiffness / c.mass, -c.damping / c.mass, c.area / c.mass
-    plant[2, 1:4] = -stiffness * c.area, -stiffness * leakage, stiffness * flow_gain
+    plant[1, :3] = -load.spring_stiffness / load.mass, -load.viscous_damping / load.mass, area / load.mass
+    plant[2, 1:4] = -stiffness * area, -stiffness * leakage, stiffness * flow_gain
     plant[3, 4] = w
-    plant[4, 3:6] = -w, -2.0 * c.spool_damping * w, w
+    plant[4, 3:6] = -w, -2.0 * valve.damping_ratio * w, w
     if held:
         plant[:2] = plant[:, :2] = 0.0
     sampled = expm(plant * g.period)[:5]  # last column: the command, held
 
-    feedback = np.zeros(6)
-    by_force = g.pressure / c.area / flow_gain
-    feedback[0] = -by_force * (g.position + g.integral * g.period)
-    feedback[1] = -by_force * g.velocity + g.compensation * c.area / flow_gain
-    feedback[2] = -g.pressure / flow_gain
-    feedback[5] = by_force
+    by_force = g.pressure / area / flow_gain
+    by_position = -by_force * (k.position_gain + k.integral_gain * g.period)
+    by_velocity = -by_force * k.velocity_gain + k.velocity_compensation * area / flow_gain
+    feedback = np.array([by_position, by_velocity, -g.pressure / flow_gain, 0.0, 0.0, by_force])
     matrix = np.zeros((6, 6))
     matrix[:5, :5] = sampled[:, :5]
     matrix[:5] += np.outer(sampled[:, 5], feedback)
-    matrix[5, 0], matrix[5, 5] = -g.integral * g.period, 1.0 if g.integral > 0.0 else 0.0
+    matrix[5, 0], matrix[5, 5] = -k.integral_gain * g.period, float(k.integral_gain > 0.0)
     return matrix
 
 

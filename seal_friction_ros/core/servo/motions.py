@@ -15,12 +15,9 @@ from seal_friction_ros.core.foundation.units import PSI
 class Setpoint(NamedTuple):
     """Reference of the position controller at one moment."""
 
-    position: float
-    """[m]"""
-    velocity: float = 0.0
-    """[m/s]"""
-    acceleration: float = 0.0
-    """[m/s^2]"""
+    position: float  # [m]
+    velocity: float = 0.0  # [m/s]
+    acceleration: float = 0.0  # [m/s^2]
 
 
 class Wave(Protocol):
@@ -28,7 +25,6 @@ class Wave(Protocol):
 
     def at(self, time: float) -> Setpoint:
         """Setpoint at ``time`` [s]."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -142,42 +138,27 @@ class Chirp(CheckedParameters):
         """Setpoint at ``time`` [s]."""
         if time < 0.0:
             return Setpoint(self.offset)
-        if time < self.duration:
-            sweep = (self.end_frequency - self.start_frequency) / self.duration
-            frequency = self.start_frequency + sweep * time
-            turns = (self.start_frequency + frequency) / 2.0 * time
+        start, end, duration = self.start_frequency, self.end_frequency, self.duration
+        if time < duration:
+            sweep = (end - start) / duration
+            frequency = start + sweep * time
+            turns = (start + frequency) / 2.0 * time
         else:
-            sweep, frequency = 0.0, self.end_frequency
-            mean = 0.5 * (self.start_frequency + self.end_frequency)
-            turns = mean * self.duration + self.end_frequency * (time - self.duration)
+            sweep, frequency = 0.0, end
+            turns = 0.5 * (start + end) * duration + end * (time - duration)
         rate = 2.0 * math.pi * frequency
         sine, cosine = math.sin(2.0 * math.pi * turns), math.cos(2.0 * math.pi * turns)
         bend = 2.0 * math.pi * sweep * cosine - rate * rate * sine
         return Setpoint(self.offset + self.amplitude * sine, self.amplitude * rate * cosine, self.amplitude * bend)
 
 
-def spool_cycles(distance: float) -> Trapezoid:
-    """Cycles of the spool-valve paper: 3 Hz, 10 cycles, 34 mm/s; the paper evaluates the 9th.
-
-    Args:
-        distance: 1.8e-3 for a single ring, 2.7e-3 for a ring across the control edge and for the whole spool [m].
-
-    Source: spool-valve paper, chapter 4 and Figure 7. The paper gives no corners: 5 m/s^2 is our choice.
-    """
-    return Trapezoid(distance=distance, speed=0.034, frequency=3.0, acceleration=5.0, cycles=10)
-
-
 class PullCommand(NamedTuple):
     """Command of the pull-test rig at one moment."""
 
-    pressure: float
-    """[Pa, gauge] on both ports"""
-    carriage: float
-    """[m] position of the far end of the spring scale"""
-    test: int
-    """index of the test from 0, over all pressures and repetitions; each test gives one reading of each kind"""
-    direction: int
-    """1: extending, -1: retracting, 0: resting"""
+    pressure: float  # [Pa, gauge] on both ports
+    carriage: float  # [m] position of the far end of the spring scale
+    test: int  # index of the test from 0, over all pressures and repetitions; each test gives one reading of each kind
+    direction: int  # 1: extending, -1: retracting, 0: resting
 
 
 @dataclass(frozen=True)

@@ -10,18 +10,19 @@ Our choices, none of them in the sources:
 - Stuck is a discrete state, without the velocity band of Karnopp: in a simulation the velocity is exact.
 - A rod that decelerates asymptotically, for example against a leaking chamber, is at rest below 1 nm/s.
 - End stops are rigid and dissipate all of the kinetic energy.
-- A chamber that is emptied faster than it is filled holds a cavity at vapour pressure (see `chamber_pressure`).
+- A chamber that is emptied faster than it is filled holds a cavity at vapour pressure (see `chamber_pressures`).
 - Below ``transition_pressure`` an orifice is laminar (see `signed_root`).
 - Input energy and dissipated energy are integrated as states, to check the energy balance.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from itertools import product
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.foundation.units import INCH, PSI
@@ -61,6 +62,11 @@ class ServoValve(CheckedParameters):
         3e5, unit='Pa', lower=1e3, upper=1e7, description='Pressure drop below which an orifice is laminar.'
     )
 
+    COMPILED: ClassVar = (
+        'supply_pressure', 'return_pressure', 'natural_frequency', 'damping_ratio', 'null_leakage',
+        'transition_pressure', 'orifice_gain',
+    )  # fmt: skip
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.supply_pressure < self.return_pressure:
@@ -68,6 +74,11 @@ class ServoValve(CheckedParameters):
                 f'ServoValve.supply_pressure = {self.supply_pressure} Pa is below '
                 f'return_pressure = {self.return_pressure} Pa'
             )
+
+    @property
+    def orifice_gain(self) -> float:
+        """K of one fully open land, Q = K sqrt(dp) [m^3/(s Pa^0.5)]: each land takes half of the rated drop."""
+        return self.rated_flow / math.sqrt(self.rated_pressure_drop / 2.0)
 
 
 @dataclass(frozen=True)
@@ -95,17 +106,46 @@ class Cylinder(CheckedParameters):
     bulk_modulus: float = parameter(7e8, unit='Pa', lower=1e7, upper=5e9, description='Effective: oil, lines, walls.')
     vapour_pressure: float = parameter(1e3, unit='Pa', lower=1.0, upper=1e5, description='Of the oil, absolute.')
 
+    COMPILED: ClassVar = (
+        'area', 'limit', 'mid_volume', 'internal_leakage', 'external_leakage', 'bulk_modulus', 'vapour',
+    )  # fmt: skip
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.bore_diameter <= self.rod_diameter:
             raise ValueError(
                 f'Cylinder.bore_diameter = {self.bore_diameter} m is not above rod_diameter = {self.rod_diameter} m'
             )
-        if self.dead_volume < 0.01 * piston_area(self) * self.stroke:
+        if self.dead_volume < 0.01 * self.area * self.stroke:
             raise ValueError(
                 f'Cylinder.dead_volume = {self.dead_volume} m3 is below 1 % of the swept volume '
-                f'{piston_area(self) * self.stroke:.3g} m3: a chamber without volume is infinitely stiff'
+                f'{self.area * self.stroke:.3g} m3: a chamber without volume is infinitely stiff'
             )
+
+    @property
+    def area(self) -> float:
+        """Piston area of each chamber [m^2]: A = pi/4 (D_bore^2 - D_rod^2)."""
+        return math.pi / 4.0 * (self.bore_diameter**2 - self.rod_diameter**2)
+
+    @property
+    def total_volume(self) -> float:
+        """Volume of both chambers [m^3], the same at every position: V_t = A stroke + 2 V_dead."""
+        return self.area * self.stroke + 2.0 * self.dead_volume
+
+    @property
+    def mid_volume(self) -> float:
+        """Volume of one chamber at position 0 [m^3]."""
+        return self.total_volume / 2.0
+
+    @property
+    def limit(self) -> float:
+        """Position of the stops [m]."""
+        return self.stroke / 2.0
+
+    @property
+    def vapour(self) -> float:
+        """Vapour pressure [Pa, gauge]."""
+        return self.vapour_pressure - AMBIENT
 
 
 @dataclass(frozen=True)
@@ -118,85 +158,31 @@ class Load(CheckedParameters):
     viscous_damping: float = parameter(20.0, unit='N s/m', lower=0.0, upper=1e7, description='Force per speed.')
 
 
-def piston_area(cylinder: Cylinder) -> float:
-    """Piston area of each chamber [m^2]: A = pi/4 (D_bore^2 - D_rod^2)."""
-    return math.pi / 4.0 * (cylinder.bore_diameter**2 - cylinder.rod_diameter**2)
-
-
-def total_volume(cylinder: Cylinder) -> float:
-    """Volume of both chambers [m^3], the same at every position: V_t = A stroke + 2 V_dead."""
-    return piston_area(cylinder) * cylinder.stroke + 2.0 * cylinder.dead_volume
-
-
-def natural_frequency(cylinder: Cylinder, mass: float) -> float:
-    r"""Hydraulic natural frequency in mid-stroke [rad/s].
-
-    .. math:: \omega_h = \sqrt{4 \beta A^2 / (V_t m)}
-
-    Source: [Merritt1967]_ chapter 6.
-    """
-    area = piston_area(cylinder)
-    return math.sqrt(4.0 * cylinder.bulk_modulus * area**2 / (total_volume(cylinder) * mass))
-
-
-def orifice_gain(valve: ServoValve) -> float:
-    """K of one fully open land, Q = K sqrt(dp) [m^3/(s Pa^0.5)]: the rated drop falls half over each of two lands."""
-    return valve.rated_flow / math.sqrt(valve.rated_pressure_drop / 2.0)
-
-
 class Constants(NamedTuple):
-    """Parameters of the equations for compiled code, SI units."""
+    """Parameters of the equations for compiled code."""
 
-    supply: float
-    ret: float
-    orifice_gain: float
-    null_leakage: float
-    transition: float
-    spool_frequency: float
-    spool_damping: float
-    area: float
-    limit: float
-    """position of the stops [m]: stroke / 2"""
-    mid_volume: float
-    """volume of one chamber at position 0 [m^3]"""
-    internal_leakage: float
-    external_leakage: float
-    bulk_modulus: float
-    vapour: float
-    """vapour pressure [Pa, gauge]"""
-    supply_enthalpy: float
-    return_enthalpy: float
-    mass: float
-    stiffness: float
-    spring_position: float
-    damping: float
-    seals: Any
-    """from `numbers_of_seals`"""
+    valve: ServoValve
+    cylinder: Cylinder
+    load: Load
+    supply_enthalpy: float  # [Pa] -H(p), see `rates`
+    return_enthalpy: float  # [Pa] the same at return pressure
+    seals: Any  # from `numbers_of_seals`
 
 
 class PlantState(NamedTuple):
     """State of valve, chambers and rod."""
 
-    position: float
-    """[m]"""
-    velocity: float
-    """[m/s] exactly 0.0 while stuck"""
+    position: float  # [m]
+    velocity: float  # [m/s] exactly 0.0 while stuck
     charge_a: float
-    """[Pa, gauge] pressure of chamber a; below vapour pressure a measure of the cavity, see `chamber_pressure`"""
-    charge_b: float
-    """[Pa, gauge] the same of chamber b"""
-    spool: float
-    """[-] -1 to 1; positive opens supply to chamber a"""
-    spool_rate: float
-    """[1/s]"""
-    energy_in: float
-    """[J] from supply, return and load force since the start"""
-    energy_dissipated: float
-    """[J] in valve, leakage, viscous load, seals and end stops"""
-    direction: int
-    """-1 or 1: sliding that way; 0: stuck"""
-    transitions: int
-    """number of times that the rod came to rest or broke away since the start"""
+    """[Pa, gauge] pressure of chamber a; below vapour pressure a measure of the cavity, see `chamber_pressures`"""
+    charge_b: float  # [Pa, gauge] the same of chamber b
+    spool: float  # [-] -1 to 1; positive opens supply to chamber a
+    spool_rate: float  # [1/s]
+    energy_in: float  # [J] from supply, return and load force since the start
+    energy_dissipated: float  # [J] in valve, leakage, viscous load, seals and end stops
+    direction: int  # -1 or 1: sliding that way; 0: stuck
+    transitions: int  # number of times that the rod came to rest or broke away since the start
 
 
 Integrated = tuple[float, float, float, float, float, float, float, float]
@@ -206,35 +192,9 @@ Integrated = tuple[float, float, float, float, float, float, float, float]
 def constants(valve: ServoValve, cylinder: Cylinder, load: Load, seals: tuple[MountedSeal, ...]) -> Constants:
     """Parameters of the equations from the parts of the plant."""
     beta = cylinder.bulk_modulus
-    return Constants(
-        supply=valve.supply_pressure,
-        ret=valve.return_pressure,
-        orifice_gain=orifice_gain(valve),
-        null_leakage=valve.null_leakage,
-        transition=valve.transition_pressure,
-        spool_frequency=valve.natural_frequency,
-        spool_damping=valve.damping_ratio,
-        area=piston_area(cylinder),
-        limit=cylinder.stroke / 2.0,
-        mid_volume=total_volume(cylinder) / 2.0,
-        internal_leakage=cylinder.internal_leakage,
-        external_leakage=cylinder.external_leakage,
-        bulk_modulus=beta,
-        vapour=cylinder.vapour_pressure - AMBIENT,
-        supply_enthalpy=-beta * math.expm1(-valve.supply_pressure / beta),
-        return_enthalpy=-beta * math.expm1(-valve.return_pressure / beta),
-        mass=load.mass,
-        stiffness=load.spring_stiffness,
-        spring_position=load.spring_position,
-        damping=load.viscous_damping,
-        seals=for_compiler(numbers_of_seals(seals) or NO_SEALS),
-    )
-
-
-def init_plant(c: Constants, position: float = 0.0) -> PlantState:
-    """At rest at ``position`` [m], valve closed, both chambers at the mean of supply and return pressure."""
-    half = (c.supply + c.ret) / 2.0
-    return PlantState(position, 0.0, half, half, 0.0, 0.0, 0.0, 0.0, 0, 0)
+    supply, ret = (-beta * math.expm1(-p / beta) for p in (valve.supply_pressure, valve.return_pressure))
+    plant = Constants(valve, cylinder, load, supply, ret, numbers_of_seals(seals) or NO_SEALS)
+    return cast(Constants, for_compiler(plant))
 
 
 @compiled
@@ -255,26 +215,14 @@ def signed_root(drop: float, transition: float) -> float:
 
 
 @compiled
-def chamber_pressure(charge: float, vapour: float) -> float:
-    r"""Pressure of a chamber [Pa, gauge]: its charge, but never below vapour pressure.
+def chamber_pressures(c: Constants, y: Sequence[float]) -> tuple[float, float]:
+    r"""Pressures of both chambers [Pa, gauge]: their charge, but never below vapour pressure.
 
     The charge is the pressure of the oil if it filled the whole chamber, beta ln(m / (rho_0 V)). Below vapour pressure,
     oil at vapour pressure fills V exp((charge - vapour) / beta) and a cavity fills the rest. This conserves volume
     through growth and collapse of the cavity.
     """
-    return max(charge, vapour)
-
-
-@compiled
-def holding_force(c: Constants, pressure_a: float, pressure_b: float, direction: int) -> float:
-    """Largest force that the seals hold at rest against a push in ``direction`` [N].
-
-    The breakaway force, or the friction at velocity 0 where this is larger (our choice: otherwise the rod would break
-    away and stop at once).
-    """
-    at_rest = friction_of_seals(c.seals, pressure_a, pressure_b, 0.0)
-    slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, direction)
-    return max(at_rest.coulomb_friction + at_rest.stiction, slowest)
+    return max(y[2], c.cylinder.vapour), max(y[3], c.cylinder.vapour)
 
 
 @compiled
@@ -283,19 +231,17 @@ def active_force(c: Constants, y: Integrated, load_force: float) -> float:
 
     .. math:: A (p_a - p_b) - k (x - x_k) - b v + F_{load}
     """
-    pressure_a = chamber_pressure(y[2], c.vapour)
-    pressure_b = chamber_pressure(y[3], c.vapour)
-    spring = c.stiffness * (y[0] - c.spring_position)
-    return c.area * (pressure_a - pressure_b) - spring - c.damping * y[1] + load_force
+    pressure_a, pressure_b = chamber_pressures(c, y)
+    spring = c.load.spring_stiffness * (y[0] - c.load.spring_position)
+    return c.cylinder.area * (pressure_a - pressure_b) - spring - c.load.viscous_damping * y[1] + load_force
 
 
 @compiled
 def force_sum(c: Constants, y: Integrated, load_force: float) -> float:
     """Axial forces on the rod except its seals [N]; 0 where the rod presses on a stop, which then carries it."""
     force = active_force(c, y, load_force)
-    if y[1] == 0.0 and ((y[0] >= c.limit and force > 0.0) or (y[0] <= -c.limit and force < 0.0)):
-        return 0.0
-    return force
+    at_stop = y[1] == 0.0 and abs(y[0]) >= c.cylinder.limit and y[0] * force > 0.0
+    return 0.0 if at_stop else force
 
 
 @compiled
@@ -305,7 +251,7 @@ def port_flow(c: Constants, opening: float, outside: float, pressure: float) -> 
     Source: [Merritt1967]_ chapter 5.
     """
     drop = outside - pressure
-    return c.orifice_gain * opening * signed_root(drop, c.transition) + c.null_leakage * drop
+    return c.valve.orifice_gain * opening * signed_root(drop, c.valve.transition_pressure) + c.valve.null_leakage * drop
 
 
 @compiled
@@ -323,40 +269,43 @@ def rates(c: Constants, y: Integrated, direction: int, command: float, load_forc
 
     Source: [Merritt1967]_ chapters 5 and 6; the energy is our derivation.
     """
+    valve, cylinder, load = c.valve, c.cylinder, c.load
     position, velocity, charge_a, charge_b, spool, spool_rate = y[0], y[1], y[2], y[3], y[4], y[5]
-    beta = c.bulk_modulus
-    a, b = chamber_pressure(charge_a, c.vapour), chamber_pressure(charge_b, c.vapour)
+    beta, vapour = cylinder.bulk_modulus, cylinder.vapour
+    a, b = chamber_pressures(c, y)
     to_a, to_b = max(spool, 0.0), max(-spool, 0.0)
-    supply_a, return_a = port_flow(c, to_a, c.supply, a), port_flow(c, to_b, c.ret, a)
-    supply_b, return_b = port_flow(c, to_b, c.supply, b), port_flow(c, to_a, c.ret, b)
-    past_piston = c.internal_leakage * (a - b)
-    flow_a = supply_a + return_a - past_piston - c.external_leakage * a
-    flow_b = supply_b + return_b + past_piston - c.external_leakage * b
+    supply, ret = valve.supply_pressure, valve.return_pressure
+    supply_a, return_a = port_flow(c, to_a, supply, a), port_flow(c, to_b, ret, a)
+    supply_b, return_b = port_flow(c, to_b, supply, b), port_flow(c, to_a, ret, b)
+    past_piston = cylinder.internal_leakage * (a - b)
+    flow_a = supply_a + return_a - past_piston - cylinder.external_leakage * a
+    flow_b = supply_b + return_b + past_piston - cylinder.external_leakage * b
 
-    swept = c.area * velocity
-    oil_a = c.mid_volume + c.area * position
-    oil_b = c.mid_volume - c.area * position
-    charge_flow_a = flow_a if charge_a >= c.vapour else flow_a * math.exp((c.vapour - charge_a) / beta)
-    charge_flow_b = flow_b if charge_b >= c.vapour else flow_b * math.exp((c.vapour - charge_b) / beta)
+    swept = cylinder.area * velocity
+    oil_a = cylinder.mid_volume + cylinder.area * position
+    oil_b = cylinder.mid_volume - cylinder.area * position
+    charge_flow_a = flow_a if charge_a >= vapour else flow_a * math.exp((vapour - charge_a) / beta)
+    charge_flow_b = flow_b if charge_b >= vapour else flow_b * math.exp((vapour - charge_b) / beta)
 
-    friction = 0.0
+    friction = acceleration = 0.0
     if direction != 0:
         friction = direction * sliding_friction_of_seals(c.seals, a, b, max(velocity * direction, 0.0), direction)
-    acceleration = (active_force(c, y, load_force) - friction) / c.mass if direction != 0 else 0.0
+        acceleration = (active_force(c, y, load_force) - friction) / load.mass
 
     density_a, density_b = math.exp(a / beta), math.exp(b / beta)
     power_in = density_a * (supply_a * c.supply_enthalpy + return_a * c.return_enthalpy) + density_b * (
         supply_b * c.supply_enthalpy + return_b * c.return_enthalpy
     )
     into_chambers = beta * ((density_a - 1.0) * flow_a + (density_b - 1.0) * flow_b)
-    rubbing = c.damping * velocity * velocity + friction * velocity
+    rubbing = load.viscous_damping * velocity * velocity + friction * velocity
+    w = valve.natural_frequency
     return (
         velocity,
         acceleration,
         beta / oil_a * (charge_flow_a - swept),
         beta / oil_b * (charge_flow_b + swept),
         spool_rate,
-        c.spool_frequency * (c.spool_frequency * (command - spool) - 2.0 * c.spool_damping * spool_rate),
+        w * (w * (command - spool) - 2.0 * valve.damping_ratio * spool_rate),
         power_in + load_force * velocity,
         power_in - into_chambers + rubbing,
     )
@@ -395,12 +344,16 @@ def margin(c: Constants, y: Integrated, direction: int, load_force: float) -> fl
     """Distance of the friction state from its end: stuck ends below zero, sliding ends at zero.
 
     Stuck: holding force minus force sum [N]. Sliding: the smaller of speed [m/s] and distance to the stop ahead [m].
+    The holding force is the breakaway force, or the friction at velocity 0 where this is larger (our choice: otherwise
+    the rod would break away and stop at once).
     """
     if direction == 0:
         force = force_sum(c, y, load_force)
-        pressure_a, pressure_b = chamber_pressure(y[2], c.vapour), chamber_pressure(y[3], c.vapour)
-        return holding_force(c, pressure_a, pressure_b, 1 if force > 0.0 else -1) - abs(force)
-    return min(y[1] * direction, c.limit - y[0] * direction)
+        pressure_a, pressure_b = chamber_pressures(c, y)
+        at_rest = friction_of_seals(c.seals, pressure_a, pressure_b, 0.0)
+        slowest = sliding_friction_of_seals(c.seals, pressure_a, pressure_b, 0.0, 1 if force > 0.0 else -1)
+        return max(at_rest.coulomb_friction + at_rest.stiction, slowest) - abs(force)
+    return min(y[1] * direction, c.cylinder.limit - y[0] * direction)
 
 
 @compiled
@@ -412,9 +365,9 @@ def after_event(c: Constants, y: Integrated, direction: int, load_force: float) 
     """
     if direction != 0:
         position, velocity = y[0], y[1]
-        if c.limit - position * direction <= 0.0:
-            position = c.limit * direction
-        lost = 0.5 * c.mass * velocity * velocity
+        if c.cylinder.limit - position * direction <= 0.0:
+            position = c.cylinder.limit * direction
+        lost = 0.5 * c.load.mass * velocity * velocity
         y = (position, 0.0, y[2], y[3], y[4], y[5], y[6], y[7] + lost)
         if margin(c, y, 0, load_force) >= 0.0:
             return y, 0
@@ -426,9 +379,9 @@ def cavity_margin(c: Constants, before: Integrated, after: Integrated) -> float:
     """Smaller distance of the charges from vapour pressure [Pa]; negative if one crossed it since ``before``."""
     nearest = 1e12
     for i in (2, 3):
-        side = before[i] - c.vapour
+        side = before[i] - c.cylinder.vapour
         if side != 0.0:
-            nearest = min(nearest, math.copysign(1.0, side) * (after[i] - c.vapour))
+            nearest = min(nearest, math.copysign(1.0, side) * (after[i] - c.cylinder.vapour))
     return nearest
 
 
@@ -461,12 +414,6 @@ def time_of_event(c: Constants, y: Integrated, direction: int, command: float, l
 
 
 @compiled
-def creeps(before: Integrated, after: Integrated, direction: int) -> bool:
-    """Whether a sliding rod decelerates below `CREEP_SPEED`: it would come to rest only after infinite time."""
-    return direction != 0 and after[1] * direction < min(CREEP_SPEED, before[1] * direction)
-
-
-@compiled
 def lasts(margin_now: float, direction: int) -> bool:
     """Whether a friction state goes on: stuck also at a margin of exactly 0, sliding only above 0."""
     return margin_now > 0.0 or (direction == 0 and margin_now == 0.0)
@@ -487,7 +434,8 @@ def inner_step(c: Constants, state: PlantState, command: float, load_force: floa
         goes_on = lasts(margin(c, new, direction, load_force), direction)
         starts_inside = margin(c, y, direction, load_force) > 0.0
         if goes_on and (cavity_margin(c, y, new) > 0.0 or not starts_inside):
-            if not creeps(y, new, direction):
+            # A rod that decelerates below CREEP_SPEED would come to rest only after infinite time.
+            if direction == 0 or new[1] * direction >= min(CREEP_SPEED, y[1] * direction):
                 return PlantState(*new, direction, transitions)
             y, rest = new, 0.0
         elif starts_inside:
@@ -513,11 +461,12 @@ def stored_energy(c: Constants, state: PlantState) -> float:
 
     .. math:: E = \sum_{a,b} [V_{oil} (H(p) - p) - p V_{cavity}] + m v^2 / 2 + k (x - x_k)^2 / 2
     """
-    beta = c.bulk_modulus
-    energy = 0.5 * c.mass * state.velocity**2 + 0.5 * c.stiffness * (state.position - c.spring_position) ** 2
-    for charge, side in ((state.charge_a, 1.0), (state.charge_b, -1.0)):
-        pressure = chamber_pressure(charge, c.vapour)
-        volume = c.mid_volume + side * c.area * state.position
+    beta, load = c.cylinder.bulk_modulus, c.load
+    energy = 0.5 * load.mass * state.velocity**2
+    energy += 0.5 * load.spring_stiffness * (state.position - load.spring_position) ** 2
+    pressure_a, pressure_b = chamber_pressures(c, state[:8])
+    for charge, pressure, side in ((state.charge_a, pressure_a, 1.0), (state.charge_b, pressure_b, -1.0)):
+        volume = c.cylinder.mid_volume + side * c.cylinder.area * state.position
         oil = volume * math.exp((charge - pressure) / beta)
         energy += oil * (beta * math.expm1(pressure / beta) - pressure) - pressure * (volume - oil)
     return energy
@@ -532,10 +481,10 @@ def fastest_rate(
     smallest volume; plus oscillation of the mass on the oil at a stop; plus damping of load and seals.
     """
     beta, volume = cylinder.bulk_modulus, cylinder.dead_volume
-    slope = 1.25 * orifice_gain(valve) / math.sqrt(valve.transition_pressure)
+    slope = 1.25 * valve.orifice_gain / math.sqrt(valve.transition_pressure)
     leakage = 2.0 * valve.null_leakage + 2.0 * cylinder.internal_leakage + cylinder.external_leakage
-    largest = total_volume(cylinder) - volume
-    stiffness = beta * piston_area(cylinder) ** 2 * (1.0 / volume + 1.0 / largest) + load.spring_stiffness
+    largest = cylinder.total_volume - volume
+    stiffness = beta * cylinder.area**2 * (1.0 / volume + 1.0 / largest) + load.spring_stiffness
     damping = (load.viscous_damping + steepest_friction(seals, valve.supply_pressure)) / load.mass
     oscillation = math.sqrt(stiffness / load.mass) + damping
     chamber = beta / volume * (slope + leakage)
@@ -554,10 +503,7 @@ def steepest_friction(seals: tuple[MountedSeal, ...], highest_pressure: float) -
         return 0.0
     numbers, speeds = numbers_of_seals(seals), np.geomspace(1e-6, 10.0, 141)
     steepest = 0.0
-    for pressure in np.linspace(0.0, highest_pressure, 5).tolist():
-        for direction in (-1, 1):
-            friction: FloatArray = np.array(
-                [sliding_friction_of_seals(numbers, pressure, pressure, v, direction) for v in speeds.tolist()]
-            )
-            steepest = max(steepest, float(np.max(np.diff(friction) / np.diff(speeds))))
+    for p, direction in product(np.linspace(0.0, highest_pressure, 5).tolist(), (-1, 1)):
+        friction = [sliding_friction_of_seals(numbers, p, p, v, direction) for v in speeds.tolist()]
+        steepest = max(steepest, float(np.max(np.diff(friction) / np.diff(speeds))))
     return steepest

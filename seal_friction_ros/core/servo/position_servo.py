@@ -33,11 +33,10 @@ from seal_friction_ros.core.servo.plant import (
     Load,
     PlantState,
     ServoValve,
-    chamber_pressure,
+    chamber_pressures,
     constants,
     fastest_rate,
     force_sum,
-    init_plant,
     inner_step,
 )
 
@@ -60,11 +59,10 @@ class ServoParameters(CheckedParameters):
     seals: tuple[MountedSeal, ...]
     control_period: float = parameter(5e-4, unit='s', lower=1e-6, upper=0.1, description='Controller sample time.')
     inner_step: float = parameter(1e-4, unit='s', lower=1e-8, upper=0.1, description='Time step of the plant.')
-    inner_steps: int = field(init=False, repr=False, compare=False)
     constants: Constants = field(init=False, repr=False, compare=False)
     gains: Gains = field(init=False, repr=False, compare=False)
     kept: Any = field(init=False, repr=False, compare=False)
-    """constants and gains for compiled code"""
+    """constants, gains, inner step and number of inner steps for compiled code"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -74,7 +72,12 @@ class ServoParameters(CheckedParameters):
                 f'ServoParameters.control_period = {self.control_period} s is not a multiple of '
                 f'inner_step = {self.inner_step} s'
             )
-        self._check_inner_step()
+        rate, part = fastest_rate(self.valve, self.cylinder, self.load, self.seals)
+        if rate * self.inner_step > LARGEST_RATE_TIMES_STEP:
+            raise ValueError(
+                f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
+                f'{LARGEST_RATE_TIMES_STEP / rate:.3g} s for the fastest part, {part}'
+            )
         c = constants(self.valve, self.cylinder, self.load, self.seals)
         g = gains(self.controller, c, self.control_period)
         radius = spectral_radius(g, c)
@@ -83,16 +86,8 @@ class ServoParameters(CheckedParameters):
                 f'ServoParameters: the closed loop is unstable, the largest eigenvalue of its transition matrix is '
                 f'{radius:.4f}: lower position_gain, velocity_compensation or force_bandwidth, or control_period'
             )
-        for name, value in (('inner_steps', steps), ('constants', c), ('gains', g), ('kept', keep((c, g)))):
+        for name, value in (('constants', c), ('gains', g), ('kept', keep((c, g, self.inner_step, steps)))):
             object.__setattr__(self, name, value)  # frozen dataclass: derived fields
-
-    def _check_inner_step(self) -> None:
-        rate, part = fastest_rate(self.valve, self.cylinder, self.load, self.seals)
-        if rate * self.inner_step > LARGEST_RATE_TIMES_STEP:
-            raise ValueError(
-                f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
-                f'{LARGEST_RATE_TIMES_STEP / rate:.3g} s for the fastest part, {part}'
-            )
 
 
 class ServoState(NamedTuple):
@@ -105,30 +100,18 @@ class ServoState(NamedTuple):
 class ServoOutputs(NamedTuple):
     """True values at the end of a step, without noise or delay."""
 
-    position: float
-    """[m]"""
-    velocity: float
-    """[m/s] exactly 0.0 at rest"""
-    pressure_a: float
-    """[Pa, gauge]"""
-    pressure_b: float
-    """[Pa, gauge]"""
-    spool: float
-    """[-] -1 to 1"""
-    force_sum: float
-    """[N] every axial force on the moving mass except seal friction"""
-    friction_force: float
-    """[N] ``m a = force_sum - friction_force``"""
-    coulomb_friction: float
-    """[N]"""
-    breakaway_force: float
-    """[N]"""
-    friction_state: int
-    """a `FrictionState`"""
-    direction: int
-    """-1, 0 or 1"""
-    command: Command
-    """outputs of the controller at the start of the step"""
+    position: float  # [m]
+    velocity: float  # [m/s] exactly 0.0 at rest
+    pressure_a: float  # [Pa, gauge]
+    pressure_b: float  # [Pa, gauge]
+    spool: float  # [-] -1 to 1
+    force_sum: float  # [N] every axial force on the moving mass except seal friction
+    friction_force: float  # [N] ``m a = force_sum - friction_force``
+    coulomb_friction: float  # [N]
+    breakaway_force: float  # [N]
+    friction_state: int  # a `FrictionState`
+    direction: int  # -1, 0 or 1
+    command: Command  # outputs of the controller at the start of the step
 
 
 NO_COMMAND = Command(0.0, 0.0, 0)
@@ -140,63 +123,45 @@ def init(parameters: ServoParameters, position: float = 0.0) -> ServoState:
     Raises:
         ValueError: The position is not between the end stops.
     """
-    if not abs(position) <= parameters.constants.limit:
-        raise ValueError(f'position = {position} m is not within the stroke, +-{parameters.constants.limit} m')
-    return ServoState(init_plant(parameters.constants, position), ControllerState(position, 0.0))
+    if not abs(position) <= parameters.cylinder.limit:
+        raise ValueError(f'position = {position} m is not within the stroke, +-{parameters.cylinder.limit} m')
+    mean = (parameters.valve.supply_pressure + parameters.valve.return_pressure) / 2.0
+    plant = PlantState(position, 0.0, mean, mean, 0.0, 0.0, 0.0, 0.0, 0, 0)
+    return ServoState(plant, ControllerState(position, 0.0))
 
 
 @compiled
-def advance_plant(
-    kept: Any, state: PlantState, command: float, load_force: float, inner_step_time: float, inner_steps: int
-) -> PlantState:
-    """``inner_steps`` inner steps with constant spool command and load force."""
-    c, _gains = kept.value
-    for _ in range(inner_steps):
-        state = inner_step(c, state, command, load_force, inner_step_time)
+def _advance(kept: Any, state: PlantState, command: float, load_force: float) -> PlantState:
+    c, _gains, time, steps = kept.value
+    for _ in range(steps):
+        state = inner_step(c, state, command, load_force, time)
     return state
 
 
 def advance(parameters: ServoParameters, state: PlantState, spool: float, load_force: float = 0.0) -> PlantState:
     """Valve, cylinder and load over one sample, with constant spool command [-1 to 1] and force on the rod [N]."""
-    command = min(max(spool, -1.0), 1.0)
-    return advance_plant(parameters.kept, state, command, load_force, parameters.inner_step, parameters.inner_steps)
+    return _advance(parameters.kept, state, min(max(spool, -1.0), 1.0), load_force)
 
 
 @compiled
 def measure(c: Constants, state: PlantState) -> Measurement:
     """Measurement of ideal sensors."""
-    return Measurement(
-        state.position,
-        state.velocity,
-        chamber_pressure(state.charge_a, c.vapour),
-        chamber_pressure(state.charge_b, c.vapour),
-    )
+    pressure_a, pressure_b = chamber_pressures(c, state[:8])
+    return Measurement(state.position, state.velocity, pressure_a, pressure_b)
 
 
 @compiled
 def _outputs(kept: Any, plant: PlantState, command: Command, load_force: float) -> ServoOutputs:
     """Outputs in a state of the plant; friction by `state_friction` of the estimator, at rest where V = 0 exactly."""
-    c, _gains = kept.value
-    measured = measure(c, plant)
+    c, _gains, _time, _steps = kept.value
+    a, b = chamber_pressures(c, plant[:8])
     force = force_sum(c, plant[:8], load_force)
-    seals = friction_of_seals(c.seals, measured.pressure_a, measured.pressure_b, plant.velocity)
+    seals = friction_of_seals(c.seals, a, b, plant.velocity)
     coulomb = seals.coulomb_friction
     sliding, breakaway = coulomb + seals.velocity_friction, coulomb + seals.stiction
     acting = state_friction(plant.velocity, force, plant.velocity == 0.0, sliding, breakaway)
-    return ServoOutputs(
-        measured.position,
-        measured.velocity,
-        measured.pressure_a,
-        measured.pressure_b,
-        plant.spool,
-        force,
-        acting.friction_force,
-        coulomb,
-        breakaway,
-        acting.state,
-        acting.direction,
-        command,
-    )
+    measured = (plant.position, plant.velocity, a, b, plant.spool, force)
+    return ServoOutputs(*measured, acting.friction_force, coulomb, breakaway, acting.state, acting.direction, command)
 
 
 def outputs(
@@ -208,17 +173,11 @@ def outputs(
 
 @compiled
 def _step(
-    kept: Any,
-    state: ServoState,
-    reference: Setpoint,
-    feedforward: float,
-    load_force: float,
-    inner_step_time: float,
-    inner_steps: int,
+    kept: Any, state: ServoState, reference: Setpoint, feedforward: float, load_force: float
 ) -> tuple[ServoState, ServoOutputs]:
-    c, g = kept.value
+    c, g, _time, _steps = kept.value
     controller, command = control(g, c, state.controller, measure(c, state.plant), reference, feedforward)
-    plant = advance_plant(kept, state.plant, command.spool, load_force, inner_step_time, inner_steps)
+    plant = _advance(kept, state.plant, command.spool, load_force)
     return ServoState(plant, controller), _outputs(kept, plant, command, load_force)
 
 
@@ -238,8 +197,7 @@ def step(
         feedforward: Friction feed-forward [N], positive on extension; likewise.
         load_force: Force from outside on the rod [N], positive on extension, constant over the step.
     """
-    p = parameters
-    return _step(p.kept, state, reference, feedforward, load_force, p.inner_step, p.inner_steps)
+    return _step(parameters.kept, state, reference, feedforward, load_force)
 
 
 class Trajectory(NamedTuple):
@@ -258,12 +216,10 @@ class Trajectory(NamedTuple):
 
 
 @compiled
-def _simulate(
-    kept: Any, state: ServoState, inputs: Any, inner_step_time: float, inner_steps: int, rows: Any
-) -> ServoState:
+def _simulate(kept: Any, state: ServoState, inputs: Any, rows: Any) -> ServoState:
     for i in range(len(inputs)):
         x, v, a, feedforward, load_force = [float(inputs[i, j]) for j in range(5)]
-        state, out = _step(kept, state, Setpoint(x, v, a), feedforward, load_force, inner_step_time, inner_steps)
+        state, out = _step(kept, state, Setpoint(x, v, a), feedforward, load_force)
         for column, value in enumerate(out[:9]):
             rows[i, column] = value
         rows[i, 9] = out.command.limited
@@ -290,5 +246,5 @@ def simulate(
     inputs = np.empty((len(setpoints), 5))
     inputs[:, :3], inputs[:, 3], inputs[:, 4] = setpoints, feedforward, load_force
     rows = np.empty((len(setpoints), len(Trajectory._fields)))
-    state = _simulate(parameters.kept, state, inputs, parameters.inner_step, parameters.inner_steps, rows)
+    state = _simulate(parameters.kept, state, inputs, rows)
     return state, Trajectory(*rows.T)

@@ -19,8 +19,7 @@ class PullRig(NamedTuple):
 class PullRigState(NamedTuple):
     """State between two samples."""
 
-    test: int
-    """index of the test, from 0"""
+    test: int  # index of the test, from 0
     plant: PlantState
 
 

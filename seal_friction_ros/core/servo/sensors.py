@@ -37,14 +37,10 @@ class SensorSettings(CheckedParameters):
 class Readings(NamedTuple):
     """One sample of each sensor; None for a lost sample."""
 
-    pressure: tuple[float, float] | None
-    """[Pa, gauge] chamber a and b"""
-    velocity: float | None
-    """[m/s]"""
-    force_sum: float | None
-    """[N]"""
-    position: float | None
-    """[m]"""
+    pressure: tuple[float, float] | None  # [Pa, gauge] chamber a and b
+    velocity: float | None  # [m/s]
+    force_sum: float | None  # [N]
+    position: float | None  # [m]
 
 
 def read(settings: SensorSettings, index: int, truth: Readings) -> Readings:

@@ -48,26 +48,19 @@ SHARPEST_SMOOTHING = 1e-5  # [m/s]
 class RecordedMotion(NamedTuple):
     """Reference and rod at one velocity sample."""
 
-    reference_velocity: float
-    """[m/s] conditioned, as in `pipeline`"""
-    reference_acceleration: float = 0.0
-    """[m/s^2]"""
-    measured_velocity: float = 0.0
-    """[m/s]"""
-    reference_age: float = 0.0
-    """[s]"""
-    ripple: float = 0.0
-    """[m/s] of the reference velocity"""
+    reference_velocity: float  # [m/s] conditioned, as in `pipeline`
+    reference_acceleration: float = 0.0  # [m/s^2]
+    measured_velocity: float = 0.0  # [m/s]
+    reference_age: float = 0.0  # [s]
+    ripple: float = 0.0  # [m/s] of the reference velocity
 
 
 class Recording(NamedTuple):
     """Recorded motion of an axis, one entry per velocity sample."""
 
     estimates: Sequence[FrictionEstimate]
-    motions: Sequence[RecordedMotion]
-    """reference and measured motion"""
-    force_sum: FloatArray
-    """[N], shape (n,)"""
+    motions: Sequence[RecordedMotion]  # reference and measured motion
+    force_sum: FloatArray  # [N], shape (n,)
 
     @property
     def time(self) -> FloatArray:
@@ -94,28 +87,20 @@ class Recording(NamedTuple):
 class RecordedLaw(NamedTuple):
     """Friction law of a recorded axis."""
 
-    scale: float
-    """[-] s"""
-    scale_std: float
-    """[-]"""
-    mass: float
-    """[kg] m"""
+    scale: float  # [-] s
+    scale_std: float  # [-]
+    mass: float  # [kg] m
     mass_is_fitted: bool
-    offset: float
-    """[N] F_0; 0 where the rod moves in one direction only"""
-    friction: FloatArray
-    """[N] force sum less inertia less offset; NaN where it is unknown"""
-    sliding: BoolArray
-    """samples of the fit"""
+    offset: float  # [N] F_0; 0 where the rod moves in one direction only
+    friction: FloatArray  # [N] force sum less inertia less offset; NaN where it is unknown
+    sliding: BoolArray  # samples of the fit
 
 
 class Residual(NamedTuple):
     """RMS friction [N] that remains for the controller while the rod slides; at rest friction is the applied force."""
 
-    sliding: float
-    """all sliding samples"""
-    reversal: float
-    """sliding samples near a reversal of the reference; 0 where there are none"""
+    sliding: float  # all sliding samples
+    reversal: float  # sliding samples near a reversal of the reference; 0 where there are none
 
     def better_than(self, other: 'Residual') -> bool:
         """Whether less friction remains while the rod slides."""
@@ -126,13 +111,10 @@ class Residual(NamedTuple):
 class RecordedTuning(TunedFeedForward[Residual]):
     """Feed-forward of a recorded axis."""
 
-    identified: dict[str, bool]
-    """parameter -> whether the recording identifies it; otherwise it is unchanged"""
+    identified: dict[str, bool]  # parameter -> whether the recording identifies it; otherwise it is unchanged
     law: RecordedLaw
-    reversal: BoolArray
-    """samples near a reversal of the reference"""
-    force: FloatArray
-    """[N] of the feed-forward after its delay, in the nominal case"""
+    reversal: BoolArray  # samples near a reversal of the reference
+    force: FloatArray  # [N] of the feed-forward after its delay, in the nominal case
 
 
 def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:

@@ -55,7 +55,6 @@ class Outcome(Protocol):
 
     def better_than(self, other: Any) -> bool:
         """Whether this outcome is better than another one."""
-        ...
 
 
 OutcomeType = TypeVar('OutcomeType', bound=Outcome)
@@ -64,10 +63,8 @@ OutcomeType = TypeVar('OutcomeType', bound=Outcome)
 class RobustnessCase(NamedTuple, Generic[OutcomeType]):
     """Outcome with an error of the friction model and of the delay."""
 
-    friction_error: float
-    """[-] the model gives ``1 + friction_error`` times the friction"""
-    delay_error: float
-    """[-] the whole delay is ``1 + delay_error`` times as long"""
+    friction_error: float  # [-] the model gives ``1 + friction_error`` times the friction
+    delay_error: float  # [-] the whole delay is ``1 + delay_error`` times as long
     outcome: OutcomeType
 
     @property
@@ -81,10 +78,8 @@ class TunedFeedForward(Generic[OutcomeType]):
     """A tuned feed-forward and its robustness."""
 
     feedforward: 'FeedForwardSettings'
-    without: OutcomeType
-    """outcome without feed-forward"""
-    cases: tuple[RobustnessCase[OutcomeType], ...]
-    """nine, by friction error, then by delay error"""
+    without: OutcomeType  # outcome without feed-forward
+    cases: tuple[RobustnessCase[OutcomeType], ...]  # nine, by friction error, then by delay error
 
     @property
     def nominal(self) -> OutcomeType:

@@ -27,7 +27,6 @@ from seal_friction_ros.core.servo.closed_loop import (
     EvaluationMotions,
     Performance,
     performance_of,
-    whole_delay,
     with_wrong_friction,
     without_feedforward,
 )
@@ -51,10 +50,8 @@ SEARCH_HOLD = 0.2  # [s] of rest after each motion during the search; the result
 class Tuning(TunedFeedForward[Performance]):
     """Result of the search."""
 
-    merit: float
-    """[-] J"""
-    candidates: int
-    """number of evaluated settings"""
+    merit: float  # [-] J
+    candidates: int  # number of evaluated settings
 
 
 class SearchPoint(NamedTuple):
@@ -87,16 +84,16 @@ class TuningProblem:
 
     axis: Axis
     settings: TuningSettings
-    noise: FloatArray | None = None
-    """as of `run_closed_loop`"""
+    noise: FloatArray | None = None  # as of `run_closed_loop`
 
     def __post_init__(self) -> None:
         gains, s = self.axis.servo.gains, self.settings
-        speed = 2.0 * math.pi * s.frequency * s.amplitude
+        rate = 2.0 * math.pi * s.frequency
+        speed = rate * s.amplitude
         for name, value, most, unit in (
             ('way', s.amplitude, gains.reach, 'm'),
-            ('speed', speed, gains.speed_max, 'm/s'),
-            ('acceleration', 2.0 * math.pi * s.frequency * speed, gains.acceleration_max, 'm/s2'),
+            ('speed', speed, gains.controller.reference_speed_max, 'm/s'),
+            ('acceleration', rate * speed, gains.controller.reference_acceleration_max, 'm/s2'),
         ):
             if value > most:
                 raise ValueError(
@@ -106,8 +103,14 @@ class TuningProblem:
 
     @property
     def whole_delay(self) -> float:
-        """Time from a velocity sample to the force of its feed-forward on the rod [s]."""
-        return whole_delay(self.axis.servo, self.settings.delay)
+        r"""Time from a velocity sample to the force of its feed-forward on the rod [s].
+
+        .. math:: T = T_d + 1 / \omega_F + \tau
+
+        with the delay T_d to the controller, and the delays of force loop, spool and sampling (see `controller`).
+        """
+        gains = self.axis.servo.gains
+        return self.settings.delay + 1.0 / gains.controller.force_bandwidth + gains.valve_delay
 
     @property
     def lead_step(self) -> float:

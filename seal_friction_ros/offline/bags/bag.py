@@ -49,8 +49,7 @@ class BagMessage(NamedTuple):
 
     topic: str
     type_name: str
-    log_time: int
-    """[ns]"""
+    log_time: int  # [ns]
     data: bytes
 
 

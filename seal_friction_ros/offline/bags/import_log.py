@@ -155,29 +155,20 @@ class Rig(CheckedParameters):
 class ImportSummary(NamedTuple):
     """Contents of an imported bag."""
 
-    rows: int
-    """one pressure, one force sum and one velocity message each"""
-    not_finite: int
-    """rows with a NaN or infinite pressure, force sum or velocity; the estimator flags them"""
-    first_stamp: int
-    """[ns]"""
-    last_stamp: int
-    """[ns]"""
+    rows: int  # one pressure, one force sum and one velocity message each
+    not_finite: int  # rows with a NaN or infinite pressure, force sum or velocity; the estimator flags them
+    first_stamp: int  # [ns]
+    last_stamp: int  # [ns]
 
 
 class Samples(NamedTuple):
     """Samples for a bag; arrays of shape (n,)."""
 
-    stamp: NDArray[np.int64]
-    """[ns]"""
-    chamber_a: FloatArray
-    """[Pa, gauge]"""
-    chamber_b: FloatArray
-    """[Pa, gauge]"""
-    force_sum: FloatArray
-    """[N]"""
-    velocity: FloatArray
-    """[m/s]"""
+    stamp: NDArray[np.int64]  # [ns]
+    chamber_a: FloatArray  # [Pa, gauge]
+    chamber_b: FloatArray  # [Pa, gauge]
+    force_sum: FloatArray  # [N]
+    velocity: FloatArray  # [m/s]
 
 
 def import_log(log: Path, rig_file: Path, out: Path) -> ImportSummary:
@@ -201,8 +192,7 @@ class ReadLog(NamedTuple):
     """A log in SI units, and its columns."""
 
     samples: 'Samples'
-    columns: dict[Term, FloatArray]
-    """values in the log, in the units of the terms"""
+    columns: dict[Term, FloatArray]  # values in the log, in the units of the terms
 
 
 def read_samples(log: Path, rig: Rig) -> ReadLog:

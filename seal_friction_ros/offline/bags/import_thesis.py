@@ -26,14 +26,10 @@ class Pull(NamedTuple):
     """One pull of the test: both readings at one pressure in one direction, sums over both seals."""
 
     test: int
-    pressure: float
-    """[Pa, gauge]"""
-    direction: int
-    """1 extend, -1 retract"""
-    static_friction: float
-    """[N] magnitude at breakaway"""
-    dynamic_friction: float
-    """[N] magnitude while the rod slides"""
+    pressure: float  # [Pa, gauge]
+    direction: int  # 1 extend, -1 retract
+    static_friction: float  # [N] magnitude at breakaway
+    dynamic_friction: float  # [N] magnitude while the rod slides
 
 
 def read_pulls() -> list[Pull]:

@@ -16,18 +16,13 @@ class BagInfo:
     """Summary of a bag."""
 
     bag: str
-    start_ns: int
-    """log time of the first message [ns]"""
+    start_ns: int  # log time of the first message [ns]
     duration_s: float
     messages: int
-    topics: dict[str, dict[str, float | str]]
-    """topic -> type, count and rate [Hz]"""
-    states: dict[str, int]
-    """estimates in each friction state"""
-    status: dict[str, int]
-    """estimates with each status bit set; ``all good``: those without any"""
-    seals: list[str]
-    """each seal with its chamber, from the newest configuration in the bag"""
+    topics: dict[str, dict[str, float | str]]  # topic -> type, count and rate [Hz]
+    states: dict[str, int]  # estimates in each friction state
+    status: dict[str, int]  # estimates with each status bit set; ``all good``: those without any
+    seals: list[str]  # each seal with its chamber, from the newest configuration in the bag
 
     def summary(self) -> str:
         """The same for a person."""

@@ -45,8 +45,7 @@ class Channel(NamedTuple):
 
     topic: str
     type_name: str
-    encoding: str
-    """of its messages; ``cdr`` for ROS 2"""
+    encoding: str  # of its messages; ``cdr`` for ROS 2
     definition_encoding: str
     definition: bytes
     metadata: dict[str, str]
@@ -56,43 +55,31 @@ class Message(NamedTuple):
     """One serialised message."""
 
     channel: Channel
-    log_time: int
-    """[ns]"""
+    log_time: int  # [ns]
     data: bytes
 
 
 class Block(NamedTuple):
     """Part of the file with records of messages: a chunk, or consecutive records outside of chunks."""
 
-    offset: int
-    """[bytes] of its beginning in the file"""
-    size: int
-    """[bytes] as stored"""
-    first: int
-    """smallest log time in it [ns]"""
-    last: int
-    """largest log time in it [ns]"""
-    unpacked_size: int
-    """[bytes]"""
-    checksum: int = 0
-    """CRC-32 of the unpacked data; 0 if unknown"""
+    offset: int  # [bytes] of its beginning in the file
+    size: int  # [bytes] as stored
+    first: int  # smallest log time in it [ns]
+    last: int  # largest log time in it [ns]
+    unpacked_size: int  # [bytes]
+    checksum: int = 0  # CRC-32 of the unpacked data; 0 if unknown
     compression: str = ''
-    fault: str = ''
-    """reason why it cannot be read; empty if none is known"""
+    fault: str = ''  # reason why it cannot be read; empty if none is known
 
 
 class Layout(NamedTuple):
     """Structure of a file."""
 
     blocks: tuple[Block, ...]
-    channels: dict[int, Channel]
-    """those repeated at the end of the file"""
-    counts: dict[int, int]
-    """messages of each channel, by the statistics of the file; empty if it has none"""
-    damage: str
-    """fault of the file from `sound_size` on; empty if it is finished"""
-    sound_size: int
-    """[bytes] of complete records"""
+    channels: dict[int, Channel]  # those repeated at the end of the file
+    counts: dict[int, int]  # messages of each channel, by the statistics of the file; empty if it has none
+    damage: str  # fault of the file from `sound_size` on; empty if it is finished
+    sound_size: int  # [bytes] of complete records
 
 
 def scan(file: BinaryIO) -> Layout:
@@ -356,8 +343,7 @@ class _Contents(NamedTuple):
     """Data of a block, and positions of its messages."""
 
     data: bytes
-    times: 'array[int]'
-    """log time of each message [ns]"""
+    times: 'array[int]'  # log time of each message [ns]
     offsets: 'array[int]'
 
     def by_time(self) -> Sequence[int]:

@@ -48,25 +48,21 @@ class Description(NamedTuple):
     type_name: str
     definition_encoding: str
     definition: bytes
-    metadata: dict[str, str]
-    """of the channel: type hash and QoS in the format of rosbag2"""
+    metadata: dict[str, str]  # of the channel: type hash and QoS in the format of rosbag2
 
 
 class Span(NamedTuple):
     """Range of the messages of a file."""
 
-    first_time: int = 0
-    """log time of its first message [ns]"""
-    last_time: int = 0
-    """log time of its last message [ns]"""
+    first_time: int = 0  # log time of its first message [ns]
+    last_time: int = 0  # log time of its last message [ns]
     messages: int = 0
 
 
 class _Mark(NamedTuple):
     """End of a complete chunk."""
 
-    size: int
-    """[bytes] of the file"""
+    size: int  # [bytes] of the file
     span: Span
     counts: dict[tuple[str, str], int]
 

@@ -33,47 +33,28 @@ class RecordedRun:
     """A bag as arrays of shape (n,), one entry per estimate; a missing input is NaN."""
 
     name: str
-    topics: dict[str, tuple[str, int]]
-    """topic -> its type and number of messages"""
-    frames: tuple[str, ...]
-    """frame names of the velocity samples, the first ten"""
-    configurations: tuple[tuple[float, str], ...]
-    """time [s] and JSON text of each change of configuration"""
-    configuration_rows: tuple[int, ...]
-    """number of estimates before each change, in the order of the bag"""
-    chambers: tuple[str, ...]
-    """chamber of each seal"""
-    start: int
-    """[ns] stamp of the first estimate"""
-    time: FloatArray
-    """[s] since the first estimate"""
-    velocity: FloatArray
-    """[m/s]"""
-    pressure_a: FloatArray
-    """[Pa, gauge]"""
-    pressure_b: FloatArray
-    """[Pa, gauge]"""
-    force_sum: FloatArray
-    """[N]"""
-    position: FloatArray
-    """[m]"""
-    reference: FloatArray
-    """[m] reference position"""
-    coulomb_friction: FloatArray
-    """[N]"""
-    coulomb_friction_std: FloatArray
-    """[N]"""
-    breakaway_force: FloatArray
-    """[N]"""
-    friction_force: FloatArray
-    """[N]"""
+    topics: dict[str, tuple[str, int]]  # topic -> its type and number of messages
+    frames: tuple[str, ...]  # frame names of the velocity samples, the first ten
+    configurations: tuple[tuple[float, str], ...]  # time [s] and JSON text of each change of configuration
+    configuration_rows: tuple[int, ...]  # number of estimates before each change, in the order of the bag
+    chambers: tuple[str, ...]  # chamber of each seal
+    start: int  # [ns] stamp of the first estimate
+    time: FloatArray  # [s] since the first estimate
+    velocity: FloatArray  # [m/s]
+    pressure_a: FloatArray  # [Pa, gauge]
+    pressure_b: FloatArray  # [Pa, gauge]
+    force_sum: FloatArray  # [N]
+    position: FloatArray  # [m]
+    reference: FloatArray  # [m] reference position
+    coulomb_friction: FloatArray  # [N]
+    coulomb_friction_std: FloatArray  # [N]
+    breakaway_force: FloatArray  # [N]
+    friction_force: FloatArray  # [N]
     state: IntArray
     direction: IntArray
     status: IntArray
-    input_age: FloatArray
-    """[s]"""
-    feedforward_force: FloatArray
-    """[N] published with the estimate; NaN where there is none"""
+    input_age: FloatArray  # [s]
+    feedforward_force: FloatArray  # [N] published with the estimate; NaN where there is none
 
     @cached_property
     def pressure(self) -> FloatArray:

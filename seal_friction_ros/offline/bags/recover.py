@@ -22,20 +22,13 @@ class Recovery:
 
     bag: str
     out: str
-    messages: int = 0
-    """number saved"""
-    topics: dict[str, int] = field(default_factory=dict)
-    """topic -> messages saved"""
-    first_ns: int = -1
-    """log time of the first message [ns]"""
-    last_ns: int = -1
-    """log time of the last message [ns]"""
-    lost_bytes: int = 0
-    """at the ends of files, after the last complete record"""
-    lost_chunks: int = 0
-    """complete chunks with invalid contents"""
-    damage: list[str] = field(default_factory=list)
-    """one line for each fault; empty for a finished and undamaged bag"""
+    messages: int = 0  # number saved
+    topics: dict[str, int] = field(default_factory=dict)  # topic -> messages saved
+    first_ns: int = -1  # log time of the first message [ns]
+    last_ns: int = -1  # log time of the last message [ns]
+    lost_bytes: int = 0  # at the ends of files, after the last complete record
+    lost_chunks: int = 0  # complete chunks with invalid contents
+    damage: list[str] = field(default_factory=list)  # one line for each fault; empty for a finished and undamaged bag
 
     def summary(self) -> str:
         """The same for a person."""

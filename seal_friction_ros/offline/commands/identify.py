@@ -49,8 +49,8 @@ def _chambers(text: str) -> tuple[str, ...]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, and write seal file and page."""
-    from seal_friction_ros.offline.identification.document import identification_numbers
     from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
+    from seal_friction_ros.offline.identification.results import identification_numbers
     from seal_friction_ros.offline.identification.sources import SourceOptions
     from seal_friction_ros.offline.identification.wording import summary
     from seal_friction_ros.offline.work.seal_writer import write_seal

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
         pressure_unit=arguments.pressure_unit,
         force_unit=arguments.force_unit,
         length_unit=arguments.length_unit,
-        geometry=geometry_of_seal_file(arguments.seal) if arguments.seal else None,
+        geometry=geometry_of_seal_file(arguments.seal)[0] if arguments.seal else None,
     )
     sheet, page = arguments.out, arguments.out.with_suffix('.html')
     write_sheet(plan, sheet)

@@ -28,24 +28,17 @@ class Comparison:
     """A case run through a measured motion, and the measured force."""
 
     bag: str
-    chain: MeasuringChain
-    """that ``shown`` is computed for"""
+    chain: MeasuringChain  # that ``shown`` is computed for
     result: TransientResult
-    time: FloatArray
-    """[s] of the measured samples"""
-    position: FloatArray
-    """[m]"""
-    measured: FloatArray
-    """force without its offset [N]"""
-    filtered: FloatArray
-    """measured force without the resonance of the measuring chain, averaged [N]"""
-    computed: FloatArray
-    """computed friction, filtered in the same way, at the measured times [N]"""
+    time: FloatArray  # [s] of the measured samples
+    position: FloatArray  # [m]
+    measured: FloatArray  # force without its offset [N]
+    filtered: FloatArray  # measured force without the resonance of the measuring chain, averaged [N]
+    computed: FloatArray  # computed friction, filtered in the same way, at the measured times [N]
     averaged_samples: int
     resonance: float | None
     """natural frequency of the measuring chain, found in the force [Hz]; None if no resonance stands out"""
-    shown: FloatArray
-    """reading of the measuring chain for the computed friction [N], at the times of ``result``"""
+    shown: FloatArray  # reading of the measuring chain for the computed friction [N], at the times of ``result``
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
@@ -116,12 +109,9 @@ def compare_with_bag(
 
 
 class _Recorded(NamedTuple):
-    time: FloatArray
-    """[s] from the first sample"""
-    position: FloatArray
-    """[m]"""
-    force: FloatArray
-    """[N]"""
+    time: FloatArray  # [s] from the first sample
+    position: FloatArray  # [m]
+    force: FloatArray  # [N]
 
 
 def _recorded(bag: Path, window: tuple[float, float] | None) -> _Recorded:

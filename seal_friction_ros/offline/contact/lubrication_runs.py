@@ -259,8 +259,7 @@ class MapRuns(NamedTuple):
     case: LubricationCase
     law: FrictionMap
     rows: list[SteadyFriction]
-    retried_steps: int
-    """steps that did not converge and were repeated in halves"""
+    retried_steps: int  # steps that did not converge and were repeated in halves
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""

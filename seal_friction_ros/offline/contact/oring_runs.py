@@ -38,16 +38,14 @@ class OringSummary:
     """axial force of the gland on the ring"""
     peak_contact_stress_Pa: tuple[float, ...]  # noqa: N815
     contact_width_m: tuple[float, ...]
-    area_deformation_gain: float | None
-    """slope of normal over axial force by least squares; None with one pressure"""
+    area_deformation_gain: float | None  # slope of normal over axial force by least squares; None with one pressure
     radial_force_N: float | None  # noqa: N815
     """value of that line at zero axial force; None with one pressure"""
     friction_N: tuple[float, ...] | None  # noqa: N815
     """sliding friction of one seal, if the case has a friction coefficient"""
     rod_profile: tuple[Profile, ...]
     gland_profile: tuple[Profile, ...]
-    wall_profile: tuple[Profile, ...]
-    """downstream wall; empty without pressure"""
+    wall_profile: tuple[Profile, ...]  # downstream wall; empty without pressure
 
 
 class Computed(NamedTuple):

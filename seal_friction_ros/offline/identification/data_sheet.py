@@ -7,7 +7,7 @@ kind of friction and direction. A dash in a cell marks a reading that could not 
 import csv
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,14 +17,12 @@ import numpy as np
 from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import UNITS, unit_size
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.identification.checks import FEWEST_PRESSURES
-from seal_friction_ros.core.identification.readings import ManualReadings
+from seal_friction_ros.core.identification.readings import FEWEST_PRESSURES, ManualReadings
 from seal_friction_ros.files import config_path, read_yaml
 
 TITLE = 'seal friction data sheet'
 PRESSURE_UNITS = ('psi', 'bar', 'MPa', 'kPa')
 FORCE_UNITS = ('lbf', 'N', 'kN')
-LENGTH_UNITS = ('in', 'mm')
 KINDS = ('static', 'dynamic')
 DIRECTIONS = {'retract': -1, 'extend': 1}
 DIMENSIONS = {
@@ -59,30 +57,22 @@ class FrictionTestPlan:
     """
 
     seal_name: str
-    lowest: float
-    """pressure in ``pressure_unit``"""
-    highest: float
-    """pressure in ``pressure_unit``"""
-    steps: int
-    """between the pressures"""
+    lowest: float  # pressure in ``pressure_unit``
+    highest: float  # pressure in ``pressure_unit``
+    steps: int  # between the pressures
     tests: int
-    seals: int
-    """number of seals that share the pressure and whose friction is measured together"""
+    seals: int  # number of seals that share the pressure and whose friction is measured together
     pressure_unit: str = 'psi'
     force_unit: str = 'lbf'
     length_unit: str = 'in'
-    geometry: SealGeometry | None = None
-    """filled in, if known"""
+    geometry: SealGeometry | None = None  # filled in, if known
 
     def __post_init__(self) -> None:
         low, high, name = self.lowest, self.highest, self.seal_name
         if not 0.0 <= low < high < math.inf:
             raise ValueError(f'pressures from {low:g} to {high:g}: give a lowest one of at least 0 and a higher one')
-        for what, count, least, most in (
-            ('pressure steps', self.steps, FEWEST_PRESSURES - 1, 100),
-            ('tests', self.tests, 1, 20),
-            ('seals', self.seals, 1, MOST_SEALS),
-        ):
+        counts = {'pressure steps': (self.steps, FEWEST_PRESSURES - 1, 100), 'tests': (self.tests, 1, 20)}
+        for what, (count, least, most) in {**counts, 'seals': (self.seals, 1, MOST_SEALS)}.items():
             if not least <= count <= most:
                 raise ValueError(f'{count} {what}: give {least} to {most}')
         if not name or not name.isprintable() or ',' in name:
@@ -103,10 +93,8 @@ class DataSheet(NamedTuple):
 
     dynamic: ManualReadings
     static: ManualReadings
-    chambers: tuple[str, ...]
-    """of each seal; they alternate, since both chambers have the same pressure"""
-    seal_document: Mapping[str, Any]
-    """name and geometry"""
+    chambers: tuple[str, ...]  # of each seal; they alternate, since both chambers have the same pressure
+    seal_document: Mapping[str, Any]  # name and geometry
     remarks: tuple[str, ...]
 
 
@@ -128,21 +116,17 @@ def columns(tests: int) -> list[SheetColumn]:
     return [SheetColumn(test, kind, side) for test in range(1, tests + 1) for kind in KINDS for side in DIRECTIONS]
 
 
-def geometry_of_seal_file(seal: str) -> SealGeometry:
-    """Geometry of a seal file: a path, or the name of one in config/seals.
+def geometry_of_seal_file(seal: str) -> tuple[SealGeometry, Mapping[str, Any]]:
+    """Geometry in a seal file (a path, or the name of one in config/seals), and its whole document.
 
     Raises:
         ValueError: The file cannot be read or has no valid geometry; names it.
     """
     path = config_path('seals', seal)
     document = read_yaml(path)
-    if not isinstance(document, Mapping):
-        raise ValueError(f'{path}: a seal file is a mapping of names to values')
-    geometry: SealGeometry = from_mapping(SealGeometry, document.get('geometry'), f'{path}: geometry')
-    return geometry
-
-
-# -- the empty sheet --------------------------------------------------------------------------------------------------
+    if not isinstance(document, Mapping) or 'geometry' not in document:
+        raise ValueError(f'{path}: no geometry: measure ring and groove and add them to the file')
+    return from_mapping(SealGeometry, document['geometry'], f'{path}: geometry'), document
 
 
 def sheet_text(plan: FrictionTestPlan) -> str:
@@ -183,28 +167,13 @@ def write_sheet(plan: FrictionTestPlan, out: Path) -> None:
         raise ValueError(f'{out}: cannot write it: {error.strerror}') from None
 
 
-# -- the filled sheet -------------------------------------------------------------------------------------------------
-
-
 class _Reading(NamedTuple):
-    """One filled cell."""
+    """One filled cell; pressure and force in the units of the sheet."""
 
-    place: str
-    """file and line"""
+    place: str  # file and line
     pressure: float
-    """in the unit of the sheet"""
     column: SheetColumn
     force: float
-    """in the unit of the sheet"""
-
-
-_Lines = Sequence[tuple[int, Sequence[str]]]
-"""Line number and cells of each line."""
-
-
-def is_data_sheet(head: Sequence[str]) -> bool:
-    """Whether a file that begins with these lines is a data sheet."""
-    return bool(head) and TITLE in head[0].lower()
 
 
 def read_data_sheet(path: Path) -> DataSheet:
@@ -214,7 +183,11 @@ def read_data_sheet(path: Path) -> DataSheet:
         ValueError: A dimension or reading is missing, out of order or implausible; one line that names it and says
             what to do.
     """
-    lines = list(_lines(read_text(path)))
+    lines = []
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        if line.strip(' ,;\t') and not line.startswith('#'):
+            separator = ';' if ';' in line and ',' not in line else ','
+            lines.append((number, [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]))
     start = next((i for i, (_, cells) in enumerate(lines) if cells[0].startswith('pressure')), None)
     if start is None:
         raise ValueError(f'{path}: not a data sheet: no row begins with pressure [unit]')
@@ -227,15 +200,12 @@ def read_data_sheet(path: Path) -> DataSheet:
     remarks = (f'{skipped} readings are marked as not taken',) if skipped else ()
 
     def manual(kind: str) -> ManualReadings:
-        chosen = [r for r in readings if r.column.kind == kind]
-        return ManualReadings(
-            path.name,
-            np.array([r.column.test for r in chosen], dtype=np.int64),
-            np.array([r.pressure for r in chosen], dtype=np.float64) * unit_size(pressure_unit),
-            np.array([DIRECTIONS[r.column.direction] for r in chosen], dtype=np.int64),
-            np.array([r.force for r in chosen], dtype=np.float64) * unit_size(force_unit),
-            np.full(len(chosen), np.nan),
-        )
+        chosen = [(r.column.test, r.pressure, DIRECTIONS[r.column.direction], r.force)
+                  for r in readings if r.column.kind == kind]  # fmt: skip
+        test, pressure, direction, force = np.array(chosen, dtype=np.float64).reshape(-1, 4).T
+        pressure, force = pressure * unit_size(pressure_unit), force * unit_size(force_unit)
+        unknown = np.full(len(chosen), np.nan)
+        return ManualReadings(path.name, test.astype(int), pressure, direction.astype(int), force, unknown)
 
     return DataSheet(manual('dynamic'), manual('static'), chambers, document, remarks)
 
@@ -262,13 +232,6 @@ def parse_number(text: str, what: str) -> float:
         return float(text)
     except ValueError:
         raise ValueError(f'{what} is {text[:40]!r}, not a number') from None
-
-
-def _lines(text: str) -> Iterator[tuple[int, list[str]]]:
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.strip(' ,;\t') and not line.startswith('#'):
-            separator = ';' if ';' in line and ',' not in line else ','
-            yield number, [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
 
 
 def _seal(path: Path, quantities: Mapping[str, list[str]]) -> tuple[tuple[str, ...], dict[str, Any]]:
@@ -311,7 +274,10 @@ def _heads(path: Path, heads: Sequence[str]) -> tuple[list[SheetColumn], str, st
     return order, units[0], units[1]
 
 
-def _readings(path: Path, rows: _Lines, order: Sequence[SheetColumn], unit: str) -> list[_Reading]:
+def _readings(
+    path: Path, rows: Sequence[tuple[int, Sequence[str]]], order: Sequence[SheetColumn], unit: str
+) -> list[_Reading]:
+    """Readings of ``rows``: line number and cells of each."""
     found: list[_Reading] = []
     missing: list[str] = []
     before = -math.inf
@@ -349,9 +315,8 @@ def _check_plausible(readings: Sequence[_Reading], pressure_unit: str, unit: str
     static = {(r.pressure, r.column[::2]): r.force for r in readings if r.column.kind == 'static'}
     for reading in readings:
         place, pressure, column, force = reading
-        others = [
-            r.force for r in readings if r.pressure == pressure and r.column.kind == column.kind and r is not reading
-        ]
+        at_pressure = [r for r in readings if r.pressure == pressure and r is not reading]
+        others = [r.force for r in at_pressure if r.column.kind == column.kind]
         middle = float(np.median(others)) if others else force
         static_force = static.get((pressure, column[::2]), force)
         doubt = ''

@@ -4,10 +4,10 @@ A fit that fails or predicts nothing is an error and gives no file. The computat
 number is rounded to six digits before another number is computed from it: the same sources give the same bytes.
 """
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,37 +18,14 @@ from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.laws.normal_force import squeeze_force
-from seal_friction_ros.core.friction.seal_file import parse_normal_force, parse_seal
+from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
+from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
+from seal_friction_ros.core.identification import diagnostics, fitting
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, candidate_laws, normal_forces
-from seal_friction_ros.core.identification.diagnostics import (
-    CHANGED,
-    FrictionChange,
-    Outlier,
-    between_runs,
-    changed_levels,
-    compare_with_law,
-    outlying_level,
-    repeatability,
-    run_drift,
-)
-from seal_friction_ros.core.identification.fitting import (
-    BreakawayFit,
-    LawFit,
-    band_coverage,
-    fit,
-    fit_breakaway,
-    jackknife_errors,
-    offsets_of,
-    plain_mean,
-    prediction_uncertainty,
-    recommended,
-    score_laws,
-)
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
-from seal_friction_ros.core.identification.signal_preparation import OffsetLine, offset_line
+from seal_friction_ros.core.identification.signal_preparation import offset_line
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.identification.document import identification_section, rounded_value, seal_document
+from seal_friction_ros.offline.identification.data_sheet import geometry_of_seal_file
 from seal_friction_ros.offline.identification.results import (
     FEWEST_PRESSURES_FOR_EXPONENT,
     Identification,
@@ -57,6 +34,9 @@ from seal_friction_ros.offline.identification.results import (
     LawSelection,
     PressureLevel,
     Ring,
+    identification_section,
+    rounded_value,
+    seal_document,
 )
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
 from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
@@ -71,26 +51,19 @@ REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is
 class IdentifyOptions:
     """Options of an identification."""
 
-    sources: SourceOptions = dataclasses.field(default_factory=SourceOptions)
+    sources: SourceOptions = field(default_factory=SourceOptions)
     seal: str | None = None
     """seal file with the geometry of the ring and its normal force: a path, or the name of one in config/seals"""
-    squeeze_force: bool = False
-    """compute the normal force from the geometry, even if the seal file has one"""
-    law: str | None = None
-    """law to save instead of the recommended one"""
-    run_to_run: float | None = None
-    """[-] relative standard deviation between runs, if known from elsewhere"""
-    name: str = ''
-    """of the seal; empty: the name of the seal file"""
+    squeeze_force: bool = False  # compute the normal force from the geometry, even if the seal file has one
+    law: str | None = None  # law to save instead of the recommended one
+    run_to_run: float | None = None  # [-] relative standard deviation between runs, if known from elsewhere
+    name: str = ''  # of the seal; empty: the name of the seal file
 
 
 def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Identification:
-    """Read sources, fit every law, select one and assess it.
+    """Read bags, logs, tables or data sheets, fit every law, select one and assess it.
 
-    Args:
-        paths: Bags, logs, tables or data sheets.
-        options: Options.
-        name: Of the seal, unless the options name it.
+    ``name`` is that of the seal, unless the options name it.
 
     Raises:
         ValueError: The data are unfit for identification, or no law predicts them; one line with the reason and what to
@@ -107,9 +80,6 @@ def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Iden
     return Identification(data, selection, quality, levels, document, warnings, remarks)
 
 
-# -- data -------------------------------------------------------------------------------------------------------------
-
-
 def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationData:
     """Read the sources and exclude readings that do not belong to one state of one seal.
 
@@ -120,43 +90,46 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
     ring = _ring(sources, options)
     prepared, changes, kept = _one_state(sources)
     readings = _with_normal_force(prepared.readings, ring)
-    outlier = _outlier(readings)
-    used = readings
+    outlier, used = None, readings
+    if not readings.are_samples and len(readings.levels) >= 4:
+        law = next(law for law in _candidates(readings) if law.name == 'pressure_power_law')
+        found = fitting.fit(law, readings)
+        floor = diagnostics.repeatability(readings, found.offsets)
+        outlier = diagnostics.outlying_level(law, readings, found.values, floor if math.isfinite(floor) else 0.0)
     if outlier is not None:  # number the levels, and the groups that are levels, without a gap
         used = readings.taken(readings.level != outlier.level)
         level = np.unique(used.level, return_inverse=True)[1]
         group = level if used.left_out_by == 'pressure' else used.group
-        used = dataclasses.replace(used, level=level, group=group)
+        used = replace(used, level=level, group=group)
     return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, changes, kept)
 
 
 def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
     """Geometry and normal force of the ring: from the seal of the options, else from a bag or data sheet."""
-    document, where = sources.seal_document, 'seal of the source'
+    found = (source.seal_document for source in sources.each if source.seal_document is not None)
+    document = next(found, None)
     if options.seal is not None:
-        path = config_path('seals', options.seal)
-        document, where = read_yaml(path), str(path)
-        if not isinstance(document, Mapping) or 'geometry' not in document:
-            raise ValueError(f'{where}: no geometry: measure ring and groove and add them to the file')
-    if document is None or 'geometry' not in document:
+        geometry, document = geometry_of_seal_file(options.seal)
+    elif document is not None and 'geometry' in document:
+        geometry = from_mapping(SealGeometry, document['geometry'], 'seal of the source: geometry')
+    else:
         return None
-    geometry = from_mapping(SealGeometry, document['geometry'], f'{where}: geometry')
     normal_force = document.get('normal_force')
     if not isinstance(normal_force, Mapping) or options.squeeze_force:
         gain = read_yaml(config_path('seals', REFERENCE_SEAL))['normal_force']['area_deformation_gain']
         force = rounded_value(squeeze_force(geometry))
         normal_force = {'law': 'area_deformation_gain', 'area_deformation_gain': gain, 'radial_force': force}
-    return Ring(geometry, parse_normal_force({'normal_force': normal_force}, 'seal'))
+    return Ring(geometry, parse_part(NormalForceLaw, {'normal_force': normal_force}, 'seal'))
 
 
 def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> FrictionReadings:
     if ring is None:
         return readings
     forces = normal_forces(readings.at.pressure, *ring)
-    return dataclasses.replace(readings, at=readings.at._replace(normal_force=forces))
+    return replace(readings, at=readings.at._replace(normal_force=forces))
 
 
-def _one_state(sources: Sources) -> tuple[PreparedReadings, tuple[FrictionChange, ...], tuple[int, ...]]:
+def _one_state(sources: Sources) -> tuple[PreparedReadings, tuple[diagnostics.FrictionChange, ...], tuple[int, ...]]:
     """Readings of the sources that agree, comparison of each further swept log with the first, and the sources kept.
 
     Sources with readings at held pressures form one law together, so a disagreement between them is an error. A swept
@@ -164,60 +137,41 @@ def _one_state(sources: Sources) -> tuple[PreparedReadings, tuple[FrictionChange
     its friction has changed.
     """
     numbers = tuple(range(len(sources.files)))
-    first = _if_swept(sources) if len(numbers) > 1 else None
-    if first is None:
+    first = None
+    if len(numbers) > 1:
+        with suppress(ValueError):  # one source by itself may have too few pressures
+            first = sources.prepare([0])
+    if first is None or not first.readings.are_samples:
         together = sources.prepare()
         _check_unchanged(together.readings)
         return together, (), numbers
     laws = {law.name: law for law in _candidates(first.readings)}
-    found = fit(laws.get('pressure_power_law_viscous', laws['pressure_power_law']), first.readings)
-    changes = tuple(compare_with_law(found, first.readings, sources.prepare([i]).readings) for i in numbers[1:])
+    found = fitting.fit(laws.get('pressure_power_law_viscous', laws['pressure_power_law']), first.readings)
+    others = (sources.prepare([i]).readings for i in numbers[1:])
+    changes = tuple(diagnostics.compare_with_law(found, first.readings, other) for other in others)
     kept = (0, *(i for i, change in zip(numbers[1:], changes, strict=True) if not change.is_change))
     return (sources.prepare(kept) if len(kept) > 1 else first), changes, kept
 
 
-def _if_swept(sources: Sources) -> PreparedReadings | None:
-    """The first source if it is a swept log; None if it has readings at held pressures, possibly too few by itself."""
-    try:
-        first = sources.prepare([0])
-    except ValueError:
-        return None
-    return first if first.readings.are_samples else None
-
-
 def _check_unchanged(readings: FrictionReadings) -> None:
-    changes = changed_levels(readings)
+    changes = [(c.other_friction / c.friction - 1.0, c) for c in diagnostics.changed_levels(readings)]
     if changes:
-        worst = max(changes, key=lambda c: abs(c.other_friction / c.friction - 1.0))
+        change, worst = max(changes, key=lambda pair: abs(pair[0]))
         raise ValueError(
             f'the friction has changed: {worst.friction:.4g} N in {worst.name} and {worst.other_friction:.4g} N in '
-            f'{worst.other_name}, {100.0 * (worst.other_friction / worst.friction - 1.0):+.0f} %, both at '
-            f'{worst.pressure / BAR:.3g} bar; runs of one seal repeat within {100.0 * CHANGED:.0f} %, so these are two '
-            'seals or two states of one seal: identify each separately'
+            f'{worst.other_name}, {100.0 * change:+.0f} %, both at {worst.pressure / BAR:.3g} bar; runs of one seal '
+            f'repeat within {100.0 * diagnostics.CHANGED:.0f} %, so these are two seals or two states of one seal: '
+            'identify each separately'
         )
 
 
 def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[CandidateLaw, ...]:
     speed = np.abs(readings.at.velocity)
     return candidate_laws(
-        geometry=ring.geometry if ring else None,
-        normal_force_law=ring.normal_force_law if ring else None,
+        **(ring._asdict() if ring else {}),
         with_speeds=bool(np.isfinite(speed).all()) and float(speed.max()) > SPEEDS_DIFFER * float(speed.min()),
         with_exponent=readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
-
-
-def _outlier(readings: FrictionReadings) -> Outlier | None:
-    """Pressure that disagrees with the law of all others; None if there are too few pressures to tell."""
-    if readings.are_samples or len(readings.levels) < 4:
-        return None
-    law = next(law for law in _candidates(readings) if law.name == 'pressure_power_law')
-    found = fit(law, readings)
-    floor = repeatability(readings, found.offsets)
-    return outlying_level(law, readings, found.values, floor if math.isfinite(floor) else 0.0)
-
-
-# -- law --------------------------------------------------------------------------------------------------------------
 
 
 def select_law(data: IdentificationData, name: str | None) -> LawSelection:
@@ -228,11 +182,12 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
     """
     laws = _candidates(data.used, data.ring)
     with progress('fit and leave out', len(laws) * (len(data.used.groups) + 1)) as advance:
-        scores = score_laws(laws, data.used, advance)
-    best = recommended(scores)
-    selected = next((score for score in scores if score.law.name == name), None) if name is not None else best
-    if selected is None:
+        scores = fitting.score_laws(laws, data.used, advance)
+    best = fitting.recommended(scores)
+    by_name = {None: best} | {score.law.name: score for score in scores}
+    if name not in by_name:
         raise ValueError(f'law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
+    selected = by_name[name]
     if selected.fit is None or selected.validation is None:
         raise ValueError(f'law {name} was not fitted: {selected.why_not}')
     if not selected.validation.error <= LARGEST_ERROR:
@@ -241,10 +196,7 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
             f'{100.0 * selected.validation.error:.0f} % on left-out readings: measure more strokes at each pressure, '
             'in both directions, with a settled seal'
         )
-    return LawSelection(scores, best, selected.fit, selected.validation, plain_mean(data.used))
-
-
-# -- quality ----------------------------------------------------------------------------------------------------------
+    return LawSelection(scores, best, selected.fit, selected.validation, fitting.plain_mean(data.used))
 
 
 def assess(data: IdentificationData, selection: LawSelection, run_to_run: float | None) -> LawQuality:
@@ -252,22 +204,26 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
     used, found, validation = data.used, selection.fit, selection.validation
     groups = len(used.groups)
     everything = data.prepared.readings
-    offsets = offsets_of(everything, found.friction(everything.at))
-    drift = {} if used.are_samples else run_drift(everything, offsets)
+    offsets = fitting.offsets_of(everything, found.friction(everything.at))
+    drift = {} if used.are_samples else diagnostics.run_drift(everything, offsets)
     between, is_drift = _run_to_run(data, drift) if run_to_run is None else (run_to_run, False)
     with progress('test the band', groups * (groups - 1)) as advance:
-        coverage = band_coverage(selection.law, used, found.values, between, advance)
+        coverage = fitting.band_coverage(selection.law, used, found.values, between, advance)
     names = [parameter.name for parameter in selection.law.parameters]
+    line = None
+    if everything.samples:
+        level_offsets = np.array([everything.half_range(inside).offset for inside in everything.levels.values()])
+        line = offset_line(everything.level_pressures, level_offsets)
     return LawQuality(
-        uncertainty=prediction_uncertainty(validation.predicted, validation.deviation, groups, between),
+        uncertainty=fitting.prediction_uncertainty(validation.predicted, validation.deviation, groups, between),
         run_to_run=between,
         is_drift=is_drift,
         coverage=coverage,
-        repeatability=repeatability(used, found.offsets),
+        repeatability=diagnostics.repeatability(used, found.offsets),
         drift=drift,
         breakaway=_breakaway(data, found),
-        offset_line=_offset_line(everything),
-        standard_errors=dict(zip(names, jackknife_errors(validation.parameters).tolist(), strict=True)),
+        offset_line=line,
+        standard_errors=dict(zip(names, fitting.jackknife_errors(validation.parameters).tolist(), strict=True)),
     )
 
 
@@ -280,14 +236,14 @@ def _run_to_run(data: IdentificationData, drift: Mapping[int, float]) -> tuple[f
     """
     if data.used.left_out_by != 'pressure' or data.used.are_samples or not data.used.samples:
         return 0.0, False
-    measured = between_runs(data.used)
+    measured = diagnostics.between_runs(data.used)
     if math.isfinite(measured):
         return measured, False
     kept = [change for level, change in drift.items() if not data.is_outlier(level)]
     return (math.sqrt(sum(change**2 for change in kept) / len(kept)), True) if kept else (0.0, False)
 
 
-def _breakaway(data: IdentificationData, found: LawFit) -> BreakawayFit | None:
+def _breakaway(data: IdentificationData, found: fitting.LawFit) -> fitting.BreakawayFit | None:
     if data.prepared.breakaway is None:
         return None
     readings = _with_normal_force(data.prepared.breakaway, data.ring)
@@ -295,17 +251,7 @@ def _breakaway(data: IdentificationData, found: LawFit) -> BreakawayFit | None:
         readings = readings.taken(readings.level != data.outlier.level)
     if len(readings.groups) < 2:
         return None
-    return fit_breakaway(readings, found.law.coulomb_friction(readings.at, found.values), found.offsets)
-
-
-def _offset_line(readings: FrictionReadings) -> OffsetLine | None:
-    if readings.are_samples or not readings.samples:
-        return None
-    offsets = np.array([readings.half_range(inside).offset for inside in readings.levels.values()])
-    return offset_line(readings.level_pressures, offsets)
-
-
-# -- levels -----------------------------------------------------------------------------------------------------------
+    return fitting.fit_breakaway(readings, found.law.coulomb_friction(readings.at, found.values), found.offsets)
 
 
 def _levels(
@@ -316,28 +262,25 @@ def _levels(
     seal = parse_seal(document)
     mounted = tuple(MountedSeal(seal, chamber) for chamber in data.sources.chambers)
     fitted, std = fitted_readings(mounted, data.prepared.chamber_pressures, readings.at.velocity)
-    measured = readings.magnitudes(offsets_of(readings, fitted))
-    predicted = iter([selection.validation.predicted[inside].mean() for inside in data.used.levels.values()])
-    expected = math.nan if data.outlier is None else data.outlier.expected
-    found: list[PressureLevel] = []
-    for level, inside in readings.levels.items():
-        half_range = readings.half_range(inside)
-        is_used = not data.is_outlier(level)
-        found.append(
-            PressureLevel(
-                pressure=float(readings.seal_pressure[inside].mean()),
-                speed=float(np.abs(readings.at.velocity[inside]).mean()),
-                measured=float(measured[inside].mean() if readings.are_samples else half_range.friction),
-                fitted=float(fitted[inside].mean()),
-                std=float(std[inside].mean()),
-                left_out=float(next(predicted) if is_used else expected),
-                offset=math.nan if readings.are_samples else half_range.offset,
-                readings=int(inside.sum()),
-                drift=quality.drift.get(level, math.nan),
-                is_used=is_used,
-            )
+    measured = readings.magnitudes(fitting.offsets_of(readings, fitted))
+    predicted = [float(selection.validation.predicted[inside].mean()) for inside in data.used.levels.values()]
+    if data.outlier is not None:
+        predicted.insert(list(readings.levels).index(data.outlier.level), data.outlier.expected)
+    return tuple(
+        PressureLevel(
+            pressure=float(readings.seal_pressure[inside].mean()),
+            speed=float(np.abs(readings.at.velocity[inside]).mean()),
+            measured=float(measured[inside].mean()) if readings.are_samples else readings.half_range(inside).friction,
+            fitted=float(fitted[inside].mean()),
+            std=float(std[inside].mean()),
+            left_out=left_out,
+            offset=math.nan if readings.are_samples else readings.half_range(inside).offset,
+            readings=int(inside.sum()),
+            drift=quality.drift.get(level, math.nan),
+            is_used=not data.is_outlier(level),
         )
-    return tuple(found)
+        for (level, inside), left_out in zip(readings.levels.items(), predicted, strict=True)
+    )
 
 
 def fitted_readings(
@@ -345,10 +288,7 @@ def fitted_readings(
 ) -> tuple[FloatArray, FloatArray]:
     """Friction and its standard deviation [N] of mounted seals, as the node computes them, shape (n,) each.
 
-    Args:
-        mounted: The seals of the rig.
-        chambers: Pressure of chambers a and b [Pa], shape (n, 2).
-        velocity: [m/s] shape (n,); NaN counts as 0, where velocity terms vanish.
+    ``chambers`` are the pressures of chambers a and b [Pa], shape (n, 2); a velocity [m/s] of NaN counts as 0.
     """
     rows = np.column_stack((chambers, np.nan_to_num(velocity))).tolist()
     found = [actuator_friction(mounted, *row) for row in rows]

@@ -1,23 +1,24 @@
-"""Records of an identification, from the data it uses to the document it makes."""
+"""Records of an identification, and its documents: the seal file and the numbers for JSON."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
+from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
+from seal_friction_ros.core.identification import fitting
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
 from seal_friction_ros.core.identification.diagnostics import FrictionChange, Outlier
-from seal_friction_ros.core.identification.fitting import (
-    BreakawayFit,
-    CrossValidation,
-    LawFit,
-    LawScore,
-    PredictionUncertainty,
-)
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.signal_preparation import OffsetLine
 from seal_friction_ros.offline.identification.sources import Sources
+from seal_friction_ros.offline.work.seal_writer import rounded
 
+DIGITS = 6  # of a number in a seal file
 FEWEST_PRESSURES_FOR_EXPONENT = 6  # with fewer, leaving each out in turn does not determine an exponent (our choice)
 
 
@@ -33,16 +34,12 @@ class IdentificationData:
     """Readings that the law is fitted to, and those that are excluded."""
 
     sources: Sources
-    prepared: PreparedReadings
-    """every reading of the sources that agree, including outliers"""
-    used: FrictionReadings
-    """without outliers"""
+    prepared: PreparedReadings  # every reading of the sources that agree, including outliers
+    used: FrictionReadings  # without outliers
     ring: Ring | None
     outlier: Outlier | None
-    changes: tuple[FrictionChange, ...]
-    """each further swept log against the law of the first one"""
-    kept: tuple[int, ...]
-    """numbers of the sources behind ``prepared``"""
+    changes: tuple[FrictionChange, ...]  # each further swept log against the law of the first one
+    kept: tuple[int, ...]  # numbers of the sources behind ``prepared``
 
     def is_outlier(self, level: int) -> bool:
         """Whether a pressure level is the outlier, which the law is not fitted to."""
@@ -53,12 +50,11 @@ class IdentificationData:
 class LawSelection:
     """All candidate laws with their scores, and the law that is saved."""
 
-    scores: tuple[LawScore, ...]
-    best: LawScore
-    """recommended: the simplest law that no other law beats beyond the noise"""
-    fit: LawFit
-    validation: CrossValidation
-    reference: CrossValidation | None
+    scores: tuple[fitting.LawScore, ...]
+    best: fitting.LawScore  # recommended: the simplest law that no other law beats beyond the noise
+    fit: fitting.LawFit
+    validation: fitting.CrossValidation
+    reference: fitting.CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
 
     @property
@@ -71,48 +67,31 @@ class LawSelection:
 class LawQuality:
     """Uncertainty of the selected law."""
 
-    uncertainty: PredictionUncertainty
-    """standard deviation of a new reading, all seals"""
+    uncertainty: fitting.PredictionUncertainty  # standard deviation of a new reading, all seals
     run_to_run: float
     """[-] relative standard deviation between runs, the part that deviations within runs do not contain"""
-    is_drift: bool
-    """whether the drift within the runs is used in its place"""
-    coverage: float
-    """share of the left-out readings inside a 95 % band that was made without them"""
-    repeatability: float
-    """[-] scatter of repeated readings"""
-    drift: dict[int, float]
-    """pressure level -> relative change of the friction over its run"""
-    breakaway: BreakawayFit | None
-    """None if no stroke starts from rest"""
-    offset_line: OffsetLine | None
-    """offset of the force sum over pressure; None for swept logs and tables"""
-    standard_errors: dict[str, float]
-    """of the parameters, by name"""
+    is_drift: bool  # whether the drift within the runs is used in its place
+    coverage: float  # share of the left-out readings inside a 95 % band that was made without them
+    repeatability: float  # [-] scatter of repeated readings
+    drift: dict[int, float]  # pressure level -> relative change of the friction over its run
+    breakaway: fitting.BreakawayFit | None  # None if no stroke starts from rest
+    offset_line: OffsetLine | None  # offset of the force sum over pressure; None for swept logs and tables
+    standard_errors: dict[str, float]  # of the parameters, by name
 
 
 class PressureLevel(NamedTuple):
     """Measured and fitted friction at one pressure."""
 
-    pressure: float
-    """[Pa, gauge] mean over seals and readings"""
-    speed: float
-    """[m/s] mean; NaN if not measured"""
-    measured: float
-    """[N] all seals"""
-    fitted: float
-    """[N] all seals, by the law of the seal file"""
-    std: float
-    """[N] of a new reading, by the law of the seal file"""
-    left_out: float
-    """[N] prediction by the law fitted without these readings"""
-    offset: float
-    """[N] of the force sum"""
+    pressure: float  # [Pa, gauge] mean over seals and readings
+    speed: float  # [m/s] mean; NaN if not measured
+    measured: float  # [N] all seals
+    fitted: float  # [N] all seals, by the law of the seal file
+    std: float  # [N] of a new reading, by the law of the seal file
+    left_out: float  # [N] prediction by the law fitted without these readings
+    offset: float  # [N] of the force sum
     readings: int
-    drift: float
-    """[-] relative change of the friction over the run; NaN if unknown"""
-    is_used: bool
-    """false for an outlier, which the law is not fitted to"""
+    drift: float  # [-] relative change of the friction over the run; NaN if unknown
+    is_used: bool  # false for an outlier, which the law is not fitted to
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +102,139 @@ class Identification:
     selection: LawSelection
     quality: LawQuality
     levels: tuple[PressureLevel, ...]
-    document: dict[str, Any]
-    """seal file"""
-    warnings: tuple[str, ...]
-    """limits of the law that its user has to know"""
-    remarks: tuple[str, ...]
-    """assumptions, and how an option changes them"""
+    document: dict[str, Any]  # seal file
+    warnings: tuple[str, ...]  # limits of the law that its user has to know
+    remarks: tuple[str, ...]  # assumptions, and how an option changes them
+
+
+def rounded_value(value: float) -> float:
+    """A number as a seal file of an identification has it."""
+    return rounded(value, DIGITS)
+
+
+def seal_document(data: IdentificationData, selection: LawSelection, quality: LawQuality, name: str) -> dict[str, Any]:
+    """Seal file of the selected law, checked as the node checks it.
+
+    Raises:
+        ValueError: The law makes no valid seal.
+    """
+    seals, law, pressure = len(data.sources.chambers), selection.law, data.used.at.pressure
+    values = _json_value(selection.fit.values)
+    files = ', '.join(data.sources.files[i].name for i in data.kept)
+    document: dict[str, Any] = {
+        'name': name,
+        'source': f'Made by seal_friction identify from {files}: law {law.name} ({law.formula}), parameters by least '
+        f'squares over {data.used.count} readings, uncertainty from readings left out.',
+    }
+    if data.ring is not None:
+        document['geometry'] = asdict(data.ring.geometry)
+    document |= law_document(law.friction_law(values))
+    terms = {key: values[key] for key in law.velocity_terms}
+    if terms:
+        document['velocity_terms'] = terms
+    stiction, ratio = (
+        (terms.get('stribeck_friction', 0.0), 0.0) if quality.breakaway is None else quality.breakaway[1:3]
+    )
+    uncertainty = {'relative_std': quality.uncertainty.relative, 'absolute_std': quality.uncertainty.absolute / seals}
+    identified = [float(pressure.min()), float(pressure.max())]
+    numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
+    document |= _json_value({**numbers, 'identified_pressure': identified})
+    parse_seal(document)
+    return document
+
+
+def _json_value(value: Any) -> Any:
+    """Value with each number rounded; None for a number that is not finite."""
+    if isinstance(value, Mapping):
+        return {key: _json_value(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_json_value(item) for item in value]
+    if not isinstance(value, float):
+        return value
+    return rounded_value(value) if math.isfinite(value) else None
+
+
+def identification_section(
+    data: IdentificationData,
+    selection: LawSelection,
+    quality: LawQuality,
+    levels: Sequence[PressureLevel],
+    warnings: Sequence[str],
+) -> dict[str, Any]:
+    """Section ``identification`` of the seal file, which records how it was made; the node ignores it."""
+    measured, fitted = _json_value([[level.measured for level in levels], [level.fitted for level in levels]])
+    section: dict[str, Any] = _json_value(
+        {
+            'law': selection.law.name,
+            'recommended_law': selection.best.law.name,
+            'parameters': selection.fit.values,
+            'standard_errors': quality.standard_errors,
+            'seal_chambers': data.sources.chambers,
+            'pressure_Pa': [level.pressure for level in levels],
+            'measured_N': measured,
+            'fitted_N': fitted,
+            'residual_N': [one - other for one, other in zip(measured, fitted, strict=True)],
+            'is_outlier': [not level.is_used for level in levels],
+            'left_out_by': data.used.left_out_by,
+            'cross_validation_error': selection.validation.error,
+            'cross_validation_rms_N': selection.validation.rms,
+            'band_coverage': quality.coverage,
+            'repeatability': quality.repeatability,
+            'readings': data.used.count,
+            'data': [data.sources.files[i]._asdict() for i in data.kept],
+            'warnings': warnings,
+        }
+    )
+    return section
+
+
+def identification_numbers(found: Identification) -> dict[str, Any]:
+    """Numbers for JSON."""
+    data, selection, quality, levels = found.data, found.selection, found.quality, found.levels
+    reference, line = selection.reference, quality.offset_line
+    numbers: dict[str, Any] = found.document['identification'] | _json_value(
+        {
+            'std_N': [level.std for level in levels],
+            'left_out_N': [level.left_out for level in levels],
+            'worst_left_out_error': worst_left_out(levels),
+            'cross_validation_mean_deviation_N': selection.validation.mean_deviation,
+            'ladder': [_ladder_row(score, selection) for score in selection.scores],
+            'plain_mean_deviation_N': reference and reference.mean_deviation,
+            'relative_std': quality.uncertainty.relative,
+            'absolute_std_N': quality.uncertainty.absolute,
+            'condition_number': selection.fit.condition_number,
+            'correlation': selection.fit.correlation.tolist(),
+            'offset_N': [level.offset for level in levels],
+            'offset_line': line and {'constant_N': line.constant, 'area_error_m2': line.area_error, 'rms_N': line.rms},
+            'drift': [level.drift for level in levels],
+        }
+    )
+    return numbers | {
+        'stiction': quality.breakaway and quality.breakaway._asdict(),
+        'changes': [{**c._asdict(), 'is_change': c.is_change} for c in data.changes],
+        'samples_used': data.prepared.used,
+        'samples_total': data.prepared.total,
+        'samples_left_out': data.prepared.left_out,
+        'data': [file._asdict() for file in data.sources.files],
+        'remarks': list(found.remarks),
+    }
+
+
+def worst_left_out(levels: Sequence[PressureLevel]) -> float:
+    """Largest relative deviation of a left-out prediction from the measured friction, over the levels in use [-]."""
+    return max(abs(level.left_out / level.measured - 1.0) for level in levels if level.is_used)
+
+
+def _ladder_row(score: fitting.LawScore, selection: LawSelection) -> dict[str, Any]:
+    row: dict[str, Any] = {'law': score.law.name, 'parameters': len(score.law.parameters)}
+    if score.validation is None or score.fit is None:
+        return row | {'why_not': score.why_not}
+    best = min((s.validation.losses for s in selection.scores if s.validation), key=np.mean)
+    return row | {
+        'values': score.fit.values,
+        'rms_N': score.validation.rms,
+        'mean_deviation_N': score.validation.mean_deviation,
+        'error': score.validation.error,
+        'is_beaten': fitting.is_beaten(score.validation.losses, best),
+        'condition_number': score.fit.condition_number,
+    }

@@ -6,8 +6,8 @@ The kind of a source follows from the file itself, so a command accepts any of t
 import csv
 import hashlib
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,22 +16,15 @@ import numpy as np
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, decode, decode_text
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import UNITS
-from seal_friction_ros.core.identification.checks import check_clipping
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
-from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog
+from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_samples
 from seal_friction_ros.offline.bags.topics import find_topics
-from seal_friction_ros.offline.identification.data_sheet import (
-    is_data_sheet,
-    parse_number,
-    read_data_sheet,
-    read_text,
-)
+from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.work.progress import progress
 
 DIRECTIONS = {'extend': 1, 'ext': 1, '1': 1, '+1': 1, 'retract': -1, 'ret': -1, '-1': -1}
@@ -45,16 +38,11 @@ VELOCITY_UNITS = {'m_per_s': 'm/s', 'mm_per_s': 'mm/s', 'in_per_s': 'in/s'}
 class SourceOptions:
     """Options on the sources; None leaves a value to the sources."""
 
-    rig: str | None = None
-    """rig file of the logs: a path, or the name of one in config/rigs"""
-    chambers: tuple[str, ...] | None = None
-    """chamber of each seal"""
-    namespace: str = ''
-    """of a bag: use only topics below it"""
-    slowest: float | None = None
-    """[m/s] see `Sliding`"""
-    largest_acceleration: float | None = None
-    """[m/s^2] see `Sliding`"""
+    rig: str | None = None  # rig file of the logs: a path, or the name of one in config/rigs
+    chambers: tuple[str, ...] | None = None  # chamber of each seal
+    namespace: str = ''  # of a bag: use only topics below it
+    slowest: float | None = None  # [m/s] see `Sliding`
+    largest_acceleration: float | None = None  # [m/s^2] see `Sliding`
 
 
 class DataFile(NamedTuple):
@@ -68,15 +56,11 @@ class Source(NamedTuple):
     """Contents of one source: either a log, or manual readings."""
 
     file: DataFile
-    chambers: tuple[str, ...] | None
-    """chamber of each seal; None if unknown"""
+    chambers: tuple[str, ...] | None  # chamber of each seal; None if unknown
     log: RecordedLog | None = None
-    manual: tuple[ManualReadings, ManualReadings] | None = None
-    """running and breakaway friction"""
-    seal_document: Mapping[str, Any] | None = None
-    """seal file inside a bag or a data sheet"""
-    remarks: tuple[str, ...] = ()
-    """assumptions that neither the source nor an option states"""
+    manual: tuple[ManualReadings, ManualReadings] | None = None  # running and breakaway friction
+    seal_document: Mapping[str, Any] | None = None  # seal file inside a bag or a data sheet
+    remarks: tuple[str, ...] = ()  # assumptions that neither the source nor an option states
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,19 +68,13 @@ class Sources:
     """Contents of all sources."""
 
     each: tuple[Source, ...]
-    chambers: tuple[str, ...]
-    """chamber of each seal"""
+    chambers: tuple[str, ...]  # chamber of each seal
     remarks: tuple[str, ...]
 
     @property
     def files(self) -> tuple[DataFile, ...]:
         """Name and digest of each source."""
         return tuple(source.file for source in self.each)
-
-    @property
-    def seal_document(self) -> Mapping[str, Any] | None:
-        """First seal file inside a source; None if there is none."""
-        return next((source.seal_document for source in self.each if source.seal_document is not None), None)
 
     def prepare(self, index: Sequence[int] | None = None) -> PreparedReadings:
         """Readings of all sources, or of those numbered in ``index``.
@@ -114,11 +92,7 @@ class Sources:
 
 
 def read_sources(paths: Sequence[Path], options: SourceOptions) -> Sources:
-    """Read every source.
-
-    Args:
-        paths: Bags and logs, or tables and data sheets.
-        options: Options on them.
+    """Read every source: bags and logs, or tables and data sheets.
 
     Raises:
         ValueError: A source cannot be read, is of no known kind, or does not fit the others; one line that names it.
@@ -146,11 +120,9 @@ def _chambers(each: Sequence[Source], options: SourceOptions) -> tuple[tuple[str
     if stated:
         return stated.pop(), []
     logs = [source.log.signals for source in each if source.log is not None]
-    found = tuple(
-        name
-        for name, column in (('a', 'pressure_a'), ('b', 'pressure_b'))
-        if any(np.nanmax(np.abs(getattr(signals, column)), initial=0.0) > 0.0 for signals in logs)
-    ) or ('a',)
+    pressures = [(name, getattr(signals, f'pressure_{name}')) for name in 'ab' for signals in logs]
+    under_pressure = dict.fromkeys(name for name, p in pressures if np.nanmax(np.abs(p), initial=0.0) > 0.0)
+    found = tuple(under_pressure) or ('a',)
     assumed = 'one seal for each chamber under pressure' if logs else 'one seal with all friction'
     return found, [f'{assumed} is assumed: {",".join(found)}; give others with --seal-chambers']
 
@@ -167,7 +139,7 @@ def _read(path: Path, options: SourceOptions) -> Source:
         raise ValueError(f'{path}: neither a bag (a folder) nor a text file') from None
     if not head:
         raise ValueError(f'{path}: empty')
-    if is_data_sheet(head):
+    if TITLE in head[0].lower():
         dynamic, static, chambers, document, remarks = read_data_sheet(path)
         texts = tuple(f'{path.name}: {remark}' for remark in remarks)
         return Source(_data_file(path), chambers, None, (dynamic, static), document, texts)
@@ -183,18 +155,13 @@ def _data_file(path: Path) -> DataFile:
     parts = sorted(p for p in path.iterdir() if p.suffix in ('.mcap', '.db3')) if path.is_dir() else [path]
     for part in parts:
         with part.open('rb') as file:
-            while block := file.read(1 << 20):
-                digest.update(block)
+            hashlib.file_digest(file, lambda: digest)
     return DataFile(path.resolve().name, digest.hexdigest())
 
 
 def _sliding(base: Sliding, options: SourceOptions) -> Sliding:
-    names = ('slowest', 'largest_acceleration')
-    values = {name: getattr(base if getattr(options, name) is None else options, name) for name in names}
-    return from_mapping(Sliding, values, 'sliding')
-
-
-# -- logs -------------------------------------------------------------------------------------------------------------
+    given = {'slowest': options.slowest, 'largest_acceleration': options.largest_acceleration}
+    return replace(base, **{name: value for name, value in given.items() if value is not None})
 
 
 def _read_log(path: Path, options: SourceOptions) -> Source:
@@ -219,29 +186,24 @@ def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
         ValueError: No rig can read it, or several can.
     """
     folder = share_directory('seal_friction_ros', __file__) / 'config' / 'rigs'
-    found, reasons = [], []
+    found: dict[str, Rig] = {}
+    reasons = []
     for rig_file in sorted(folder.glob('*.yaml')):
         rig = read_rig(rig_file)
         try:
             read_samples(path, rig)
+            found[rig_file.stem] = rig
         except ValueError as error:
             reasons.append(f'{rig_file.stem}: {str(error).removeprefix(f"{path}: ")}')
-        else:
-            found.append((rig, rig_file.stem))
-    found = [(rig, name) for rig, name in found if rig.header != 'none'] or found
-    if len(found) == 1:
-        rig, name = found[0]
+    found = {name: rig for name, rig in found.items() if rig.header != 'none'} or found
+    if len(found) > 1:
+        raise ValueError(f'{path}: rigs {" and ".join(found)} can both read it: name one with --rig')
+    for name, rig in found.items():
         return rig, (f'{path.name} was read as a log of rig {name}; if it is of another, name that with --rig',)
-    if found:
-        names = ' and '.join(name for _, name in found)
-        raise ValueError(f'{path}: rigs {names} can both read it: name one with --rig')
     raise ValueError(
         f'{path}: not a table with a pressure and a friction column, and no log of a known rig ({"; ".join(reasons)}): '
         'write a rig file (docs/rig_files.md) and give it with --rig'
     )
-
-
-# -- bags -------------------------------------------------------------------------------------------------------------
 
 
 def _read_bag(path: Path, options: SourceOptions) -> Source:
@@ -274,20 +236,13 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
                 raise ValueError(f'{path}: message on {message.topic} at {message.log_time} ns: {error}') from None
             if count % 1000 == 0:
                 advance(1000)
-    name = path.resolve().name
-    log = RecordedLog(name, _increasing(np.array(stamps, dtype=np.int64), rows), _sliding(Sliding(), options))
-    return Source(_data_file(path), chambers, log, seal_document=document)
-
-
-def _increasing(stamps: IntArray, rows: Sequence[Sequence[float]]) -> Signals:
-    """Signals of the rows whose stamp [ns] is above all stamps before it."""
-    kept = np.diff(np.maximum.accumulate(stamps), prepend=stamps[:1] - 1) > 0
-    columns = np.array(rows, dtype=np.float64).reshape(len(stamps), 4).T
+    stamp = np.array(stamps, dtype=np.int64)
+    kept = np.diff(np.maximum.accumulate(stamp), prepend=stamp[:1] - 1) > 0  # stamps above all stamps before
+    columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     columns = np.where(np.abs(columns) < 1e15, columns, np.nan)  # [SI] no measurement is as large, and NaN stays NaN
-    return Signals((stamps - stamps[:1].sum()) * 1e-9, *columns).taken(kept)
-
-
-# -- tables -----------------------------------------------------------------------------------------------------------
+    signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns).taken(kept)
+    log = RecordedLog(path.resolve().name, signals, _sliding(Sliding(), options))
+    return Source(_data_file(path), chambers, log, seal_document=document)
 
 
 def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
@@ -303,17 +258,15 @@ def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
     rows = table_rows(path)
     if not rows:
         raise ValueError(f'{path}: no readings')
-    names = list(rows[0])
-    pressure = column_in_si(path, rows, names, 'pressure', PRESSURE_UNITS)
-    friction = column_in_si(path, rows, names, 'friction', FRICTION_UNITS)
+    pressure = column_in_si(path, rows, 'pressure', PRESSURE_UNITS)
+    friction = column_in_si(path, rows, 'friction', FRICTION_UNITS)
     speed = np.full(len(rows), np.nan)
-    if any(name.startswith('velocity') for name in names):
-        speed = np.abs(column_in_si(path, rows, names, 'velocity', VELOCITY_UNITS))
+    if any(name.startswith('velocity') for name in rows[0]):
+        speed = np.abs(column_in_si(path, rows, 'velocity', VELOCITY_UNITS))
     direction = _codes(path, rows, 'direction', DIRECTIONS, 1)
     kinds = _codes(path, rows, 'kind', KINDS, 0)
-    texts = [row.get('test', '') for row in rows]
-    numbers = {text: number for number, text in enumerate(dict.fromkeys(texts))}
-    columns = (np.array([numbers[text] for text in texts]), pressure, direction, friction, speed)
+    test = np.unique([row.get('test', '') for row in rows], return_inverse=True)[1]
+    columns = (test, pressure, direction, friction, speed)
     dynamic, static = (ManualReadings(path.name, *(column[kinds == kind] for column in columns)) for kind in (0, 1))
     return dynamic, static
 
@@ -333,22 +286,15 @@ def table_rows(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def column_in_si(
-    path: Path, rows: Sequence[Mapping[str, str]], names: Iterable[str], quantity: str, units: Mapping[str, str]
-) -> FloatArray:
-    """A column in SI units; its name is that of the quantity, followed by the unit.
+def column_in_si(path: Path, rows: Sequence[Mapping[str, str]], quantity: str, units: Mapping[str, str]) -> FloatArray:
+    """A column of the table ``path`` in SI units; its name is that of the quantity, followed by a unit.
 
-    Args:
-        path: Of the table, for the error message.
-        rows: Of the table.
-        names: Of its columns.
-        quantity: Beginning of the name.
-        units: Unit in the name -> unit in `UNITS`.
+    ``rows`` are those of `table_rows`, at least one; ``units`` maps the unit in the name to the unit in `UNITS`.
 
     Raises:
         ValueError: There is no such column, or several, or a cell is not a number.
     """
-    found = [name for name in names if name.startswith(quantity)]
+    found = [name for name in rows[0] if name.startswith(quantity)]
     unit = found[0].removeprefix(quantity).strip('_ ()[]') if found else ''
     if len(found) != 1 or unit not in units:
         raise ValueError(

@@ -6,14 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR
-from seal_friction_ros.core.identification.diagnostics import (
-    ILL_CONDITIONED,
-    SETTLED,
-    FrictionChange,
-    Outlier,
-    collinear_regressors,
-    traded_off,
-)
+from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.fitting import is_beaten
 from seal_friction_ros.offline.identification.results import (
     FEWEST_PRESSURES_FOR_EXPONENT,
@@ -23,8 +16,6 @@ from seal_friction_ros.offline.identification.results import (
     LawSelection,
     PressureLevel,
 )
-
-# -- warnings ---------------------------------------------------------------------------------------------------------
 
 
 def warnings_of(
@@ -52,18 +43,18 @@ def warnings_of(
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
 
 
-def _change_text(first: str, change: FrictionChange) -> str:
+def _change_text(first: str, change: diagnostics.FrictionChange) -> str:
     percent = f'{100.0 * (change.ratio - 1.0):+.0f} % (standard error {100.0 * change.standard_error:.0f} %)'
     left = f'the law of {first} leaves an RMS of {change.rms:.3g} N there, one fitted there {change.own_rms:.3g} N'
-    if change.is_change:
-        return (
-            f'the friction has changed: in {change.name} it is {percent} against the law of {first}; {left}; it is '
-            'another state of the machine and was not averaged in: identify it separately'
-        )
-    return f'{change.name} agrees with {first}: friction {percent}; {left}; both are fitted together'
+    if not change.is_change:
+        return f'{change.name} agrees with {first}: friction {percent}; {left}; both are fitted together'
+    return (
+        f'the friction has changed: in {change.name} it is {percent} against the law of {first}; {left}; it is another '
+        'state of the machine and was not averaged in: identify it separately'
+    )
 
 
-def _outlier_text(outlier: Outlier, levels: Sequence[PressureLevel]) -> str:
+def _outlier_text(outlier: diagnostics.Outlier, levels: Sequence[PressureLevel]) -> str:
     level = next(level for level in levels if not level.is_used)
     others = [abs(other.drift) for other in levels if other.is_used and math.isfinite(other.drift)]
     largest = max(others, default=0.0)
@@ -73,7 +64,7 @@ def _outlier_text(outlier: Outlier, levels: Sequence[PressureLevel]) -> str:
         f'other pressures expects {outlier.expected:.3g} N ({percent:+.0f} %, {outlier.standard_deviations:.1f} '
         'standard deviations); the law was not fitted to it'
     )
-    if math.isfinite(level.drift) and abs(level.drift) > SETTLED and abs(level.drift) > 2.0 * largest:
+    if math.isfinite(level.drift) and abs(level.drift) > diagnostics.SETTLED and abs(level.drift) > 2.0 * largest:
         return (
             f'{text}. A reason to look: its friction changed by {100.0 * level.drift:+.0f} % during the run, that of '
             f'the other runs by {100.0 * largest:.0f} % at most: the seal had not settled (lubricant pushed out, twist '
@@ -85,37 +76,30 @@ def _outlier_text(outlier: Outlier, levels: Sequence[PressureLevel]) -> str:
 
 
 def _collinearity_texts(data: IdentificationData, selection: LawSelection) -> Iterator[str]:
-    for pair in collinear_regressors(data.prepared.readings, data.prepared.chamber_pressures):
+    for pair in diagnostics.collinear_regressors(data.prepared.readings, data.prepared.chamber_pressures):
         yield (
             f'{pair.one} and {pair.other} are collinear: they changed together (correlation {pair.correlation:+.2f}), '
             'so their effects can hardly be separated: drive several speeds at each pressure'
         )
-    for pair in traded_off(selection.fit):
+    for pair in diagnostics.traded_off(selection.fit):
         yield (
             f'{pair.one} and {pair.other} trade off (correlation {pair.correlation:+.3f}): the data determine the '
             'friction that they give together, but neither of them alone'
         )
-    if not selection.fit.condition_number <= ILL_CONDITIONED:
+    if not selection.fit.condition_number <= diagnostics.ILL_CONDITIONED:
         yield f'the fit is ill-conditioned: condition number {selection.fit.condition_number:.0f} (good below 30)'
 
 
 def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
     """Best law with against best law without pressure-dependent Coulomb friction: text, and whether pressure pays."""
-    with_it, without = (
-        min(
-            ((score.validation, score.law.name) for score in selection.scores
-             if score.validation is not None and score.law.depends_on_pressure == side),
-            key=lambda pair: float(pair[0].losses.mean()), default=None,
-        )
-        for side in (True, False)
-    )  # fmt: skip
-    if with_it is None or without is None:
+    scored = [(score.law, score.validation) for score in selection.scores if score.validation is not None]
+    scored.sort(key=lambda pair: float(pair[1].losses.mean()), reverse=True)
+    best = {law.depends_on_pressure: (law.name, validation) for law, validation in scored}
+    if len(best) < 2:
         return None
-    text = (
-        f'out of sample {with_it[0].rms:.3g} N RMS remain with pressure ({with_it[1]}) and {without[0].rms:.3g} N '
-        f'without ({without[1]})'
-    )
-    return text, is_beaten(without[0].losses, with_it[0].losses)
+    (name, validation), (other_name, other) = best[True], best[False]
+    text = f'out of sample {validation.rms:.3g} N RMS remain with pressure ({name}) and {other.rms:.3g} N without'
+    return f'{text} ({other_name})', is_beaten(other.losses, validation.losses)
 
 
 def _parameter_texts(selection: LawSelection) -> Iterator[str]:
@@ -140,7 +124,7 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
             f'the runs ({100.0 * quality.run_to_run:.0f} %) is used in its place in the standard deviation; repeat '
             'runs, or give a known value with --run-to-run'
         )
-    drifted = [level for level in levels if level.is_used and abs(level.drift) > SETTLED]
+    drifted = [level for level in levels if level.is_used and abs(level.drift) > diagnostics.SETTLED]
     if drifted:
         at = ', '.join(f'{100.0 * level.drift:+.0f} % at {level.pressure / BAR:.3g} bar' for level in drifted)
         yield f'the friction drifted during the runs ({at}): let the seal settle until its friction stays constant'
@@ -153,14 +137,11 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
         )
 
 
-# -- remarks ----------------------------------------------------------------------------------------------------------
-
-
 def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[str]:
     """Assumptions and how to change them, one line each."""
     prepared = data.prepared
-    total, used = sum(prepared.total.values()), sum(prepared.used.values())
     if prepared.left_out:
+        total, used = sum(prepared.total.values()), sum(prepared.used.values())
         why = ', '.join(f'{name} {100.0 * count / total:.0f} %' for name, count in prepared.left_out.items())
         yield f'{used} of {total} samples used ({100.0 * used / total:.0f} %); not used: {why}'
     gain = _pressure_gain(selection)
@@ -177,37 +158,26 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
         yield 'breakaway is not identified from logs without held pressures'
 
 
-# -- summary ----------------------------------------------------------------------------------------------------------
-
-
 def summary(found: Identification) -> str:
     """The result for a person: law, numbers at each pressure, ladder, remarks and warnings."""
     selection, quality = found.selection, found.quality
     lines = [f'law: {selection.law.name} ({selection.law.formula})']
-    for parameter in selection.law.parameters:
-        error = quality.standard_errors[parameter.name]
-        value = selection.fit.values[parameter.name]
-        lines.append(f'  {parameter.name} = {value:.4g} {parameter.unit}, standard error {error:.2g}')
+    for p in selection.law.parameters:
+        value, error = selection.fit.values[p.name], quality.standard_errors[p.name]
+        lines.append(f'  {p.name} = {value:.4g} {p.unit}, standard error {error:.2g}')
     lines += ['  pressure [bar]  measured [N]  fitted [N]  std [N]']
     for level in found.levels:
-        row = (level.pressure / BAR, level.measured, level.fitted, level.std)
-        numbers = '  '.join(f'{value:{width}.4g}' for value, width in zip(row, (14, 12, 10, 7), strict=True))
+        numbers = f'{level.pressure / BAR:14.4g}  {level.measured:12.4g}  {level.fitted:10.4g}  {level.std:7.4g}'
         lines.append(f'  {numbers}{"" if level.is_used else "  outlier, not used"}')
     lines += [f'laws on left-out readings (left out by {found.data.used.left_out_by}):']
-    lines += [f'  {line}' for line in _ladder_lines(selection)]
+    rows = [(score.law.name, score.validation, score.why_not) for score in selection.scores]
+    for name, validation, why_not in [*rows, ('mean of the other readings', selection.reference, '')]:
+        if validation is not None:
+            mark = ' <- recommended' if name == selection.best.law.name else ''
+            lines.append(f'  {name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}')
+        elif why_not:
+            lines.append(f'  {name:32} not fitted: {why_not}')
     lines += [f'95 % band: holds {100.0 * quality.coverage:.0f} % of the left-out readings']
     lines += [f'note: {remark}' for remark in found.remarks]
     lines += [f'warning: {warning}' for warning in found.warnings]
     return '\n'.join(lines)
-
-
-def _ladder_lines(selection: LawSelection) -> Iterator[str]:
-    rows = [(score.law.name, score.validation, ' <- recommended' if score is selection.best else '', score.why_not)
-            for score in selection.scores]  # fmt: skip
-    if selection.reference is not None:
-        rows.append(('mean of the other readings', selection.reference, '', ''))
-    for name, validation, mark, why_not in rows:
-        if validation is None:
-            yield f'{name:32} not fitted: {why_not}'
-        else:
-            yield f'{name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}'

@@ -20,8 +20,7 @@ class ReplayResult:
     recorded_feedforwards: int
     differing: int
     """estimates and feed-forwards whose bytes differ from the recorded ones, including missing and surplus ones"""
-    first_difference: str
-    """for a person; empty if there is none"""
+    first_difference: str  # for a person; empty if there is none
 
     @property
     def identical(self) -> bool:

@@ -15,11 +15,9 @@ from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics,
 class FieldDifference:
     """Difference of one field over all messages, second bag minus first."""
 
-    largest: float
-    """largest magnitude, in the unit of the field; infinite if only one of the two is a number"""
+    largest: float  # largest magnitude, in the unit of the field; infinite if only one of the two is a number
     rms: float
-    outside: int
-    """number of messages with a difference outside the tolerance"""
+    outside: int  # number of messages with a difference outside the tolerance
 
 
 _NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
@@ -33,8 +31,7 @@ class BagComparison:
     messages_a: int
     messages_b: int
     identical_bytes: bool
-    first_difference: str
-    """for a person; empty if no difference is outside the tolerance"""
+    first_difference: str  # for a person; empty if no difference is outside the tolerance
     fields: dict[str, FieldDifference]
 
     @property

@@ -56,8 +56,7 @@ class Step(NamedTuple):
     """One message, and the answers of the estimator to it."""
 
     message: BagMessage
-    answers: tuple[tuple[str, bytes], ...]
-    """message type and bytes of each answer"""
+    answers: tuple[tuple[str, bytes], ...]  # message type and bytes of each answer
 
 
 def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuration | None) -> Iterator[Step]:

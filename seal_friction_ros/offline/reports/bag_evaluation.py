@@ -9,7 +9,8 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from itertools import chain, pairwise
+from itertools import chain, groupby, pairwise
+from operator import itemgetter
 from statistics import fmean
 from typing import Any, NamedTuple
 
@@ -39,45 +40,29 @@ _HARMLESS = int(Status.OUTSIDE_IDENTIFIED_RANGE)  # the inputs are good, the law
 class Event(NamedTuple):
     """One steady stroke, or one start from rest."""
 
-    direction: int
-    """-1 or 1"""
-    pressure: float
-    """[Pa, gauge]"""
-    force_sum: float
-    """[N] signed: mean of a stroke, peak of a start"""
-    estimated: float
-    """[N] Coulomb friction of a stroke, breakaway force of a start"""
-    std: float
-    """[N] one standard deviation of the Coulomb friction"""
+    direction: int  # -1 or 1
+    pressure: float  # [Pa, gauge]
+    force_sum: float  # [N] signed: mean of a stroke, peak of a start
+    estimated: float  # [N] Coulomb friction of a stroke, breakaway force of a start
+    std: float  # [N] one standard deviation of the Coulomb friction
     samples: int
-    first: int
-    """index of the first estimate"""
-    last: int
-    """index of the last estimate"""
+    first: int  # index of the first estimate
+    last: int  # index of the last estimate
 
 
 @dataclass(frozen=True)
 class PressureLevel:
     """Measured against estimated friction at one pressure: sliding or breakaway."""
 
-    pressure: float
-    """[Pa, gauge] mean"""
-    measured: float
-    """[N]"""
-    measured_spread: float | None
-    """[N] standard deviation between events, offset removed; None with too few events"""
-    offset: float | None
-    """[N] removed offset: mean force sum of the two directions; None with one direction"""
-    estimated: float
-    """[N]"""
-    estimated_std: float
-    """[N]"""
-    deviation: float
-    """[N] estimated minus measured"""
-    deviation_percent: float | None
-    """[%] of the measured friction; None where this is not above 0 N"""
-    in_band: int
-    """events with their own reading in the 95 % band of the estimate"""
+    pressure: float  # [Pa, gauge] mean
+    measured: float  # [N]
+    measured_spread: float | None  # [N] standard deviation between events, offset removed; None with too few events
+    offset: float | None  # [N] removed offset: mean force sum of the two directions; None with one direction
+    estimated: float  # [N]
+    estimated_std: float  # [N]
+    deviation: float  # [N] estimated minus measured
+    deviation_percent: float | None  # [%] of the measured friction; None where this is not above 0 N
+    in_band: int  # events with their own reading in the 95 % band of the estimate
     samples: int
     events: tuple[Event, ...]
 
@@ -106,20 +91,13 @@ class BagEvaluation:
 
     friction: FrictionByPressure
     estimates: int
-    start: int
-    """[ns]"""
-    duration: float
-    """[s] from the first stamp to the last"""
-    rates: dict[str, float]
-    """topic -> messages per second of this duration"""
-    state_shares: dict[str, float]
-    """state -> share of the time"""
-    status_counts: dict[str, int]
-    """bit -> number of estimates with it"""
-    flagged: int
-    """number of estimates with any status bit"""
-    input_age: dict[str, float]
-    """quantiles [s] of the age of the inputs; empty if an input is missing throughout"""
+    start: int  # [ns]
+    duration: float  # [s] from the first stamp to the last
+    rates: dict[str, float]  # topic -> messages per second of this duration
+    state_shares: dict[str, float]  # state -> share of the time
+    status_counts: dict[str, int]  # bit -> number of estimates with it
+    flagged: int  # number of estimates with any status bit
+    input_age: dict[str, float]  # quantiles [s] of the age of the inputs; empty if an input is missing throughout
 
 
 # -- evaluation -------------------------------------------------------------------------------------------------------
@@ -129,10 +107,7 @@ def evaluate_run(run: RecordedRun) -> BagEvaluation:
     """All numbers of a bag."""
     duration = float(run.time.max() - run.time.min())
     known = run.input_age[np.isfinite(run.input_age) & (run.input_age != -1.0)]
-    ages = {}
-    if len(known):
-        quantiles = np.quantile(known, (0.5, 0.99, 1.0))
-        ages = dict(zip(('p50', 'p99', 'max'), (float(q) for q in quantiles), strict=True))
+    quantiles = {'p50': 0.5, 'p99': 0.99, 'max': 1.0} if len(known) else {}
     counts = {topic: count for topic, (kind, count) in run.topics.items() if kind in DECODERS}
     return BagEvaluation(
         friction=friction_by_pressure(run),
@@ -143,7 +118,7 @@ def evaluate_run(run: RecordedRun) -> BagEvaluation:
         state_shares=_state_shares(run),
         status_counts=_status_counts(run.status),
         flagged=int(np.count_nonzero(run.status)),
-        input_age=ages,
+        input_age={name: float(np.quantile(known, share)) for name, share in quantiles.items()},
     )
 
 
@@ -198,12 +173,10 @@ def _runs(run: RecordedRun) -> list[tuple[int, IntArray]]:
 
 
 def _steady_stroke(run: RecordedRun, usable: BoolArray, direction: int, index: IntArray) -> Event | None:
-    if direction == 0 or len(index) < MIN_STEADY_SAMPLES:
-        return None
     trimmed = round(TRIMMED_SHARE * len(index))
     middle = index[trimmed : len(index) - trimmed]
     middle = middle[usable[middle]]
-    if len(middle) < MIN_STEADY_SAMPLES:
+    if direction == 0 or len(middle) < MIN_STEADY_SAMPLES:
         return None
     speed = np.abs(run.velocity[middle])
     median = float(np.median(speed))
@@ -218,13 +191,10 @@ def _start(
     run: RecordedRun, usable: BoolArray, rest: tuple[int, IntArray], motion: tuple[int, IntArray]
 ) -> Event | None:
     direction, index = motion[0], rest[1]
-    follows = run.time[motion[1][0]] - run.time[index[-1]] <= MAX_GAP
-    if rest[0] != 0 or direction == 0 or len(motion[1]) < MIN_STEADY_SAMPLES or not follows:
-        return None
-    if run.time[index[-1]] - run.time[index[0]] < MIN_REST:
-        return None
+    gap, duration = run.time[motion[1][0]] - run.time[index[-1]], run.time[index[-1]] - run.time[index[0]]
+    is_start = rest[0] == 0 and direction != 0 and gap <= MAX_GAP and duration >= MIN_REST
     index = index[usable[index]]
-    if not len(index):
+    if not is_start or len(motion[1]) < MIN_STEADY_SAMPLES or not len(index):
         return None
     peak = index[[np.argmax(direction * run.force_sum[index])]]
     if direction * run.force_sum[peak[0]] <= 0.0:  # a force outside the force sum moved the rod, or the sign is wrong
@@ -246,9 +216,9 @@ def _levels(events: Sequence[Event]) -> tuple[PressureLevel, ...]:
     if not events:
         return ()
     ordered = sorted(events, key=lambda event: event.pressure)
-    labels = pressure_labels(np.array([event.pressure for event in ordered]))
-    ends = np.flatnonzero(np.diff(labels)) + 1
-    return tuple(_level(ordered[first:last]) for first, last in pairwise([0, *ends.tolist(), len(ordered)]))
+    labels = pressure_labels(np.array([event.pressure for event in ordered])).tolist()
+    levels = groupby(zip(labels, ordered, strict=True), key=itemgetter(0))
+    return tuple(_level([event for _, event in members]) for _, members in levels)
 
 
 def pressure_labels(pressures: FloatArray) -> IntArray:
@@ -260,17 +230,13 @@ def pressure_labels(pressures: FloatArray) -> IntArray:
     highest = float(np.abs(pressures).max())
     gap = np.maximum(LEVEL_GAP * np.abs(pressures[1:]), LEVEL_GAP_MIN)
     width = max(LEVEL_WIDTH * highest, 2.0 * LEVEL_GAP_MIN)
-    labels = np.zeros(len(pressures), dtype=np.int64)
-    clusters = np.split(np.arange(len(pressures)), np.flatnonzero(np.diff(pressures) > gap) + 1)
-    used = 0
-    for cluster in clusters:
-        inside = pressures[cluster]
+    labels, used = [], 0
+    for inside in np.split(pressures, np.flatnonzero(np.diff(pressures) > gap) + 1):
         span = float(inside[-1] - inside[0])
         parts = max(math.ceil(span / width), 1)
-        part = np.minimum((inside - inside[0]) / (span or 1.0) * parts, parts - 1).astype(np.int64)
-        labels[cluster] = used + part
+        labels.append(used + np.minimum((inside - inside[0]) / (span or 1.0) * parts, parts - 1).astype(np.int64))
         used += parts
-    return labels
+    return np.concatenate(labels)
 
 
 def _level(events: Sequence[Event]) -> PressureLevel:
@@ -281,11 +247,11 @@ def _level(events: Sequence[Event]) -> PressureLevel:
     measured = (means[0] - means[1]) / 2.0 if offset is not None else fmean(float(r) for r in readings)
     freedom = len(events) - len(means)  # degrees of freedom
     spread = math.sqrt(float(np.sum((readings - measured) ** 2)) / freedom) if freedom > 0 else None
-    estimated, std = fmean(event.estimated for event in events), fmean(event.std for event in events)
+    pressure, estimated, std = (fmean(getattr(e, name) for e in events) for name in ('pressure', 'estimated', 'std'))
     deviation = estimated - measured
     in_band = sum(abs(e.estimated - r) <= BAND_95 * e.std for e, r in zip(events, readings, strict=True))
     return PressureLevel(
-        fmean(event.pressure for event in events),
+        pressure,
         measured,
         spread,
         offset,
@@ -310,27 +276,25 @@ def _notes(
             f'stroke needs {MIN_STEADY_SAMPLES} usable samples at nearly constant speed.'
         )
     for name, levels in (('sliding', sliding), ('breakaway', breakaway)):
-        one_sided = [f'{level.pressure / BAR:.2f} bar' for level in levels if not level.both_directions]
-        if one_sided:
+        if one_sided := _pressures_text(level for level in levels if not level.both_directions):
             notes.append(
-                f'At {", ".join(one_sided)} the {name} friction was measured in one direction only: the measured value '
-                'is the mean magnitude, and an offset of the force sum remains in it.'
+                f'At {one_sided} the {name} friction was measured in one direction only: the measured value is the '
+                'mean magnitude, and an offset of the force sum remains in it.'
             )
-        reversed_sign = [f'{level.pressure / BAR:.2f} bar' for level in levels if level.measured <= 0.0]
-        if reversed_sign:
-            notes.append(
-                f'At {", ".join(reversed_sign)} the force sum of {name} is against the motion: check the signs of '
-                'force sum and velocity.'
-            )
-    left_out = len(usable) - int(np.count_nonzero(usable))
-    if left_out:
-        notes.append(
-            f'{left_out} of {len(usable)} estimates have unusable inputs and are left out of the measured friction.'
-        )
+        if against := _pressures_text(level for level in levels if level.measured <= 0.0):
+            text = 'is against the motion: check the signs of force sum and velocity.'
+            notes.append(f'At {against} the force sum of {name} {text}')
+    if left_out := np.count_nonzero(~usable):
+        text = 'estimates have unusable inputs and are left out of the measured friction.'
+        notes.append(f'{left_out} of {len(usable)} {text}')
     same_pressures = np.allclose(run.pressure_a, run.pressure_b, rtol=0.02, atol=5e3, equal_nan=True)
     if not same_pressures and {'a', 'b'} <= {*run.chambers}:
         notes.append('The seals see different pressures: the pressure of a level is the mean over the seals.')
     return tuple(notes)
+
+
+def _pressures_text(levels: Iterable[PressureLevel]) -> str:
+    return ', '.join(f'{level.pressure / BAR:.2f} bar' for level in levels)
 
 
 def evaluation_numbers(evaluation: BagEvaluation) -> dict[str, Any]:

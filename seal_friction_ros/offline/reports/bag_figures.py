@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,8 +16,8 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, Event, PressureLevel, worst_level
-from seal_friction_ros.offline.reports.figure_style import Plot
+from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel, worst_level
+from seal_friction_ros.offline.reports.figure_style import Plot, finished
 from seal_friction_ros.offline.reports.formatting import force_unit, number, speed_unit
 
 STATE_COLOURS = {
@@ -33,16 +34,15 @@ _MARKS = 3000  # of single strokes over pressure
 
 def run_figures(run: RecordedRun, evaluation: BagEvaluation) -> list[Plot]:
     """Every figure that the bag has the data for."""
-    friction = evaluation.friction
-    plots = [live_figure(run, friction.sliding)]
-    if friction.sliding or friction.breakaway:
-        plots.append(pressure_figure(friction.sliding, friction.breakaway))
-    if friction.sliding:
-        plots.append(deviation_figure(friction.sliding))
-    plots += [sliding_velocity_figure(run, friction.sliding), inputs_figure(run)]
-    if run.status.any():
-        plots.append(status_figure(run))
-    return plots
+    sliding, breakaway = evaluation.friction.sliding, evaluation.friction.breakaway
+    return [
+        live_figure(run, sliding),
+        *([pressure_figure(sliding, breakaway)] if sliding or breakaway else []),
+        *([deviation_figure(sliding)] if sliding else []),
+        sliding_velocity_figure(run, sliding),
+        inputs_figure(run),
+        *([status_figure(run)] if run.status.any() else []),
+    ]
 
 
 def friction_summary(levels: Sequence[PressureLevel]) -> str:
@@ -64,31 +64,23 @@ def friction_summary(levels: Sequence[PressureLevel]) -> str:
 def live_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
     """Live estimate against measured friction: the whole bag, and a part with strokes."""
     first, last, level = detail_window(run, levels)
-    figure, axes = style.new_figure(
-        friction_summary(levels), 6.6, nrows=4, gridspec_kw={'height_ratios': [5.0, 0.35, 6.0, 0.35], 'hspace': 0.02}
-    )
+    heights = {'height_ratios': [5.0, 0.35, 6.0, 0.35], 'hspace': 0.02}
+    figure, axes = style.new_figure(friction_summary(levels), 6.6, nrows=4, gridspec_kw=heights)
     whole, part = slice(0, len(run.time)), slice(first, last + 1)
     _draw_friction(axes[0], run, whole, None)
     _draw_states(axes[1], run, whole)
     axes[0].axvspan(run.time[first], run.time[last], color=style.BLACK, alpha=0.08, lw=0)
-    axes[0].set_title('Whole bag')
-    style.legend_above(axes[0])
     _draw_friction(axes[2], run, part, level)
     _draw_states(axes[3], run, part)
     axes[2].set_title('Shaded part' if level is None else f'Shaded part, at {level.pressure / BAR:.1f} bar')
     present = [state for state in FrictionState if (run.state == state).any()]
-    axes[3].legend(
-        handles=[Patch(color=STATE_COLOURS[state], label=state.name.lower()) for state in present],
-        loc='upper right',
-        bbox_to_anchor=(1.0, -1.4),
-        ncols=4,
-        borderaxespad=0.0,
-        handlelength=1.0,
-    )
+    handles = [Patch(color=STATE_COLOURS[state], label=state.name.lower()) for state in present]
+    spacing: dict[str, Any] = {'ncols': 4, 'borderaxespad': 0.0, 'handlelength': 1.0}
+    axes[3].legend(handles=handles, loc='upper right', bbox_to_anchor=(1.0, -1.4), **spacing)
     axes[3].set_xlabel(TIME_LABEL, loc='left')
     if level is not None and _offset_matters(level):
         style.legend_above(axes[2], slice(1, 3))  # the legend of the first panel names the others
-    return Plot('live_estimate', figure)
+    return finished('live_estimate', figure, axes[0], title='Whole bag')
 
 
 def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[int, int, PressureLevel | None]:
@@ -101,7 +93,10 @@ def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[in
         level = levels[len(levels) // 2]
         events = sorted(level.events, key=lambda event: event.first)
         pairs = [(a, b) for a, b in pairwise(events) if a.direction != b.direction]
-        one, other = _nearest(pairs) if pairs else (events[0], events[0])
+        gaps = [b.first - a.last for a, b in pairs]
+        near = [pair for pair, gap in zip(pairs, gaps, strict=True) if gap <= 2 * min(gaps) + 1]
+        # The pair with the shortest gap; of equal ones the middle one, since the first may be a run-in.
+        one, other = near[len(near) // 2] if near else (events[0], events[0])
         first = one.first
         while first > 0 and run.state[first - 1] != FrictionState.SLIDING:
             first -= 1
@@ -110,13 +105,6 @@ def detail_window(run: RecordedRun, levels: Sequence[PressureLevel]) -> tuple[in
     half = max(len(run.time) // 200, 100)
     middle = int(np.argmax(np.abs(run.friction_force)))
     return max(middle - half, 0), min(middle + half, len(run.time) - 1), None
-
-
-def _nearest(pairs: Sequence[tuple[Event, Event]]) -> tuple[Event, Event]:
-    """Pair with the shortest gap between its strokes; the middle one of equals, since the first may be a run-in."""
-    gaps = [b.first - a.last for a, b in pairs]
-    near = [pair for pair, gap in zip(pairs, gaps, strict=True) if gap <= 2 * min(gaps) + 1]
-    return near[len(near) // 2]
 
 
 def _offset_matters(level: PressureLevel) -> bool:
@@ -143,11 +131,8 @@ def _draw_friction(ax: Axes, run: RecordedRun, part: slice, level: PressureLevel
     look = {'color': style.BLUE, 'lw': 1.6, 'alpha': 0.9, 'label': 'estimated friction force'}
     style.thin_line(ax, time, run.friction_force[part] / size, **look)
     style.zero_lines(ax)
-    ax.set(
-        xlim=(time[0], time[-1] if time[-1] > time[0] else time[0] + 1.0),
-        ylim=(-1.15 * largest / size, 1.15 * largest / size),
-        ylabel=f'force [{unit}]',
-    )
+    end, limit = time[-1] if time[-1] > time[0] else time[0] + 1.0, 1.15 * largest / size
+    ax.set(xlim=(time[0], end), ylim=(-limit, limit), ylabel=f'force [{unit}]')
     ax.tick_params(labelbottom=False)
 
 
@@ -163,15 +148,10 @@ def _draw_states(ax: Axes, run: RecordedRun, part: slice) -> None:
     grid = np.linspace(time[0], time[-1], min(style.COLUMNS, 4 * len(time)))
     held = np.clip(np.searchsorted(time, grid, side='right') - 1, 0, len(time) - 1)
     end = time[-1] if time[-1] > time[0] else time[0] + 1.0
-    ax.imshow(
-        run.state[part][held][np.newaxis],
-        aspect='auto',
-        cmap=ListedColormap([STATE_COLOURS[state] for state in FrictionState]),
-        extent=(float(time[0]), float(end), 0.0, 1.0),
-        interpolation='nearest',
-        vmin=-0.5,
-        vmax=len(FrictionState) - 0.5,
-    )
+    colours = ListedColormap([STATE_COLOURS[state] for state in FrictionState])
+    look: dict[str, Any] = {'cmap': colours, 'vmin': -0.5, 'vmax': len(FrictionState) - 0.5, 'interpolation': 'nearest'}
+    extent = (float(time[0]), float(end), 0.0, 1.0)
+    ax.imshow(run.state[part][held][np.newaxis], aspect='auto', extent=extent, **look)
     ax.set_yticks([])
     ax.grid(visible=False)
     ax.set_ylabel('state', rotation=0, ha='right', va='center')
@@ -182,23 +162,20 @@ def inputs_figure(run: RecordedRun) -> Plot:
     pressures = run.pressure[np.isfinite(run.pressure)] / BAR
     low, high = (float(pressures.min()), float(pressures.max())) if len(pressures) else (0.0, 0.0)
     first, last = float(run.time.min()), float(run.time.max())
-    figure, axes = style.new_figure(
-        f'Inputs: {low:.1f} to {high:.1f} bar, {last - first:.0f} s', 5.4, nrows=3, sharex=True
-    )
+    title = f'Inputs: {low:.1f} to {high:.1f} bar, {last - first:.0f} s'
+    figure, axes = style.new_figure(title, 5.4, nrows=3, sharex=True)
     same = np.array_equal(run.pressure_a, run.pressure_b, equal_nan=True)
     label = 'chambers a and b' if same else 'chamber a'
     style.thin_line(axes[0], run.time, run.pressure_a / BAR, color=style.BLUE, lw=1.1, label=label)
     if not same:
         style.thin_line(axes[0], run.time, run.pressure_b / BAR, color=style.ORANGE, lw=1.1, label='chamber b')
-    style.legend_above(axes[0])
-    axes[0].set_ylabel('pressure\n[bar, gauge]')
     unit, size = speed_unit(_largest(run.velocity))
     style.thin_line(axes[1], run.time, run.velocity / size, color=style.GREEN, lw=1.0)
     axes[1].set_ylabel(f'rod velocity\n[{unit}]')
     unit, size = force_unit(_largest(run.force_sum))
     style.thin_line(axes[2], run.time, run.force_sum / size, color=style.BLACK, lw=1.0)
     axes[2].set(ylabel=f'force sum\n[{unit}]', xlabel=TIME_LABEL, xlim=(first, max(last, first + 1e-3)))
-    return Plot('inputs', figure)
+    return finished('inputs', figure, axes[0], ylabel='pressure\n[bar, gauge]')
 
 
 def status_figure(run: RecordedRun) -> Plot:
@@ -238,7 +215,11 @@ def pressure_figure(sliding: Sequence[PressureLevel], breakaway: Sequence[Pressu
         estimated = np.array([level.estimated for level in levels]) / size
         if name == 'sliding':
             half = BAND_95 * np.array([level.estimated_std for level in levels]) / size
-            _draw_band(ax, pressure, estimated, half)
+            if len(levels) == 1:
+                look = {'color': style.SKY, 'lw': 10.0, 'alpha': 0.45, 'ls': ''}
+                ax.errorbar(pressure, estimated, half, label='sliding, 95 % band', **look)
+            else:
+                style.fill_band(ax, pressure, estimated, half, label='sliding, 95 % band')
         single = {'marker': '_', 'ms': 14, 'mew': 2.0} if len(levels) == 1 else {}
         ax.plot(pressure, estimated, color=colour, ls=dashes, lw=1.8, label=f'{name}, estimated', **single)
         events = [(event.pressure / BAR, level.reading(event) / size) for level in levels for event in level.events]
@@ -247,22 +228,10 @@ def pressure_figure(sliding: Sequence[PressureLevel], breakaway: Sequence[Pressu
         measured = [level.measured / size for level in levels]
         ax.plot(pressure, measured, ls='', marker=marker, ms=6.5, color=dot, mec='white', label=f'{name}, measured')
     highest = max(level.pressure for level in chain(sliding, breakaway)) / BAR
-    ax.set(
-        xlim=(-0.03 * highest, 1.05 * highest if highest > 0.0 else 1.0),
-        ylim=(0.0, None),
-        xlabel=PRESSURE_LABEL,
-        ylabel=f'friction of all seals [{unit}]',
-    )
+    ax.set(xlim=(-0.03 * highest, 1.05 * highest if highest > 0.0 else 1.0), ylim=(0.0, None))
+    ax.set(xlabel=PRESSURE_LABEL, ylabel=f'friction of all seals [{unit}]')
     ax.legend(loc='upper left')
     return Plot('friction_over_pressure', figure)
-
-
-def _draw_band(ax: Axes, pressure: FloatArray, middle: FloatArray, half: FloatArray) -> None:
-    label = 'sliding, 95 % band'
-    if len(pressure) == 1:
-        ax.errorbar(pressure, middle, half, color=style.SKY, lw=10.0, alpha=0.45, ls='', label=label)
-    else:
-        style.fill_band(ax, pressure, middle, half, label=label)
 
 
 def deviation_figure(levels: Sequence[PressureLevel]) -> Plot:
@@ -279,29 +248,23 @@ def deviation_figure(levels: Sequence[PressureLevel]) -> Plot:
     ax.set_xticks(place, [f'{level.pressure / BAR:.1f}' for level in shown])
     ax.grid(visible=False, axis='x')
     largest = 1.2 * max(float(np.abs(deviation).max()), float(band.max()), 1.0) if shown else 1.0
-    ax.set(
-        xlim=(-0.7, max(len(shown), 4) - 0.3), ylim=(-largest, largest), xlabel=PRESSURE_LABEL, ylabel='deviation [%]'
-    )
-    style.legend_above(ax)
-    return Plot('deviation', figure)
-
-
-def _velocity_title(levels: Sequence[PressureLevel]) -> str:
-    if len(levels) >= 2 and levels[-1].measured > levels[0].measured > 0.0:
-        unit, size = force_unit(levels[-1].measured)
-        low, high = (f'{x.measured / size:.3g} {unit} at {x.pressure / BAR:.1f} bar' for x in (levels[0], levels[-1]))
-        return f'Sliding friction grows from {low} to {high}'
-    if levels and all(level.both_directions and level.measured > 0.0 for level in levels):
-        return 'Friction changes its sign with the direction of motion'
-    return 'Friction over velocity, measured and estimated'
+    limits = {'xlim': (-0.7, max(len(shown), 4) - 0.3), 'ylim': (-largest, largest)}
+    return finished('deviation', figure, ax, xlabel=PRESSURE_LABEL, ylabel='deviation [%]', **limits)
 
 
 def sliding_velocity_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
     """Friction over velocity, measured and estimated, coloured by pressure."""
+    title = 'Friction over velocity, measured and estimated'
+    if len(levels) >= 2 and levels[-1].measured > levels[0].measured > 0.0:
+        unit, size = force_unit(levels[-1].measured)
+        low, high = (f'{x.measured / size:.3g} {unit} at {x.pressure / BAR:.1f} bar' for x in (levels[0], levels[-1]))
+        title = f'Sliding friction grows from {low} to {high}'
+    elif levels and all(level.both_directions and level.measured > 0.0 for level in levels):
+        title = 'Friction changes its sign with the direction of motion'
     speed_name, speed_size = speed_unit(_largest(run.velocity))
     largest = max(_largest(run.force_sum), _largest(run.friction_force))
     unit, size = force_unit(largest)
-    figure, axes = style.new_figure(_velocity_title(levels), 4.2, ncols=2, sharex=True, sharey=True)
+    figure, axes = style.new_figure(title, 4.2, ncols=2, sharex=True, sharey=True)
     good: IntArray = np.flatnonzero(np.isfinite(run.velocity) & np.isfinite(run.force_sum) & np.isfinite(run.pressure))
     good = good[:: len(good) // _DOTS + 1]
     good = good[np.argsort(-run.pressure[good], kind='stable')]  # low pressures on top: they reach less far

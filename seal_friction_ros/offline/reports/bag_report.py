@@ -1,13 +1,13 @@
 """Report of a bag: figures and numbers of the estimate, and of the tracking of a servo if the bag has a reference."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation
@@ -15,7 +15,7 @@ from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, Pres
 from seal_friction_ros.offline.reports.bag_figures import friction_summary, run_figures
 from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, number
-from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, ReportSummary, Table, write_page
+from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Columns, ReportSummary, Table, table_of, write_page
 from seal_friction_ros.offline.reports.tracking_evaluation import TrackingStretch
 from seal_friction_ros.offline.reports.tracking_figures import stretch_name, tracking_plots, tracking_summary
 
@@ -52,16 +52,13 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         start=datetime.fromtimestamp(evaluation.start // 1_000_000_000, UTC),
         sliding_table=_level_table(evaluation.friction.sliding, 'strokes'),
         breakaway_table=_level_table(evaluation.friction.breakaway, 'starts'),
-        topic_table=_topic_table(run, evaluation),
-        state_table=_state_table(evaluation),
-        status_table=_status_table(evaluation),
-        age_table=_age_table(evaluation),
+        **_run_tables(run, evaluation),
         configurations=list(_shown_configurations(run)),
         tracking=tracking,
         tracking_limits=tracking_evaluation,
         tracking_summary=tracking_summary(tracking) if tracking else '',
-        tracking_table=_tracking_table(stretches),
-        feedforward_table=_feedforward_table(stretches),
+        tracking_table=table_of(stretches, _TRACKING_COLUMNS, (0,)),
+        feedforward_table=table_of(stretches, _FEEDFORWARD_COLUMNS),
     )
     numbers = bag_evaluation.evaluation_numbers(evaluation)
     return ReportSummary(out, figures, numbers | {'tracking': tracking_evaluation.tracking_numbers(tracking)})
@@ -69,120 +66,89 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
 
 def _level_table(levels: Sequence[PressureLevel], events: str) -> Table:
     unit, size = force_unit(max((abs(level.estimated) for level in levels), default=0.0))
-    heads = (
-        'pressure [bar]', f'measured [{unit}]', f'spread [{unit}]', f'estimated [{unit}]', f'std [{unit}]',
-        f'deviation [{unit}]', 'deviation [%]', 'in 95 % band', 'samples', f'offset of the force sum [{unit}]',
-    )  # fmt: skip
-    rows = [
+    columns: Columns = (
+        ('pressure [bar]', lambda level: number(level.pressure, unit=BAR)),
         (
-            number(level.pressure / BAR),
-            number(level.measured / size) + ('' if level.both_directions else ' *'),
-            number(None if level.measured_spread is None else level.measured_spread / size),
-            number(level.estimated / size),
-            number(level.estimated_std / size),
-            number(level.deviation / size, signed=True),
-            number(level.deviation_percent, 1, signed=True),
-            f'{level.in_band} of {len(level.events)} {events}',
-            level.samples,
-            number(None if level.offset is None else level.offset / size, signed=True),
-        )
-        for level in levels
-    ]
-    return Table(heads, rows)
+            f'measured [{unit}]',
+            lambda level: number(level.measured, unit=size) + ('' if level.both_directions else ' *'),
+        ),
+        (f'spread [{unit}]', lambda level: number(level.measured_spread, unit=size)),
+        (f'estimated [{unit}]', lambda level: number(level.estimated, unit=size)),
+        (f'std [{unit}]', lambda level: number(level.estimated_std, unit=size)),
+        (f'deviation [{unit}]', lambda level: number(level.deviation, unit=size, signed=True)),
+        ('deviation [%]', lambda level: number(level.deviation_percent, 1, signed=True)),
+        ('in 95 % band', lambda level: f'{level.in_band} of {len(level.events)} {events}'),
+        ('samples', lambda level: level.samples),
+        (f'offset of the force sum [{unit}]', lambda level: number(level.offset, unit=size, signed=True)),
+    )
+    return table_of(levels, columns)
 
 
-def _tracking_table(stretches: Sequence[TrackingStretch]) -> Table:
-    heads = (
-        'stretch', 'time [s]', 'RMS error [µm]', 'change [%]', 'peak error [µm]', 'dwell per reversal [ms]',
-        'change [%]', 'dwell of the reference [ms]', 'not sliding [%]',
-    )  # fmt: skip
-    rows = [
-        (
-            stretch_name(s),
-            f'{s.start:.1f} to {s.end:.1f}',
-            number(s.rms / UM, 1),
-            number(s.rms_change, 1, signed=True),
-            number(s.peak / UM, 1),
-            'no reversal' if s.dwell is None else number(s.dwell / MS, 1),
-            number(s.dwell_change, 1, signed=True),
-            number(None if s.reference_dwell is None else s.reference_dwell / MS, 1),
-            number(None if s.not_sliding is None else 100.0 * s.not_sliding, 1),
-        )
-        for s in stretches
-    ]
-    return Table(heads, rows, (0,))
+def _time_span(stretch: TrackingStretch) -> str:
+    return f'{stretch.start:.1f} to {stretch.end:.1f}'
 
 
-def _feedforward_table(stretches: Sequence[TrackingStretch]) -> Table:
-    heads = (
-        'time [s]', 'left out before [s]', 'samples', 'reference', 'largest feed-forward [N]', 'scale',
-        'smoothing velocity [mm/s]', 'lead time [ms]',
-    )  # fmt: skip
-    rows = []
-    for stretch in stretches:
-        known = stretch.settings
-        settings = known and (
-            known.scale,
-            known.smoothing_velocity / MM,
-            known.lead_time / MS,
-        )
-        repeats = f', {1.0 / stretch.period:.3g} Hz' if stretch.period else ''
-        rows.append(
-            (
-                f'{stretch.start:.1f} to {stretch.end:.1f}',
-                number(stretch.settling),
-                stretch.samples,
-                f'± {length_text(stretch.amplitude)}{repeats}',
-                number(stretch.feedforward_peak),
-                *(number(value) for value in settings or (None,) * 5),
-            )
-        )
-    return Table(heads, rows)
+_TRACKING_COLUMNS: Columns = (
+    ('stretch', stretch_name),
+    ('time [s]', _time_span),
+    ('RMS error [µm]', lambda s: number(s.rms, 1, unit=UM)),
+    ('change [%]', lambda s: number(s.rms_change, 1, signed=True)),
+    ('peak error [µm]', lambda s: number(s.peak, 1, unit=UM)),
+    ('dwell per reversal [ms]', lambda s: 'no reversal' if s.dwell is None else number(s.dwell, 1, unit=MS)),
+    ('change [%]', lambda s: number(s.dwell_change, 1, signed=True)),
+    ('dwell of the reference [ms]', lambda s: number(s.reference_dwell, 1, unit=MS)),
+    ('not sliding [%]', lambda s: number(s.not_sliding, 1, unit=0.01)),
+)
 
 
-def _topic_table(run: RecordedRun, evaluation: BagEvaluation) -> Table:
-    topics = sorted(run.topics.items())
-    rows = [(topic, kind, count, number(evaluation.rates.get(topic), 1)) for topic, (kind, count) in topics]
-    return Table(('topic', 'type', 'messages', 'rate [1/s]'), rows, (0, 1))
+def _setting(name: str, unit: float = 1.0) -> Callable[[TrackingStretch], str]:
+    """Cell with a setting of the feed-forward; a dash where the settings are unknown."""
+    return lambda stretch: number(getattr(stretch.settings, name, None), unit=unit)
 
 
-def _state_table(evaluation: BagEvaluation) -> Table:
-    rows = [(state.lower(), number(100.0 * share, 1)) for state, share in evaluation.state_shares.items()]
-    return Table(('state', 'share of the time [%]'), rows, (0,))
+_FEEDFORWARD_COLUMNS: Columns = (
+    ('time [s]', _time_span),
+    ('left out before [s]', lambda s: number(s.settling)),
+    ('samples', lambda s: s.samples),
+    ('reference', lambda s: f'± {length_text(s.amplitude)}' + (f', {1.0 / s.period:.3g} Hz' if s.period else '')),
+    ('largest feed-forward [N]', lambda s: number(s.feedforward_peak)),
+    ('scale', _setting('scale')),
+    ('smoothing velocity [mm/s]', _setting('smoothing_velocity', MM)),
+    ('lead time [ms]', _setting('lead_time', MS)),
+)
 
 
-def _status_table(evaluation: BagEvaluation) -> Table:
-    rows = [
-        (name.lower().replace('_', ' '), count, number(100.0 * count / evaluation.estimates))
-        for name, count in evaluation.status_counts.items()
-        if count
-    ]
-    return Table(('status bit', 'estimates', 'share [%]'), rows, (0,))
-
-
-def _age_table(evaluation: BagEvaluation) -> Table:
-    rows = [(name, number(age / MS, 3)) for name, age in evaluation.input_age.items()]
-    return Table(('age of the older input', '[ms]'), rows, (0,))
+def _run_tables(run: RecordedRun, evaluation: BagEvaluation) -> dict[str, Table]:
+    """Tables of topics, states, status bits and ages of the inputs."""
+    rates, estimates = evaluation.rates, evaluation.estimates
+    topics = [(topic, kind, count, number(rates.get(topic), 1)) for topic, (kind, count) in sorted(run.topics.items())]
+    states = [(state.lower(), number(100.0 * share, 1)) for state, share in evaluation.state_shares.items()]
+    counts = {name.lower().replace('_', ' '): count for name, count in evaluation.status_counts.items() if count}
+    bits = [(name, count, number(100.0 * count / estimates)) for name, count in counts.items()]
+    ages = [(name, number(age, 3, unit=MS)) for name, age in evaluation.input_age.items()]
+    return {
+        'topic_table': Table(('topic', 'type', 'messages', 'rate [1/s]'), topics, (0, 1)),
+        'state_table': Table(('state', 'share of the time [%]'), states, (0,)),
+        'status_table': Table(('status bit', 'estimates', 'share [%]'), bits, (0,)),
+        'age_table': Table(('age of the older input', '[ms]'), ages, (0,)),
+    }
 
 
 class _ShownConfiguration(NamedTuple):
     """One configuration of the bag; only ``text`` if it cannot be parsed."""
 
-    time: float
-    """[s] since the first estimate"""
+    time: float  # [s] since the first estimate
     text: str
     seal_table: Table | None = None
     setting_table: Table | None = None
-    seals: Sequence[str] = ()
-    """JSON of each different seal"""
+    seals: Sequence[str] = ()  # JSON of each different seal
 
 
 def _shown_configurations(run: RecordedRun) -> Iterator[_ShownConfiguration]:
     """The first and the last configurations: settings with units and meanings, and the seals."""
-    shown = run.configurations
+    shown, known = run.configurations, meanings(EstimatorSettings)
     if len(shown) > 2 * _SHOWN_CONFIGURATIONS + 1:
         shown = (*shown[:_SHOWN_CONFIGURATIONS], *shown[-_SHOWN_CONFIGURATIONS:])
-    known = meanings(EstimatorSettings)
     for time, text in shown:
         try:
             document = json.loads(text)
@@ -192,14 +158,8 @@ def _shown_configurations(run: RecordedRun) -> Iterator[_ShownConfiguration]:
         except (ValueError, LookupError, TypeError):
             yield _ShownConfiguration(time, text)
             continue
-        rows = [
-            (name, value, known[name].unit, known[name].description) if name in known else (name, value, '', '')
-            for name, value in sorted(settings.items())
-        ]
-        yield _ShownConfiguration(
-            time,
-            text,
-            Table(('seal', 'chamber'), mounted, (0, 1)),
-            Table(('setting', *PARAMETER_HEADS[1:]), rows, (0, 2, 3)),
-            list(dict.fromkeys(seals)),
-        )
+        described = [(name, value, known.get(name, Meaning('', ''))) for name, value in sorted(settings.items())]
+        rows = [(name, value, meaning.unit, meaning.description) for name, value, meaning in described]
+        setting_table = Table(('setting', *PARAMETER_HEADS[1:]), rows, (0, 2, 3))
+        seal_table = Table(('seal', 'chamber'), mounted, (0, 1))
+        yield _ShownConfiguration(time, text, seal_table, setting_table, list(dict.fromkeys(seals)))

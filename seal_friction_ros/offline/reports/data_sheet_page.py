@@ -7,9 +7,5 @@ from seal_friction_ros.offline.reports.page import write_page
 
 
 def write_data_sheet_page(plan: FrictionTestPlan, out: Path) -> None:
-    """Write the empty sheet as a page to print.
-
-    Raises:
-        ValueError: The page cannot be written.
-    """
+    """Write the empty sheet as a page to print; errors as of `write_page`."""
     write_page(out, 'data_sheet', (), plan=plan, dimensions=DIMENSIONS, procedure=PROCEDURE)

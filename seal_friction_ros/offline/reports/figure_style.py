@@ -52,8 +52,7 @@ _STYLE = {
 class Plot(NamedTuple):
     """One figure of a page."""
 
-    name: str
-    """file name without suffix, and id on the page"""
+    name: str  # file name without suffix, and id on the page
     figure: Figure
 
 
@@ -118,40 +117,33 @@ def label_panels(axes: Sequence[Axes], xlabel: str, ylabel: str, columns: int = 
 def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:
     """Legend in a row above the axes, with opaque dots; only the ``chosen`` of the labelled artists."""
     handles, labels = ax.get_legend_handles_labels()
-    legend = ax.legend(
-        handles[chosen],
-        labels[chosen],
-        loc='lower right',
-        bbox_to_anchor=(1.0, 1.0),
-        ncols=6,
-        borderaxespad=0.2,
-        columnspacing=1.2,
-        handlelength=1.6,
-        handletextpad=0.5,
-    )
+    place: dict[str, Any] = {'loc': 'lower right', 'bbox_to_anchor': (1.0, 1.0), 'borderaxespad': 0.2}
+    spacing: dict[str, Any] = {'ncols': 6, 'columnspacing': 1.2, 'handlelength': 1.6, 'handletextpad': 0.5}
+    legend = ax.legend(handles[chosen], labels[chosen], **place, **spacing)
     for handle in legend.legend_handles:
         if isinstance(handle, Line2D) and handle.get_linestyle() == 'None':
             handle.set_alpha(1.0)
 
 
-def finished(name: str, figure: Figure, ax: Axes, xlabel: str, ylabel: str) -> Plot:
-    """The figure with labels, a y axis from zero, and its legend above."""
-    ax.set(ylim=(0.0, None), xlabel=xlabel, ylabel=ylabel)
-    legend_above(ax)
+def finished(name: str, figure: Figure, ax: Axes, *others: Axes, **settings: Any) -> Plot:
+    """The figure, with ``settings`` of an axis (as `Axes.set`), and the legends above it and ``others``."""
+    ax.set(**settings)
+    for one in (ax, *others):
+        legend_above(one)
     return Plot(name, figure)
 
 
 def figure_18(figure: Figure, ax: Axes, unit: str) -> Plot:
     """Coefficient of friction over normal force, with the axes of Figure 18 of the thesis."""
-    labels = f'normal force of one seal [{unit}]', 'coefficient of dynamic friction [-]'
-    ax.set_xlim(0.0, None)
-    return finished('fig18_coefficient_of_friction', figure, ax, *labels)
+    labels = {'xlabel': f'normal force of one seal [{unit}]', 'ylabel': 'coefficient of dynamic friction [-]'}
+    return finished('fig18_coefficient_of_friction', figure, ax, xlim=(0.0, None), ylim=(0.0, None), **labels)
 
 
 def figure_19(figure: Figure, ax: Axes, unit: str) -> Plot:
     """Normal over axial force, with the axes of Figure 19 of the thesis."""
-    labels = f'axial force of one seal, pressure times projected area [{unit}]', f'normal force of one seal [{unit}]'
-    return finished('fig19_normal_force', figure, ax, *labels)
+    xlabel = f'axial force of one seal, pressure times projected area [{unit}]'
+    labels = {'xlabel': xlabel, 'ylabel': f'normal force of one seal [{unit}]'}
+    return finished('fig19_normal_force', figure, ax, ylim=(0.0, None), **labels)
 
 
 def zero_lines(ax: Axes, *, vertical: bool = False) -> None:
@@ -194,15 +186,12 @@ def thin_line(ax: Axes, x: FloatArray, values: FloatArray, **look: Any) -> None:
 
 def true_spans(time: FloatArray, where: BoolArray) -> list[tuple[float, float]]:
     """Start and length of each span of time in which ``where`` holds; a sample lasts until the next time."""
-    known = where[: len(time) - 1]
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
+    edges = np.flatnonzero(np.diff(where[: len(time) - 1], prepend=False, append=False))
     return [(float(time[a]), float(time[b] - time[a])) for a, b in edges.reshape(-1, 2)]
 
 
 def shade(ax: Axes, time: FloatArray, where: BoolArray, label: str | None = None) -> None:
     """Shade the times at which ``where`` holds."""
     if spans := true_spans(time, where):
-        transform = ax.get_xaxis_transform()
-        ax.broken_barh(
-            spans, (0.0, 1.0), transform=transform, color=LIGHT_GREY, alpha=0.7, lw=0, zorder=0.5, label=label
-        )
+        look: dict[str, Any] = {'color': LIGHT_GREY, 'alpha': 0.7, 'lw': 0, 'zorder': 0.5, 'label': label}
+        ax.broken_barh(spans, (0.0, 1.0), transform=ax.get_xaxis_transform(), **look)

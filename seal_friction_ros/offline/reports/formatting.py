@@ -7,11 +7,11 @@ from seal_friction_ros.core.foundation.units import BAR, MM, PSI, UM
 MINUS, DASH = '\N{MINUS SIGN}', '\N{EN DASH}'
 
 
-def number(value: float | None, digits: int = 2, *, signed: bool = False) -> str:
-    """Number with so many decimals; a dash for None and for a value that is not finite."""
+def number(value: float | None, digits: int = 2, *, unit: float = 1.0, signed: bool = False) -> str:
+    """Value in multiples of ``unit`` with so many decimals; a dash for None and for a value that is not finite."""
     if value is None or not math.isfinite(value):
         return DASH
-    rounded = round(value, digits) + 0.0  # no minus zero
+    rounded = round(value / unit, digits) + 0.0  # no minus zero
     return f'{rounded:{"+" if signed and rounded else ""}.{digits}f}'.replace('-', MINUS)
 
 

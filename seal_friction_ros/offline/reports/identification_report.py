@@ -1,11 +1,10 @@
 """Report of an identification: measured friction, fitted law, and the out-of-sample error of each law."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
@@ -16,16 +15,15 @@ from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGai
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification.candidate_laws import normal_forces
-from seal_friction_ros.core.identification.fitting import CrossValidation, LawScore, offsets_of
+from seal_friction_ros.core.identification.fitting import CrossValidation, offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.identification.document import worst_left_out
 from seal_friction_ros.offline.identification.pipeline import fitted_readings
-from seal_friction_ros.offline.identification.results import Identification, PressureLevel, Ring
+from seal_friction_ros.offline.identification.results import Identification, Ring, worst_left_out
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number
-from seal_friction_ros.offline.reports.page import Table, write_page
+from seal_friction_ros.offline.reports.page import Columns, Table, table_of, write_page
 from seal_friction_ros.offline.work.seal_writer import seal_text
 
 PRIOR_ART_SEAL = 'ms28775_114_prior_art'  # the only ring with known charts
@@ -36,14 +34,7 @@ _DIRECTIONS = ((1.0, style.BLUE, 'extending'), (-1.0, style.ORANGE, 'retracting'
 
 @house_style()
 def write_identification_report(found: Identification, out: Path) -> tuple[Path, ...]:
-    """Write the report of an identification; see `write_page`.
-
-    Returns:
-        Paths of the figures.
-
-    Raises:
-        ValueError: The page cannot be written.
-    """
+    """Write the report of an identification; result and errors as of `write_page`."""
     plots = identification_figures(found)
     return write_page(
         out,
@@ -67,42 +58,40 @@ def write_identification_report(found: Identification, out: Path) -> tuple[Path,
 
 
 def _level_table(found: Identification) -> Table:
-    columns: dict[str, Callable[[PressureLevel], Any]] = {
-        'pressure [bar]': lambda level: number(level.pressure / BAR) + ('' if level.is_used else ' *'),
-        'speed [mm/s]': lambda level: number(level.speed / MM, 1),
-        'measured [N]': lambda level: number(level.measured),
-        'law [N]': lambda level: number(level.fitted),
-        'residual [N]': lambda level: number(level.measured - level.fitted, signed=True),
-        'residual [%]': lambda level: number(100.0 * (1.0 - level.fitted / level.measured), 1, signed=True),
-        'std [N]': lambda level: number(level.std),
-        'predicted unseen [N]': lambda level: number(level.left_out),
-        'off [%]': lambda level: number(100.0 * (level.left_out / level.measured - 1.0), 1, signed=True),
-        'offset of the force sum [N]': lambda level: number(level.offset, signed=True),
-        'drift in the run [%]': lambda level: number(100.0 * level.drift, 1, signed=True),
-        'readings': lambda level: level.readings,
-    }
-    return Table(list(columns), [[cell(level) for cell in columns.values()] for level in found.levels])
+    columns: Columns = (
+        ('pressure [bar]', lambda level: number(level.pressure / BAR) + ('' if level.is_used else ' *')),
+        ('speed [mm/s]', lambda level: number(level.speed / MM, 1)),
+        ('measured [N]', lambda level: number(level.measured)),
+        ('law [N]', lambda level: number(level.fitted)),
+        ('residual [N]', lambda level: number(level.measured - level.fitted, signed=True)),
+        ('residual [%]', lambda level: number(100.0 * (1.0 - level.fitted / level.measured), 1, signed=True)),
+        ('std [N]', lambda level: number(level.std)),
+        ('predicted unseen [N]', lambda level: number(level.left_out)),
+        ('off [%]', lambda level: number(100.0 * (level.left_out / level.measured - 1.0), 1, signed=True)),
+        ('offset of the force sum [N]', lambda level: number(level.offset, signed=True)),
+        ('drift in the run [%]', lambda level: number(100.0 * level.drift, 1, signed=True)),
+        ('readings', lambda level: level.readings),
+    )
+    return table_of(found.levels, columns)
 
 
 def _ladder_table(found: Identification) -> Table:
-    rows = [_ladder_row(score, found) for score in found.selection.scores]
-    if found.selection.reference is not None:
+    def errors(validation: CrossValidation) -> list[str]:
+        return [number(validation.rms), number(validation.mean_deviation), number(100.0 * validation.error, 1)]
+
+    selection, rows = found.selection, []
+    for score in selection.scores:
+        cells = [f'{score.law.name} ({score.law.formula})', len(score.law.parameters)]
+        if score.validation is None or score.fit is None:
+            rows.append((*cells, *4 * [DASH], score.why_not))
+            continue
+        marks = {'recommended': score is selection.best, 'saved': score.fit is selection.fit}
+        mark = ', '.join(name for name, holds in marks.items() if holds)
+        rows.append((*cells, *errors(score.validation), number(score.fit.condition_number, 1), mark))
+    if selection.reference is not None:
         text = 'no law: mean of the other readings at the same pressure'
-        rows.append((text, DASH, *_errors(found.selection.reference), DASH, ''))
+        rows.append((text, DASH, *errors(selection.reference), DASH, ''))
     return Table(('law', 'parameters', 'RMS [N]', 'mean deviation [N]', 'off [%]', 'condition', ''), rows, (0, 6))
-
-
-def _errors(validation: CrossValidation) -> tuple[str, str, str]:
-    return number(validation.rms), number(validation.mean_deviation), number(100.0 * validation.error, 1)
-
-
-def _ladder_row(score: LawScore, found: Identification) -> tuple[str, ...]:
-    name, parameters = f'{score.law.name} ({score.law.formula})', str(len(score.law.parameters))
-    if score.validation is None or score.fit is None:
-        return name, parameters, DASH, DASH, DASH, DASH, score.why_not
-    marks = ['recommended'] if score is found.selection.best else []
-    marks += ['saved'] if score.fit is found.selection.fit else []
-    return name, parameters, *_errors(score.validation), number(score.fit.condition_number, 1), ', '.join(marks)
 
 
 def _parameter_table(found: Identification) -> Table:
@@ -121,19 +110,16 @@ def _parameter_table(found: Identification) -> Table:
 
 def _correlation_table(found: Identification) -> Table:
     names = [p.name for p in found.selection.law.parameters]
-    rows = [
-        (name, *(number(float(x), 3, signed=True) for x in row))
-        for name, row in zip(names, found.selection.fit.correlation, strict=True)
-    ]
+    correlation = zip(names, found.selection.fit.correlation.tolist(), strict=True)
+    rows = [(name, *(number(value, 3, signed=True) for value in values)) for name, values in correlation]
     return Table(('correlation', *names), rows, (0,))
 
 
 def _data_table(found: Identification) -> Table:
-    rows = []
-    for file in found.data.sources.files:
-        total, used = found.data.prepared.total.get(file.name), found.data.prepared.used.get(file.name)
-        share = 'not used: see the warnings' if total is None or used is None else f'{used} of {total}'
-        rows.append((file.name, share, file.sha256))
+    total = found.data.prepared.total
+    used = {name: f'{count} of {total[name]}' for name, count in found.data.prepared.used.items()}
+    files = found.data.sources.files
+    rows = [(file.name, used.get(file.name, 'not used: see the warnings'), file.sha256) for file in files]
     return Table(('source', 'samples used', 'SHA-256'), rows, (0, 1, 2))
 
 
@@ -194,15 +180,16 @@ def _draw_readings(ax: Axes, shown: _FittedReadings, x: FloatArray, y: FloatArra
 
 def fitted_law_figure(shown: _FittedReadings) -> Plot:
     """Law over pressure with its band, and the readings (as Figure 24)."""
-    levels, size = shown.found.levels, shown.size
+    levels, size, are_samples = shown.found.levels, shown.size, shown.readings.are_samples
     title = 'Friction over pressure, law and readings'
     if shown.readings.left_out_by == 'pressure':
         title = f'Error of the law at a pressure left out of the fit: at most {100.0 * worst_left_out(levels):.1f} %'
     figure, ax = style.new_figure(title, 4.4)
-    if shown.readings.are_samples:
-        pressure, fitted, std = np.array([(level.pressure / BAR, level.fitted, level.std) for level in levels]).T
+    at_levels = [(level.pressure / BAR, level.measured, level.fitted, level.std) for level in levels]
+    x, measured, fitted, std = np.array(at_levels).T
+    if are_samples:
         look = {'fmt': 's', 'color': style.BLACK, 'ms': 5.0, 'capsize': 3.0, 'zorder': 4}
-        ax.errorbar(pressure, fitted / size, BAND_95 * std / size, **look, label='law at the mean, and 95 % band')
+        ax.errorbar(x, fitted / size, BAND_95 * std / size, **look, label='law at the mean, and 95 % band')
     else:
         highest = max(shown.seal.pressure_max, float(shown.readings.seal_pressure.max()))
         pressure = np.linspace(min(shown.seal.pressure_min, highest), highest, 201)
@@ -210,10 +197,14 @@ def fitted_law_figure(shown: _FittedReadings) -> Plot:
         style.fill_band(ax, pressure / BAR, fitted / size, BAND_95 * std / size, label='95 % band')
         ax.plot(pressure / BAR, fitted / size, color=style.BLACK, lw=1.8, label='law')
     _draw_readings(ax, shown, shown.pressure, shown.measured / size)
-    if not shown.readings.are_samples:
-        x, y = np.array([(level.pressure / BAR, level.measured / size) for level in levels]).T
-        ax.plot(x, y, 'D', ms=6.0, color=style.BLACK, mec='white', label='measured')
-    return finished('fig24_model_over_pressure', figure, ax, PRESSURE_LABEL, f'friction of all seals [{shown.unit}]')
+    if not are_samples:
+        ax.plot(x, measured / size, 'D', ms=6.0, color=style.BLACK, mec='white', label='measured')
+    return _over_pressure('fig24_model_over_pressure', figure, ax, shown.unit)
+
+
+def _over_pressure(name: str, figure: Figure, ax: Axes, unit: str) -> Plot:
+    labels = {'xlabel': PRESSURE_LABEL, 'ylabel': f'friction of all seals [{unit}]'}
+    return finished(name, figure, ax, ylim=(0.0, None), **labels)
 
 
 def agreement_figure(shown: _FittedReadings) -> Plot:
@@ -225,9 +216,8 @@ def agreement_figure(shown: _FittedReadings) -> Plot:
     style.fill_band(ax, line / size, line / size, BAND_95 * quality.uncertainty.std(line) / size, label='95 % band')
     ax.plot(line / size, line / size, color=style.BLACK, lw=1.2, label='equal')
     _draw_readings(ax, shown, shown.fitted / size, shown.measured / size)
-    ax.set(xlim=(0.0, None), xlabel=f'law [{shown.unit}]', ylabel=f'measured, all seals [{shown.unit}]')
-    style.legend_above(ax)
-    return Plot('measured_against_model', figure)
+    labels = {'xlabel': f'law [{shown.unit}]', 'ylabel': f'measured, all seals [{shown.unit}]'}
+    return finished('measured_against_model', figure, ax, xlim=(0.0, None), **labels)
 
 
 def out_of_sample_figure(found: Identification) -> Plot:
@@ -248,14 +238,13 @@ def out_of_sample_figure(found: Identification) -> Plot:
     half = BAND_95 * found.quality.uncertainty.std(validation.predicted) / size
     style.fill_band(axes[1], order.astype(float), np.zeros(used.count), half, alpha=0.25, label='95 % band', step='mid')
     axes[0].set_ylabel(f'measured - predicted [{unit}]')
-    style.legend_above(axes[1])
-    return Plot('residuals', figure)
+    return finished('residuals', figure, axes[1])
 
 
 def ladder_figure(found: Identification) -> Plot:
     """Out-of-sample error of each law."""
-    scored = [(score, score.validation) for score in found.selection.scores if score.validation is not None]
-    errors = [100.0 * validation.error for _, validation in scored]
+    scored = [(score, 100.0 * score.validation.error) for score in found.selection.scores if score.validation]
+    errors = [error for _, error in scored]
     figure, ax = style.new_figure('Error of each law on readings left out of its fit', 1.5 + 0.33 * len(scored))
     colours = [style.GREEN if score is found.selection.best else style.SKY for score, _ in scored]
     bars = ax.barh(range(len(scored)), errors, color=colours, height=0.65)
@@ -264,12 +253,11 @@ def ladder_figure(found: Identification) -> Plot:
     ax.invert_yaxis()
     ax.grid(visible=False, axis='y')
     ax.set(xlim=(None, 1.12 * max(errors)), xlabel='sum of the deviations over sum of the measured friction [%]')
-    if found.selection.reference is not None:
-        reference = 100.0 * found.selection.reference.error
-        label = f'mean of the other tests, no law: {reference:.1f} %'
-        ax.axvline(reference, color=style.VERMILLION, ls='--', label=label)
-        style.legend_above(ax)
-    return Plot('ladder', figure)
+    if found.selection.reference is None:
+        return Plot('ladder', figure)
+    reference = 100.0 * found.selection.reference.error
+    ax.axvline(reference, color=style.VERMILLION, ls='--', label=f'mean of the other tests, no law: {reference:.1f} %')
+    return finished('ladder', figure, ax)
 
 
 def velocity_cloud_figure(shown: _FittedReadings) -> Plot:
@@ -277,14 +265,14 @@ def velocity_cloud_figure(shown: _FittedReadings) -> Plot:
     figure, ax = style.new_figure('Friction over velocity', 4.2)
     chosen = shown.dots
     velocity, direction = shown.readings.at.velocity[chosen], shown.readings.at.direction[chosen] / shown.size
-    look = {'marker': 'o', 'ls': '', 'mew': 0.0}
-    label = 'measured, offset removed'
-    ax.plot(velocity, direction * shown.measured[chosen], color=style.BLUE, ms=2.5, alpha=0.25, label=label, **look)
-    ax.plot(velocity, direction * shown.fitted[chosen], color=style.BLACK, ms=2.0, alpha=0.35, label='law', **look)
+    for friction, look in (
+        (shown.measured, {'color': style.BLUE, 'ms': 2.5, 'alpha': 0.25, 'label': 'measured, offset removed'}),
+        (shown.fitted, {'color': style.BLACK, 'ms': 2.0, 'alpha': 0.35, 'label': 'law'}),
+    ):
+        ax.plot(velocity, direction * friction[chosen], 'o', mew=0.0, **look)
     style.zero_lines(ax, vertical=True)
-    ax.set(xlabel='rod velocity [m/s]', ylabel=f'friction of all seals [{shown.unit}]')
-    style.legend_above(ax)
-    return Plot('friction_over_velocity', figure)
+    labels = {'xlabel': 'rod velocity [m/s]', 'ylabel': f'friction of all seals [{shown.unit}]'}
+    return finished('friction_over_velocity', figure, ax, **labels)
 
 
 def static_figure(shown: _FittedReadings, breakaway: FrictionReadings) -> Plot:
@@ -303,7 +291,7 @@ def static_figure(shown: _FittedReadings, breakaway: FrictionReadings) -> Plot:
             line = np.linspace(float(pressure.min()), float(pressure.max()), 101) / BAR
             curve = np.polyval(np.polyfit(pressure / BAR, friction, 2), line)
             ax.plot(line, curve / size, color=colour, lw=1.8, label=f'{name}, second order')
-    return finished('fig16_static_and_dynamic', figure, ax, PRESSURE_LABEL, f'friction of all seals [{unit}]')
+    return _over_pressure('fig16_static_and_dynamic', figure, ax, unit)
 
 
 def fitted_coefficient_figure(shown: _FittedReadings, ring: Ring) -> Plot:
@@ -322,20 +310,19 @@ def fitted_coefficient_figure(shown: _FittedReadings, ring: Ring) -> Plot:
 
 def computed_normal_force_figure(shown: _FittedReadings, ring: Ring) -> Plot:
     """Normal over axial force (as Figure 19)."""
-    normal, area = normal_forces(shown.readings.at.pressure, *ring), projected_area(ring.geometry)
-    axial = shown.readings.at.pressure * area
-    order = np.argsort(axial.ravel(), kind='stable')
-    x, y = axial.ravel()[order], normal.ravel()[order]
+    normal, area, law = normal_forces(shown.readings.at.pressure, *ring), projected_area(ring.geometry), ring[1]
+    axial = (shown.readings.at.pressure * area).ravel()
+    order = np.argsort(axial, kind='stable')
+    x, y = axial[order], normal.ravel()[order]
     unit, size = force_unit(float(max(x.max(), y.max())))
-    law = ring.normal_force_law
     title = 'Normal over axial force'
     if isinstance(law, AreaDeformationGain):
         title = f'Normal force: {law.area_deformation_gain:.3g} of the axial force, plus {law.radial_force:.3g} N'
     figure, ax = style.new_figure(title, 3.6)
     ax.plot(x / size, y / size, color=style.BLUE, lw=1.8, label='law of the normal force')
     levels = np.array([level.pressure * area for level in shown.found.levels])
-    at_levels = np.interp(levels, x, y)
-    ax.plot(levels / size, at_levels / size, 'o', color=style.BLACK, ms=5.0, label='pressures measured')
+    look = {'color': style.BLACK, 'ms': 5.0, 'label': 'pressures measured'}
+    ax.plot(levels / size, np.interp(levels, x, y) / size, 'o', **look)
     return style.figure_19(figure, ax, unit)
 
 
@@ -354,7 +341,7 @@ def prior_art_readings_figure(shown: _FittedReadings, ring: Ring) -> list[Plot]:
     figure, ax = style.new_figure(f'Prior art is {off.min():.0f} to {off.max():.0f} % above the readings', 4.0)
     ax.plot(pressure / BAR, prior / size, color=style.VERMILLION, lw=1.8, label='prior art, from charts')
     _draw_readings(ax, shown, shown.pressure, shown.measured / size)
-    return [finished('fig17_prior_art_and_tests', figure, ax, PRESSURE_LABEL, f'friction of all seals [{unit}]')]
+    return [_over_pressure('fig17_prior_art_and_tests', figure, ax, unit)]
 
 
 def _same_ring(law: PriorArtChart, ring: Ring) -> bool:

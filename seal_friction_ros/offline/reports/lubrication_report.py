@@ -109,8 +109,9 @@ def write_comparison_page(comparison: Comparison, out: Path) -> tuple[Path, ...]
     rows = [(name, f'{v:.3g}' if isinstance(v, float) else v) for name, v in comparison.numbers().items()]
     table = Table(('number', 'value'), rows, (0,))
     plots = [comparison_figure(comparison), friction_loop_figure(result), film_figure(result)]
-    template = 'lubrication_comparison'
-    return _write_case_page(out, template, plots, result.case, comparison=comparison, number_table=table)
+    return _write_case_page(
+        out, 'lubrication_comparison', plots, result.case, comparison=comparison, number_table=table
+    )
 
 
 @house_style()

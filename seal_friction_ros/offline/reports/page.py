@@ -5,7 +5,7 @@ missing value is an error. A page contains neither time nor place, so the same i
 """
 
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -22,15 +22,22 @@ from seal_friction_ros.offline.work.atomic_file import write_whole
 
 TEMPLATES = Path(__file__).with_name('templates')
 PARAMETER_HEADS = ('parameter', 'value', 'unit', 'meaning')
+Columns = Sequence[tuple[str, Callable[[Any], Any]]]
+"""head of each column, and the function that gives its cell of a record"""
 
 
 class Table(NamedTuple):
-    """A table of a page; the cells are shown as ``str`` makes them."""
+    """A table of a page; a cell is shown as ``str`` of its value."""
 
     heads: Sequence[str]
     rows: Sequence[Sequence[Any]]
-    text_columns: Sequence[int] = ()
-    """columns that hold text, which is aligned left; the others hold numbers"""
+    text_columns: Sequence[int] = ()  # columns that hold text, which is aligned left; the others hold numbers
+
+
+def table_of(records: Iterable[Any], columns: Columns, text_columns: Sequence[int] = ()) -> Table:
+    """Table with a row for each record."""
+    heads, cells = zip(*columns, strict=True)
+    return Table(heads, [[cell(record) for cell in cells] for record in records], text_columns)
 
 
 @dataclass(frozen=True)
@@ -39,18 +46,14 @@ class ReportSummary:
 
     page: Path
     figures: tuple[Path, ...]
-    numbers: dict[str, Any]
-    """plain types for JSON; None for a missing number"""
+    numbers: dict[str, Any]  # plain types for JSON; None for a missing number
 
 
 def parameter_rows(record: Any, prefix: str = '') -> list[tuple[Any, ...]]:
     """Name, value, unit and meaning of each described field of a record, for a `Table` with `PARAMETER_HEADS`."""
-    rows = []
-    for name, meaning in meanings(record).items():
-        value = getattr(record, name)
-        shown = f'{value:.10g}' if isinstance(value, float) else value
-        rows.append((prefix + name, shown, meaning.unit, meaning.description))
-    return rows
+    values = {name: getattr(record, name) for name in meanings(record)}
+    shown = {name: f'{value:.10g}' if isinstance(value, float) else value for name, value in values.items()}
+    return [(prefix + name, shown[name], known.unit, known.description) for name, known in meanings(record).items()]
 
 
 @cache

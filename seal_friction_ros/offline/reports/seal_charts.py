@@ -15,7 +15,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, PSI
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, Seal, actuator_friction
-from seal_friction_ros.core.friction.geometry import SealGeometry, contact_length, projected_area, squeeze, stretch
+from seal_friction_ros.core.friction.geometry import contact_length, projected_area, squeeze, stretch
 from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
@@ -47,10 +47,8 @@ class ChartsSummary:
     figures: tuple[Path, ...]
     seal: str
     seal_count: int
-    pressures: tuple[float, ...]
-    """[Pa, gauge]"""
-    coulomb_friction: tuple[float, ...]
-    """[N] of all ``seal_count`` seals, at each of ``pressures``"""
+    pressures: tuple[float, ...]  # [Pa, gauge]
+    coulomb_friction: tuple[float, ...]  # [N] of all ``seal_count`` seals, at each of ``pressures``
     measured: tuple[float, ...]
     """[N] mean dynamic friction of the tests of the thesis at each of ``pressures``; empty for another seal"""
 
@@ -105,8 +103,12 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
         shown = charted_seal(parse_seal(document := read_yaml(seal)))
     except ValueError as error:
         raise ValueError(str(error) if str(error).startswith(str(seal)) else f'{seal}: {error}') from None
-    pressures, measured = _compared(shown)
-    law = shown.seal.coulomb_law
+    law, normal, dimensions = shown.seal.coulomb_law, None, None
+    if isinstance(law, PhysicsBased):  # normal force of one seal without pressure [N]: of the law, and of Table 4
+        of_table = thesis_columns('normal_force', normal_force_lbf=LBF)[0]
+        normal = law.normal_force_law.normal_force(0.0, law.projected_area), float(of_table[0])
+    if isinstance(law, PhysicsBased | PriorArtChart):
+        dimensions = {f.__name__: f(law.geometry) for f in (squeeze, stretch, projected_area, contact_length)}
     figures = write_page(
         out,
         'seal',
@@ -114,12 +116,13 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
         shown=shown,
         source=document.get('source', ''),
         is_physics_based=isinstance(law, PhysicsBased),
-        dimensions=_dimensions(law.geometry) if isinstance(law, PhysicsBased | PriorArtChart) else None,
-        normal_without_pressure=_normal_without_pressure(shown),
+        dimensions=dimensions,
+        normal_without_pressure=normal,
         state_pressure_of_thesis=STATE_PRESSURE,
         friction_table=_friction_table(shown),
         document=seal_text(document),
     )
+    pressures, measured = _compared(shown)
     frictions = tuple(shown.friction(pressure).coulomb_friction for pressure in pressures)
     return ChartsSummary(out, figures, shown.seal.name, len(shown.mounted), pressures, frictions, measured)
 
@@ -153,20 +156,6 @@ def _compared(shown: ChartedSeal) -> tuple[tuple[float, ...], tuple[float, ...]]
         return tuple(np.linspace(shown.seal.pressure_min, shown.seal.pressure_max, 11).tolist()), ()
     levels, means = mean_dynamic_friction()
     return tuple(levels.tolist()), tuple(means.tolist())
-
-
-def _normal_without_pressure(shown: ChartedSeal) -> tuple[float, float] | None:
-    """Normal force of one seal without pressure [N]: of the law, and of Table 4; None for another seal or law."""
-    law = shown.seal.coulomb_law
-    if not (shown.is_thesis_seal and isinstance(law, PhysicsBased)):
-        return None
-    (normal,) = thesis_columns('normal_force', normal_force_lbf=LBF)
-    return law.normal_force_law.normal_force(0.0, law.projected_area), float(normal[0])
-
-
-def _dimensions(geometry: SealGeometry) -> dict[str, float]:
-    """Squeeze and stretch [-], projected area [m^2] and contact length [m]."""
-    return {f.__name__: f(geometry) for f in (squeeze, stretch, projected_area, contact_length)}
 
 
 def _friction_table(shown: ChartedSeal) -> Table:
@@ -235,8 +224,8 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     """Law over pressure with its band, and the readings of the thesis (Figure 24)."""
     pressures = shown.chart_pressures
     frictions = [shown.friction(p) for p in pressures]
-    coulomb = np.array([f.coulomb_friction for f in frictions])
-    half = BAND_95 * np.array([f.coulomb_friction_std for f in frictions])
+    values = np.array([(f.coulomb_friction, f.coulomb_friction_std, f.stiction) for f in frictions])
+    coulomb, std, stiction = values.T
     unit, size = force_unit(float(coulomb[-1]))
     compared, measured = _compared(shown)
     if measured:
@@ -246,14 +235,13 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     else:
         title = f'Coulomb friction reaches {coulomb[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
     figure, ax = style.new_figure(title, 4.4)
-    style.fill_band(ax, pressures / BAR, coulomb / size, half / size, label=f'95 % band (± {BAND_95} std)')
+    style.fill_band(ax, pressures / BAR, coulomb / size, BAND_95 * std / size, label=f'95 % band (± {BAND_95} std)')
     ax.plot(pressures / BAR, coulomb / size, color=style.BLUE, lw=1.8, label='Coulomb friction, model')
-    breakaway = coulomb + np.array([f.stiction for f in frictions])
-    ax.plot(pressures / BAR, breakaway / size, color=style.ORANGE, ls='--', label='breakaway force, model')
+    ax.plot(pressures / BAR, (coulomb + stiction) / size, color=style.ORANGE, ls='--', label='breakaway force, model')
     if shown.is_thesis_seal:
         _draw_readings(ax, size)
-    ax.set(xlim=(-0.01 * pressures[-1] / BAR, None), ylim=(0.0, None))
-    ax.set(xlabel=PRESSURE_LABEL, ylabel=f'friction of {shown.count_text} [{unit}]')
+    ylabel = f'friction of {shown.count_text} [{unit}]'
+    ax.set(xlim=(-0.01 * pressures[-1] / BAR, None), ylim=(0.0, None), xlabel=PRESSURE_LABEL, ylabel=ylabel)
     ax.legend(loc='upper left' if coulomb[-1] > coulomb[0] else 'best')
     return Plot('fig24_model_over_pressure', figure)
 
@@ -277,15 +265,13 @@ def sliding_state_figure(shown: ChartedSeal) -> Plot:
     ax.plot(velocity / INCH, friction / size, color=style.BLUE, lw=1.8, drawstyle='steps-mid')
     style.zero_lines(ax, vertical=True)
     ax.set(xlabel='rod velocity [in/s]', ylabel=f'friction of {shown.count_text} [{unit}]')
-    above = ax.secondary_xaxis('top', functions=(lambda inch: inch * 25.4, lambda mm: mm / 25.4))
-    above.set_xlabel('[mm/s]')
+    ax.secondary_xaxis('top', functions=(lambda inch: inch * 25.4, lambda mm: mm / 25.4)).set_xlabel('[mm/s]')
     return Plot('fig22_state_1', figure)
 
 
 def rest_state_figure(shown: ChartedSeal) -> Plot:
     """Friction over force sum at rest (Figure 23)."""
-    pressure = shown.state_pressure
-    friction = shown.friction(pressure)
+    pressure, friction = shown.state_pressure, shown.friction(shown.state_pressure)
     coulomb = friction.coulomb_friction
     swept = np.linspace(-2.0 * coulomb, 2.0 * coulomb, 2001)
     unit, size = force_unit(coulomb)
@@ -298,9 +284,8 @@ def rest_state_figure(shown: ChartedSeal) -> Plot:
     for threshold in (-coulomb, coulomb):
         ax.axvline(threshold / size, color=style.VERMILLION, lw=0.9, ls=':')
     style.zero_lines(ax, vertical=True)
-    ax.set(xlabel=f'force sum [{unit}]', ylabel=f'friction of {shown.count_text} [{unit}]')
-    style.legend_above(ax)
-    return Plot('fig23_states_2_and_3', figure)
+    labels = {'xlabel': f'force sum [{unit}]', 'ylabel': f'friction of {shown.count_text} [{unit}]'}
+    return finished('fig23_states_2_and_3', figure, ax, **labels)
 
 
 def prior_art_table_figure() -> Plot:
@@ -309,7 +294,8 @@ def prior_art_table_figure() -> Plot:
     figure, ax = style.new_figure('Prior art: friction of one seal read from charts', 3.6)
     ax.plot(pressure / BAR, friction, 'o-', color=style.VERMILLION, ms=5.0, label='Table 3')
     ax.plot(pressure / BAR, part, 's--', color=style.ORANGE, ms=4.0, label='share due to pressure')
-    return finished('fig12_prior_art', figure, ax, PRESSURE_LABEL, 'friction of one seal [N]')
+    labels = {'xlabel': PRESSURE_LABEL, 'ylabel': 'friction of one seal [N]'}
+    return finished('fig12_prior_art', figure, ax, ylim=(0.0, None), **labels)
 
 
 def prior_art_tests_figure() -> Plot:

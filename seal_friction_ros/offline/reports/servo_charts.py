@@ -1,13 +1,15 @@
 """Charts of a simulated position servo with and without seal friction: the flat peaks of Figure 25 of the thesis."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
-from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
 from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS
 from seal_friction_ros.core.servo.motions import Sine
@@ -15,7 +17,7 @@ from seal_friction_ros.core.servo.position_servo import ServoParameters, Traject
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, tracking_peak, tracking_rms
 from seal_friction_ros.files import load_seals
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit, number
 from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, parameter_rows, write_page
 
@@ -27,28 +29,21 @@ SHOWN_PERIODS = 2  # in the figures
 class ServoTracking:
     """Tracking of one servo."""
 
-    rms: float
-    """[m] root mean square of the tracking error"""
-    peak: float
-    """[m] largest tracking error"""
-    reached: float
-    """[m] amplitude of the rod"""
-    dwell: float
-    """[s] mean rest per reversal; the simulated rod rests at exactly 0 m/s"""
-    dwell_share: float
-    """[-] of a period"""
+    rms: float  # [m] root mean square of the tracking error
+    peak: float  # [m] largest tracking error
+    reached: float  # [m] amplitude of the rod
+    dwell: float  # [s] mean rest per reversal; the simulated rod rests at exactly 0 m/s
+    dwell_share: float  # [-] of a period
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ServoChartsSummary:
     """Files of the charts, and their numbers."""
 
     page: Path
     figures: tuple[Path, ...]
-    amplitude: float
-    """[m] of the reference"""
-    frequency: float
-    """[Hz] of the reference"""
+    amplitude: float  # [m] of the reference
+    frequency: float  # [Hz] of the reference
     seals: int
     with_friction: ServoTracking
     without_friction: ServoTracking
@@ -57,10 +52,8 @@ class ServoChartsSummary:
 class FollowedWave(NamedTuple):
     """A settled servo that follows a wave; all arrays of shape (n,)."""
 
-    time: FloatArray
-    """[s] since the first sample"""
-    reference: FloatArray
-    """[m]"""
+    time: FloatArray  # [s] since the first sample
+    reference: FloatArray  # [m]
     trajectory: Trajectory
     tracking: ServoTracking
 
@@ -119,13 +112,7 @@ def write_servo_charts(
         CHART_PERIODS=CHART_PERIODS,
     )
     return ServoChartsSummary(
-        page=out,
-        figures=figures,
-        amplitude=wave.amplitude,
-        frequency=wave.frequency,
-        seals=len(servo.seals),
-        with_friction=rubbing.tracking,
-        without_friction=free.tracking,
+        out, figures, wave.amplitude, wave.frequency, len(servo.seals), rubbing.tracking, free.tracking
     )
 
 
@@ -151,22 +138,25 @@ def _parameter_table(parameters: ServoParameters, wave: Sine) -> Table:
 
 
 def _shown_periods(run: FollowedWave, wave: Sine) -> slice:
-    step = run.time[1] - run.time[0]
-    return slice(0, round(SHOWN_PERIODS / (wave.frequency * step)) + 1)
+    return slice(0, round(SHOWN_PERIODS / (wave.frequency * (run.time[1] - run.time[0]))) + 1)
+
+
+def _prepare_time_axes(axes: Sequence[Axes], time: FloatArray, at_rest: BoolArray, label: str) -> None:
+    style.shade(axes[0], time, at_rest, label)
+    style.shade(axes[1], time, at_rest)
+    axes[1].set(xlabel='time [s]', xlim=(time[0], time[-1]))
 
 
 def figure_25(rubbing: FollowedWave, free: FollowedWave, wave: Sine) -> Plot:
     """Position with and without friction against the reference (Figure 25), and the tracking errors."""
-    part = _shown_periods(rubbing, wave)
-    time, dwell = rubbing.time[part], rubbing.tracking.dwell
-    share = 100.0 * rubbing.tracking.dwell_share
+    dwell, share = rubbing.tracking.dwell, 100.0 * rubbing.tracking.dwell_share
     title = f'Friction flattens the peaks: a rest of {dwell / MS:.1f} ms at each reversal, {share:.0f} % of a period'
     if not dwell:
         title = 'The rod reverses without a rest'
     figure, axes = style.new_figure(title, 5.6, nrows=2, sharex=True, gridspec_kw={'height_ratios': [3.0, 1.6]})
-    at_rest = rubbing.trajectory.velocity[part] == 0.0
-    for ax, label in zip(axes, ('at rest, with friction', None), strict=True):
-        style.shade(ax, time, at_rest, label)
+    part = _shown_periods(rubbing, wave)
+    time = rubbing.time[part]
+    _prepare_time_axes(axes, time, rubbing.trajectory.velocity[part] == 0.0, 'at rest, with friction')
     unit, size = length_unit(max(rubbing.tracking.peak, free.tracking.peak))
     for run, colour, name in ((free, style.ORANGE, 'without friction'), (rubbing, style.BLUE, 'with friction')):
         position, reference = run.trajectory.position[part], run.reference[part]
@@ -175,35 +165,25 @@ def figure_25(rubbing: FollowedWave, free: FollowedWave, wave: Sine) -> Plot:
         style.thin_line(axes[1], time, (reference - position) / size, color=colour, label=label)
     look = {'color': style.BLACK, 'lw': 1.1, 'ls': ':', 'label': 'reference'}
     style.thin_line(axes[0], time, rubbing.reference[part] / MM, **look)
-    axes[0].set_ylabel('position [mm]')
-    axes[1].set(ylabel=f'reference less\nposition [{unit}]', xlabel='time [s]', xlim=(time[0], time[-1]))
-    for ax in axes:
-        style.legend_above(ax)
-    return Plot('fig25_servo_with_and_without_friction', figure)
+    axes[1].set_ylabel(f'reference less\nposition [{unit}]')
+    return finished('fig25_servo_with_and_without_friction', figure, *axes, ylabel='position [mm]')
 
 
 def forces_figure(rubbing: FollowedWave, wave: Sine) -> Plot:
     """Force sum and friction force against the breakaway force, and the chamber pressures."""
     part = _shown_periods(rubbing, wave)
     time, trajectory = rubbing.time[part], Trajectory(*(column[part] for column in rubbing.trajectory))
-    breakaway = trajectory.breakaway_force
     unit, size = force_unit(float(np.abs(trajectory.force_sum).max()))
-    title = f'The seals hold the rod up to a force sum of {breakaway.max() / size:.3g} {unit}'
+    title = f'The seals hold the rod up to a force sum of {trajectory.breakaway_force.max() / size:.3g} {unit}'
     figure, axes = style.new_figure(title, 5.2, nrows=2, sharex=True)
-    for ax, label in zip(axes, ('at rest', None), strict=True):
-        style.shade(ax, time, trajectory.velocity == 0.0, label)
-    for values, look in (
-        (breakaway, {'color': style.VERMILLION, 'lw': 1.1, 'ls': ':', 'label': 'breakaway force'}),
-        (-breakaway, {'color': style.VERMILLION, 'lw': 1.1, 'ls': ':'}),
-        (trajectory.force_sum, {'color': style.BLACK, 'lw': 1.2, 'label': 'force sum'}),
-        (trajectory.friction_force, {'color': style.BLUE, 'lw': 1.6, 'label': 'friction force'}),
-    ):
-        style.thin_line(axes[0], time, values / size, **look)
+    _prepare_time_axes(axes, time, trajectory.velocity == 0.0, 'at rest')
+    threshold = {'color': style.VERMILLION, 'lw': 1.1, 'ls': ':'}
+    style.thin_line(axes[0], time, trajectory.breakaway_force / size, label='breakaway force', **threshold)
+    style.thin_line(axes[0], time, -trajectory.breakaway_force / size, **threshold)
+    style.thin_line(axes[0], time, trajectory.force_sum / size, color=style.BLACK, lw=1.2, label='force sum')
+    style.thin_line(axes[0], time, trajectory.friction_force / size, color=style.BLUE, lw=1.6, label='friction force')
     style.zero_lines(axes[0])
-    axes[0].set_ylabel(f'force [{unit}]')
     style.thin_line(axes[1], time, trajectory.pressure_a / BAR, color=style.BLUE, label='chamber a')
     style.thin_line(axes[1], time, trajectory.pressure_b / BAR, color=style.ORANGE, label='chamber b')
-    axes[1].set(ylabel='pressure [bar, gauge]', xlabel='time [s]', xlim=(time[0], time[-1]))
-    for ax in axes:
-        style.legend_above(ax)
-    return Plot('forces_and_pressures', figure)
+    axes[1].set_ylabel('pressure [bar, gauge]')
+    return finished('forces_and_pressures', figure, *axes, ylabel=f'force [{unit}]')

@@ -1,7 +1,6 @@
 """Report of a measurement of several cycles, evaluated as in the spool-valve paper."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -9,12 +8,14 @@ from seal_friction_ros.core.foundation.units import MM
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation, SpoolFriction, evaluate_cycles
 from seal_friction_ros.offline.identification.sources import column_in_si, table_rows
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.page import ReportSummary, write_page
 
-TIME_UNITS = {'s': 's', 'ms': 'ms'}
-LENGTH_UNITS = {'m': 'm', 'mm': 'mm', 'um': 'um'}
-FORCE_UNITS = {'n': 'N', 'kn': 'kN', 'lbf': 'lbf'}
+COLUMN_UNITS = {
+    'time': {'s': 's', 'ms': 'ms'},
+    'displacement': {'m': 'm', 'mm': 'mm', 'um': 'um'},
+    'force': {'n': 'N', 'kn': 'kN', 'lbf': 'lbf'},
+}
 
 
 @house_style()
@@ -34,12 +35,9 @@ def write_spool_report(
         ValueError: The table cannot be read or evaluated, or the page cannot be written.
     """
     rows = table_rows(table)
-    names = list(rows[0]) if rows else []
     if len(rows) < 100:
         raise ValueError(f'{table}: {len(rows)} rows are too few for {settings.cycles} cycles')
-    time = column_in_si(table, rows, names, 'time', TIME_UNITS)
-    displacement = column_in_si(table, rows, names, 'displacement', LENGTH_UNITS)
-    force = column_in_si(table, rows, names, 'force', FORCE_UNITS)
+    time, displacement, force = (column_in_si(table, rows, *column) for column in COLUMN_UNITS.items())
     steps = np.diff(time)
     if not (np.isfinite(steps).all() and steps.min() > 0.5 * np.median(steps) and steps.max() < 1.5 * np.median(steps)):
         raise ValueError(
@@ -49,22 +47,8 @@ def write_spool_report(
         found = evaluate_cycles(time, displacement, force, settings, reference)
     except ValueError as error:
         raise ValueError(f'{table}: {error}') from None
-    numbers = spool_numbers(found)
-    figures = write_page(
-        out,
-        'spool_evaluation',
-        [displacement_figure(found, settings)],
-        name=table.name,
-        numbers=numbers,
-        settings=settings,
-    )
-    return ReportSummary(out, figures, numbers)
-
-
-def spool_numbers(found: SpoolFriction) -> dict[str, Any]:
-    """The numbers for JSON."""
     up = found.velocity > 0.0
-    return {
+    numbers = {
         'reference_force_N': found.reference_force,
         'resonance_Hz': found.resonance,
         'stroke_m': float(np.ptp(found.displacement)),
@@ -72,6 +56,9 @@ def spool_numbers(found: SpoolFriction) -> dict[str, Any]:
         'highest_normalised': float(found.normalised[up].max()) if up.any() else None,
         'lowest_normalised': float(found.normalised[~up].min()) if (~up).any() else None,
     }
+    plots = [displacement_figure(found, settings)]
+    figures = write_page(out, 'spool_evaluation', plots, name=table.name, numbers=numbers, settings=settings)
+    return ReportSummary(out, figures, numbers)
 
 
 def displacement_figure(found: SpoolFriction, settings: SpoolEvaluation) -> Plot:
@@ -85,8 +72,6 @@ def displacement_figure(found: SpoolFriction, settings: SpoolEvaluation) -> Plot
     top.plot(x, found.normalised, color=style.BLUE, lw=1.8, label='filtered and averaged')
     top.axvspan(-half, half, color=style.GREY, alpha=0.12, lw=0, label='range of the reference force')
     style.zero_lines(top)
-    top.set_ylabel('normalised friction [-]')
-    style.legend_above(top)
     bottom.plot(x, found.velocity / MM, color=style.ORANGE)
     bottom.set(ylabel='speed [mm/s]', xlabel='displacement from the middle of the stroke [mm]')
-    return Plot('friction_over_displacement', figure)
+    return finished('friction_over_displacement', figure, top, ylabel='normalised friction [-]')

@@ -16,16 +16,11 @@ THESIS_SEAL = 'ms28775_114'  # names of seals and cases that are compared with t
 class ThesisContact(NamedTuple):
     """Contact stress at one pressure, one of Figures B-7 to B-11 of the thesis."""
 
-    normal_force: float
-    """[N] sum over the cells"""
-    peak_stress: float
-    """[Pa]"""
-    width: float
-    """[m]"""
-    position: FloatArray
-    """[m] of the cells, from the upstream end of the contact"""
-    stress: FloatArray
-    """[Pa]"""
+    normal_force: float  # [N] sum over the cells
+    peak_stress: float  # [Pa]
+    width: float  # [m]
+    position: FloatArray  # [m] of the cells, from the upstream end of the contact
+    stress: FloatArray  # [Pa]
 
 
 def thesis_columns(table: str, **units: float) -> list[FloatArray]:

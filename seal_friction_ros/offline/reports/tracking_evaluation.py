@@ -30,54 +30,33 @@ SAME = 0.05  # periods, amplitudes and shapes that differ by a smaller share are
 class Periodicity(NamedTuple):
     """Period of a reference."""
 
-    period: float
-    """[s]"""
-    crossings: FloatArray
-    """[s] since the first sample: upward crossings of a level slightly above the middle"""
+    period: float  # [s]
+    crossings: FloatArray  # [s] since the first sample: upward crossings of a level slightly above the middle
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingStretch:
     """Tracking over a stretch of unchanged configuration, without the settling time."""
 
-    first: int
-    """index of the first evaluated estimate"""
-    last: int
-    """index of the last evaluated estimate"""
-    start: float
-    """[s] time of the first, since the first estimate of the bag"""
-    end: float
-    """[s] time of the last"""
-    settling: float
-    """[s] left out before"""
-    settings: FeedForwardSettings | None
-    """None if they are not in the bag"""
-    standstill: float
-    """[m/s] speed at and below which the rod rests: ``stick_velocity`` of the estimator"""
-    samples: int
-    """evaluated estimates: those with reference and position"""
-    amplitude: float
-    """[m] of the reference, half peak to peak"""
-    period: float | None
-    """[s] of the reference; None if it is not periodic"""
-    rms: float
-    """[m] root mean square of the tracking error"""
-    peak: float
-    """[m] largest tracking error"""
-    reversals: int
-    """changes of direction of the rod"""
-    dwell: float | None
-    """[s] mean rest per reversal of the rod; None if it does not reverse"""
-    reference_dwell: float | None
-    """[s] the same of the reference, which also passes through standstill"""
-    not_sliding: float | None
-    """[-] share of the estimates of known state that do not slide"""
-    feedforward_peak: float
-    """[N] largest feed-forward; 0.0 without"""
-    rms_change: float | None = None
-    """[%] against the first stretch without feed-forward; None if the reference differs"""
-    dwell_change: float | None = None
-    """[%] the same of the dwell"""
+    first: int  # index of the first evaluated estimate
+    last: int  # index of the last evaluated estimate
+    start: float  # [s] time of the first, since the first estimate of the bag
+    end: float  # [s] time of the last
+    settling: float  # [s] left out before
+    settings: FeedForwardSettings | None  # None if they are not in the bag
+    standstill: float  # [m/s] speed at and below which the rod rests: ``stick_velocity`` of the estimator
+    samples: int  # evaluated estimates: those with reference and position
+    amplitude: float  # [m] of the reference, half peak to peak
+    period: float | None  # [s] of the reference; None if it is not periodic
+    rms: float  # [m] root mean square of the tracking error
+    peak: float  # [m] largest tracking error
+    reversals: int  # changes of direction of the rod
+    dwell: float | None  # [s] mean rest per reversal of the rod; None if it does not reverse
+    reference_dwell: float | None  # [s] the same of the reference, which also passes through standstill
+    not_sliding: float | None  # [-] share of the estimates of known state that do not slide
+    feedforward_peak: float  # [N] largest feed-forward; 0.0 without
+    rms_change: float | None = None  # [%] against the first stretch without feed-forward; None if the reference differs
+    dwell_change: float | None = None  # [%] the same of the dwell
 
     @property
     def has_feedforward(self) -> bool:
@@ -90,8 +69,7 @@ class TrackingEvaluation:
     """Tracking in every stretch of a bag."""
 
     stretches: tuple[TrackingStretch, ...]
-    notes: tuple[str, ...]
-    """notes for the reader"""
+    notes: tuple[str, ...]  # notes for the reader
 
     @property
     def without(self) -> TrackingStretch | None:
@@ -117,7 +95,7 @@ def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
     evaluated = [_evaluate(run, *stretch) for stretch in configuration_stretches(run)]
     found = tuple(stretch for stretch in evaluated if stretch is not None)
     base = TrackingEvaluation(found, ()).without
-    compared = tuple(stretch if base is None else _compared(stretch, base) for stretch in found)
+    compared = tuple(_compared(stretch, base) for stretch in found)
     return TrackingEvaluation(compared, tuple(_notes(compared, base, len(evaluated) - len(found))))
 
 
@@ -126,21 +104,17 @@ def configuration_stretches(run: RecordedRun) -> Iterator[tuple[int, int, Config
 
     The configuration is None before the first one in the bag, and where it cannot be parsed.
     """
-    known = [(0, None), *zip(run.configuration_rows, map(_parsed, run.configurations), strict=True)]
-    changes = [known[0]]
-    for row, configuration in known[1:]:
+    changes: list[tuple[int, Configuration | None]] = [(0, None)]
+    for row, (_, text) in zip(run.configuration_rows, run.configurations, strict=True):
+        try:
+            configuration = parse_snapshot(text).configuration
+        except (ValueError, LookupError, TypeError):
+            configuration = None  # the report shows the text
         if configuration is None or configuration != changes[-1][1]:
             changes.append((row, configuration))
     for (first, configuration), (end, _) in pairwise([*changes, (len(run.time), None)]):
         if end > first:
             yield first, end, configuration
-
-
-def _parsed(change: tuple[float, str]) -> Configuration | None:
-    try:
-        return parse_snapshot(change[1]).configuration
-    except (ValueError, LookupError, TypeError):
-        return None  # the report shows the text
 
 
 def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configuration | None) -> TrackingStretch | None:
@@ -154,13 +128,14 @@ def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configurati
         return None
     repeats = periodicity(run.time[part], run.reference[part])
     if repeats is not None:
-        part = part[run.time[part] < run.time[part[0]] + _whole_periods(run.time[part], repeats.period)]
+        step = float(np.median(np.diff(run.time[part])))
+        whole = math.floor(float(run.time[part[-1]] - run.time[part[0]] + step) / repeats.period + 1e-6)
+        part = part[run.time[part] < run.time[part[0]] + (whole * repeats.period - step / 2.0)]
     time, reference, position = run.time[part], run.reference[part], run.position[part]
     standstill = estimator_settings.stick_velocity
     turns, dwell = _dwell(time, run.velocity[part], standstill)
     _, reference_dwell = _dwell(time[1:], np.diff(reference) / np.diff(time), standstill)
-    known = run.state[part] != FrictionState.UNKNOWN
-    sliding = np.count_nonzero(run.state[part] == FrictionState.SLIDING)
+    known = run.state[part][run.state[part] != FrictionState.UNKNOWN]
     force = run.feedforward_force[part]
     return TrackingStretch(
         first=int(part[0]),
@@ -178,7 +153,7 @@ def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configurati
         reversals=turns,
         dwell=dwell,
         reference_dwell=reference_dwell,
-        not_sliding=1.0 - float(sliding / np.count_nonzero(known)) if known.any() else None,
+        not_sliding=1.0 - float(np.mean(known == FrictionState.SLIDING)) if len(known) else None,
         feedforward_peak=float(np.abs(force[np.isfinite(force)]).max(initial=0.0)),
     )
 
@@ -191,12 +166,6 @@ def _longest_part(run: RecordedRun, first: int, end: int) -> IntArray:
     steps = np.diff(run.time[known])
     parts = np.split(known, np.flatnonzero((steps > MAX_GAP) | (steps <= 0.0)) + 1)
     return max(parts, key=lambda part: float(run.time[part[-1]] - run.time[part[0]]))
-
-
-def _whole_periods(time: FloatArray, period: float) -> float:
-    """Duration of the whole periods within ``time`` [s], to half a sample."""
-    step = float(np.median(np.diff(time)))
-    return math.floor(float(time[-1] - time[0] + step) / period + 1e-6) * period - step / 2.0
 
 
 def _even(time: FloatArray, values: FloatArray) -> tuple[float, FloatArray]:
@@ -226,9 +195,9 @@ def periodicity(time: FloatArray, reference: FloatArray) -> Periodicity | None:
     step, even = _even(time, reference)
     middle, amplitude = (even.max() + even.min()) / 2.0, float(np.ptp(even)) / 2.0
     level = middle + HYSTERESIS * amplitude
-    side = np.where(even > level, 1, 0) - np.where(even < middle - HYSTERESIS * amplitude, 1, 0)
-    outside = np.flatnonzero(side)
-    up = outside[1:][(side[outside[1:]] == 1) & (side[outside[:-1]] == -1)]
+    above = even > level
+    outside = np.flatnonzero(above | (even < middle - HYSTERESIS * amplitude))
+    up = outside[1:][above[outside[1:]] & ~above[outside[:-1]]]
     if len(up) <= MIN_PERIODS:
         return None
     crossings = step * (up - (even[up] - level) / (even[up] - even[up - 1]))
@@ -252,8 +221,8 @@ def _same_reference(one: TrackingStretch, other: TrackingStretch) -> bool:
     return all(a is b if a is None or b is None else math.isclose(a, b, rel_tol=SAME) for a, b in pairs)
 
 
-def _compared(stretch: TrackingStretch, base: TrackingStretch) -> TrackingStretch:
-    if stretch is base or not _same_reference(stretch, base):
+def _compared(stretch: TrackingStretch, base: TrackingStretch | None) -> TrackingStretch:
+    if base is None or stretch is base or not _same_reference(stretch, base):
         return stretch
     return replace(stretch, rms_change=_change(stretch.rms, base.rms), dwell_change=_change(stretch.dwell, base.dwell))
 

@@ -10,7 +10,7 @@ from seal_friction_ros.core.foundation.units import MM, UM
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot
+from seal_friction_ros.offline.reports.figure_style import Plot, finished
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit
 from seal_friction_ros.offline.reports.tracking_evaluation import TrackingEvaluation, TrackingStretch, periodicity
 
@@ -23,10 +23,8 @@ def tracking_plots(run: RecordedRun, evaluation: TrackingEvaluation) -> list[Plo
     shown = [stretch for stretch in (evaluation.without, evaluation.compensated) if stretch is not None]
     if not shown:
         return []
-    plots = [stretches_figure(run, evaluation, shown)]
-    if np.isfinite(run.feedforward_force).any():
-        plots.append(compensation_figure(run, shown))
-    return plots
+    compensation = [compensation_figure(run, shown)] if np.isfinite(run.feedforward_force).any() else []
+    return [stretches_figure(run, evaluation, shown), *compensation]
 
 
 def tracking_summary(evaluation: TrackingEvaluation) -> str:
@@ -83,12 +81,12 @@ def stretches_figure(run: RecordedRun, evaluation: TrackingEvaluation, shown: Se
         style.thin_line(above, time, run.position[part] / MM, color=style.BLUE, lw=1.7, label='position')
         style.thin_line(below, time, (run.reference[part] - run.position[part]) / size, color=style.VERMILLION)
         style.zero_lines(below)
-        below.set_title(_tracking_text(stretch), fontsize=9.0, pad=4.0)
+        dwell = '' if stretch.dwell is None else f'; dwell {1e3 * stretch.dwell:.3g} ms per reversal'
+        text = f'{length_text(stretch.rms)} RMS, peak {length_text(stretch.peak)}{dwell}'
+        below.set_title(text, fontsize=9.0, pad=4.0)
         above.set_xlabel('')
     axes[1, 0].set(ylim=(-1.12 * largest / size, 1.12 * largest / size), ylabel=f'reference less\nposition [{unit}]')
-    axes[0, 0].set_ylabel('position [mm]')
-    style.legend_above(axes[0, 0])
-    return Plot('tracking', figure)
+    return finished('tracking', figure, axes[0, 0], ylabel='position [mm]')
 
 
 def _prepare_panel(ax: Axes, run: RecordedRun, stretch: TrackingStretch, part: slice, count: int) -> FloatArray:
@@ -100,11 +98,6 @@ def _prepare_panel(ax: Axes, run: RecordedRun, stretch: TrackingStretch, part: s
     at_rest = np.isin(run.state[part], (FrictionState.STUCK, FrictionState.BREAKAWAY))
     style.shade(ax, time, at_rest, 'not sliding')
     return time
-
-
-def _tracking_text(stretch: TrackingStretch) -> str:
-    text = f'{length_text(stretch.rms)} RMS, peak {length_text(stretch.peak)}'
-    return text if stretch.dwell is None else f'{text}; dwell {1e3 * stretch.dwell:.3g} ms per reversal'
 
 
 def compensation_figure(run: RecordedRun, shown: Sequence[TrackingStretch]) -> Plot:
@@ -125,6 +118,4 @@ def compensation_figure(run: RecordedRun, shown: Sequence[TrackingStretch]) -> P
         style.thin_line(ax, time, friction, color=style.BLUE, lw=1.5, label='estimated friction force')
         style.thin_line(ax, time, force, color=style.ORANGE, lw=1.5, label='feed-forward')
         style.zero_lines(ax)
-    axes[0, 0].set_ylabel(f'force [{unit}]')
-    style.legend_above(axes[0, 0])
-    return Plot('friction_and_feedforward', figure)
+    return finished('friction_and_feedforward', figure, axes[0, 0], ylabel=f'force [{unit}]')

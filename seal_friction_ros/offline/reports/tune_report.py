@@ -1,5 +1,6 @@
 """Report of a tuning, to check before use of the parameters on a machine."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,10 @@ from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import MM, MS, UM
 from seal_friction_ros.core.servo import closed_loop
-from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS, AxisRun, Performance
-from seal_friction_ros.core.tuning.recorded_axis import NEAR_REVERSAL, Residual
+from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS, AxisRun
+from seal_friction_ros.core.tuning.recorded_axis import NEAR_REVERSAL
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports.figure_style import Plot, house_style
+from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number, relative_change, signed_percent
 from seal_friction_ros.offline.reports.page import Table, write_page
 from seal_friction_ros.offline.tuning.tune import BagTuning, SimulatorTuning
@@ -23,98 +24,69 @@ SHOWN_PERIODS = 2  # of the sine
 SHOWN_REVERSALS = 6  # of a bag
 DOTS = 8000  # in the scatter
 SHADES = (style.SKY, style.BLUE, style.BLACK)  # delay too small, right, too large
-RESIDUALS = (('sliding', 'while sliding'), ('reversal', 'near reversals'))
 TIME_LABEL = 'time since the first reference [s]'
+_REFERENCE: dict[str, Any] = {'color': style.GREY, 'lw': 2.2, 'alpha': 0.6, 'label': 'reference'}
 
 
 @house_style()
 def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[Path, ...]:
-    """Write the page of a tuning; see `write_page`.
-
-    Returns:
-        Paths of the figures.
-
-    Raises:
-        ValueError: The page cannot be written.
-    """
-    shared = {
-        'tuning': tuning,
-        'found': tuning.found,
-        'was': tuning.found.without,
-        'now': tuning.found.nominal,
-        'parameter_table': _parameter_table(tuning),
-        'case_table': _case_table(tuning),
-    }
+    """Write the page of a tuning; result and errors as of `write_page`."""
+    found = tuning.found
+    tables = {'parameter_table': _parameter_table(tuning), 'case_table': _case_table(tuning)}
+    shared = {'tuning': tuning, 'found': found, 'was': found.without, 'now': found.nominal, **tables}
     if isinstance(tuning, SimulatorTuning):
-        problem = tuning.problem
-        performances = [case.outcome for case in tuning.found.cases]
-        return write_page(
-            out,
-            'simulator_tuning',
-            tuning_figures(tuning),
-            worst={name: max(getattr(p, name) for p in performances) for name in ('tracking_rms', 'overshoot')},
-            reversals=sum(p.limit_cycle_reversals for p in performances),
-            settings=problem.settings,
-            whole_delay=problem.whole_delay,
-            loop=closed_loop,
-            **shared,
-        )
-    return write_page(
-        out,
-        'bag_tuning',
-        recorded_axis_figures(tuning),
-        recorded=tuning.track.numbers(),
-        sliding_samples=int(np.count_nonzero(tuning.found.law.sliding)),
-        offset_is_known=bool(np.isfinite(tuning.found.law.offset)),
-        NEAR_REVERSAL=NEAR_REVERSAL,
-        **shared,
-    )
+        outcomes = [case.outcome for case in tuning.found.cases]
+        special: dict[str, Any] = {
+            'worst': {name: max(getattr(o, name) for o in outcomes) for name in ('tracking_rms', 'overshoot')},
+            'reversals': sum(o.limit_cycle_reversals for o in outcomes),
+            'settings': tuning.problem.settings,
+            'whole_delay': tuning.problem.whole_delay,
+            'loop': closed_loop,
+        }
+        return write_page(out, 'simulator_tuning', tuning_figures(tuning), **shared, **special)
+    special = {
+        'recorded': tuning.track.numbers(),
+        'sliding_samples': int(np.count_nonzero(tuning.found.law.sliding)),
+        'offset_is_known': bool(np.isfinite(tuning.found.law.offset)),
+        'NEAR_REVERSAL': NEAR_REVERSAL,
+    }
+    return write_page(out, 'bag_tuning', recorded_axis_figures(tuning), **shared, **special)
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------
 
 
 def _parameter_table(tuning: SimulatorTuning | BagTuning) -> Table:
-    before, now = tuning.task.before, tuning.found.feedforward
-    rows = [
-        (
-            name,
-            f'{getattr(before, name):g}',
-            f'{getattr(now, name):g}',
-            meaning.unit,
-            'tuned' if name in tuning.task.tuned else '',
-            meaning.description,
-        )
-        for name, meaning in meanings(now).items()
-    ]
+    before, now, tuned = tuning.task.before, tuning.found.feedforward, tuning.task.tuned
+    rows = []
+    for name, meaning in meanings(now).items():
+        values = (f'{getattr(settings, name):g}' for settings in (before, now))
+        rows.append((name, *values, meaning.unit, 'tuned' if name in tuned else '', meaning.description))
     return Table(('parameter', 'before', 'now', 'unit', '', 'meaning'), rows, (0, 3, 4, 5))
 
 
+# head of a column -> its value in the result of a case, unit, decimals
+_PERFORMANCE_COLUMNS = {
+    'tracking RMS [µm]': ('tracking_rms', UM, 1),
+    'peak [µm]': ('tracking_peak', UM, 1),
+    'dwell [ms]': ('dwell', MS, 2),
+    'overshoot [µm]': ('overshoot', UM, 1),
+    'reversals at rest': ('limit_cycle_reversals', 1, 0),
+    'largest force [N]': ('largest_force', 1.0, 1),
+    'largest rate [N/ms]': ('largest_force_rate', 1.0 / MS, 1),
+}
+_RESIDUAL_COLUMNS = {'left while sliding [N]': ('sliding', 1.0, 2), 'left near reversals [N]': ('reversal', 1.0, 2)}
+
+
 def _case_table(tuning: SimulatorTuning | BagTuning) -> Table:
-    heads: tuple[str, ...] = ('left while sliding [N]', 'left near reversals [N]')
-    if isinstance(tuning, SimulatorTuning):
-        heads = (
-            'tracking RMS [µm]', 'peak [µm]', 'dwell [ms]', 'overshoot [µm]', 'reversals at rest', 'largest force [N]',
-            'largest rate [N/ms]',
-        )  # fmt: skip
-
-    def cells(outcome: Performance | Residual) -> tuple[Any, ...]:
-        if isinstance(outcome, Residual):
-            return tuple(number(value) for value in outcome)
-        return (
-            number(outcome.tracking_rms / UM, 1),
-            number(outcome.tracking_peak / UM, 1),
-            number(outcome.dwell / MS),
-            number(outcome.overshoot / UM, 1),
-            outcome.limit_cycle_reversals,
-            number(outcome.largest_force, 1),
-            number(outcome.largest_force_rate * MS, 1),
-        )
-
-    rows = [('without', DASH, *cells(tuning.found.without))]
-    for friction_error, delay_error, outcome in tuning.found.cases:
-        rows.append((signed_percent(friction_error), signed_percent(delay_error), *cells(outcome)))
-    return Table(('friction model', 'delay', *heads), rows)
+    columns = _PERFORMANCE_COLUMNS if isinstance(tuning, SimulatorTuning) else _RESIDUAL_COLUMNS
+    rows = [('without', DASH, tuning.found.without)]
+    rows += [(signed_percent(case[0]), signed_percent(case[1]), case.outcome) for case in tuning.found.cases]
+    cells = [
+        (*errors, *(number(getattr(outcome, name) / size, digits) for name, size, digits in columns.values()))
+        for *errors, outcome in rows
+    ]
+    return Table(('friction model', 'delay', *columns), cells)
 
 
 # -- figures of the simulated servo -----------------------------------------------------------------------------------
@@ -124,16 +96,11 @@ def tuning_figures(tuning: SimulatorTuning) -> list[Plot]:
     """Tracking, forces, move and robustness."""
     sine, move, _ = tuning.problem.runs(closed_loop.without_feedforward(tuning.found.feedforward))
     tuned_sine, tuned_move, _ = tuning.problem.runs(tuning.found.feedforward)
-    return [
-        tuned_tracking_figure(tuning, sine, tuned_sine),
-        tuned_force_figure(tuning, tuned_sine),
-        move_figure(tuning, move, tuned_move),
-        robustness_figure(tuning),
-    ]
+    plots = [tuned_tracking_figure(tuning, sine, tuned_sine), tuned_force_figure(tuning, tuned_sine)]
+    return [*plots, move_figure(tuning, move, tuned_move), robustness_figure(tuning)]
 
 
 def _shown_time(tuning: SimulatorTuning) -> tuple[float, float]:
-    """Start and end of the shown periods of the sine [s]."""
     period = 1.0 / tuning.problem.settings.frequency
     return SETTLING_PERIODS * period, (SETTLING_PERIODS + SHOWN_PERIODS) * period
 
@@ -148,19 +115,16 @@ def _line_between(ax: Axes, span: tuple[float, float], time: FloatArray, values:
 def tuned_tracking_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> Plot:
     """Figure 25 of the thesis with and without feed-forward: two periods, one reversal, the error."""
     was, now = tuning.found.without, tuning.found.nominal
-    title = (
-        f'With feed-forward: error {relative_change(was.tracking_rms, now.tracking_rms)}, '
-        f'dwell {relative_change(was.dwell, now.dwell)}'
-    )
-    figure, axes = style.new_figure(title, 7.4, nrows=3, gridspec_kw={'height_ratios': [4.0, 4.0, 2.8]})
+    error, dwell = relative_change(was.tracking_rms, now.tracking_rms), relative_change(was.dwell, now.dwell)
+    title, heights = f'With feed-forward: error {error}, dwell {dwell}', {'height_ratios': [4.0, 4.0, 2.8]}
+    figure, axes = style.new_figure(title, 7.4, nrows=3, gridspec_kw=heights)
     span, period = _shown_time(tuning), 1.0 / tuning.problem.settings.frequency
     peak = span[0] + 0.25 * period
     zoom = (peak - ZOOM * period, peak + ZOOM * period)
     axes[0].axvspan(*zoom, color=style.BLACK, alpha=0.08, lw=0)
-    reference = {'color': style.GREY, 'lw': 3.0, 'alpha': 0.5, 'label': 'reference'}
     runs = ((without, style.VERMILLION, 'without feed-forward'), (with_it, style.BLUE, 'with feed-forward'))
     for ax, shown in ((axes[0], span), (axes[1], zoom)):
-        _line_between(ax, shown, without.time, without.reference / MM, **reference)
+        _line_between(ax, shown, without.time, without.reference / MM, **{**_REFERENCE, 'lw': 3.0, 'alpha': 0.5})
         for run, colour, label in runs:
             _line_between(ax, shown, run.time, run.position / MM, color=colour, label=label)
         ax.set_ylabel('rod position [mm]')
@@ -168,10 +132,9 @@ def tuned_tracking_figure(tuning: SimulatorTuning, without: AxisRun, with_it: Ax
         _line_between(axes[2], span, run.time, (run.position - run.reference) / UM, color=colour)
     style.zero_lines(axes[2])
     axes[2].set(ylabel='error [µm]', xlabel='time [s]')
-    axes[1].set_title('Shaded part: a reversal')
-    style.legend_above(axes[0])
     figure.align_ylabels(axes)
-    return Plot('tracking', figure)
+    axes[1].set_title('Shaded part: a reversal')
+    return finished('tracking', figure, axes[0])
 
 
 def tuned_force_figure(tuning: SimulatorTuning, run: AxisRun) -> Plot:
@@ -181,9 +144,7 @@ def tuned_force_figure(tuning: SimulatorTuning, run: AxisRun) -> Plot:
     _line_between(ax, span, run.time, run.friction_force, color=style.BLACK, lw=1.2, label='friction of the seals')
     _line_between(ax, span, run.time, run.feedforward, color=style.BLUE, label='feed-forward at the controller')
     style.zero_lines(ax)
-    ax.set(ylabel='force [N]', xlabel='time [s]')
-    style.legend_above(ax)
-    return Plot('force', figure)
+    return finished('force', figure, ax, ylabel='force [N]', xlabel='time [s]')
 
 
 def move_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> Plot:
@@ -193,8 +154,7 @@ def move_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> 
     over = max(case.outcome.overshoot for case in tuning.found.cases)
     title = f'Largest overshoot of the move in all cases: {over / UM:.3g} µm'
     figure, axes = style.new_figure(title, 4.8, nrows=2, sharex=True)
-    reference = {'color': style.GREY, 'lw': 2.2, 'alpha': 0.6, 'label': 'reference'}
-    axes[0].plot(without.time, without.reference / MM, **reference)
+    axes[0].plot(without.time, without.reference / MM, **_REFERENCE)
     for run, colour, label in (
         (without, style.VERMILLION, 'without feed-forward'),
         (with_it, style.BLUE, 'with'),
@@ -202,30 +162,26 @@ def move_figure(tuning: SimulatorTuning, without: AxisRun, with_it: AxisRun) -> 
     ):
         axes[0].plot(run.time, run.position / MM, color=colour, lw=1.0)
         axes[1].plot(run.time, (run.position - run.reference) / UM, color=colour, label=label)
-    axes[0].set_ylabel('rod position [mm]')
     axes[1].set(ylabel='error [µm]', xlabel='time [s]', xlim=(0.0, without.time[-1]))
     style.zero_lines(axes[1])
-    for ax in axes:
-        style.legend_above(ax)
     figure.align_ylabels(axes)
-    return Plot('move', figure)
+    return finished('move', figure, *axes, ylabel='rod position [mm]')
 
 
 def robustness_figure(tuning: SimulatorTuning | BagTuning) -> Plot:
     """Error and dwell, or the friction left to the controller, in all cases."""
-    found, title = tuning.found, 'NOT better in every case'
-    panels = tuple((name, 1.0, f'RMS friction left {text} [N]') for name, text in RESIDUALS)
+    found = tuning.found
     if isinstance(tuning, SimulatorTuning):
+        better = 'Better than none with every model and delay tried'
         panels = (('tracking_rms', UM, 'tracking RMS [µm]'), ('dwell', MS, 'dwell per reversal [ms]'))
-    if found.better_in_every_case:
-        simulated = isinstance(tuning, SimulatorTuning)
-        title = 'Better than none with every model and delay tried' if simulated else 'Less friction left in every case'
-    figure, axes = style.new_figure(title, 3.8, ncols=2)
+    else:
+        better, label = 'Less friction left in every case', 'RMS friction left'
+        panels = (('sliding', 1.0, f'{label} while sliding [N]'), ('reversal', 1.0, f'{label} near reversals [N]'))
+    figure, axes = style.new_figure(better if found.better_in_every_case else 'NOT better in every case', 3.8, ncols=2)
     for ax, (name, size, label) in zip(axes, panels, strict=True):
         values = {case[:2]: getattr(case.outcome, name) / size for case in found.cases}
         _draw_cases(ax, values, getattr(found.without, name) / size, label)
-    style.legend_above(axes[1])
-    return Plot('robustness', figure)
+    return finished('robustness', figure, axes[1])
 
 
 def _draw_cases(ax: Axes, values: dict[tuple[float, float], float], without: float, label: str) -> None:
@@ -254,15 +210,24 @@ def recorded_axis_figures(tuning: BagTuning) -> list[Plot]:
     return plots
 
 
+def _prepare_time_axes(tuning: BagTuning, axes: Sequence[Axes]) -> tuple[slice, FloatArray]:
+    """Shade the reversals on two time axes; returns the shown samples and their times [s]."""
+    part = _shown_reversals(tuning.found.reversal)
+    time = tuning.recording.time[part]
+    for ax in axes:
+        style.shade(ax, time, tuning.found.reversal[part])
+    axes[1].set(xlabel=TIME_LABEL, xlim=(time[0], time[-1]))
+    return part, time
+
+
 def recorded_friction_figure(tuning: BagTuning) -> Plot:
     """Friction of the axis, and the feed-forward along its recorded reference."""
     found = tuning.found
     change = relative_change(found.without.sliding, found.nominal.sliding)
-    figure, axes = style.new_figure(
-        f'Friction left to the controller while sliding: {change}', 5.6, nrows=2, sharex=True
-    )
-    part = _shown_reversals(found.reversal)
-    time, friction, force = tuning.recording.time[part], found.law.friction[part], found.force[part]
+    title = f'Friction left to the controller while sliding: {change}'
+    figure, axes = style.new_figure(title, 5.6, nrows=2, sharex=True)
+    part, time = _prepare_time_axes(tuning, axes)
+    friction, force = found.law.friction[part], found.force[part]
     unit, size = force_unit(float(np.nanmax(np.abs(friction), initial=0.0)))
     label = 'friction: force sum less inertia'
     style.thin_line(axes[0], time, friction / size, color=style.BLACK, lw=1.0, label=label)
@@ -271,11 +236,8 @@ def recorded_friction_figure(tuning: BagTuning) -> Plot:
     style.thin_line(axes[1], time, (friction - force) / size, color=style.BLUE, lw=1.0, label='with feed-forward')
     for ax in axes:
         style.zero_lines(ax)
-        style.legend_above(ax)
-        style.shade(ax, time, found.reversal[part])
-    axes[0].set_ylabel(f'force [{unit}]')
-    axes[1].set(ylabel=f'left to the controller [{unit}]', xlabel=TIME_LABEL, xlim=(time[0], time[-1]))
-    return Plot('match', figure)
+    axes[1].set_ylabel(f'left to the controller [{unit}]')
+    return finished('match', figure, *axes, ylabel=f'force [{unit}]')
 
 
 def recorded_law_figure(tuning: BagTuning) -> Plot:
@@ -293,27 +255,22 @@ def recorded_law_figure(tuning: BagTuning) -> Plot:
     ax.plot(line, height, color=style.BLUE, label='feed-forward')
     most = 1.4 * max(float(np.quantile(np.abs(share), 0.99)), settings.scale, 0.1)
     ylabel = 'friction / Coulomb friction\nof the model [-]'
-    ax.set(xlim=(-reach, reach), ylim=(-most, most), xlabel='rod velocity [mm/s]', ylabel=ylabel)
     style.zero_lines(ax, vertical=True)
-    style.legend_above(ax)
-    return Plot('law', figure)
+    limits = {'xlim': (-reach, reach), 'ylim': (-most, most)}
+    return finished('law', figure, ax, xlabel='rod velocity [mm/s]', ylabel=ylabel, **limits)
 
 
 def recorded_tracking_figure(tuning: BagTuning) -> Plot:
     """Tracking as recorded."""
     figure, axes = style.new_figure('Tracking as recorded', 4.4, nrows=2, sharex=True)
-    part = _shown_reversals(tuning.found.reversal)
-    time, reference, position = tuning.recording.time[part], tuning.track.reference[part], tuning.track.position[part]
-    style.thin_line(axes[0], time, reference / MM, color=style.GREY, lw=2.2, alpha=0.6, label='reference')
+    part, time = _prepare_time_axes(tuning, axes)
+    reference, position = tuning.track.reference[part], tuning.track.position[part]
+    style.thin_line(axes[0], time, reference / MM, **_REFERENCE)
     style.thin_line(axes[0], time, position / MM, color=style.VERMILLION, label='rod')
     style.thin_line(axes[1], time, (position - reference) / UM, color=style.VERMILLION)
     style.zero_lines(axes[1])
-    for ax in axes:
-        style.shade(ax, time, tuning.found.reversal[part])
-    axes[0].set_ylabel('position [mm]')
-    axes[1].set(ylabel='error [µm]', xlabel=TIME_LABEL, xlim=(time[0], time[-1]))
-    style.legend_above(axes[0])
-    return Plot('recorded', figure)
+    axes[1].set_ylabel('error [µm]')
+    return finished('recorded', figure, axes[0], ylabel='position [mm]')
 
 
 def _shown_reversals(reversal: BoolArray) -> slice:

@@ -14,18 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
+from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    DECODERS,
-    ESTIMATE_TYPE,
-    FORCE_TYPE,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-    decode,
-    decode_text,
-)
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
 from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, Reference, condition_reference
 from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Position, ServoReference, Velocity
@@ -59,10 +50,8 @@ class TuningTask(NamedTuple):
     source: str
     motion: str
     seals: str
-    before: FeedForwardSettings
-    """settings before the tuning"""
-    tuned: tuple[str, ...]
-    """names of the tuned parameters; the others are unchanged"""
+    before: FeedForwardSettings  # settings before the tuning
+    tuned: tuple[str, ...]  # names of the tuned parameters; the others are unchanged
 
 
 class RecordedTrack(NamedTuple):
@@ -74,11 +63,9 @@ class RecordedTrack(NamedTuple):
     def numbers(self) -> dict[str, float | None]:
         """Tracking error as recorded [m], with any compensation active at that time; None without positions."""
         known = np.isfinite(self.reference) & np.isfinite(self.position)
+        errors = {'recorded_tracking_rms': tracking_rms, 'recorded_tracking_peak': tracking_peak}
         pair = self.reference[known], self.position[known]
-        return {
-            'recorded_tracking_rms': tracking_rms(*pair) if known.any() else None,
-            'recorded_tracking_peak': tracking_peak(*pair) if known.any() else None,
-        }
+        return {name: error(*pair) if known.any() else None for name, error in errors.items()}
 
 
 @dataclass(frozen=True)
@@ -95,17 +82,15 @@ class SimulatorTuning:
         was, now = self.found.without, self.found.nominal
         if not self.found.feedforward.scale:
             return 'No feed-forward is better than none on this plant.'
-        worst = self.found.cases[-1]
-        better = 'better than none, and at rest,'
+        worst, better, end = self.found.cases[-1], 'better than none, and at rest,', '.'
         if not self.found.better_in_every_case:
-            better = 'NOT better than none, or not at rest,'
-        text = (
+            better, end = 'NOT better than none, or not at rest,', ': see the robustness cases.'
+        return (
             f'Tracking RMS {was.tracking_rms / MM:.3g} to {now.tracking_rms / MM:.3g} mm, '
             f'dwell per reversal {was.dwell / MS:.3g} to {now.dwell / MS:.3g} ms; '
             f'{better} in every case with a model error up to {100.0 * worst.friction_error:.3g} % and a delay error '
-            f'up to {100.0 * worst.delay_error:.3g} %'
+            f'up to {100.0 * worst.delay_error:.3g} %{end}'
         )
-        return f'{text}.' if self.found.better_in_every_case else f'{text}: see the robustness cases.'
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -133,8 +118,7 @@ class SimulatorTuning:
 class BagTuning:
     """Result of a tuning on a bag of a real axis."""
 
-    bag: str
-    """name of the bag"""
+    bag: str  # name of the bag
     task: TuningTask
     recording: Recording
     track: RecordedTrack
@@ -239,33 +223,26 @@ def sensor_noise(settings: TuningSettings) -> FloatArray:
 
 
 def _seals_text(configuration: Configuration) -> str:
-    names = [str(document.get('name', 'no name')) for document in configuration.seal_documents]
-    chambers = configuration.selection.seal_chambers
-    return ', '.join(f'{name} on chamber {chamber}' for name, chamber in zip(names, chambers, strict=True))
+    mounted = zip(configuration.seal_documents, configuration.selection.seal_chambers, strict=True)
+    return ', '.join(f'{seal.get("name", "no name")} on chamber {chamber}' for seal, chamber in mounted)
 
 
-class RecordedAxis(NamedTuple):
-    """Contents of a bag for the tuning."""
+def read_recording(
+    bag: Path, override: Configuration | None = None, namespace: str = ''
+) -> tuple[Recording, RecordedTrack, Configuration]:
+    """Recording of an axis from the first reference on, its track, and the last configuration in the bag.
 
-    recording: Recording
-    track: RecordedTrack
-    configuration: Configuration
-    """the last one in the bag"""
-
-
-def read_recording(bag: Path, override: Configuration | None = None, namespace: str = '') -> RecordedAxis:
-    """Recording of an axis from the first reference on; the estimates are computed anew.
-
-    A velocity sample takes the newest other inputs. A sample with a stamp not after the previous one is left out.
+    The estimates are computed anew. A velocity sample takes the newest other inputs. A sample whose stamp is not after
+    the previous one is left out.
 
     Raises:
         BagError: The bag cannot be read, or an input is missing in it.
     """
     topics = find_topics(bag, namespace)
     needed = {
-        REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
-        FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
-        PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
+        messages.REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
+        messages.FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
+        messages.PRESSURE_TYPE: (topics.pressure, 'the friction depends on the pressure'),
     }
     for type_name, (topic, reason) in needed.items():
         if not topic:
@@ -281,20 +258,20 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
             if count % 1000 == 0:
                 advance(1000)
             message = step.message
-            if message.type_name == CONFIGURATION_TYPE:
-                configuration = parse_snapshot(decode_text(message.data)).configuration
+            if message.type_name == messages.CONFIGURATION_TYPE:
+                configuration = parse_snapshot(messages.decode_text(message.data)).configuration
                 continue
             if message.topic not in topics:
                 continue
-            sample = DECODERS[message.type_name](message.data)
+            sample = messages.DECODERS[message.type_name](message.data)
             held[type(sample)] = sample
             conditioned = _with_reference(conditioned, sample)
             reference = held.get(ServoReference)
             if not isinstance(sample, Velocity) or reference is None:
                 continue
             if not estimates or sample.stamp > estimates[-1].stamp:
-                (data,) = (data for type_name, data in step.answers if type_name == ESTIMATE_TYPE)
-                estimates.append(decode(ESTIMATE_TYPE, data))
+                (data,) = (data for type_name, data in step.answers if type_name == messages.ESTIMATE_TYPE)
+                estimates.append(messages.decode(messages.ESTIMATE_TYPE, data))
                 age = (sample.stamp - reference.stamp) * 1e-9
                 given = conditioned.velocity
                 motions.append(
@@ -303,9 +280,8 @@ def read_recording(bag: Path, override: Configuration | None = None, namespace: 
                 rows.append((held[Force].force, reference.position, held[Position].position))
     if len(estimates) < 2:
         raise BagError(f'{bag}: fewer than two velocity samples after the first reference')
-    force, reference_position, position = np.array(rows).T
-    track = RecordedTrack(reference_position, position)
-    return RecordedAxis(Recording(estimates, motions, force), track, configuration)
+    force, *track = np.array(rows).T
+    return Recording(estimates, motions, force), RecordedTrack(*track), configuration
 
 
 def _with_reference(conditioned: Reference, sample: Any) -> Reference:
@@ -323,7 +299,7 @@ def page_of(out: Path) -> Path:
 
 
 def check_target(out: Path) -> None:
-    """Check before the computation that parameter file and page can be written.
+    """Check that parameter file and page can be written; called before the computation.
 
     Raises:
         ValueError: A file is not from an earlier tuning, or the folder cannot be written to.
@@ -333,10 +309,10 @@ def check_target(out: Path) -> None:
     parent = next(parent for parent in out.absolute().parents if parent.exists())
     if out.is_dir() or not parent.is_dir() or not os.access(parent, os.W_OK):
         raise ValueError(f'{out}: cannot write a file there')
-    if out.exists() and not out.read_text(encoding='utf-8', errors='replace').startswith(MADE_BY):
-        raise ValueError(f'{out} exists already and is not from tune: not overwriting')
-    if page_of(out).exists() and not out.exists():
-        raise ValueError(f'{page_of(out)} exists already and is not from tune: not overwriting')
+    is_own = out.exists() and out.read_text(encoding='utf-8', errors='replace').startswith(MADE_BY)
+    for path in (out, page_of(out)):
+        if path.exists() and not is_own:
+            raise ValueError(f'{path} exists already and is not from tune: not overwriting')
 
 
 def parameter_text(tuning: SimulatorTuning | BagTuning) -> str:

@@ -23,8 +23,7 @@ class Outcome(NamedTuple, Generic[Result]):
     """Outcome of one call."""
 
     result: Result | None
-    error: str = ''
-    """one line; empty if there is a result"""
+    error: str = ''  # one line; empty if there is a result
 
 
 def available_cores() -> int:

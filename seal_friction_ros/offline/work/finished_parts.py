@@ -25,10 +25,8 @@ Values = Mapping[str, Any]
 class Part(NamedTuple):
     """One independent part of a longer computation."""
 
-    key: str
-    """from `part_key`"""
-    names: tuple[str, ...]
-    """of the values in the result"""
+    key: str  # from `part_key`
+    names: tuple[str, ...]  # of the values in the result
     call: Callable[[], Any]
     """picklable function that computes the part; returns `Values`, or a named tuple with these fields"""
 

@@ -3,10 +3,11 @@
 import math
 
 import pytest
+from harness.thesis_fit import power_law_from_points
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw, power_law_from_points
+from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
 
 TABLE = CoefficientTable((10.0, 100.0, 400.0), (0.3, 0.15, 0.07))
 forces = st.floats(1e-3, 1e6)

@@ -10,12 +10,32 @@ from hypothesis import strategies as st
 from seal_friction_ros.core.friction.geometry import (
     SealGeometry,
     contact_length,
-    hoop_force,
     projected_area,
     squeeze,
     stretch,
-    stretch_radial_force,
 )
+
+
+def hoop_force(seal: SealGeometry) -> float:
+    """Tension along the stretched ring [N]; a loose ring has none.
+
+    T = E eps A_section, A_section = pi d^2 / 4.
+
+    Source: thesis, section 4.1 and Figure 13; no tension in a loose ring is our addition.
+    """
+    section = math.pi / 4.0 * seal.section_diameter**2
+    return seal.elastic_modulus * max(stretch(seal), 0.0) * section
+
+
+def stretch_radial_force(seal: SealGeometry) -> float:
+    """Radial force the stretched ring adds on the inner wall, summed over the circumference [N].
+
+    2 pi T, as for a hoop under internal pressure.
+
+    Source: thesis, section 4.1 and Figure 13.
+    """
+    return 2.0 * math.pi * hoop_force(seal)
+
 
 # A ring of 2 mm section, squeezed 10 % between 10.0 mm and 13.6 mm, stretched 25 % over the rod.
 RING = SealGeometry(

@@ -6,12 +6,12 @@ from decimal import Decimal
 from statistics import fmean, linear_regression
 
 import pytest
+from harness.thesis_fit import power_law_from_points
 from paths import ROOT
 
 from seal_friction_ros.core.foundation.units import INCH, LBF, PSI
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import contact_length, projected_area, squeeze
-from seal_friction_ros.core.friction.laws.friction_coefficient import power_law_from_points
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import read_yaml

@@ -3,11 +3,12 @@ from functools import partial
 from itertools import pairwise
 
 import pytest
+from harness.spool_program import spool_cycles
 from hypothesis import given
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.foundation.units import PSI
-from seal_friction_ros.core.servo.motions import Chirp, PullTest, Setpoint, Sine, Step, Trapezoid, spool_cycles
+from seal_friction_ros.core.servo.motions import Chirp, PullTest, Setpoint, Sine, Step, Trapezoid
 
 WAVES = [Sine(0.002, 3.0, 0.01), Trapezoid(), Chirp(duration=2.0), Chirp(start_frequency=9.0, end_frequency=2.0)]
 

@@ -23,12 +23,8 @@ from seal_friction_ros.core.servo.plant import (
     ServoValve,
     fastest_rate,
     inner_step,
-    natural_frequency,
-    orifice_gain,
-    piston_area,
     signed_root,
     stored_energy,
-    total_volume,
 )
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs
 
@@ -58,10 +54,7 @@ def test_natural_frequency_is_that_of_merritt_within_1_percent():
     crossing = k + position[k] / (position[k] - position[k + 1])
     measured = 2.0 * math.pi * (len(k) - 1) / ((crossing[-1] - crossing[0]) * free.control_period)
     cylinder = free.cylinder
-    expected = math.sqrt(
-        4.0 * cylinder.bulk_modulus * piston_area(cylinder) ** 2 / (total_volume(cylinder) * free.load.mass)
-    )
-    assert natural_frequency(cylinder, free.load.mass) == expected
+    expected = math.sqrt(4.0 * cylinder.bulk_modulus * cylinder.area**2 / (cylinder.total_volume * free.load.mass))
     assert measured == pytest.approx(expected, rel=1e-4)
 
 
@@ -70,10 +63,10 @@ def test_pressure_of_a_locked_piston_rises_as_the_closed_form():
     locked = ServoParameters(valve=TIGHT_VALVE, cylinder=TIGHT_CYLINDER, seals=LOCK)
     valve, cylinder, opening = locked.valve, locked.cylinder, 0.05
     state = plant(locked, charge_a=1e6, spool=opening)
-    volume = total_volume(cylinder) / 2.0
+    volume = cylinder.total_volume / 2.0
     for i in range(1, 5):
         state = advance(locked, state, opening)
-        fall = cylinder.bulk_modulus * orifice_gain(valve) * opening * i * locked.control_period / (2.0 * volume)
+        fall = cylinder.bulk_modulus * valve.orifice_gain * opening * i * locked.control_period / (2.0 * volume)
         root = math.sqrt(valve.supply_pressure - 1e6) - fall
         assert state.charge_a == pytest.approx(valve.supply_pressure - root**2, rel=1e-9)
         assert root**2 > valve.transition_pressure
@@ -87,7 +80,7 @@ def test_pressure_of_a_locked_piston_leaks_away_as_the_closed_form():
     state = state._replace(charge_a=state.charge_a + 1e6, charge_b=state.charge_b - 1e6)
     for _ in range(100):
         state = advance(locked, state, 0.0)
-    rate = 4.0 * locked.cylinder.bulk_modulus / total_volume(locked.cylinder) * (5e-14 + 6e-14)
+    rate = 4.0 * locked.cylinder.bulk_modulus / locked.cylinder.total_volume * (5e-14 + 6e-14)
     expected = 2e6 * math.exp(-rate * 100 * locked.control_period)
     assert state.charge_a - state.charge_b == pytest.approx(expected, rel=1e-7)
 
@@ -144,8 +137,8 @@ def test_energy_in_is_stored_and_dissipated(load):
 def reference_solution(servo, commands, command_time):
     """Stick and slip as events of scipy's solver, the equations written again, with the laws and not their tables."""
     valve, cylinder, load = servo.valve, servo.cylinder, servo.load
-    area, beta, gain = piston_area(cylinder), cylinder.bulk_modulus, orifice_gain(valve)
-    middle = total_volume(cylinder) / 2.0
+    area, beta, gain = cylinder.area, cylinder.bulk_modulus, valve.orifice_gain
+    middle = cylinder.total_volume / 2.0
     w, z = valve.natural_frequency, valve.damping_ratio
 
     def root(dp):
@@ -259,7 +252,7 @@ def test_cavitating_chamber_keeps_its_oil():
     # No flow: the charge depends on the volume alone, p_0 + beta ln(V_0 / V), while the cavity grows and collapses.
     shut = ServoParameters(valve=TIGHT_VALVE, cylinder=TIGHT_CYLINDER, load=Load(mass=50.0), seals=())
     state = plant(shut)
-    start, middle, area = state.charge_a, shut.constants.mid_volume, shut.constants.area
+    start, middle, area = state.charge_a, shut.cylinder.mid_volume, shut.cylinder.area
     lowest, collapsed = 0.0, False
     for i in range(400):
         state = advance(shut, state, 0.0, 3000.0 if i < 60 else -3000.0)

@@ -201,7 +201,7 @@ def test_feedforward_that_is_not_finite_counts_as_zero():
 def test_command_beyond_what_supply_and_spool_can_do_is_cut_and_says_so():
     _, out = step(SERVO, init(SERVO), Setpoint(0.0, 0.0, 0.0), 1e9)
     assert out.command.limited == Limited.FORCE
-    assert out.command.force == pytest.approx(SERVO.constants.area * (SERVO.valve.supply_pressure - 1e5))
+    assert out.command.force == pytest.approx(SERVO.cylinder.area * (SERVO.valve.supply_pressure - 1e5))
     fast = measure(SERVO.constants, init(SERVO).plant)._replace(velocity=5.0)
     _, command = control(SERVO.gains, SERVO.constants, ControllerState(0.0, 0.0), fast, Setpoint(0.0, 0.0, 0.0), 0.0)
     assert command.limited == Limited.FORCE | Limited.SPOOL

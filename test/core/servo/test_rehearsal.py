@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import yaml
+from harness.spool_program import spool_cycles
 from paths import ROOT
 
 from seal_friction_ros.core.foundation.units import LBF
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.servo.motions import PullTest, spool_cycles
+from seal_friction_ros.core.servo.motions import PullTest
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.core.servo.pull_rig import init_pull_rig, pull_rig, step_pull_rig
 

@@ -20,7 +20,6 @@ from seal_friction_ros.core.servo.closed_loop import (
     StoppedWave,
     dwell,
     run_closed_loop,
-    whole_delay,
     with_wrong_friction,
     without_feedforward,
 )
@@ -127,7 +126,7 @@ def test_dwell_counts_all_rest_and_a_rod_that_never_moves_in_full():
 
 
 def test_whole_delay_adds_force_loop_and_valve():
-    assert whole_delay(SERVO, 0.001) == pytest.approx(0.001 + 1.0 / 500.0 + 2.0 * 0.8 / 1257.0 + 0.5 * PERIOD)
+    assert DEFAULT.whole_delay == pytest.approx(0.001 + 1.0 / 500.0 + 2.0 * 0.8 / 1257.0 + 0.5 * PERIOD)
 
 
 # -- the default feed-forward ----------------------------------------------------------------------------------------

@@ -130,6 +130,39 @@ def test_delft_o_ring_and_x_ring_are_not_averaged(tmp_path):
     assert not run.out.exists()
 
 
+# --- tables ---
+
+
+def readings_table(path, scatter, friction):
+    """Table of readings at 0 to 70 bar and three speeds, with a relative scatter."""
+    random = np.random.default_rng(7)
+    rows = ['pressure_bar,friction_N,direction,velocity_m_per_s,test']
+    for test in range(1, 4):
+        for bar in range(0, 71, 10):
+            for speed in (0.02, 0.1, 0.3):
+                measured = friction(bar, speed) * random.normal(1.0, scatter)
+                rows.append(f'{bar},{measured:.3f},extend,{speed},{test}')
+    path.write_text('\n'.join(rows))
+    return str(path)
+
+
+def test_a_level_at_which_the_law_of_the_others_gives_no_friction_is_no_outlier(tmp_path):
+    """The power law fitted to the other pressures gives 0 N at 0 bar, where no relative deviation exists."""
+    table = readings_table(
+        tmp_path / 'table.csv', 0.01, lambda bar, speed: (6.0 + 20.0 * np.tanh(bar / 40.0)) * np.exp(-speed / 0.5)
+    )
+    run = Run(tmp_path, table)
+    assert run.code == 0, run.errors
+    assert run.figures['measured_N'][0] == pytest.approx(4.62, rel=0.05)  # 6 N times the mean of exp over the speeds
+    assert run.figures['is_outlier'] == [False] * 8
+
+
+def test_readings_without_scatter_have_no_outlier(tmp_path):
+    run = Run(tmp_path, readings_table(tmp_path / 'table.csv', 0.0, lambda *_: 5.0))
+    assert run.code == 0, run.errors
+    assert run.figures['is_outlier'] == [False] * 8
+
+
 # --- MBARI ---
 
 

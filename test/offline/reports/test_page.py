@@ -75,7 +75,7 @@ def test_a_template_is_strict_about_missing_values(name):
 
 def test_every_template_belongs_to_a_report():
     sources = ''.join(path.read_text() for path in TEMPLATES.parent.glob('*.py'))
-    assert sorted(re.findall(r"write_page\(\s*out,\s*'(\w+)'", sources)) == PAGES
+    assert sorted(re.findall(r"write_(?:case_)?page\(\s*out,\s*'(\w+)'", sources)) == PAGES
 
 
 def test_the_templates_are_installed():

@@ -1,10 +1,8 @@
 """Normal force -> coefficient of friction of rubber on a lubricated metal wall."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from statistics import linear_regression
 
 from seal_friction_ros.core.foundation.compiled import Bound, evaluate
 from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
@@ -45,12 +43,7 @@ class PowerLaw(FrictionCoefficientLaw):
         start=lambda typical: typical.friction / typical.normal_force**0.6,
     )
     exponent: float = parameter(
-        unit='1',
-        lower=0.0,
-        upper=0.99,
-        description='n; 0 is a constant coefficient.',
-        symbol='n',
-        start=lambda _: 0.4,
+        unit='1', lower=0.0, upper=0.99, description='n; 0 is a constant coefficient.', symbol='n', start=lambda _: 0.4
     )
 
 
@@ -89,22 +82,3 @@ FRICTION_COEFFICIENT_LAWS: dict[str, type[FrictionCoefficientLaw]] = {
     'monotone_table': CoefficientTable,
 }
 """Name in a seal file -> law."""
-
-
-def power_law_from_points(normal_forces: Sequence[float], frictions: Sequence[float]) -> PowerLaw:
-    """Power law through measured friction, by least squares of log(friction) over log(normal force).
-
-    log f_c = log c + (1 - n) log F_n: relative deviations count alike at every pressure, as the scatter of the
-    readings is a share of the reading.
-
-    Args:
-        normal_forces: Normal force of each reading [N], shape (n,), n >= 2.
-        frictions: Coulomb friction of each reading [N], shape (n,).
-
-    Raises:
-        ValueError: The points make no power law (see `PowerLaw`).
-    """
-    x = [math.log(force) for force in normal_forces]
-    y = [math.log(friction) for friction in frictions]
-    slope, intercept = linear_regression(x, y)
-    return PowerLaw(math.exp(intercept), 1.0 - slope)

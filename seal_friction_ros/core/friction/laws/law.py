@@ -9,26 +9,22 @@ from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import Bound, bound
-from seal_friction_ros.core.foundation.parameters import check
+from seal_friction_ros.core.foundation.parameters import CheckedParameters
 
 
 @dataclasses.dataclass(frozen=True)
-class Law:
+class Law(CheckedParameters):
     """Parameters of a law, each a field made by `parameter`, and its function.
 
     A subclass sets ``function``. It takes parameters named after attributes of the record (a number, a tuple of
     numbers, another law, a table), and then its two arguments.
-
-    Raises:
-        ValueError: A parameter is out of bounds.
     """
 
     function: ClassVar[Callable[..., float]]
-    bound: Bound = dataclasses.field(init=False, repr=False, compare=False)
-    """the function of the two arguments alone"""
+    bound: Bound = dataclasses.field(init=False, repr=False, compare=False)  # the function of the two arguments alone
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         self.check_together()
         object.__setattr__(self, 'bound', bound(type(self).function, self))
 
@@ -47,14 +43,10 @@ class Law:
 class TypicalReading(NamedTuple):
     """Sizes that occur in a set of readings, for the first guess of a fit."""
 
-    friction: float
-    """[N] mean, of one seal"""
-    pressure: float
-    """[Pa] highest"""
-    speed: float
-    """[m/s] highest"""
-    normal_force: float
-    """[N] mean, of one seal; NaN where the geometry is not known"""
+    friction: float  # [N] mean, of one seal
+    pressure: float  # [Pa] highest
+    speed: float  # [m/s] highest
+    normal_force: float  # [N] mean, of one seal; NaN where the geometry is not known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,12 +57,9 @@ class FrictionLaw(Law):
     speed, and a seal with such a law has no velocity terms.
     """
 
-    NAME: ClassVar[str]
-    """name in a seal file"""
-    FORMULA: ClassVar[str]
-    """for people"""
-    PART: ClassVar[str] = ''
-    """key of the seal file that holds its parameters; empty: the name of the law"""
+    NAME: ClassVar[str]  # name in a seal file
+    FORMULA: ClassVar[str]  # for people
+    PART: ClassVar[str] = ''  # key of the seal file that holds its parameters; empty: the name of the law
     FITTED_PART: ClassVar[tuple[str, type[Law]] | None] = None
     """field that identification fits, and the law that it fits there; None: the parameters of the law itself"""
 

@@ -34,12 +34,7 @@ class PressurePowerLaw(FrictionLaw):
     function = staticmethod(pressure_power_law)
 
     friction_at_no_pressure: float = parameter(
-        unit='N',
-        lower=0.0,
-        upper=1e6,
-        description='f_0.',
-        symbol='f_0',
-        start=lambda typical: 0.5 * typical.friction,
+        unit='N', lower=0.0, upper=1e6, description='f_0.', symbol='f_0', start=lambda typical: 0.5 * typical.friction
     )
     friction_at_one_bar: float = parameter(
         unit='N',

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compilable
-from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 
 
 @compilable
@@ -38,15 +38,12 @@ NO_VELOCITY_TERMS = VelocityTermNumbers(0.0, 0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)
-class VelocityTerms:
+class VelocityTerms(CheckedParameters):
     r"""Sliding friction of a seal beyond its Coulomb friction.
 
     .. math:: F = [f_c + \sigma |v| + f_S\,e^{-|v|/v_S}]\,(1 + a\,\mathrm{sgn}(v))
 
     Source: [Armstrong1994]_ eq. (5) with an exponent of 1, which is our choice, as is one asymmetry for all terms.
-
-    Raises:
-        ValueError: A value is out of bounds.
     """
 
     viscous_friction: float = parameter(
@@ -86,9 +83,6 @@ class VelocityTerms:
         symbol='a',
         start=lambda _: 0.0,
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     @property
     def numbers(self) -> VelocityTermNumbers:
