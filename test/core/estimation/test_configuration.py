@@ -167,15 +167,15 @@ def test_every_shipped_seal_survives_the_text_and_the_wire(path):
 def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
     parameters = CONFIGURATION.parameters()
     before = []
-    for stamp in range(0, 40 * MS, MS):
+    for stamp in range(0, 200 * MS, MS):
         before += [Pressure(stamp, 3e6, 3e6), Force(stamp, 12.0), ServoReference(stamp, 0.0, 0.02, 0.0)]
         before += [Velocity(stamp, 5e-4, b'')]
     state = init(parameters)
     for message in before:
         state, _ = receive_one(parameters, state, message)
     back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state)))
-    straight = receive_one(parameters, state, Velocity(40 * MS, 1.5e-3, b'rod'))
-    taken_up = receive_one(back.configuration.parameters(), back.state, Velocity(40 * MS, 1.5e-3, b'rod'))
+    straight = receive_one(parameters, state, Velocity(200 * MS, 1.5e-3, b'rod'))
+    taken_up = receive_one(back.configuration.parameters(), back.state, Velocity(200 * MS, 1.5e-3, b'rod'))
     assert straight[1].feedforward.force > 0.0
     assert taken_up == straight
 

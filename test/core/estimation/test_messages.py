@@ -21,6 +21,7 @@ from seal_friction_ros.core.estimation.records import (
     ServoReference,
     Status,
     Velocity,
+    WatchdogTick,
 )
 from seal_friction_ros.core.friction.states import FrictionState
 
@@ -40,6 +41,11 @@ SAMPLES = {
     wire.REFERENCE_TYPE: (
         {'position': 0.01, 'velocity': -0.02, 'acceleration': 0.3},
         ServoReference(STAMP, 0.01, -0.02, 0.3),
+        lambda record, frame: wire.encode(record._replace(frame_id=frame)),
+    ),
+    wire.TICK_TYPE: (
+        {'idle_time': 0.25},
+        WatchdogTick(STAMP, 0.25),
         lambda record, frame: wire.encode(record._replace(frame_id=frame)),
     ),
     wire.FEEDFORWARD_TYPE: (
@@ -91,7 +97,8 @@ def encode(type_name: str, frame: bytes = b'') -> bytes:
 
 def decoded(type_name: str, frame: bytes):
     record = SAMPLES[type_name][1]
-    return record._replace(frame_id=frame) if type_name in (wire.VELOCITY_TYPE, wire.REFERENCE_TYPE) else record
+    with_frame = (wire.VELOCITY_TYPE, wire.REFERENCE_TYPE, wire.TICK_TYPE)
+    return record._replace(frame_id=frame) if type_name in with_frame else record
 
 
 # --- the same bytes as others ---
@@ -134,6 +141,7 @@ def test_padding_is_zero(type_name):
         wire.VELOCITY_TYPE: Velocity(stamp, ones, b''),
         wire.POSITION_TYPE: Position(stamp, ones),
         wire.REFERENCE_TYPE: ServoReference(stamp, ones, ones, ones),
+        wire.TICK_TYPE: WatchdogTick(stamp, ones),
         wire.FEEDFORWARD_TYPE: FeedForward(stamp, ones, ones, 0x01010101),
         wire.ESTIMATE_TYPE: FrictionEstimate(stamp, *[ones] * 4, FrictionState.SLIDING, 1, 0x01010101, ones),
     }
@@ -285,8 +293,8 @@ def test_status_bits_in_the_message_definition_are_those_of_the_code():
     assert constants('uint32') == {bit.name: bit.value for bit in Status}
 
 
-def test_status_bits_are_sixteen_different_powers_of_two():
-    assert [bit.value for bit in Status] == [2**i for i in range(16)]
+def test_status_bits_are_different_powers_of_two():
+    assert [bit.value for bit in Status] == [2**i for i in range(18)]
 
 
 def test_the_generated_message_has_the_constants_of_the_code():

@@ -25,7 +25,7 @@ def test_every_parameter_belongs_to_one_group_and_every_group_is_documented(node
 
 def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
     names = [name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.names()]
-    assert f'{FEEDFORWARD_PREFIX}coulomb_scale' in names
+    assert f'{FEEDFORWARD_PREFIX}scale' in names
     fixed = {name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.fixed()}
     assert fixed == {'autostart', 'realtime_priority', 'seals', 'seal_chambers', 'record'}
 
