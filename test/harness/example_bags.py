@@ -3,18 +3,16 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
-    FORCE_TYPE,
-    POSITION_TYPE,
-    PRESSURE_TYPE,
-    REFERENCE_TYPE,
-    VELOCITY_TYPE,
+    INPUTS,
     encode,
     encode_text,
+    type_of,
 )
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.files import load_configuration
@@ -22,6 +20,7 @@ from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.replay.replay import replay
 
 STEP = 10_000_000  # [ns]
+TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}
 
 
 def write_inputs(path: Path, samples: int = 300, configuration: Configuration | None = None) -> Path:
@@ -33,18 +32,16 @@ def write_inputs(path: Path, samples: int = 300, configuration: Configuration | 
         for i in range(samples):
             stamp = 1_000_000_000 + i * STEP
             velocity = max(abs(math.sin(i / 20)) - 0.3, 0.0) * math.copysign(0.05, math.sin(i / 20))
+            inputs: list[Any] = []
             if i % 50 != 7:
-                pressure = Pressure(stamp, 2e6 + 1e6 * math.sin(i / 70), math.nan if i % 61 == 5 else 5e5)
-                writer.write(b.PRESSURE_TOPIC, PRESSURE_TYPE, stamp, encode(pressure, b'rod'))
-            force = Force(stamp, 60.0 * math.sin(i / 20 + 0.3))
-            writer.write(b.FORCE_TOPIC, FORCE_TYPE, stamp, encode(force, b'rod'))
+                inputs.append(Pressure(stamp, 2e6 + 1e6 * math.sin(i / 70), math.nan if i % 61 == 5 else 5e5))
+            inputs.append(Force(stamp, 60.0 * math.sin(i / 20 + 0.3)))
             if 100 <= i < 200:
-                reference = ServoReference(stamp, 0.001 * i, velocity, 0.0, b'rod')
-                writer.write(b.REFERENCE_TOPIC, REFERENCE_TYPE, stamp, encode(reference))
-            position = encode(Position(stamp, 0.001 * i), b'rod')
-            writer.write(b.POSITION_TOPIC, POSITION_TYPE, stamp, position)
-            data = encode(Velocity(stamp, velocity, b'rod'))
-            writer.write(b.VELOCITY_TOPIC, VELOCITY_TYPE, stamp, data)
+                inputs.append(ServoReference(stamp, 0.001 * i, velocity, 0.0, b'rod'))
+            inputs += [Position(stamp, 0.001 * i), Velocity(stamp, velocity, b'rod')]
+            for number, record in enumerate(inputs):  # received 1 us apart, so there is time between them for others
+                type_name = type_of(record)
+                writer.write(TOPICS[type_name], type_name, stamp + 1000 * number, encode(record, b'rod'))
     return path
 
 

@@ -78,6 +78,7 @@ ALGORITHM_VERSION = 2
 """
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
+_NOT_YET = {'stamp_age_max': 0.0}  # settings that version 1 had not: without effect
 
 
 class Snapshot(NamedTuple):
@@ -128,11 +129,17 @@ def parse_snapshot(text: str) -> Snapshot:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
 
+def snapshot_version(text: str) -> int:
+    """Version of the algorithm that made a snapshot, from its valid text."""
+    return int(json.loads(text).get('version', 1))
+
+
 def _settings(record_type: Any, document: Any, version: int, where: str) -> Any:
     """Settings of a snapshot; those of another version as far as they are settings still, within the present bounds."""
     if version == ALGORITHM_VERSION:
         return from_mapping(record_type, document, where)
-    known, kept = meanings(record_type), {}
+    known = meanings(record_type)
+    kept = {name: value for name, value in _NOT_YET.items() if name in known}
     for old_name, value in document.items():
         name = _RENAMED.get(old_name, old_name)
         if name in known:

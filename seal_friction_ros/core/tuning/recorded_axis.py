@@ -29,7 +29,7 @@ from seal_friction_ros.core.estimation.feedforward import (
     usable,
     wanted_velocity,
 )
-from seal_friction_ros.core.estimation.records import FrictionEstimate
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, RobustnessCase, TunedFeedForward
@@ -152,7 +152,8 @@ def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
     velocity = recording.velocity
     slope = acceleration(recording.time, velocity)
     state = np.array([estimate.state for estimate in recording.estimates])
-    usable = np.array([not estimate.status & UNUSABLE for estimate in recording.estimates])
+    unsuited = UNUSABLE | int(Status.MOTION_UNCERTAIN)
+    usable = np.array([not estimate.status & unsuited for estimate in recording.estimates])
     sliding = (state == FrictionState.SLIDING) & usable & np.isfinite(slope) & np.isfinite(recording.force_sum)
     count = int(np.count_nonzero(sliding))
     if count < FEWEST_SLIDING:

@@ -1,11 +1,12 @@
 """Recorded answers of the estimator against replayed ones: number of differences, and the first difference."""
 
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from itertools import islice
 from typing import Any
 
+from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
 from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE
 
 LONGEST_QUEUE = 100_000  # replayed answers that may wait for a recorded one; bounds memory if recording has stopped
@@ -21,6 +22,7 @@ class ReplayResult:
     differing: int
     """estimates and feed-forwards whose bytes differ from the recorded ones, including missing and surplus ones"""
     first_difference: str  # for a person; empty if there is none
+    recorded_version: int = ALGORITHM_VERSION  # of estimator and feed-forward when the bag was recorded
 
     @property
     def identical(self) -> bool:
@@ -29,7 +31,7 @@ class ReplayResult:
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
-        return {**asdict(self), 'identical': self.identical}
+        return {**asdict(self), 'version': ALGORITHM_VERSION, 'identical': self.identical}
 
     def summary(self, *, verified: bool) -> str:
         """One line for a person; ``verified``: about the comparison with the recorded answers."""
@@ -41,7 +43,13 @@ class ReplayResult:
         if not self.recorded_estimates:
             return 'no estimates in the bag to compare with'
         recorded = self.recorded_estimates + self.recorded_feedforwards
-        return f'{self.differing} of {recorded} recorded messages differ; {self.first_difference}'
+        reason = ''
+        if self.recorded_version != ALGORITHM_VERSION:
+            reason = (
+                f': version {self.recorded_version} of the algorithm made them, this is version {ALGORITHM_VERSION} '
+                '(see CHANGELOG.rst)'
+            )
+        return f'{self.differing} of {recorded} recorded messages differ{reason}; {self.first_difference}'
 
 
 class AnswerStream:
@@ -91,8 +99,17 @@ class AnswerStream:
         self.first = self.first or text()
 
 
-def replay_result(velocities: int, streams: Mapping[str, AnswerStream], *, is_cut: bool) -> ReplayResult:
-    """Result at the end of a bag; ``is_cut``: the answer to its last message may be missing."""
+def replay_result(
+    velocities: int, streams: Mapping[str, AnswerStream], versions: Iterable[int], *, is_cut: bool
+) -> ReplayResult:
+    """Result at the end of a bag.
+
+    Args:
+        velocities: Number of velocity samples.
+        streams: By message type.
+        versions: Of the algorithm, of each recorded configuration.
+        is_cut: The answer to the last message may be missing.
+    """
     for stream in streams.values():
         stream.finish(may_lack=int(is_cut))
     recorded = Counter({type_name: stream.recorded for type_name, stream in streams.items()})
@@ -102,6 +119,7 @@ def replay_result(velocities: int, streams: Mapping[str, AnswerStream], *, is_cu
         recorded[FEEDFORWARD_TYPE],
         sum(stream.differing for stream in streams.values()),
         next((stream.first for stream in streams.values() if stream.first), ''),
+        min(versions, default=ALGORITHM_VERSION),
     )
 
 

@@ -18,8 +18,14 @@ from seal_friction_ros.core.estimation.compiled_pipeline import (
     UnsuitedError,
     receive_all,
 )
-from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE
+from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot, snapshot_version
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    DECODERS,
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    decode_text,
+)
 from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration
@@ -62,6 +68,7 @@ def replay_in_bulk(
 
 def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]) -> ReplayResult:
     velocities, is_cut = 0, False
+    versions: set[int] = set()
     streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in topics.answers.items() if topic}
     for messages, answers in _answered(read_in_bulk(bag, _kind_of(topics)), override):
         kinds = messages.kinds
@@ -69,10 +76,12 @@ def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: 
         for type_name, stream in streams.items():
             stream.compare_block(messages, answers, _RECORDED[type_name])
         if len(kinds):
+            if kinds[0] == Kind.CONFIGURATION and override is None:
+                versions.add(snapshot_version(decode_text(messages.message(0))))
             answered = answers.estimate_sizes[-1] or answers.feedforward_sizes[-1]
             is_cut = bool(answered) or int(kinds[-1]) in (Kind.ESTIMATE, Kind.OTHER_ESTIMATE)
         advance(len(kinds))
-    return replay_result(velocities, streams, is_cut=is_cut)
+    return replay_result(velocities, streams, versions, is_cut=is_cut)
 
 
 def compile_now() -> None:

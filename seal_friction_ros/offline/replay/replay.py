@@ -11,6 +11,7 @@ from seal_friction_ros.core.estimation.configuration import (
     first_snapshot,
     parse_snapshot,
     snapshot_text,
+    snapshot_version,
 )
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
@@ -18,6 +19,7 @@ from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     DECODERS,
     ESTIMATE_TYPE,
+    decode_text,
     encode_text,
 )
 from seal_friction_ros.core.estimation.pipeline import answered, init
@@ -150,13 +152,16 @@ def _compare(replayed: Iterable[Step], topics: Topics) -> ReplayResult:
     stop between a message and its answer, so the answer to its last message may be missing.
     """
     velocities, is_cut, compared = 0, False, topics.answers
+    versions: set[int] = set()
     streams = {type_name: AnswerStream(type_name) for type_name, topic in compared.items() if topic}
     for message, answers in replayed:
         velocities += message.topic == topics.velocity
+        if message.type_name == CONFIGURATION_TYPE and message.topic == topics.configuration:
+            versions.add(snapshot_version(decode_text(message.data)))
         for type_name, data in answers:
             if type_name in streams:
                 streams[type_name].add_replayed(data)
         if message.topic and message.topic == compared.get(message.type_name):
             streams[message.type_name].compare_recorded(message.data)
         is_cut = bool(answers) or message.type_name == ESTIMATE_TYPE
-    return replay_result(velocities, streams, is_cut=is_cut)
+    return replay_result(velocities, streams, versions, is_cut=is_cut)

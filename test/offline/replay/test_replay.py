@@ -17,6 +17,7 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.offline.bags.bag import ESTIMATE_TOPIC, BagError, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.replay.parallel_replay import verify
 from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
 
@@ -173,3 +174,11 @@ def test_a_namespace_is_whole_names(recorded: Path, tmp_path: Path):
     assert replay(tmp_path / 'two', namespace='arm').identical
     with pytest.raises(BagError, match='nothing to estimate from'):
         replay(tmp_path / 'two', namespace='/ar')
+
+
+def test_a_bag_of_an_older_version_replays_and_the_version_is_named():
+    result = verify(ROOT / 'test' / 'corpus' / 'version_1' / 'faults', bulk_from=10**9)
+    assert (result.recorded_version, result.velocity_samples, result.recorded_estimates) == (1, 570, 570)
+    assert not result.identical
+    assert 'version 1 of the algorithm made them, this is version 2' in result.summary(verified=True)
+    assert verify(ROOT / 'test' / 'corpus' / 'version_1' / 'faults', bulk_from=0) == result
