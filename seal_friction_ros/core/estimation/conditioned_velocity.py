@@ -28,7 +28,7 @@ LONGEST_SMOOTHING = 0.02  # [s]
 LONGEST_WAIT = 0.2  # [s] a signal that has not pushed for this time, or takes it for h, is at rest
 MEMORY = 60.0  # [s] time constant with which a learnt half-width is forgotten
 SLOW_RIPPLE = 4.0  # [-] a ripple counts at speeds up to this multiple of it; a sharp peak of a fast motion is none
-SETTLING = 100  # samples after which a ripple of a signal in motion is known; until then nothing may push by it
+SETTLING = 100  # samples, or [ms] if that is sooner, after which the ripple of a signal is known
 SHORT_WAY = 8.0  # [-] a reversal after a way of less than this multiple of h widens the play
 
 
@@ -40,14 +40,14 @@ class ConditionedVelocity(NamedTuple):
     half_width: float  # [m] h; 0.0 for a clean signal
     ripple: float  # [m/s] of the velocity as it was given, in one sample; 0.0 for a clean signal
     smoothing: float  # [s] time constant with which the velocity was smoothed
-    is_waiting: bool  # whether the speed is falling because no push has come: the signal slows down or is at rest
+    is_waiting: bool  # whether no push has come for the speed: the signal slows down or is at rest
     last_velocity: float  # [m/s] of the last sample, as given
     last_change: float  # [m/s] last change of the given velocity
     last_ripple: float  # [m] last half-width that a ripple asked for
     slack: float  # [m] place in the play, between -h and h
     last_push: int  # [ns] stamp of the last push
     way: float  # [m] pushed since the last reversal, with its sign
-    samples: int  # number of samples, counted up to `SETTLING`
+    samples: int  # number of samples, or of [ms] if larger, counted up to `SETTLING`
 
 
 NOT_CONDITIONED = ConditionedVelocity(NEVER, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0.0, 0.0, NEVER, 0.0, 0)
@@ -74,7 +74,7 @@ def condition_velocity(
     step = (stamp - state.stamp) * 1e-9
     if not 0.0 < step <= LONGEST_STEP:  # a gap, or a clock that was set back: samples count from now on
         step = LONGEST_STEP
-    samples = state.samples + 1 if state.samples < SETTLING else SETTLING
+    samples = min(state.samples + max(int(step * 1e3 + 0.5), 1), SETTLING)
     change = velocity - state.last_velocity
     half_width, ripple = _learnt(state, velocity, change, step)
     half_width = max(half_width, resolution * step)
@@ -95,7 +95,7 @@ def condition_velocity(
         half_width,
         half_width / step,
         smoothing,
-        push == 0.0 and result != state.velocity,
+        push == 0.0 and (result != state.velocity or state.half_width == 0.0),
         velocity,
         change,
         ripple,

@@ -11,6 +11,7 @@ from typing import ClassVar, NamedTuple
 
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
+    SETTLING,
     ConditionedVelocity,
     condition_velocity,
 )
@@ -298,8 +299,10 @@ def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_r
     speed = abs(motion.velocity)
     if at_rest:
         return speed > CREEP * settings.stick_velocity
-    if motion.half_width == 0.0:
-        return False
+    if motion.samples < SETTLING:
+        return True
+    if motion.half_width == 0.0:  # the first step of a motion may be a ripple that is not learnt yet
+        return motion.velocity * (motion.last_velocity - motion.last_change) <= 0.0
     return motion.is_waiting or speed <= settings.slip_velocity + motion.half_width / SETTLING_TIME
 
 
