@@ -44,16 +44,16 @@ def test_a_failed_start_request_is_answered_and_the_estimate_continues():
 
 
 def test_a_disk_failure_is_logged_and_a_new_recording_can_start(tmp_path: Path, monkeypatch, capfd):
-    def full(self, *message):
-        raise OSError(28, 'No space left on device')
+    def full(self, *message, **options):
+        raise OSError(5, 'Input/output error')
 
     with graph({'record_directory': str(tmp_path)}) as g:
         g.connect()
         with monkeypatch.context() as broken:
             broken.setattr(BagWriter, 'write', full)
             assert g.call(Trigger, START, Trigger.Request()).success
-            assert g.spin_until(lambda: 'No space left' in g.probe.values('recorder').get('message', ''))
-        assert capfd.readouterr().err.count('No space left on device') == 1
+            assert g.spin_until(lambda: 'Input/output error' in g.probe.values('recorder').get('message', ''))
+        assert capfd.readouterr().err.count('Input/output error') == 1
         assert g.estimate(10**9, 0.1).state == FrictionEstimate.SLIDING
         assert g.call(Trigger, START, Trigger.Request()).success
         assert g.call(Trigger, STOP, Trigger.Request()).success
