@@ -48,6 +48,7 @@ class Recording:
         except (ValueError, RuntimeError) as error:
             self.failure = str(error)
             raise BagError(f'record_directory = {directory!r}, record_name = {name!r}: {error}') from None
+        self.failure = ''
         if self._recorder.error:
             raise BagError(self._recorder.error)
         return self._recorder.path
@@ -79,8 +80,9 @@ class Recording:
         if recorder is None:
             return ''
         recorder.stop()
-        self._finishing.append(recorder)
         self.failure = recorder.error
+        if not recorder.error:
+            self._finishing.append(recorder)
         counts = f'{recorder.written} messages, {recorder.waiting} more to be written, {recorder.dropped} dropped'
         return recorder.error or f'{recorder.path}: {counts}'
 
