@@ -5,9 +5,8 @@ from pathlib import Path
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from seal_friction_ros.core.estimation.node_options import RecordingOptions
-from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.bag import BagError, timed_name
 from seal_friction_ros.offline.bags.recorder import Recorder
-from seal_friction_ros.offline.bags.retention import timed_name
 
 
 class Recording:

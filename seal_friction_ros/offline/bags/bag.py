@@ -6,11 +6,13 @@ memory is bounded, and no file outside the bag is opened.
 """
 
 import errno
+import re
 import shutil
 import sqlite3
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
@@ -35,6 +37,10 @@ REFERENCE_TOPIC = '/servo_reference'
 ESTIMATE_TOPIC = '/friction_estimate'
 FEEDFORWARD_TOPIC = '/friction_feedforward'
 CONFIGURATION_TOPIC = '/friction_estimator/configuration'
+
+START_IN_NAME = re.compile(r'_[0-9]{8}_[0-9]{6}_[0-9]{6}\Z')
+"""Time of the start at the end of the name of a bag."""
+
 LARGEST_METADATA = 1 << 20  # [bytes] of metadata.yaml, with some 5000 files or 1000 topics
 _FOLDER_MODE = 0o750  # of a bag, less what the umask of the process forbids
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -52,6 +58,11 @@ class BagMessage(NamedTuple):
     type_name: str
     log_time: int  # [ns]
     data: bytes
+
+
+def timed_name(name: str) -> str:
+    """``name`` with the present time (UTC) at its end, in the place of another time there."""
+    return f'{START_IN_NAME.sub("", name)}_{datetime.now(UTC):%Y%m%d_%H%M%S_%f}'
 
 
 @cache

@@ -19,8 +19,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from seal_friction_ros.offline.bags.bag import BagError, BagWriter
-from seal_friction_ros.offline.bags.retention import delete_oldest, timed_name
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter, timed_name
+from seal_friction_ros.offline.bags.retention import delete_oldest
 
 QUEUE_LENGTH = 100_000  # [messages] fourteen seconds of seven topics at 1 kHz
 FLUSH_PERIOD = 0.3  # [s]

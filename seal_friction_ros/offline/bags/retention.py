@@ -1,34 +1,27 @@
-"""Names of the recorder's bags with the time of their start, and deletion of the oldest of them."""
+"""Deletion of the oldest bags of a recorder."""
 
 import re
 from contextlib import suppress
-from datetime import UTC, datetime
 from pathlib import Path
 
 from seal_friction_ros.files import read_yaml
-from seal_friction_ros.offline.bags.bag import LARGEST_METADATA
+from seal_friction_ros.offline.bags.bag import LARGEST_METADATA, START_IN_NAME
 
-_START = re.compile(r'_[0-9]{8}_[0-9]{6}_[0-9]{6}$')
 _METADATA = 'metadata.yaml'
-
-
-def timed_name(name: str) -> str:
-    """``name`` with the present time (UTC) at its end, in the place of another time there."""
-    return f'{_START.sub("", name)}_{datetime.now(UTC):%Y%m%d_%H%M%S_%f}'
 
 
 def delete_oldest(folder: Path, owner: str, largest: int) -> None:
     """Delete the oldest finished bags of a recorder until the remaining ones have at most ``largest`` [bytes].
 
-    A bag counts if its name ends like that of `timed_name`, its ``metadata.yaml`` says that ``owner`` finished it, and
-    its folder contains nothing but that file and its MCAP files. Everything else in ``folder`` stays: bags with another
-    name, unfinished bags, folders with another file in them, and links.
+    A bag counts if its name ends like that of `timed_name`, its ``metadata.yaml`` says that ``owner`` finished it, and its
+    folder contains nothing but that file and its MCAP files. Everything else in ``folder`` stays: bags with another name,
+    unfinished bags, folders with another file in them, and links.
 
     Raises:
         OSError: ``folder`` cannot be read.
     """
     total = 0
-    bags = [path for path in folder.iterdir() if _START.search(path.name) and _is_finished_by(path, owner)]
+    bags = [path for path in folder.iterdir() if START_IN_NAME.search(path.name) and _is_finished_by(path, owner)]
     for bag in sorted(bags, key=lambda path: path.name[-22:], reverse=True):
         with suppress(OSError):  # the other bags count as well
             files = list(bag.glob('*.mcap'))

@@ -14,10 +14,10 @@ from mcap.reader import make_reader
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
 from seal_friction_ros.offline.bags import mcap_reader, mcap_writer
 from seal_friction_ros.offline.bags import recorder as recorder_module
-from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages, timed_name
 from seal_friction_ros.offline.bags.recorder import FLUSH_PERIOD, Recorder
 from seal_friction_ros.offline.bags.recover import recover
-from seal_friction_ros.offline.bags.retention import delete_oldest, timed_name
+from seal_friction_ros.offline.bags.retention import delete_oldest
 
 
 def record(recorder: Recorder, number: int) -> None:
