@@ -13,8 +13,8 @@ _METADATA = 'metadata.yaml'
 def delete_oldest(folder: Path, owner: str, largest: int) -> None:
     """Delete the oldest finished bags of a recorder until the remaining ones have at most ``largest`` [bytes].
 
-    A bag counts if its name ends like that of `timed_name`, its ``metadata.yaml`` says that ``owner`` finished it, and its
-    folder contains nothing but that file and its MCAP files. Everything else in ``folder`` stays: bags with another name,
+    A bag counts if its name ends like that of `timed_name`, its ``metadata.yaml`` says that ``owner`` finished it, and
+    its folder contains nothing but that file and its MCAP files. Everything else stays: bags with another name,
     unfinished bags, folders with another file in them, and links.
 
     Raises:
