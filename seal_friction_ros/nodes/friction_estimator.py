@@ -56,7 +56,6 @@ class FrictionEstimator(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         self._logged_errors: dict[str, str] = {}
-        self._recording = Recording()
         self._configuration: Configuration | None = None
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
@@ -64,6 +63,7 @@ class FrictionEstimator(ManagedNode):
         self._timers: list[Any] = []
         self._sent: list[tuple[str, Output, bytes]] = []
         super().__init__('friction_estimator', FRICTION_ESTIMATOR_PARAMETERS, **kwargs)
+        self._recording = Recording(self.get_fully_qualified_name())
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
 
@@ -152,9 +152,16 @@ class FrictionEstimator(ManagedNode):
         self._topics[name] = self._inputs[name].topic_name
 
     def _on_watch_timer(self) -> None:
-        """Publish diagnostics when a publisher of an input has appeared or disappeared; follow a clock that was set."""
+        """Publish diagnostics when a publisher of an input has appeared or disappeared; follow a clock that was set.
+
+        If the next bag is due, let it begin with a snapshot.
+        """
         if self._watch.has_changed():
             self.publish_diagnostics()
+        following = self._recording.continue_in_next_bag()
+        if following:
+            self._publish_configuration()
+            self.get_logger().info(f'recording to {following}')
         if self.active and self._now == self._steady_time:
             offset = time.time_ns() - self._now()
             if abs(offset - self._state.clock_offset) > _LARGEST_CLOCK_STEP:
@@ -261,7 +268,7 @@ class FrictionEstimator(ManagedNode):
         try:
             path = self._recording.start(self.settings(RecordingOptions))
         except ValueError as error:
-            self.get_logger().error(str(error))
+            self._log_error_once('recorder', str(error))
             self._publish_configuration()
             return False, str(error)
         self._publish_configuration()

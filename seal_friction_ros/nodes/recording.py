@@ -1,19 +1,23 @@
 """Recording of the node: at most one bag at a time, started and stopped while the node estimates."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from seal_friction_ros.core.estimation.node_options import RecordingOptions
-from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.bag import BagError, timed_name
 from seal_friction_ros.offline.bags.recorder import Recorder
 
 
 class Recording:
-    """The present bag, if any, and the bags that are being finished."""
+    """The present bag, if any, and the bags that are being finished.
 
-    def __init__(self) -> None:
+    Args:
+        owner: Full name of the node.
+    """
+
+    def __init__(self, owner: str = '') -> None:
+        self._owner = owner
         self._recorder: Recorder | None = None
         self._finishing: list[Recorder] = []
         self.failure = ''
@@ -23,7 +27,8 @@ class Recording:
         """Start a bag named ``record_name``, or after the present time if that is empty; return its folder.
 
         Raises:
-            BagError: The bag cannot be created, or another bag is being recorded.
+            BagError: The bag cannot be created, or another bag is being recorded, or the disk has no room: then the
+                recording begins once there is room.
         """
         if self._recorder is not None and not self._recorder.error:
             raise BagError(f'recording to {self._recorder.path} already: stop that first')
@@ -32,14 +37,26 @@ class Recording:
         try:
             folder = Path(directory).expanduser()
             self._recorder = Recorder(
-                folder / (name or f'friction_{datetime.now(UTC):%Y%m%d_%H%M%S_%f}'),
+                folder / (name or timed_name('friction')),
                 split_size=options.record_split_size,
                 split_duration=options.record_split_duration,
+                free_space=options.record_free_space,
+                keep_size=options.record_keep_size,
+                owner=self._owner,
             )
         except (ValueError, RuntimeError) as error:
             self.failure = str(error)
             raise BagError(f'record_directory = {directory!r}, record_name = {name!r}: {error}') from None
+        self.failure = ''
+        if self._recorder.error:
+            raise BagError(self._recorder.error)
         return self._recorder.path
+
+    def continue_in_next_bag(self) -> Path | None:
+        """Begin the next bag if it is due; its folder. The caller has to record a snapshot first."""
+        if self._recorder is None or not self._recorder.is_next_due:
+            return None
+        return self._recorder.begin_next()
 
     def record(self, topic: str, type_name: str, log_time: int, data: bytes) -> None:
         """Record one message, if a bag is being recorded."""
@@ -62,8 +79,9 @@ class Recording:
         if recorder is None:
             return ''
         recorder.stop()
-        self._finishing.append(recorder)
         self.failure = recorder.error
+        if not recorder.error:
+            self._finishing.append(recorder)
         counts = f'{recorder.written} messages, {recorder.waiting} more to be written, {recorder.dropped} dropped'
         return recorder.error or f'{recorder.path}: {counts}'
 

@@ -128,6 +128,14 @@ TRIALS = (
         process.stopped_and_continued,
     ),
     Trial('disk full', 'as usual', 'as usual', 'recorder: the error of the disk', 'valid; verifies', process.disk_full),
+    Trial(
+        'disk nearly full, later with room again',
+        'as usual',
+        'as usual',
+        'recorder: ERROR with `record_free_space`, then as usual',
+        'two bags, both verify',
+        process.disk_nearly_full,
+    ),
     Trial('disk read-only', 'as usual', 'as usual', 'recorder: the error of the disk', 'none', process.read_only),
     Trial(
         'folder of the bag removed',

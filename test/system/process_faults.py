@@ -143,10 +143,13 @@ class EstimatorProcess(SpunNodes):
 
 
 @contextmanager
-def estimator_process(folder: Path, directory: str = '', prefix: tuple[str, ...] = ()) -> Iterator[EstimatorProcess]:
+def estimator_process(
+    folder: Path, directory: str = '', prefix: tuple[str, ...] = (), free_space: int = 0
+) -> Iterator[EstimatorProcess]:
     """Run the estimator, recording to ``bag`` in a folder, by a command that prepares its file system."""
     domain, log = free_domain(), folder / 'log'
     recording = {'record': True, 'record_directory': directory or str(folder), 'record_name': 'bag'}
+    recording['record_free_space'] = free_space
     with (
         node_process('friction_estimator', domain, {**recording, **SETTINGS}, log, prefix=prefix) as process,
         ros_context(domain) as context,
@@ -218,14 +221,25 @@ def burst(chance: random.Random, folder: Path) -> list[str]:
     return wrong + verified(folder / 'bag')
 
 
-def on_a_disk(folder: Path, options: str, error: str) -> list[str]:
-    """Record to a disk mounted for this try; the recorder must report ``error``."""
+@contextmanager
+def on_small_disk(folder: Path, options: str, free_space: int = 0) -> Iterator[tuple[EstimatorProcess, Path]]:
+    """Run the estimator, recording to a disk mounted for this try; the folder leads there.
+
+    Raises:
+        RuntimeError: There is no user namespace to mount it in.
+    """
     if subprocess.run([*OWN_MOUNTS, 'true'], check=False, capture_output=True).returncode:
-        return ['needs a user namespace to mount a small disk in']
+        raise RuntimeError('needs a user namespace to mount a small disk in')
     small = folder / 'disk'
     small.mkdir()
     mount = f'mount -t tmpfs -o {options} none "$0" && exec "$@"'
-    with estimator_process(folder, str(small), (*OWN_MOUNTS, 'sh', '-c', mount, str(small))) as place:
+    with estimator_process(folder, str(small), (*OWN_MOUNTS, 'sh', '-c', mount, str(small)), free_space) as place:
+        yield place, Path(f'/proc/{place.process.pid}/root{small}')
+
+
+def on_a_disk(folder: Path, options: str, error: str) -> list[str]:
+    """Record to a disk with those mount options; the recorder must report ``error``."""
+    with on_small_disk(folder, options) as (place, small):
 
         def reported() -> bool:
             """Whether the error is reported; sends samples until it is."""
@@ -236,9 +250,8 @@ def on_a_disk(folder: Path, options: str, error: str) -> list[str]:
             return [f'recorder: {place.recorder_messages[-1:]}']
         last = place.recorder_messages[-1]
         wrong = unless('could not be finished' not in last, last) + place.unrecovered()
-        bag = Path(f'/proc/{place.process.pid}/root{small}/bag')
-        if bag.exists():
-            shutil.copytree(bag, folder / 'copy')
+        if (small / 'bag').exists():
+            shutil.copytree(small / 'bag', folder / 'copy')
     if (folder / 'copy').exists():
         wrong += unless(sum(1 for _ in read_messages(folder / 'copy')), 'nothing in the bag')
         wrong += verified(folder / 'copy')
@@ -248,6 +261,28 @@ def on_a_disk(folder: Path, options: str, error: str) -> list[str]:
 def disk_full(chance: random.Random, folder: Path) -> list[str]:
     """A disk with little room."""
     return on_a_disk(folder, f'size={chance.randrange(150, 400)}k', 'No space left on device')
+
+
+def disk_nearly_full(chance: random.Random, folder: Path) -> list[str]:
+    """A disk that something else fills, and that has room again later."""
+    with on_small_disk(folder, 'size=8m', free_space=2_000_000) as (place, small):
+
+        def says(message: str) -> bool:
+            """Whether the newest report of the recorder contains ``message``; sends samples meanwhile."""
+            place.run(50, 1e5)
+            return message in ''.join(place.recorder_messages[-1:])
+
+        place.run(chance.randrange(100, 300))
+        (small / 'other').write_bytes(bytes(chance.randrange(6_300_000, 7_000_000)))
+        wrong = unless(place.spin_until(lambda: says('record_free_space')), 'recording goes on')
+        (small / 'other').unlink()
+        wrong += unless(place.spin_until(lambda: says('recording') and not says('stopped')), 'recording does not go on')
+        place.run(chance.randrange(100, 300))
+        wrong += place.unrecovered()
+        shutil.copytree(small, folder / 'copies')
+    for bag in sorted((folder / 'copies').iterdir()):
+        wrong += verified(Path(recover(bag).out))
+    return wrong + unless(len(list((folder / 'copies').glob('*_recovered'))) == 2, 'not two bags')
 
 
 def read_only(chance: random.Random, folder: Path) -> list[str]:

@@ -11,7 +11,11 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.foundation.parameters import ParameterGroup, check, parameter
 
-_SMALLEST_SPLIT = {'record_split_size': 1_000_000, 'record_split_duration': 10.0}  # [bytes], [s]
+_SMALLEST = {  # besides 0
+    'record_split_size': 1_000_000,  # [bytes]
+    'record_split_duration': 10.0,  # [s]
+    'record_keep_size': 10_000_000,  # [bytes]
+}
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,8 @@ class RecordingOptions:
     """Recording, one ROS parameter per field.
 
     Raises:
-        ValueError: A value is out of bounds, the name of the bag could lead out of the folder, or the splits are so
-            small that a bag would have thousands of files.
+        ValueError: A value is out of bounds, the name of the bag could lead out of the folder, or bags or their files
+            would be so small that there are thousands of them.
     """
 
     record: bool = parameter(False, unit='', live=False, description='Start recording at activation.')
@@ -68,10 +72,26 @@ class RecordingOptions:
     record_split_duration: float = parameter(
         0.0, unit='s', lower=0.0, upper=1e9, description='Longest duration of one file of the bag; 0: no limit.'
     )
+    record_free_space: int = parameter(
+        1_000_000_000,
+        unit='bytes',
+        lower=0,
+        upper=10**15,
+        description='Space that recording leaves free on the disk: it stops before, and continues in a new bag once '
+        'there is room again. 0: it stops when the disk is full.',
+    )
+    record_keep_size: int = parameter(
+        0,
+        unit='bytes',
+        lower=0,
+        upper=10**15,
+        description='Size of all bags of this node in record_directory, above which it deletes its oldest finished '
+        'ones; a new bag begins after each tenth of it. 0: keep all.',
+    )
 
     def __post_init__(self) -> None:
         check(self)
-        for name, least in _SMALLEST_SPLIT.items():
+        for name, least in _SMALLEST.items():
             value = getattr(self, name)
             if 0 < value < least:
                 raise ValueError(f'RecordingOptions.{name} = {value} makes too many files: 0 or at least {least}')

@@ -6,11 +6,13 @@ memory is bounded, and no file outside the bag is opened.
 """
 
 import errno
+import re
 import shutil
 import sqlite3
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
@@ -25,7 +27,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, PACKAGE
 from seal_friction_ros.files import parse_yaml, read_yaml, share_directory
 from seal_friction_ros.offline.bags import mcap_reader, sqlite_reader
-from seal_friction_ros.offline.bags.mcap_writer import Description, McapOutput, Span
+from seal_friction_ros.offline.bags.mcap_writer import FILE_MODE, Description, McapOutput, Span
 
 PRESSURE_TOPIC = '/cylinder_pressure'
 VELOCITY_TOPIC = '/rod_velocity'
@@ -35,7 +37,12 @@ REFERENCE_TOPIC = '/servo_reference'
 ESTIMATE_TOPIC = '/friction_estimate'
 FEEDFORWARD_TOPIC = '/friction_feedforward'
 CONFIGURATION_TOPIC = '/friction_estimator/configuration'
-_LARGEST_METADATA = 1 << 20  # [bytes] of metadata.yaml, with some 5000 files or 1000 topics
+
+START_IN_NAME = re.compile(r'_[0-9]{8}_[0-9]{6}_[0-9]{6}\Z')
+"""Time of the start at the end of the name of a bag."""
+
+LARGEST_METADATA = 1 << 20  # [bytes] of metadata.yaml, with some 5000 files or 1000 topics
+_FOLDER_MODE = 0o750  # of a bag, less what the umask of the process forbids
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 
@@ -51,6 +58,11 @@ class BagMessage(NamedTuple):
     type_name: str
     log_time: int  # [ns]
     data: bytes
+
+
+def timed_name(name: str) -> str:
+    """``name`` with the present time (UTC) at its end, in the place of another time there."""
+    return f'{START_IN_NAME.sub("", name)}_{datetime.now(UTC):%Y%m%d_%H%M%S_%f}'
 
 
 @cache
@@ -95,12 +107,20 @@ class BagWriter:
         path: Folder of the bag; must not exist.
         split_size: Largest size of a file, after which the next one begins [bytes]; 0: no limit.
         split_duration: Longest duration of a file, after which the next one begins [s]; 0: no limit.
+        custom_data: For ``metadata.yaml``.
 
     Raises:
         BagError: There is something at ``path`` already, or it cannot be made.
     """
 
-    def __init__(self, path: Path, *, split_size: int = 0, split_duration: float = 0.0) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        split_size: int = 0,
+        split_duration: float = 0.0,
+        custom_data: Mapping[str, str] | None = None,
+    ) -> None:
         self.path = path
         for type_name in DECODERS:
             describe(type_name)  # raises here and not at the first message
@@ -108,11 +128,12 @@ class BagWriter:
         self._descriptions: dict[tuple[str, str], Description] = {}
         self._listed = 0
         self._last_time = -1
-        self._custom_data: dict[str, str] = {}
+        self._custom_data = dict(custom_data or {})
         self._finished: list[tuple[str, Span]] = []
+        self._finished_size = 0
         self._finished_counts: dict[tuple[str, str], int] = {}
         try:
-            path.mkdir(parents=True)
+            path.mkdir(_FOLDER_MODE, parents=True)
         except FileExistsError:
             raise BagError(f'{path} exists already: not overwriting') from None
         except OSError as error:
@@ -129,7 +150,13 @@ class BagWriter:
             raise BagError(f'{path}: cannot make a bag there: {error.strerror}') from None
 
     def write(
-        self, topic: str, type_name: str, log_time: int, data: bytes, description: Description | None = None
+        self,
+        topic: str,
+        type_name: str,
+        log_time: int,
+        data: bytes,
+        description: Description | None = None,
+        publish_time: int | None = None,
     ) -> int:
         """Append one serialised message.
 
@@ -139,6 +166,7 @@ class BagWriter:
             log_time: [ns]
             data: CDR.
             description: Of the topic; optional if the type is installed.
+            publish_time: [ns] on any clock; default: the recorded log time.
 
         Returns:
             The recorded log time [ns]: the one given, or 1 ns after the last one if that is later.
@@ -153,7 +181,7 @@ class BagWriter:
         if self._is_full(log_time, len(data)):
             self._split()
         self._last_time = log_time
-        self._output.write(topic, known, log_time, data)
+        self._output.write(topic, known, log_time, data, publish_time)
         return log_time
 
     def flush(self) -> None:
@@ -171,13 +199,18 @@ class BagWriter:
         """Number of messages written so far."""
         return sum(span.messages for _, span in self._finished) + self._output.span.messages
 
-    def close(self, custom_data: dict[str, str] | None = None) -> None:
-        """Write pending messages, the index and the final ``metadata.yaml``, which holds ``custom_data``.
+    @property
+    def size(self) -> int:
+        """Of all files with pending messages [bytes]."""
+        return self._finished_size + self._output.size
+
+    def close(self, custom_data: Mapping[str, str] | None = None) -> None:
+        """Write pending messages, the index and the final ``metadata.yaml``, which also holds ``custom_data``.
 
         Raises:
             OSError: Writing failed.
         """
-        self._custom_data = custom_data or {}
+        self._custom_data |= custom_data or {}
         self._output.finish(_yaml_text(self._information()))
         self._write_metadata()
         self._output.close()
@@ -196,7 +229,8 @@ class BagWriter:
             while True:
                 try:
                     self._output.finish_early()
-                    self._custom_data = {'dropped_messages': str(offered - self.message_count), 'failure': failure}
+                    dropped = str(offered - self.message_count)
+                    self._custom_data |= {'dropped_messages': dropped, 'failure': failure}
                     self._write_metadata()
                     return
                 except OSError as error:
@@ -222,11 +256,12 @@ class BagWriter:
                 self.close()
                 return
         except OSError:
-            self._remove()
+            self.remove()
             raise
-        self._remove()
+        self.remove()
 
-    def _remove(self) -> None:
+    def remove(self) -> None:
+        """Remove the bag."""
         self._output.close()
         shutil.rmtree(self.path, ignore_errors=True)
 
@@ -245,6 +280,7 @@ class BagWriter:
         following = self._file(len(self._finished) + 1)
         finished.close()
         self._finished.append((finished.path.name, finished.span))
+        self._finished_size += finished.size
         self._finished_counts = self._counts(finished)
         self._output = following
         self._write_metadata()
@@ -281,6 +317,7 @@ class BagWriter:
         text = _yaml_text({'rosbag2_bagfile_information': self._information()})
         partial = self.path / 'metadata.yaml.partial'
         try:
+            partial.touch(FILE_MODE)
             partial.write_text(text)
             partial.replace(self.path / 'metadata.yaml')
         except OSError:
@@ -428,7 +465,7 @@ def storage(path: Path) -> Storage:
         metadata = path / 'metadata.yaml'
         if not metadata.is_file():
             raise BagError(f'{path}: not a rosbag2 bag: no metadata.yaml in it')
-        document = read_yaml(_inside(path, 'metadata.yaml'), _LARGEST_METADATA)
+        document = read_yaml(_inside(path, 'metadata.yaml'), LARGEST_METADATA)
         information = document.get('rosbag2_bagfile_information') if isinstance(document, Mapping) else None
         if not isinstance(information, Mapping):
             raise ValueError('metadata.yaml is not in the format of rosbag2')

@@ -56,6 +56,7 @@ class Message(NamedTuple):
 
     channel: Channel
     log_time: int  # [ns]
+    publish_time: int  # [ns]
     data: bytes
 
 
@@ -271,7 +272,7 @@ def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
         ValueError: The file is not finished, or a block cannot be read.
     """
     with path.open('rb') as file:
-        for channel, log_time, data in messages(file, scan_finished(file)):
+        for channel, log_time, _, data in messages(file, scan_finished(file)):
             yield channel.topic, channel.type_name, log_time, data
 
 
@@ -287,8 +288,8 @@ def file_topics(path: Path) -> Iterator[tuple[str, str, int]]:
             for number, channel in layout.channels.items():
                 yield channel.topic, channel.type_name, layout.counts.get(number, 0)
         else:
-            for channel, _, _ in messages(file, layout):
-                yield channel.topic, channel.type_name, 1
+            for message in messages(file, layout):
+                yield message.channel.topic, message.channel.type_name, 1
 
 
 def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], None] | None = None) -> Iterator[Message]:
@@ -356,8 +357,9 @@ class _Contents(NamedTuple):
     def message(self, number: int, channels: dict[int, Channel]) -> Message:
         """One message."""
         offset = self.offsets[number]
-        _, length, channel, _, log_time, _ = _MESSAGE.unpack_from(self.data, offset)
-        return Message(channels[channel], log_time, self.data[offset + _MESSAGE.size : offset + RECORD.size + length])
+        _, length, channel, _, log_time, publish_time = _MESSAGE.unpack_from(self.data, offset)
+        data = self.data[offset + _MESSAGE.size : offset + RECORD.size + length]
+        return Message(channels[channel], log_time, publish_time, data)
 
 
 _NOTHING = _Contents(b'', array('Q'), array('Q'))

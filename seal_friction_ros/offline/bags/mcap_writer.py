@@ -31,6 +31,7 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 CHUNK_SIZE = 64 * 1024  # [bytes] small, so that the writing thread blocks briefly; the file does not get larger
+FILE_MODE = 0o640  # of the files of a bag, less what the umask of the process forbids
 _MESSAGE_OVERHEAD = 47  # [bytes] head of a message and its entry in the index
 _MARKS = 4  # chunks that can be dropped to make room for the end of the file
 # Heads of records (https://mcap.dev/spec), each beginning with the opcode and the length of the rest.
@@ -77,11 +78,11 @@ class _Chunk:
         self.first_time = self.last_time = -1
         """log times of the first and the last message [ns]"""
 
-    def add(self, channel: int, log_time: int, data: bytes) -> None:
+    def add(self, channel: int, log_time: int, publish_time: int, data: bytes) -> None:
         """Append one message."""
         self.index.setdefault(channel, []).extend((log_time, len(self.data)))
         length = _MESSAGE.size - _OPCODE_AND_LENGTH + len(data)
-        self.data += _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, 0, log_time, log_time)
+        self.data += _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, 0, log_time, publish_time)
         self.data += data
         if self.first_time < 0:
             self.first_time = log_time
@@ -134,12 +135,23 @@ class McapOutput:
         """Of the file with pending messages [bytes]."""
         return self._stream.tell() + self._pending
 
-    def write(self, topic: str, description: Description, log_time: int, data: bytes) -> None:
-        """Append one message; its ``log_time`` [ns] is not before that of the last one."""
+    def write(
+        self, topic: str, description: Description, log_time: int, data: bytes, publish_time: int | None = None
+    ) -> None:
+        """Append one message.
+
+        Args:
+            topic: Its topic.
+            description: Of the topic.
+            log_time: [ns] not before that of the last message.
+            data: CDR.
+            publish_time: [ns] on any clock; default: ``log_time``.
+        """
         key = (topic, description.type_name)
         if key not in self._channels:
             self._add_channel(key, description)
-        self._chunk.add(self._channels[key].id, log_time, data)
+        publish_time = log_time if publish_time is None else publish_time
+        self._chunk.add(self._channels[key].id, log_time, publish_time, data)
         self.counts[key] += 1
         first, _, before = self.span
         self.span = Span(first if before else log_time, log_time, before + 1)
@@ -235,7 +247,7 @@ class _Stream:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._size = 0
-        self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        self._handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, FILE_MODE)
 
     def write(self, data: bytes) -> None:
         """Write all data."""

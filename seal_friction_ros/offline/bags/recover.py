@@ -96,14 +96,14 @@ def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
             if layout.damage:
                 found.lost_bytes += path.stat().st_size - layout.sound_size
                 found.damage.append(f'{path.name}: {layout.damage}')
-            for channel, log_time, data in mcap_reader.messages(file, layout, on_fault):
+            for channel, log_time, publish_time, data in mcap_reader.messages(file, layout, on_fault):
                 topic, type_name, encoding = channel[:3]
                 if encoding != 'cdr':
                     raise BagError(f'{path}: {topic} is encoded as {encoding[:40]!r}, not as CDR')
                 key = topic, type_name
                 if key not in descriptions:
                     descriptions[key] = _described(channel)
-                found.last_ns = writer.write(topic, type_name, log_time, data, descriptions[key])
+                found.last_ns = writer.write(topic, type_name, log_time, data, descriptions[key], publish_time)
                 found.first_ns = found.last_ns if found.first_ns < 0 else found.first_ns
                 found.messages += 1
                 found.topics[topic] = found.topics.get(topic, 0) + 1

@@ -1,6 +1,8 @@
 """Bags: what we write opens elsewhere, what is damaged is said in one line."""
 
+import os
 import shutil
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -162,7 +164,7 @@ def test_what_was_flushed_is_in_the_file_and_whole(tmp_path: Path):
         assert list(mcap_reader.messages(file, mcap_reader.scan(file))) == []
         writer.flush()
         layout = mcap_reader.scan(file)
-        assert [decode_text(data) for _, _, data in mcap_reader.messages(file, layout)] == list('0123456789')
+        assert [decode_text(message.data) for message in mcap_reader.messages(file, layout)] == list('0123456789')
         assert layout.sound_size == (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size
     writer.close()
 
@@ -188,6 +190,20 @@ def test_a_bag_is_never_overwritten(tmp_path: Path):
     with pytest.raises(BagError, match='exists already: not overwriting'):
         BagWriter(tmp_path / 'bag')
     assert {p.name: p.read_bytes() for p in (tmp_path / 'bag').iterdir()} == before
+
+
+@pytest.mark.parametrize(('umask', 'folder', 'file'), [(0, 0o750, 0o640), (0o022, 0o750, 0o640), (0o077, 0o700, 0o600)])
+def test_others_cannot_read_a_bag(tmp_path: Path, umask: int, folder: int, file: int):
+    before = os.umask(umask)
+    try:
+        with BagWriter(tmp_path / 'bag', split_duration=1e-9) as writer:
+            for log_time in (1, 5):
+                writer.write('/t', CONFIGURATION_TYPE, log_time, encode_text('a'))
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / 'bag').stat().st_mode) == folder
+    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in (tmp_path / 'bag').iterdir()}
+    assert modes == dict.fromkeys(('metadata.yaml', 'bag_0.mcap', 'bag_1.mcap'), file)
 
 
 def test_a_failure_while_writing_leaves_nothing_behind(tmp_path: Path):
@@ -245,8 +261,9 @@ def test_a_file_is_byte_for_byte_what_the_writer_of_the_mcap_library_makes(tmp_p
                 schema = theirs.register_schema(*description[:3])
                 channels[topic] = theirs.register_channel(topic, 'cdr', schema, description.metadata)
             data = bytes(number % 50)
-            ours.write(topic, description, 10**9 + number, data)
-            theirs.add_message(channels[topic], 10**9 + number, data, publish_time=10**9 + number)
+            publish_time = 10**9 + number if number % 2 else 10**18 - number
+            ours.write(topic, description, 10**9 + number, data, None if number % 2 else publish_time)
+            theirs.add_message(channels[topic], 10**9 + number, data, publish_time=publish_time)
             if number % 700 == 699:
                 ours.flush()
                 theirs.flush()

@@ -3,18 +3,21 @@
 import errno
 import gc
 import os
+import threading
 import time
 from pathlib import Path
 
 import pytest
 import yaml
+from mcap.reader import make_reader
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
-from seal_friction_ros.offline.bags import mcap_writer
+from seal_friction_ros.offline.bags import mcap_reader, mcap_writer
 from seal_friction_ros.offline.bags import recorder as recorder_module
-from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages, timed_name
 from seal_friction_ros.offline.bags.recorder import FLUSH_PERIOD, Recorder
 from seal_friction_ros.offline.bags.recover import recover
+from seal_friction_ros.offline.bags.retention import delete_oldest
 
 
 def record(recorder: Recorder, number: int) -> None:
@@ -157,7 +160,7 @@ def test_metadata_that_cannot_be_written_costs_no_message(tmp_path: Path, monkey
 
 
 def test_any_failure_stops_the_recording_and_says_why(tmp_path: Path, monkeypatch):
-    def broken(self, *message):
+    def broken(self, *message, **options):
         raise RuntimeError('the disk sings')
 
     monkeypatch.setattr(BagWriter, 'write', broken)
@@ -175,6 +178,234 @@ def test_a_recording_is_split_by_size_and_reads_as_one(tmp_path: Path):
     recorder.close()
     assert len(list((tmp_path / 'bag').glob('*.mcap'))) > 3
     assert texts(tmp_path / 'bag') == [str(number) for number in range(5000)]
+
+
+def test_each_message_keeps_the_wall_time_beside_its_log_time(tmp_path: Path):
+    began = time.time_ns()
+    recorder = Recorder(tmp_path / 'bag')
+    for number in range(3):
+        record(recorder, number)
+    recorder.close()
+    ended = time.time_ns()
+    recover(tmp_path / 'bag', tmp_path / 'copy')
+    for bag in ('bag', 'copy'):
+        with (tmp_path / bag / f'{bag}_0.mcap').open('rb') as file:
+            times = [(m.log_time, m.publish_time) for _, _, m in make_reader(file).iter_messages()]
+        assert [log_time for log_time, _ in times] == [0, 1, 2]
+        assert began <= times[0][1] <= times[1][1] <= times[2][1] <= ended
+
+
+class Room:
+    """Stands for ``shutil`` where the recorder asks for the free space of the disk."""
+
+    def __init__(self, free: int) -> None:
+        self.free = free
+
+    def disk_usage(self, path: Path) -> 'Room':
+        assert path.is_dir()
+        return self
+
+
+@pytest.fixture
+def room(monkeypatch) -> Room:
+    monkeypatch.setattr(recorder_module, 'RESUME_PERIOD', 0.01)
+    stand_in = Room(10**12)
+    monkeypatch.setattr(recorder_module, 'shutil', stand_in)
+    return stand_in
+
+
+def test_recording_stops_before_the_disk_is_full_and_continues_in_a_new_bag_once_there_is_room(
+    tmp_path: Path, room: Room
+):
+    floor = 50_000_000
+    recorder = Recorder(tmp_path / 'bag', free_space=floor)
+    record(recorder, 0)
+    wait_until(lambda: not recorder.waiting)
+    room.free = floor
+    wait_until(lambda: recorder.error)
+    assert f'less than {floor} bytes left free' in recorder.error
+    assert 'a new bag begins once there is room' in recorder.error
+    record(recorder, 1)
+    assert (recorder.written, recorder.dropped) == (1, 1)
+    room.free = floor + 5_000_000  # not enough: recording would soon stop again
+    time.sleep(0.05)
+    assert not recorder.is_next_due
+    room.free = floor + 10_000_000
+    wait_until(lambda: recorder.is_next_due)
+    following = recorder.begin_next()
+    assert not recorder.is_next_due
+    record(recorder, 2)
+    wait_until(lambda: not recorder.error)
+    recorder.close()
+    assert recorder.path == following
+    assert (recorder.written, recorder.dropped, recorder.error) == (1, 0, '')
+    assert (texts(tmp_path / 'bag'), texts(following)) == (['0'], ['2'])
+    about = information(tmp_path / 'bag')['custom_data']
+    assert about['dropped_messages'] == '0'
+    assert 'record_free_space' in about['failure']
+    recover(tmp_path / 'bag', tmp_path / 'copy')
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        assert mcap_reader.scan(file).counts  # finished with its index
+
+
+def test_a_recorder_without_room_leaves_no_bag_and_begins_once_there_is_room(tmp_path: Path, room: Room):
+    room.free = 10**6
+    recorder = Recorder(tmp_path / 'bag', free_space=10**6)
+    assert recorder.error
+    assert list(tmp_path.iterdir()) == []
+    record(recorder, 0)
+    assert recorder.dropped == 1
+    room.free = 10**8
+    wait_until(lambda: recorder.is_next_due)
+    following = recorder.begin_next()
+    record(recorder, 1)
+    recorder.close()
+    assert texts(following) == ['1']
+
+
+def test_a_full_disk_is_left_alone_until_it_has_room(tmp_path: Path, room: Room, monkeypatch):
+    room.free = 0
+    recorder = Recorder(tmp_path / 'bag')
+    with monkeypatch.context() as full:
+        full.setattr(mcap_writer, 'os', Disk(room=90_000))
+        for number in range(5000):
+            record(recorder, number)
+        wait_until(lambda: recorder.error)
+    assert 'No space left' in recorder.error
+    time.sleep(0.05)
+    assert not recorder.is_next_due
+    room.free = 10**8
+    wait_until(lambda: recorder.is_next_due)
+    recorder.begin_next()
+    record(recorder, 5000)
+    recorder.close()
+    assert recorder.error == ''
+    assert texts(recorder.path) == ['5000']
+
+
+def test_a_next_bag_that_cannot_be_made_is_tried_again(tmp_path: Path, room: Room, monkeypatch):
+    recorder = Recorder(tmp_path / 'bag', free_space=10**7)
+    record(recorder, 0)
+    wait_until(lambda: not recorder.waiting)
+    room.free = 0
+    wait_until(lambda: recorder.error)
+    error = recorder.error
+    room.free = 10**12
+    with monkeypatch.context() as broken:
+        broken.setattr(recorder_module, 'timed_name', lambda name: name)  # exists already
+        wait_until(lambda: recorder.is_next_due)
+        recorder.begin_next()
+        record(recorder, 1)
+        wait_until(lambda: recorder.is_next_due)
+    assert recorder.error == error
+    recorder.begin_next()
+    record(recorder, 2)
+    recorder.close()
+    assert texts(tmp_path / 'bag') == ['0']
+    assert texts(recorder.path) == ['2']
+
+
+def test_a_disk_that_fails_otherwise_is_not_tried_again(tmp_path: Path, room: Room, monkeypatch):
+    def broken(self, *message, **options):
+        raise OSError(errno.EIO, 'Input/output error')
+
+    monkeypatch.setattr(BagWriter, 'write', broken)
+    recorder = Recorder(tmp_path / 'bag')
+    record(recorder, 0)
+    wait_until(lambda: recorder.error)
+    time.sleep(0.05)
+    assert not recorder.is_next_due
+    assert 'once there is room' not in recorder.error
+    recorder.close()
+
+
+def test_the_disk_is_never_asked_for_its_space_where_messages_are_recorded(tmp_path: Path, monkeypatch):
+    asked = []
+
+    class Watched:
+        @staticmethod
+        def disk_usage(path: Path) -> Room:
+            assert path.is_dir()
+            asked.append(threading.current_thread().name)
+            return Room(10**12)
+
+    recorder = Recorder(tmp_path / 'bag', free_space=1)
+    monkeypatch.setattr(recorder_module, 'shutil', Watched)
+    for number in range(1000):
+        record(recorder, number)
+        recorder.flush_if_idle()
+    recorder.close()
+    assert set(asked) == {'recorder'}
+
+
+def record_long(recorder: Recorder, size: int) -> list[Path]:
+    """Record ``size`` [bytes] and begin each bag that is due, as the node does; the bags, oldest first."""
+    bags = [recorder.path]
+    for number in range(size // 10_000):
+        recorder.record('/t', CONFIGURATION_TYPE, number, encode_text(str(number)) + bytes(10_000))
+        if number % 10 == 0:
+            wait_until(lambda: not recorder.waiting)
+            time.sleep(0.003)
+        if recorder.is_next_due:
+            bags.append(recorder.begin_next())
+    recorder.close()
+    return bags
+
+
+def numbers(bag: Path) -> list[int]:
+    return [int(decode_text(message.data[:-10_000])) for message in read_messages(bag)]
+
+
+def test_the_oldest_bags_are_deleted_beyond_the_size_to_keep(tmp_path: Path):
+    keep = 3_000_000
+    recorder = Recorder(tmp_path / timed_name('bag'), keep_size=keep, owner='/axis/friction_estimator')
+    bags = record_long(recorder, 5_000_000)
+    left = [bag for bag in bags if bag.exists()]
+    assert len(bags) > 12
+    assert left == bags[len(bags) - len(left) :]
+    assert sorted(tmp_path.iterdir()) == sorted(left)
+    size = sum(file.stat().st_size for bag in left for file in bag.iterdir())
+    assert keep * 0.8 < size < keep * 1.1
+    found = [number for bag in left for number in numbers(bag)]
+    assert found == list(range(found[0], 500))  # a message at the change is in one bag and not lost
+
+
+def test_nothing_but_finished_bags_of_the_same_recorder_is_ever_deleted(tmp_path: Path):
+    def bag(name: str, owner: str = '/mine', finished: bool = True) -> Path:
+        writer = BagWriter(tmp_path / name, custom_data={'recorded_by': owner} if owner else {})
+        writer.write('/t', CONFIGURATION_TYPE, 1, encode_text('a'))
+        if finished:
+            writer.close({'dropped_messages': '0'})
+        else:
+            writer.flush()
+        return writer.path
+
+    start = '20200101_000000_00000'
+    ours = [bag(f'friction_{start}{number}') for number in range(3)]
+    others = [
+        bag('friction_of_monday'),
+        bag(f'friction_{start}3_recovered'),
+        bag(f'friction_{start}4', owner='/other'),
+        bag(f'friction_{start}5', owner=''),
+        bag(f'friction_{start}6', finished=False),
+    ]
+    noted = bag(f'friction_{start}7')
+    (noted / 'notes.txt').write_text('keep')
+    renamed = bag(f'friction_{start}8').rename(tmp_path / f'kept_{start}8')
+    folder = tmp_path / f'work_{start}9'
+    folder.mkdir()
+    (tmp_path / f'file_{start}0').write_text('')
+    link = tmp_path / f'link_{start}2'
+    link.symlink_to(ours[2], target_is_directory=True)
+    damaged = bag(f'damaged_{start}3')
+    (damaged / 'metadata.yaml').write_text('[')
+    before = set(tmp_path.iterdir())
+    delete_oldest(tmp_path, '/mine', sum(file.stat().st_size for file in ours[2].glob('*.mcap')))
+    assert before - set(tmp_path.iterdir()) == set(ours[:2])
+    delete_oldest(tmp_path, '/mine', 0)
+    assert before - set(tmp_path.iterdir()) == set(ours)
+    assert all(path.exists() for path in (*others, noted, renamed, folder, damaged))
+    assert (noted / 'notes.txt').exists()
 
 
 def test_nothing_is_overwritten(tmp_path: Path):
