@@ -5,7 +5,6 @@ axis gives the same bytes.
 """
 
 import math
-import os
 import textwrap
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -35,10 +34,11 @@ from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.replay import steps
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.work.targets import mark
 
 CONTROL_PERIOD, INNER_STEP = 1e-3, 1e-4  # [s] of the simulated servo, as in servo_simulator
 NOISE_LENGTH = 8192  # samples of noise, which then repeats
-MADE_BY = '# Feed-forward of friction_estimator, made by seal_friction tune.'
+MADE_BY = f'# Feed-forward of friction_estimator, {mark("tune")}.'
 NODE = '/**/friction_estimator'  # in every namespace
 TUNED = ('scale', 'lead_time', 'smoothing_velocity', 'slew_limit')
 PERFORMANCE = ('tracking_rms', 'tracking_peak', 'dwell', 'overshoot', 'limit_cycle_reversals')
@@ -296,23 +296,6 @@ def _with_reference(conditioned: Reference, sample: Any) -> Reference:
 def page_of(out: Path) -> Path:
     """Page that belongs to a parameter file: beside it, with the suffix ``.html``."""
     return out.with_suffix('.html')
-
-
-def check_target(out: Path) -> None:
-    """Check that parameter file and page can be written; called before the computation.
-
-    Raises:
-        ValueError: A file is not from an earlier tuning, or the folder cannot be written to.
-    """
-    if out.suffix in ('.html', '.htm'):
-        raise ValueError(f'{out}: FILE is the parameter file (.yaml); the report beside it gets the suffix .html')
-    parent = next(parent for parent in out.absolute().parents if parent.exists())
-    if out.is_dir() or not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise ValueError(f'{out}: cannot write a file there')
-    is_own = out.exists() and out.read_text(encoding='utf-8', errors='replace').startswith(MADE_BY)
-    for path in (out, page_of(out)):
-        if path.exists() and not is_own:
-            raise ValueError(f'{path} exists already and is not from tune: not overwriting')
 
 
 def parameter_text(tuning: SimulatorTuning | BagTuning) -> str:
