@@ -81,12 +81,19 @@ _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
 _NOT_YET = {'stamp_age_max': 0.0}  # settings that version 1 had not: without effect
 
 
+class Recorded(NamedTuple):
+    """What acted when the bag was recorded that a bag of `replay` is made from."""
+
+    feedforward: FeedForwardSettings | None  # None: not known
+
+
 class Snapshot(NamedTuple):
     """Everything that the next answer depends on besides the messages to come."""
 
     configuration: Configuration
     state: PipelineState
     version: int = ALGORITHM_VERSION  # of the algorithm that recorded it
+    recorded: Recorded | None = None  # None: recorded live; else the answers in the bag are replayed and did not act
 
 
 def first_snapshot(configuration: Configuration) -> Snapshot:
@@ -96,7 +103,7 @@ def first_snapshot(configuration: Configuration) -> Snapshot:
 
 def snapshot_text(snapshot: Snapshot) -> str:
     """Snapshot as JSON; equal snapshots give equal text. Numbers of the state are hexadecimal, NaN included."""
-    configuration, state, version = snapshot
+    configuration, state, version, recorded = snapshot
     document = {
         'version': version,
         'selection': dataclasses.asdict(configuration.selection),
@@ -105,6 +112,9 @@ def snapshot_text(snapshot: Snapshot) -> str:
         'feedforward': dataclasses.asdict(configuration.feedforward),
         'state': _encoded_record(state),
     }
+    if recorded is not None:
+        acted = recorded.feedforward
+        document['recorded'] = {'feedforward': dataclasses.asdict(acted) if acted is not None else None}
     return json.dumps(document, sort_keys=True, allow_nan=False)
 
 
@@ -124,7 +134,7 @@ def parse_snapshot(text: str) -> Snapshot:
             _settings(FeedForwardSettings, document['feedforward'], version, 'configuration: feedforward'),
         )
         state = _state(configuration, document['state'], version)
-        return Snapshot(configuration, state, version)
+        return Snapshot(configuration, state, version, _recorded(document.get('recorded'), version))
     except (TypeError, AttributeError, LookupError, OverflowError, RecursionError) as error:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
@@ -132,6 +142,13 @@ def parse_snapshot(text: str) -> Snapshot:
 def snapshot_version(text: str) -> int:
     """Version of the algorithm that made a snapshot, from its valid text."""
     return int(json.loads(text).get('version', 1))
+
+
+def _recorded(document: Any, version: int) -> Recorded | None:
+    if document is None:
+        return None
+    acted, where = document['feedforward'], 'configuration: recorded.feedforward'
+    return Recorded(None if acted is None else _settings(FeedForwardSettings, acted, version, where))
 
 
 def _settings(record_type: Any, document: Any, version: int, where: str) -> Any:
