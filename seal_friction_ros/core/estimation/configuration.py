@@ -17,6 +17,14 @@ from seal_friction_ros.core.estimation.records import Force, Pressure
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.seal_file import mount_seals
 
+PLACEHOLDER = 'placeholder'
+"""Seal file of the default configuration."""
+PLACEHOLDER_WARNING = (
+    'the seals are the placeholder of the default configuration, not those of your machine: name their seal files in '
+    'the parameter seals'
+)
+_DEFAULT_OF_VERSION_1 = ('ms28775_114', 'ms28775_114')
+
 
 @dataclass(frozen=True)
 class SealSelection:
@@ -27,7 +35,7 @@ class SealSelection:
     """
 
     seals: tuple[str, ...] = parameter(
-        ('ms28775_114', 'ms28775_114'),
+        (PLACEHOLDER, PLACEHOLDER),
         unit='',
         live=False,
         description='Seal file of each seal: a path, or the name of one in config/seals.',
@@ -60,6 +68,11 @@ class Configuration:
     seal_documents: tuple[Mapping[str, Any], ...]
     settings: EstimatorSettings
     feedforward: FeedForwardSettings
+
+    @property
+    def has_placeholder(self) -> bool:
+        """Whether a seal is the placeholder of the default configuration."""
+        return PLACEHOLDER in self.selection.seals
 
     def parameters(self) -> PipelineParameters:
         """Parameters of estimate and feed-forward.
@@ -121,14 +134,19 @@ def snapshot_text(snapshot: Snapshot) -> str:
 def parse_snapshot(text: str) -> Snapshot:
     """Snapshot from its JSON text.
 
+    The default seals of version 1 had no mark: they count as `PLACEHOLDER`.
+
     Raises:
         ValueError: The text is not the JSON of a snapshot, or a value in it is not valid.
     """
     try:
         document = json.loads(text)
         version = int(document.get('version', 1))
+        selection = from_mapping(SealSelection, document['selection'], 'configuration: selection')
+        if version == 1 and selection.seals == _DEFAULT_OF_VERSION_1:
+            selection = dataclasses.replace(selection, seals=(PLACEHOLDER, PLACEHOLDER))
         configuration = Configuration(
-            from_mapping(SealSelection, document['selection'], 'configuration: selection'),
+            selection,
             tuple(document['seal_documents']),
             _settings(EstimatorSettings, document['settings'], version, 'configuration: settings'),
             _settings(FeedForwardSettings, document['feedforward'], version, 'configuration: feedforward'),
