@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import (
+    ALGORITHM_VERSION,
     Configuration,
     Recorded,
     SealSelection,
@@ -148,6 +149,14 @@ def _is_replayed(bag: Path, topics: Topics) -> bool:
     return first is not None and parse_snapshot(decode_text(first)).recorded is not None
 
 
+def _of_this_version(message: BagMessage) -> BagMessage:
+    """A message of the new bag: its configuration is of the version that makes the answers."""
+    if message.type_name != CONFIGURATION_TYPE:
+        return message
+    snapshot = parse_snapshot(decode_text(message.data))._replace(version=ALGORITHM_VERSION)
+    return message._replace(data=encode_text(snapshot_text(snapshot)))
+
+
 def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter, acted: str) -> Iterator[Step]:
     """Write inputs, configuration and new answers, and the recorded feed-forward on the topic ``acted``."""
     answered, kept = topics.answers, topics.feedforward + RECORDED
@@ -155,7 +164,7 @@ def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter, acted:
         message = step.message
         is_used = message.topic in topics or message.type_name == CONFIGURATION_TYPE
         if is_used and message.type_name not in answered:
-            log_time = writer.write(*message)
+            log_time = writer.write(*_of_this_version(message))
             for type_name, data in step.answers:
                 writer.write(answered[type_name] or ANSWER_TOPICS[type_name], type_name, log_time, data)
         elif message.topic == acted:
