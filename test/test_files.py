@@ -2,6 +2,7 @@
 
 import os
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from seal_friction_ros.files import (
     default_configuration,
     load_configuration,
     load_parameter_file,
+    load_seals,
     read_yaml,
     share_directory,
 )
@@ -133,13 +135,14 @@ def load(path: Path):
     return load_configuration(SealSelection((str(path),), ('a',)), EstimatorSettings())
 
 
-def test_the_default_configuration_is_the_actuator_of_the_thesis():
-    parameters = default_configuration().parameters()
-    seals = parameters.estimator.seals
-    assert [(m.seal.name, m.chamber) for m in seals] == [
-        ('ms28775_114', 'a'),
-        ('ms28775_114', 'b'),
-    ]
+def test_the_default_configuration_is_a_placeholder_with_the_numbers_of_the_thesis():
+    configuration = default_configuration()
+    assert configuration.has_placeholder
+    seals = configuration.parameters().estimator.seals
+    assert [(m.seal.name, m.chamber) for m in seals] == [('placeholder', 'a'), ('placeholder', 'b')]
+    thesis = load_seals(SealSelection(('ms28775_114', 'ms28775_114')))
+    assert [replace(m.seal, name='ms28775_114') for m in seals] == [m.seal for m in thesis]
+    assert not load_configuration(SealSelection(('ms28775_114',), ('a',)), EstimatorSettings()).has_placeholder
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,13 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, Snapshot, snapshot_text
+from seal_friction_ros.core.estimation.configuration import (
+    PLACEHOLDER_WARNING,
+    Configuration,
+    SealSelection,
+    Snapshot,
+    snapshot_text,
+)
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
@@ -73,6 +79,8 @@ class FrictionEstimator(ManagedNode):
         """Read the seal files; create publishers and subscriptions."""
         settings = self.settings(EstimatorSettings), self.settings(FeedForwardSettings)
         configuration = load_configuration(self.settings(SealSelection), *settings)
+        if configuration.has_placeholder:
+            self.get_logger().warning(PLACEHOLDER_WARNING)
         self._statistics = EstimatorDiagnostics()
         self._watch = GraphWatch(self, self._inputs, self._outputs, self._subscribe)
         for topic, type_name in OUTPUTS.items():

@@ -5,11 +5,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection, first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.configuration import (
+    Configuration,
+    SealSelection,
+    first_snapshot,
+    parse_snapshot,
+    snapshot_text,
+)
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     INPUTS,
+    decode_text,
     encode,
     encode_text,
     type_of,
@@ -46,9 +53,17 @@ def write_inputs(path: Path, samples: int = 300, configuration: Configuration | 
 
 
 def write_recorded(folder: Path, configuration: Configuration | None = None) -> Path:
-    """The same with the answers to it, as a replay gives them."""
-    replay(write_inputs(folder / 'inputs', configuration=configuration), out=folder / 'recorded')
-    return folder / 'recorded'
+    """The same with the answers to it, as a live node records them: a replay without its mark."""
+    replay(write_inputs(folder / 'inputs', configuration=configuration), out=folder / 'replayed')
+    return rewrite(folder / 'replayed', folder / 'recorded', lambda _, message: as_recorded(message))
+
+
+def as_recorded(message: b.BagMessage) -> b.BagMessage:
+    """A message of a replay without the mark of the replay."""
+    if message.type_name != CONFIGURATION_TYPE:
+        return message
+    snapshot = parse_snapshot(decode_text(message.data))._replace(recorded=None)
+    return message._replace(data=encode_text(snapshot_text(snapshot)))
 
 
 def rewrite(source: Path, out: Path, change: Callable[[int, b.BagMessage], b.BagMessage | None]) -> Path:

@@ -282,6 +282,12 @@ def test_an_invalid_seal_file_prevents_the_start_and_the_log_names_the_field(tmp
         assert g.probe.count_publishers('friction_estimate') == 0
 
 
+@pytest.mark.parametrize(('seals', 'warnings'), [({}, 1), ({'seals': ['ms28775_114'], 'seal_chambers': ['a']}, 0)])
+def test_placeholder_seals_are_a_warning_in_the_log(seals: dict[str, object], warnings: int, capfd):
+    with graph(seals):
+        assert capfd.readouterr().err.count('the seals are the placeholder of the default configuration') == warnings
+
+
 def test_the_node_declares_the_parameters_of_its_table_and_no_other():
     with graph() as g:
         declared = {name for name in g.estimator._parameters if name.split('.')[0] not in ROS_PARAMETERS}

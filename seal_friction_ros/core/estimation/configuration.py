@@ -17,6 +17,14 @@ from seal_friction_ros.core.estimation.records import Force, Pressure
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.seal_file import mount_seals
 
+PLACEHOLDER = 'placeholder'
+"""Seal file of the default configuration."""
+PLACEHOLDER_WARNING = (
+    'the seals are the placeholder of the default configuration, not those of your machine: name their seal files in '
+    'the parameter seals'
+)
+_DEFAULT_OF_VERSION_1 = ('ms28775_114', 'ms28775_114')
+
 
 @dataclass(frozen=True)
 class SealSelection:
@@ -27,7 +35,7 @@ class SealSelection:
     """
 
     seals: tuple[str, ...] = parameter(
-        ('ms28775_114', 'ms28775_114'),
+        (PLACEHOLDER, PLACEHOLDER),
         unit='',
         live=False,
         description='Seal file of each seal: a path, or the name of one in config/seals.',
@@ -61,6 +69,11 @@ class Configuration:
     settings: EstimatorSettings
     feedforward: FeedForwardSettings
 
+    @property
+    def has_placeholder(self) -> bool:
+        """Whether a seal is the placeholder of the default configuration."""
+        return PLACEHOLDER in self.selection.seals
+
     def parameters(self) -> PipelineParameters:
         """Parameters of estimate and feed-forward.
 
@@ -81,12 +94,19 @@ _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
 _NOT_YET = {'stamp_age_max': 0.0}  # settings that version 1 had not: without effect
 
 
+class Recorded(NamedTuple):
+    """What acted when the bag was recorded that a bag of `replay` is made from."""
+
+    feedforward: FeedForwardSettings | None  # None: not known
+
+
 class Snapshot(NamedTuple):
     """Everything that the next answer depends on besides the messages to come."""
 
     configuration: Configuration
     state: PipelineState
     version: int = ALGORITHM_VERSION  # of the algorithm that recorded it
+    recorded: Recorded | None = None  # None: recorded live; else the answers in the bag are replayed and did not act
 
 
 def first_snapshot(configuration: Configuration) -> Snapshot:
@@ -96,7 +116,7 @@ def first_snapshot(configuration: Configuration) -> Snapshot:
 
 def snapshot_text(snapshot: Snapshot) -> str:
     """Snapshot as JSON; equal snapshots give equal text. Numbers of the state are hexadecimal, NaN included."""
-    configuration, state, version = snapshot
+    configuration, state, version, recorded = snapshot
     document = {
         'version': version,
         'selection': dataclasses.asdict(configuration.selection),
@@ -105,11 +125,16 @@ def snapshot_text(snapshot: Snapshot) -> str:
         'feedforward': dataclasses.asdict(configuration.feedforward),
         'state': _encoded_record(state),
     }
+    if recorded is not None:
+        acted = recorded.feedforward
+        document['recorded'] = {'feedforward': dataclasses.asdict(acted) if acted is not None else None}
     return json.dumps(document, sort_keys=True, allow_nan=False)
 
 
 def parse_snapshot(text: str) -> Snapshot:
     """Snapshot from its JSON text.
+
+    The default seals of version 1 had no mark: they count as `PLACEHOLDER`.
 
     Raises:
         ValueError: The text is not the JSON of a snapshot, or a value in it is not valid.
@@ -117,14 +142,17 @@ def parse_snapshot(text: str) -> Snapshot:
     try:
         document = json.loads(text)
         version = int(document.get('version', 1))
+        selection = from_mapping(SealSelection, document['selection'], 'configuration: selection')
+        if version == 1 and selection.seals == _DEFAULT_OF_VERSION_1:
+            selection = dataclasses.replace(selection, seals=(PLACEHOLDER, PLACEHOLDER))
         configuration = Configuration(
-            from_mapping(SealSelection, document['selection'], 'configuration: selection'),
+            selection,
             tuple(document['seal_documents']),
             _settings(EstimatorSettings, document['settings'], version, 'configuration: settings'),
             _settings(FeedForwardSettings, document['feedforward'], version, 'configuration: feedforward'),
         )
         state = _state(configuration, document['state'], version)
-        return Snapshot(configuration, state, version)
+        return Snapshot(configuration, state, version, _recorded(document.get('recorded'), version))
     except (TypeError, AttributeError, LookupError, OverflowError, RecursionError) as error:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
@@ -132,6 +160,13 @@ def parse_snapshot(text: str) -> Snapshot:
 def snapshot_version(text: str) -> int:
     """Version of the algorithm that made a snapshot, from its valid text."""
     return int(json.loads(text).get('version', 1))
+
+
+def _recorded(document: Any, version: int) -> Recorded | None:
+    if document is None:
+        return None
+    acted, where = document['feedforward'], 'configuration: recorded.feedforward'
+    return Recorded(None if acted is None else _settings(FeedForwardSettings, acted, version, where))
 
 
 def _settings(record_type: Any, document: Any, version: int, where: str) -> Any:

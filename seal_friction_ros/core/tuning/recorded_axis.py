@@ -9,7 +9,8 @@ scale of the feed-forward; it includes the error of the model.
 The smoothing is the widest with which the law, along the motion of the rod, is nearly as good as with the best
 smoothing. The slew limit is the lowest with which the force along the recorded reference is nearly the same. Along the
 reference the smoothing would be much too wide, since a rod without compensation reverses late. A recording does not
-show the delay from command to force. All of it is our choice.
+show the delay from command to force. The force limit is `FORCE_MARGIN` times the largest friction: that of the law, or
+of the sliding samples but for the largest `NOISE_SHARE`, whichever is larger. All of it is our choice.
 """
 
 import math
@@ -33,7 +34,7 @@ from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, RobustnessCase, TunedFeedForward
-from seal_friction_ros.core.tuning.simulated_axis import bounded, nearest_preferred, preferred
+from seal_friction_ros.core.tuning.simulated_axis import bounded, force_limit, nearest_preferred, preferred
 
 ACCELERATION_WINDOW = 11  # samples of the parabola whose slope is the acceleration
 MOST_UNEVEN = 0.5  # of the median period: a sample with a larger deviation has no acceleration
@@ -43,6 +44,7 @@ NEAR_REVERSAL = 0.1  # of the time between two reversals of the reference, befor
 NEARLY = 0.05  # of the friction: a smaller RMS difference counts as none
 IDENTIFIED = 0.05  # largest relative standard deviation of an identified parameter
 SHARPEST_SMOOTHING = 1e-5  # [m/s]
+NOISE_SHARE = 0.01  # of the sliding samples: larger frictions count as noise
 
 
 class RecordedMotion(NamedTuple):
@@ -242,7 +244,9 @@ def tune_recorded_axis(
     time = recording.time
     reversal = near_reversals(time, recording.reference_velocity)
     law = fit_law(recording, known.mass or None)
+    largest = largest_friction(recording, law)
     identified: dict[str, float | None] = {
+        'force_limit': force_limit(largest),
         'scale': round(law.scale, 2) if law.scale > 0.0 and law.scale_std <= IDENTIFIED * law.scale else None,
         'lead_time': known.whole_delay or None,
         'smoothing_velocity': _smoothing(recording, law),
@@ -261,7 +265,13 @@ def tune_recorded_axis(
     acting = delayed(time, feedforward_force(settings, recording), late)
     without = residual(law, reversal, np.zeros(len(time)))
     known_names = {name: value is not None for name, value in identified.items()}
-    return RecordedTuning(settings, without, tuple(cases), known_names, law, reversal, acting)
+    return RecordedTuning(settings, without, tuple(cases), largest, known_names, law, reversal, acting)
+
+
+def largest_friction(recording: Recording, law: RecordedLaw) -> float:
+    """Largest friction of a recorded axis [N], see `NOISE_SHARE`."""
+    measured = float(np.quantile(np.abs(law.friction[law.sliding]), 1.0 - NOISE_SHARE))
+    return max(measured, law.scale * float(recording.coulomb_friction[law.sliding].max()))
 
 
 def _with_values(settings: FeedForwardSettings, values: dict[str, float | None]) -> FeedForwardSettings:

@@ -8,6 +8,8 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 if TYPE_CHECKING:  # loads numpy, which `seal_friction tune --help` does not need
     from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 
+FORCE_MARGIN = 1.5  # force limit over the largest friction found (our choice)
+
 
 @dataclass(frozen=True)
 class TuningSettings(CheckedParameters):
@@ -80,6 +82,7 @@ class TunedFeedForward(Generic[OutcomeType]):
     feedforward: 'FeedForwardSettings'
     without: OutcomeType  # outcome without feed-forward
     cases: tuple[RobustnessCase[OutcomeType], ...]  # nine, by friction error, then by delay error
+    largest_friction: float  # [N] found on the axis; ``force_limit`` is `FORCE_MARGIN` times as large
 
     @property
     def nominal(self) -> OutcomeType:

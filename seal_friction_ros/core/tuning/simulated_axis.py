@@ -10,7 +10,9 @@ too much overshoot in any case, or with reversals while the reference rests, are
 Search: first with the sharpest force that the sample time allows, a grid over scale and lead time, then a compass
 search from its best point (one of both up or down, then half the stride). Next the widest smoothing and then the lowest
 slew limit with a J that is nearly as good, to spare valve and machine. Last, scale and lead time once more. Values are
-preferred numbers. Nothing is random, so a problem has one answer. All of it is our choice.
+preferred numbers. The force limit is `FORCE_MARGIN` times the largest friction on the axis, found before the search
+without feed-forward and with all of the friction compensated. Nothing is random, so a problem has one answer. All of it
+is our choice.
 """
 
 import math
@@ -31,7 +33,7 @@ from seal_friction_ros.core.servo.closed_loop import (
     without_feedforward,
 )
 from seal_friction_ros.core.servo.motions import Sine
-from seal_friction_ros.core.tuning.settings import RobustnessCase, TunedFeedForward, TuningSettings
+from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RobustnessCase, TunedFeedForward, TuningSettings
 
 MOST_CANDIDATES = 100
 """Number of settings after which the search ends, to bound its time."""
@@ -174,6 +176,21 @@ def bounded(name: str, value: float) -> float:
     return min(max(value, lower if lower is not None else value), upper if upper is not None else value)
 
 
+def force_limit(friction: float) -> float:
+    """Force limit [N] for the largest friction found [N]: `FORCE_MARGIN` times as large, rounded up to two digits."""
+    wanted = max(FORCE_MARGIN * friction, 1e-3)
+    digit = 10.0 ** (math.floor(math.log10(wanted)) - 1)
+    return bounded('force_limit', float(f'{digit * math.ceil(wanted / digit - 1e-9):.3g}'))
+
+
+def _largest_friction(problem: TuningProblem) -> float:
+    """Largest friction [N] over the evaluation motions, breakaway included."""
+    settings = problem.axis.pipeline.feedforward
+    whole = replace(settings, scale=1.0, force_limit=bounded('force_limit', math.inf))
+    runs = (*problem.runs(without_feedforward(settings)), *problem.runs(whole))
+    return max(float(abs(run.friction_force).max()) for run in runs)
+
+
 def merit(problem: TuningProblem, without: Performance, cases: Sequence[RobustnessCase[Performance]]) -> float:
     """J of the cases, one of them nominal; infinite where one is rejected. More cases can only increase J.
 
@@ -196,7 +213,10 @@ def tune(problem: TuningProblem, advance: Callable[[int], None] = lambda _: None
         problem: Axis and task.
         advance: Called with 1 for every candidate, at most `MOST_CANDIDATES` times.
     """
-    without = problem.without()
+    without, friction = problem.without(), _largest_friction(problem)
+    pipeline = problem.axis.pipeline
+    limited = replace(pipeline.feedforward, force_limit=force_limit(friction))
+    problem = replace(problem, axis=problem.axis._replace(pipeline=pipeline._replace(feedforward=limited)))
     found: dict[SearchPoint, float] = {}
 
     def merit_at(point: SearchPoint) -> float:
@@ -218,7 +238,7 @@ def tune(problem: TuningProblem, advance: Callable[[int], None] = lambda _: None
     point = _gentlest(point, merit_at)
     feedforward = problem.feedforward(_compass(point, merit_at, STRIDES[-1:]))
     cases = [problem.case(feedforward, *errors, problem.settings.hold_time) for errors in sorted(problem.errors())]
-    return Tuning(feedforward, without, tuple(cases), merit(problem, without, cases), len(found))
+    return Tuning(feedforward, without, tuple(cases), friction, merit(problem, without, cases), len(found))
 
 
 def _grid(problem: TuningProblem) -> list[SearchPoint]:

@@ -15,7 +15,7 @@ from seal_friction_ros.core.estimation.messages import DECODERS
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, read_messages
-from seal_friction_ros.offline.bags.topics import Topics, find_topics
+from seal_friction_ros.offline.bags.topics import RECORDED, Topics, find_topics
 from seal_friction_ros.offline.work.progress import progress
 
 MAX_GAP = 0.5  # [s] samples further apart do not belong to one stretch of a recording (our choice)
@@ -24,7 +24,7 @@ LARGEST_INPUT = 1e15  # [SI] above any real pressure, force or speed; the compar
 _MAX_PENDING = 10_000  # velocity samples that may wait for their estimate; older ones never got one
 _MAX_FRAMES = 10  # frame names that are kept
 _INPUTS = ('velocity', 'pressure_a', 'pressure_b', 'force_sum', 'position', 'reference')
-_COLUMNS = (*_INPUTS, *FrictionEstimate._fields[1:], 'feedforward_force')
+_COLUMNS = (*_INPUTS, *FrictionEstimate._fields[1:], 'replayed_force', 'feedforward_force')
 _INTEGERS = {'state', 'direction', 'status'}
 
 
@@ -54,7 +54,8 @@ class RecordedRun:
     direction: IntArray
     status: IntArray
     input_age: FloatArray  # [s]
-    feedforward_force: FloatArray  # [N] published with the estimate; NaN where there is none
+    feedforward_force: FloatArray  # [N] that acted, published with the estimate; NaN where there is none
+    replayed_force: FloatArray | None  # [N] feed-forward of a replay, which did not act; None: the bag is no replay
 
     @cached_property
     def pressure(self) -> FloatArray:
@@ -84,7 +85,7 @@ def read_run(bag: Path, namespace: str = '') -> RecordedRun:
     infos = bag_topics(bag)
     with progress(f'read {bag.name}', sum(info.message_count for info in infos.values())) as advance:
         for count, message in enumerate(read_messages(bag), start=1):
-            if message.topic in topics:
+            if message.topic in topics or message.topic == collector.acted:
                 collector.take(message)
             if count % 1000 == 0:
                 advance(1000)
@@ -100,6 +101,7 @@ class _RunCollector:
     def __init__(self, topics: Topics) -> None:
         self.stamps = array('q')
         self._topics = topics
+        self.acted = topics.feedforward + RECORDED
         self._rows = array('d')
         self._held = dict.fromkeys(_INPUTS, math.nan)
         self._pending: dict[int, tuple[float, ...]] = {}
@@ -133,10 +135,10 @@ class _RunCollector:
         elif topic == topics.estimate:
             self.stamps.append(record.stamp)
             self._rows.extend(self._pending.pop(record.stamp, (math.nan,) * len(_INPUTS)))
-            self._rows.extend((*record[1:], math.nan))
-        elif topic == topics.feedforward:
+            self._rows.extend((*record[1:], math.nan, math.nan))
+        elif topic in (topics.feedforward, self.acted):
             if self.stamps and self.stamps[-1] == record.stamp:
-                self._rows[-1] = record.force
+                self._rows[-1 if topic == self.acted else -2] = record.force
         else:
             self._configurations.append((message.log_time, len(self.stamps), record))
 
@@ -157,6 +159,8 @@ class _RunCollector:
         for column in _INPUTS:
             values[column][~(np.abs(values[column]) < LARGEST_INPUT)] = math.nan
         values['velocity'][(values['status'] & int(Status.VELOCITY_OUT_OF_RANGE)) != 0] = math.nan
+        if not any(_is_replayed(text) for _, _, text in self._configurations[:1]):
+            values |= {'feedforward_force': values['replayed_force'], 'replayed_force': None}
         start = int(stamps[0])
         # A configuration has no stamp: the time at which it was recorded counts.
         changes = tuple((round((t - start) * 1e-9, 6), text) for t, _, text in self._configurations)
@@ -171,6 +175,14 @@ class _RunCollector:
             time=np.asarray((stamps - start) * 1e-9, dtype=np.float64),
             **values,
         )
+
+
+def _is_replayed(text: str) -> bool:
+    """Whether a configuration is that of a replay; one that cannot be parsed is not."""
+    try:
+        return parse_snapshot(text).recorded is not None
+    except (ValueError, LookupError, TypeError):
+        return False
 
 
 def _chambers(configurations: Sequence[tuple[float, str]]) -> tuple[str, ...]:

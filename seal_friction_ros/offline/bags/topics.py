@@ -11,6 +11,10 @@ ANSWER_TOPICS = {messages.ESTIMATE_TYPE: ESTIMATE_TOPIC, messages.FEEDFORWARD_TY
 """Message type of an answer -> topic, if the bag has no topic of that type."""
 
 
+RECORDED = '_recorded'
+"""End of the name of the topic that keeps the feed-forward that acted, in a bag of ``seal_friction replay``."""
+
+
 class Topics(NamedTuple):
     """Names of the estimator's topics in a bag; empty if there is no such topic."""
 
@@ -58,7 +62,7 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
     names = []
     below = f'/{namespace.strip("/")}/'.replace('//', '/')
     known = bag_topics(bag) if known is None else known
-    topics = {topic: info for topic, info in known.items() if topic.startswith(below)}
+    topics = {topic: info for topic, info in known.items() if topic.startswith(below) and not topic.endswith(RECORDED)}
     for wanted in TYPES:
         found = sorted(topic for topic, info in topics.items() if info.type_name == wanted and info.message_count)
         if len(found) > 1:

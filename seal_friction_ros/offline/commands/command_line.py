@@ -5,9 +5,12 @@ import dataclasses
 import json
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
+
+from seal_friction_ros.offline.work.targets import PAGE, Kind, checked_targets
 
 SUCCESS, DIFFERENT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 """Exit codes: no difference; a difference or a failed check; unusable input; interrupted by SIGINT."""
@@ -38,14 +41,23 @@ def add_command(
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('--json', action='store_true', help='print the numbers as one JSON object on stdout')
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={})
     return parser
+
+
+def add_target(parser: argparse.ArgumentParser, option: str, kind: Kind, **options: Any) -> None:
+    """Add an option for a file or bag that the command writes; the first one adds ``--force``."""
+    targets = parser.get_default('targets')
+    if not targets:
+        parser.add_argument('--force', action='store_true', help='overwrite what this command did not make')
+    action = parser.add_argument(option, type=Path, **options)
+    parser.set_defaults(targets={**targets, action.dest: kind})
 
 
 def add_page(parser: argparse.ArgumentParser, option: str = '--out', *, required: bool = True) -> None:
     """Add the option for an HTML page."""
     text = 'page with figures to write, PNG and SVG beside it'
-    parser.add_argument(option, type=Path, required=required, metavar='FILE.html', help=text)
+    add_target(parser, option, PAGE, required=required, metavar='FILE.html', help=text)
 
 
 def add_namespace(parser: argparse.ArgumentParser, condition: str = '') -> None:
@@ -70,6 +82,21 @@ def number_of_workers(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.work.executor import available_cores
 
     return arguments.workers or available_cores()
+
+
+def checked(arguments: argparse.Namespace) -> AbstractContextManager[None]:
+    """Context in which the command runs, if it may write its targets; see `checked_targets`."""
+    values = vars(arguments)
+    targets = [(values[name], kind) for name, kind in arguments.targets.items() if values[name] is not None]
+    inputs = [path for name, value in values.items() if name not in arguments.targets for path in _paths(value)]
+    return checked_targets(arguments.command, targets, inputs, force=bool(values.get('force')))
+
+
+def _paths(value: Any) -> Iterator[Path]:
+    """Every path in the value of an argument; a text may be one."""
+    for item in value if isinstance(value, list) else [value]:
+        if isinstance(item, Path) or (isinstance(item, str) and item):
+            yield Path(item)
 
 
 def non_negative(text: str) -> float:

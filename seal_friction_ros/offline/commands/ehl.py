@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import SEAL_FILE, mark
 
 
 def add_parser(commands: Any) -> None:
@@ -31,7 +32,7 @@ def add_parser(commands: Any) -> None:
         steps, 'map', run_map, 'compute a friction map: steady friction over speed and pressure',
         'ehl map inner_seal --seal-file mapped.yaml',
     )  # fmt: skip
-    chart.add_argument('--seal-file', type=Path, metavar='FILE.yaml', help='seal file to write; must not exist')
+    cli.add_target(chart, '--seal-file', SEAL_FILE, metavar='FILE.yaml', help='seal file to write')
     for step in (run, study, chart):
         step.add_argument('case', help='case file: a path, or the name of one in config/ehl')
         cli.add_workers(step, 'runs')
@@ -90,15 +91,14 @@ def run_map(arguments: argparse.Namespace) -> int:
     """Compute the friction map of a case."""
     from seal_friction_ros.offline.contact import lubrication_runs as runs
     from seal_friction_ros.offline.reports.lubrication_report import write_map_page
-    from seal_friction_ros.offline.work.seal_writer import check_new, write_seal
+    from seal_friction_ros.offline.work.seal_writer import write_seal
 
     case = runs.single_case(arguments.case, 'friction map')
-    if arguments.seal_file is not None:
-        check_new(arguments.seal_file)
     computed = runs.run_map(case, cli.number_of_workers(arguments), arguments.work)
     numbers, summary = _with_page(arguments, computed, lambda page: write_map_page(computed, page))
     if arguments.seal_file is not None:
-        write_seal(runs.seal_document(computed, arguments.seal_file.stem), arguments.seal_file)
+        document = runs.seal_document(computed, arguments.seal_file.stem)
+        write_seal(document, arguments.seal_file, f'Seal file, {mark("ehl")} map.')
     return cli.print_result(arguments, numbers, summary)
 
 

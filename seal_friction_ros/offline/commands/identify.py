@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import SEAL_FILE, mark
 
 
 def add_parser(commands: Any) -> None:
@@ -15,7 +16,7 @@ def add_parser(commands: Any) -> None:
         'identify O-ring257_*bar.csv --rig delft --out o_ring.yaml',
     )  # fmt: skip
     parser.add_argument('sources', type=Path, nargs='+', metavar='SOURCE', help='bag, log, table or data sheet')
-    parser.add_argument('--out', type=Path, required=True, metavar='SEAL.yaml', help='seal file to write')
+    cli.add_target(parser, '--out', SEAL_FILE, required=True, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
     parser.add_argument('--rig', help='rig file of the logs: a path, or the name of one in config/rigs')
     parser.add_argument('--seal', help='seal file with the geometry of the ring: a path, or one in config/seals')
@@ -64,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         figures = write_identification_report(found, arguments.report)
         written |= {'report': arguments.report, 'figures': figures}
-    write_seal(found.document, arguments.out)
+    write_seal(found.document, arguments.out, f'Seal file, {mark("identify")}.')
     return cli.print_result(
         arguments, identification_numbers(found) | written, f'{summary(found)}\n{arguments.out}: written'
     )

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import BAG
 
 
 def add_parser(commands: Any) -> None:
@@ -23,7 +24,7 @@ def add_parser(commands: Any) -> None:
         'import thesis --out pull_test',
     )  # fmt: skip
     for source in (log, thesis):
-        source.add_argument('--out', type=Path, required=True, metavar='BAG', help='bag to make; must not exist')
+        cli.add_target(source, '--out', BAG, required=True, metavar='BAG', help='bag to make')
 
 
 def run_log(arguments: argparse.Namespace) -> int:

@@ -75,7 +75,8 @@ def main(arguments: list[str] | None = None) -> int:
         autocomplete(parser)
     parsed = parser.parse_args(arguments)
     try:
-        return int(parsed.run(parsed))
+        with cli.checked(parsed):
+            return int(parsed.run(parsed))
     except BrokenPipeError:
         raise
     except (ValueError, OSError) as error:

@@ -1,10 +1,10 @@
 """``seal_friction oring``: compute contact stress and normal force of an O-ring by finite elements."""
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import SEAL_FILE
 
 
 def add_parser(commands: Any) -> None:
@@ -16,7 +16,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('case', metavar='CASE', help='case file: a path, or the name of one in config/oring')
     help_text = 'gauge pressures, instead of those in the file'
     parser.add_argument('--pressures', type=float, nargs='+', default=(), metavar='PA', help=help_text)
-    parser.add_argument('--out', type=Path, metavar='SEAL.yaml', help='seal file to write; must not exist')
+    cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
 
 
@@ -25,10 +25,8 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.files import config_path
     from seal_friction_ros.offline.contact.oring_runs import compute_case, seal_comment, seal_document
     from seal_friction_ros.offline.reports.oring_report import numbers_text, write_oring_report
-    from seal_friction_ros.offline.work.seal_writer import check_new, write_seal
+    from seal_friction_ros.offline.work.seal_writer import write_seal
 
-    if arguments.out:
-        check_new(arguments.out)
     path = config_path('oring', arguments.case)
     computed = compute_case(path, arguments.pressures, for_seal_file=arguments.out is not None)
     if arguments.report:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import BAG
 
 
 def add_parser(commands: Any) -> None:
@@ -12,7 +13,7 @@ def add_parser(commands: Any) -> None:
     description = 'make a valid bag from the readable part of a damaged or unfinished bag'
     parser = cli.add_command(commands, 'recover', run, description, 'recover build/bags/friction_20260302_101500')
     parser.add_argument('bag', type=Path)
-    parser.add_argument('--out', type=Path, metavar='BAG', help='bag to make; default: BAG_recovered')
+    cli.add_target(parser, '--out', BAG, metavar='BAG', help='bag to make; default: BAG_recovered')
 
 
 def run(arguments: argparse.Namespace) -> int:

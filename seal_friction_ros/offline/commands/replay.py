@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import BAG
 
 
 def add_parser(commands: Any) -> None:
@@ -17,7 +18,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('bags', type=Path, nargs='+', metavar='BAG')
     cli.add_workers(parser, 'bags')
     cli.add_configuration(parser)
-    parser.add_argument('--out', type=Path, metavar='BAG', help='write inputs and new estimates to this bag')
+    cli.add_target(parser, '--out', BAG, metavar='BAG', help='write inputs and new estimates to this bag')
     cli.add_namespace(parser)
     parser.add_argument('--verify', action='store_true', help='compare with the recorded estimates byte for byte')
 

@@ -20,7 +20,9 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the page."""
+    from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
     from seal_friction_ros.offline.reports.bag_report import write_report
 
-    numbers = write_report(arguments.bag, arguments.out, arguments.namespace)
-    return cli.print_result(arguments, numbers, f'{arguments.out}: written')
+    summary = write_report(arguments.bag, arguments.out, arguments.namespace)
+    warning = f'warning: {PLACEHOLDER_WARNING}\n' if summary.numbers['placeholder_seals'] else ''
+    return cli.print_result(arguments, summary, f'{warning}{arguments.out}: written')

@@ -1,10 +1,10 @@
 """``seal_friction sheet``: make an empty data sheet of the friction test plan."""
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import DATA_SHEET
 
 
 def add_parser(commands: Any) -> None:
@@ -14,7 +14,9 @@ def add_parser(commands: Any) -> None:
         'sheet rod_seal --seal ms28775_114 --out sheet.csv',
     )  # fmt: skip
     parser.add_argument('name', help='name of the seal')
-    parser.add_argument('--out', type=Path, required=True, metavar='SHEET.csv', help='must not exist')
+    cli.add_target(
+        parser, '--out', DATA_SHEET, required=True, metavar='SHEET.csv', help='sheet to write; a page goes beside it'
+    )
     parser.add_argument(
         '--pressures', type=_pressures, default=(0.0, 1000.0, 10), metavar='LOW:HIGH:STEPS', help='default 0:1000:10'
     )

@@ -7,6 +7,7 @@ from typing import Any
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import PARAMETER_FILE
 
 
 def add_parser(commands: Any) -> None:
@@ -18,7 +19,7 @@ def add_parser(commands: Any) -> None:
     )  # fmt: skip
     parser.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
     help_text = 'parameter file to write; a report goes beside it'
-    parser.add_argument('--out', type=Path, required=True, metavar='FILE', help=help_text)
+    cli.add_target(parser, '--out', PARAMETER_FILE, required=True, metavar='FILE.yaml', help=help_text)
     cli.add_configuration(parser)
     cli.add_namespace(parser, 'with --bag: ')
     for name, meaning in _settings().items():
@@ -38,11 +39,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Tune on the simulated servo or on a bag."""
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.tune_report import write_tuning_page
-    from seal_friction_ros.offline.tuning.tune import check_target, page_of, tune_bag, tune_simulator, write_parameters
+    from seal_friction_ros.offline.tuning.tune import page_of, tune_bag, tune_simulator, write_parameters
 
     given = _given(arguments)
     configuration = chosen_configuration(arguments.params, arguments.seal)
-    check_target(arguments.out)
     if arguments.bag:
         tuning: Any = tune_bag(arguments.bag, RecordedAxisSettings(**given), configuration, arguments.namespace)
     else:

@@ -216,6 +216,7 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     stamps: list[int] = []
     pressures, force = (math.nan, math.nan), math.nan
     chambers, document = None, None
+    remarks: tuple[str, ...] = ()
     total = sum(info.message_count for info in bag_topics(path).values())
     with progress(f'read {path.name}', total) as advance:
         for count, message in enumerate(read_messages(path), start=1):
@@ -232,6 +233,8 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
                 elif message.topic == topics.configuration:
                     configuration = parse_snapshot(decode_text(message.data)).configuration
                     chambers, document = configuration.selection.seal_chambers, configuration.seal_documents[0]
+                    if configuration.has_placeholder:
+                        document, remarks = None, (_placeholder_remark(path, chambers),)
             except ValueError as error:
                 raise ValueError(f'{path}: message on {message.topic} at {message.log_time} ns: {error}') from None
             if count % 1000 == 0:
@@ -242,7 +245,14 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     columns = np.where(np.abs(columns) < 1e15, columns, np.nan)  # [SI] no measurement is as large, and NaN stays NaN
     signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns).taken(kept)
     log = RecordedLog(path.resolve().name, signals, _sliding(Sliding(), options))
-    return Source(_data_file(path), chambers, log, seal_document=document)
+    return Source(_data_file(path), chambers, log, seal_document=document, remarks=remarks)
+
+
+def _placeholder_remark(path: Path, chambers: Sequence[str]) -> str:
+    return (
+        f'{path.resolve().name} was recorded with the placeholder seals of the default configuration: their geometry '
+        f'is not used, give that of your ring with --seal; seals on the chambers {",".join(chambers)} are assumed'
+    )
 
 
 def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:

@@ -124,7 +124,7 @@ def _answered(blocks: Iterator[Messages], override: Configuration | None) -> Ite
         for first, end in pairwise([0, *changes, len(block.kinds)]):
             messages = block.taken(first, end)
             if end > first and messages.kinds[0] == Kind.CONFIGURATION:
-                configuration, state, _ = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))
+                configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))[:2]
                 parameters = parameters if override else configuration.parameters()
             state, answers = receive_all(parameters, state, messages)
             yield messages, answers

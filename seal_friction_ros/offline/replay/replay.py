@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import (
+    ALGORITHM_VERSION,
     Configuration,
+    Recorded,
     SealSelection,
     Snapshot,
     first_snapshot,
@@ -33,7 +35,7 @@ from seal_friction_ros.offline.bags.bag import (
     bag_topics,
     read_messages,
 )
-from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS, Topics, find_topics
+from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS, RECORDED, Topics, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 from seal_friction_ros.offline.work.progress import progress
 
@@ -66,7 +68,7 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
 
     The estimator uses ``override``, or else the newest configuration in the bag, or else the default configuration. The
     configuration messages that are returned hold the configuration used: ``override`` replaces recorded ones, and if
-    the bag has none, one is inserted at the start.
+    the bag has none, one is inserted at the start. They are marked as replayed, with the settings that acted.
 
     Raises:
         BagError: A message does not match its type.
@@ -76,7 +78,7 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
     state = init(parameters)
     inputs = {topics.pressure, topics.velocity, topics.force, topics.reference, topics.tick} - {''}
     if not topics.configuration:
-        data = encode_text(snapshot_text(first_snapshot(configuration)))
+        data = encode_text(snapshot_text(first_snapshot(configuration)._replace(recorded=Recorded(None))))
         yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, data), ())
     for message in messages:
         answers: list[tuple[str, bytes]] = []
@@ -86,11 +88,14 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
                 record = DECODERS[message.type_name](message.data)
                 state, answers = answered(parameters, state, record, message.log_time)
             elif message.topic == topics.configuration:
-                configuration, state, _ = parse_snapshot(DECODERS[CONFIGURATION_TYPE](message.data))
+                snapshot = parse_snapshot(DECODERS[CONFIGURATION_TYPE](message.data))
+                state = snapshot.state
+                recorded = snapshot.recorded or Recorded(snapshot.configuration.feedforward)
                 if override:
-                    used = message._replace(data=encode_text(snapshot_text(Snapshot(override, state))))
+                    snapshot = Snapshot(override, state)
                 else:
-                    parameters = configuration.parameters()
+                    parameters = snapshot.configuration.parameters()
+                used = message._replace(data=encode_text(snapshot_text(snapshot._replace(recorded=recorded))))
         except ValueError as error:
             raise BagError(f'message on {message.topic} at {message.log_time} ns: {error}') from None
         yield Step(used, tuple(answers))
@@ -100,6 +105,8 @@ def replay(
     bag: Path, override: Configuration | None = None, out: Path | None = None, namespace: str = ''
 ) -> ReplayResult:
     """Replay a bag and compare the answers with the recorded ones; with ``out``, write inputs and answers as a new bag.
+
+    The new bag keeps the recorded feed-forward, which acted on the axis, on a topic whose name ends with `RECORDED`.
 
     Args:
         bag: The bag.
@@ -118,7 +125,9 @@ def replay(
         if out is None:
             return _compare(replayed, topics)
         with BagWriter(out) as writer:
-            return _compare(_written(replayed, topics, writer), topics)
+            acted = topics.feedforward + RECORDED
+            kept = acted if acted in known or _is_replayed(bag, topics) else topics.feedforward
+            return _compare(_written(replayed, topics, writer, kept), topics)
 
 
 def count_messages(topics: Mapping[str, TopicInfo]) -> int:
@@ -133,15 +142,33 @@ def _counted(replayed: Iterable[Step], advance: Callable[[int], None]) -> Iterat
         yield step
 
 
-def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter) -> Iterator[Step]:
-    answered = topics.answers
+def _is_replayed(bag: Path, topics: Topics) -> bool:
+    """Whether the answers in a bag are replayed, so that they did not act."""
+    texts = (message.data for message in read_messages(bag) if message.topic == topics.configuration)
+    first = next(texts, None) if topics.configuration else None
+    return first is not None and parse_snapshot(decode_text(first)).recorded is not None
+
+
+def _of_this_version(message: BagMessage) -> BagMessage:
+    """A message of the new bag: its configuration is of the version that makes the answers."""
+    if message.type_name != CONFIGURATION_TYPE:
+        return message
+    snapshot = parse_snapshot(decode_text(message.data))._replace(version=ALGORITHM_VERSION)
+    return message._replace(data=encode_text(snapshot_text(snapshot)))
+
+
+def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter, acted: str) -> Iterator[Step]:
+    """Write inputs, configuration and new answers, and the recorded feed-forward on the topic ``acted``."""
+    answered, kept = topics.answers, topics.feedforward + RECORDED
     for step in replayed:
         message = step.message
         is_used = message.topic in topics or message.type_name == CONFIGURATION_TYPE
         if is_used and message.type_name not in answered:
-            log_time = writer.write(*message)
+            log_time = writer.write(*_of_this_version(message))
             for type_name, data in step.answers:
                 writer.write(answered[type_name] or ANSWER_TOPICS[type_name], type_name, log_time, data)
+        elif message.topic == acted:
+            writer.write(*message._replace(topic=kept))
         yield step
 
 

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
@@ -32,7 +33,7 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         namespace: Only topics below it count; for bags of several actuators.
 
     Returns:
-        Files, and as numbers `evaluation_numbers` and ``tracking``, a list of `TrackingStretch`.
+        Files, and as numbers `evaluation_numbers`, ``placeholder_seals`` and ``tracking``, a list of `TrackingStretch`.
 
     Raises:
         BagError: The bag cannot be read, or holds no estimates.
@@ -41,12 +42,15 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
     run = read_run(bag, namespace)
     evaluation, tracking = bag_evaluation.evaluate_run(run), tracking_evaluation.evaluate_tracking(run)
     stretches = tracking.stretches if tracking else ()
+    snapshots = (snapshot for _, _, snapshot in tracking_evaluation.configuration_stretches(run))
+    has_placeholder = any(snapshot is not None and snapshot.configuration.has_placeholder for snapshot in snapshots)
     figures = write_page(
         out,
         'bag',
         run_figures(run, evaluation) + (tracking_plots(run, tracking) if tracking else []),
         run=run,
         evaluation=evaluation,
+        warnings=[_sentence(PLACEHOLDER_WARNING)] if has_placeholder else [],
         limits=bag_evaluation,
         summary=friction_summary(evaluation.friction.sliding),
         start=datetime.fromtimestamp(evaluation.start // 1_000_000_000, UTC),
@@ -60,8 +64,12 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         tracking_table=table_of(stretches, _TRACKING_COLUMNS, (0,)),
         feedforward_table=table_of(stretches, _FEEDFORWARD_COLUMNS),
     )
-    numbers = bag_evaluation.evaluation_numbers(evaluation)
+    numbers = bag_evaluation.evaluation_numbers(evaluation) | {'placeholder_seals': has_placeholder}
     return ReportSummary(out, figures, numbers | {'tracking': tracking_evaluation.tracking_numbers(tracking)})
+
+
+def _sentence(text: str) -> str:
+    return f'{text[0].upper()}{text[1:]}.'
 
 
 def _level_table(levels: Sequence[PressureLevel], events: str) -> Table:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.configuration import Snapshot, parse_snapshot
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
@@ -25,6 +25,12 @@ MIN_SAMPLES = 50  # a shorter stretch is not evaluated
 MIN_PERIODS = 2  # of a periodic reference
 HYSTERESIS = 0.1  # of the amplitude: a reference must pass the middle by this much to cross it
 SAME = 0.05  # periods, amplitudes and shapes that differ by a smaller share are the same
+
+
+_REPLAYED = (
+    'The estimates and the feed-forward in this bag are replayed: the replayed feed-forward did not act. The tracking '
+    'is that of the recording, with the feed-forward that acted then.'
+)
 
 
 class Periodicity(NamedTuple):
@@ -43,7 +49,7 @@ class TrackingStretch:
     start: float  # [s] time of the first, since the first estimate of the bag
     end: float  # [s] time of the last
     settling: float  # [s] left out before
-    settings: FeedForwardSettings | None  # None if they are not in the bag
+    settings: FeedForwardSettings | None  # that acted; None if they are not in the bag
     standstill: float  # [m/s] speed at and below which the rod rests: ``stick_velocity`` of the estimator
     samples: int  # evaluated estimates: those with reference and position
     amplitude: float  # [m] of the reference, half peak to peak
@@ -54,14 +60,14 @@ class TrackingStretch:
     dwell: float | None  # [s] mean rest per reversal of the rod; None if it does not reverse
     reference_dwell: float | None  # [s] the same of the reference, which also passes through standstill
     not_sliding: float | None  # [-] share of the estimates of known state that do not slide
-    feedforward_peak: float  # [N] largest feed-forward; 0.0 without
+    feedforward_peak: float | None  # [N] largest feed-forward that acted; 0.0 without; None if it is not known
     rms_change: float | None = None  # [%] against the first stretch without feed-forward; None if the reference differs
     dwell_change: float | None = None  # [%] the same of the dwell
 
     @property
-    def has_feedforward(self) -> bool:
-        """Whether the feed-forward was ever above 0 N."""
-        return self.feedforward_peak > 0.0
+    def has_feedforward(self) -> bool | None:
+        """Whether the feed-forward that acted was ever above 0 N; None if it is not known."""
+        return None if self.feedforward_peak is None else self.feedforward_peak > 0.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +80,12 @@ class TrackingEvaluation:
     @property
     def without(self) -> TrackingStretch | None:
         """First stretch without feed-forward: the base of the comparison."""
-        return next((stretch for stretch in self.stretches if not stretch.has_feedforward), None)
+        return next((stretch for stretch in self.stretches if stretch.has_feedforward is False), None)
+
+    @property
+    def unknown(self) -> TrackingStretch | None:
+        """First stretch of which it is not known whether a feed-forward acted: a replay of a bag without one."""
+        return next((stretch for stretch in self.stretches if stretch.has_feedforward is None), None)
 
     @property
     def compensated(self) -> TrackingStretch | None:
@@ -96,31 +107,34 @@ def evaluate_tracking(run: RecordedRun) -> TrackingEvaluation | None:
     found = tuple(stretch for stretch in evaluated if stretch is not None)
     base = TrackingEvaluation(found, ()).without
     compared = tuple(_compared(stretch, base) for stretch in found)
-    return TrackingEvaluation(compared, tuple(_notes(compared, base, len(evaluated) - len(found))))
+    notes = [] if run.replayed_force is None else [_REPLAYED]
+    return TrackingEvaluation(compared, (*notes, *_notes(compared, base, len(evaluated) - len(found))))
 
 
-def configuration_stretches(run: RecordedRun) -> Iterator[tuple[int, int, Configuration | None]]:
-    """First index, index behind the last, and configuration of each stretch of unchanged configuration.
+def configuration_stretches(run: RecordedRun) -> Iterator[tuple[int, int, Snapshot | None]]:
+    """First index, index behind the last, and first snapshot of each stretch of unchanged configuration.
 
-    The configuration is None before the first one in the bag, and where it cannot be parsed.
+    The snapshot is None before the first one in the bag, and where it cannot be parsed. In a replay the settings that
+    acted count too.
     """
-    changes: list[tuple[int, Configuration | None]] = [(0, None)]
+    changes: list[tuple[int, Snapshot | None]] = [(0, None)]
     for row, (_, text) in zip(run.configuration_rows, run.configurations, strict=True):
         try:
-            configuration = parse_snapshot(text).configuration
+            snapshot = parse_snapshot(text)
         except (ValueError, LookupError, TypeError):
-            configuration = None  # the report shows the text
-        if configuration is None or configuration != changes[-1][1]:
-            changes.append((row, configuration))
-    for (first, configuration), (end, _) in pairwise([*changes, (len(run.time), None)]):
+            snapshot = None  # the report shows the text
+        last = changes[-1][1]
+        if snapshot is None or last is None or snapshot[:1] + snapshot[3:] != last[:1] + last[3:]:
+            changes.append((row, snapshot))
+    for (first, snapshot), (end, _) in pairwise([*changes, (len(run.time), None)]):
         if end > first:
-            yield first, end, configuration
+            yield first, end, snapshot
 
 
-def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configuration | None) -> TrackingStretch | None:
+def _evaluate(run: RecordedRun, first: int, end: int, snapshot: Snapshot | None) -> TrackingStretch | None:
     """Numbers of one stretch; None if it is too short."""
-    settings = configuration.feedforward if configuration else None
-    estimator_settings = configuration.settings if configuration else EstimatorSettings()
+    settings = (snapshot.recorded or snapshot.configuration).feedforward if snapshot else None
+    estimator_settings = snapshot.configuration.settings if snapshot else EstimatorSettings()
     settling = (settings or FeedForwardSettings()).fade_time + SETTLING_TIME
     part = _longest_part(run, first, end)
     part = part[run.time[part] >= run.time[part[0]] + settling] if len(part) else part
@@ -137,6 +151,8 @@ def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configurati
     _, reference_dwell = _dwell(time[1:], np.diff(reference) / np.diff(time), standstill)
     known = run.state[part][run.state[part] != FrictionState.UNKNOWN]
     force = run.feedforward_force[part]
+    force = force[np.isfinite(force)]
+    is_known = run.replayed_force is None or len(force) > 0 or (settings is not None and settings.scale == 0.0)
     return TrackingStretch(
         first=int(part[0]),
         last=int(part[-1]),
@@ -154,7 +170,7 @@ def _evaluate(run: RecordedRun, first: int, end: int, configuration: Configurati
         dwell=dwell,
         reference_dwell=reference_dwell,
         not_sliding=1.0 - float(np.mean(known == FrictionState.SLIDING)) if len(known) else None,
-        feedforward_peak=float(np.abs(force[np.isfinite(force)]).max(initial=0.0)),
+        feedforward_peak=float(np.abs(force).max(initial=0.0)) if is_known else None,
     )
 
 
@@ -238,7 +254,7 @@ def _notes(stretches: Sequence[TrackingStretch], base: TrackingStretch | None, s
             f'{short} stretches of unchanged configuration are too short to evaluate the tracking: fewer than '
             f'{MIN_SAMPLES} samples with reference and position remain after settling.'
         )
-    if stretches and base is None:
+    if base is None and any(stretch.has_feedforward for stretch in stretches):
         yield 'There is no stretch without feed-forward to compare with.'
     for stretch in stretches:
         if base is not None and not _same_reference(stretch, base):

@@ -18,12 +18,21 @@ PERIODS = 3  # that are shown
 SHOWN_TIME = 1.0  # [s] of a reference that is not periodic
 
 
+_WITH_OR_WITHOUT = {
+    True: ' with feed-forward',
+    False: ' without feed-forward',
+    None: '; feed-forward that acted: not known',
+}
+
+
 def tracking_plots(run: RecordedRun, evaluation: TrackingEvaluation) -> list[Plot]:
     """Every figure of the tracking that the bag has the data for."""
-    shown = [stretch for stretch in (evaluation.without, evaluation.compensated) if stretch is not None]
+    known = [stretch for stretch in (evaluation.without, evaluation.compensated) if stretch is not None]
+    shown = known or [stretch for stretch in (evaluation.unknown,) if stretch is not None]
     if not shown:
         return []
-    compensation = [compensation_figure(run, shown)] if np.isfinite(run.feedforward_force).any() else []
+    forces = [run.feedforward_force] if run.replayed_force is None else [run.feedforward_force, run.replayed_force]
+    compensation = [compensation_figure(run, shown)] if any(np.isfinite(force).any() for force in forces) else []
     return [stretches_figure(run, evaluation, shown), *compensation]
 
 
@@ -31,17 +40,18 @@ def tracking_summary(evaluation: TrackingEvaluation) -> str:
     """Result of the comparison, in one line."""
     without, compensated = evaluation.without, evaluation.compensated
     if compensated is None or without is None or compensated.rms_change is None:
-        alone = compensated or without
+        alone = compensated or without or evaluation.unknown
         if alone is None:
             return 'No stretch is long enough to evaluate the tracking'
-        with_or_without = 'with' if alone.has_feedforward else 'without'
-        return f'Tracking error {length_text(alone.rms)} RMS {with_or_without} feed-forward'
+        return f'Tracking error {length_text(alone.rms)} RMS{_WITH_OR_WITHOUT[alone.has_feedforward]}'
     verb, before, after = 'cuts' if compensated.rms_change < 0.0 else 'raises', without.rms, compensated.rms
     return f'Feed-forward {verb} the tracking error from {length_text(before)} to {length_text(after)} RMS'
 
 
 def stretch_name(stretch: TrackingStretch) -> str:
     """Name of a stretch in figures and tables."""
+    if stretch.has_feedforward is None:
+        return 'feed-forward that acted: not known'
     if not stretch.has_feedforward:
         return 'without feed-forward'
     if stretch.settings is None:
@@ -106,16 +116,20 @@ def compensation_figure(run: RecordedRun, shown: Sequence[TrackingStretch]) -> P
     last = shown[-1]
     peak = max(float(np.abs(run.friction_force[part]).max()) for part in parts)
     unit, size = force_unit(peak)
-    title = (
-        f'Feed-forward up to {last.feedforward_peak / size:.3g} {unit} against friction up to {peak / size:.3g} {unit}'
-        if last.has_feedforward
-        else f'Friction up to {peak / size:.3g} {unit}, no feed-forward'
+    title = f'Friction up to {peak / size:.3g} {unit}, ' + (
+        'no feed-forward' if last.has_feedforward is False else 'feed-forward that acted: not known'
     )
+    if last.feedforward_peak:
+        largest = f'{last.feedforward_peak / size:.3g} {unit}'
+        title = f'Feed-forward up to {largest} against friction up to {peak / size:.3g} {unit}'
     figure, axes = style.new_figure(title, 3.4, ncols=len(shown), sharey='row', squeeze=False)
     for stretch, part, ax in zip(shown, parts, axes[0], strict=True):
         time = _prepare_panel(ax, run, stretch, part, len(shown))
         friction, force = run.friction_force[part] / size, run.feedforward_force[part] / size
         style.thin_line(ax, time, friction, color=style.BLUE, lw=1.5, label='estimated friction force')
         style.thin_line(ax, time, force, color=style.ORANGE, lw=1.5, label='feed-forward')
+        if run.replayed_force is not None:
+            replayed = run.replayed_force[part] / size
+            style.thin_line(ax, time, replayed, color=style.GREY, lw=1.2, ls='--', label='replayed, did not act')
         style.zero_lines(ax)
     return finished('friction_and_feedforward', figure, axes[0, 0], ylabel=f'force [{unit}]')

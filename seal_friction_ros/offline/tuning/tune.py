@@ -5,7 +5,6 @@ axis gives the same bytes.
 """
 
 import math
-import os
 import textwrap
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 import yaml
 
 from seal_friction_ros.core.estimation import messages
-from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
 from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, Reference, condition_reference
@@ -27,7 +26,12 @@ from seal_friction_ros.core.servo.closed_loop import Axis
 from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
 from seal_friction_ros.core.tuning.recorded_axis import RecordedMotion, RecordedTuning, Recording, tune_recorded_axis
-from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
+from seal_friction_ros.core.tuning.settings import (
+    FORCE_MARGIN,
+    RecordedAxisSettings,
+    TunedFeedForward,
+    TuningSettings,
+)
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
@@ -35,12 +39,13 @@ from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.replay import steps
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.work.targets import mark
 
 CONTROL_PERIOD, INNER_STEP = 1e-3, 1e-4  # [s] of the simulated servo, as in servo_simulator
 NOISE_LENGTH = 8192  # samples of noise, which then repeats
-MADE_BY = '# Feed-forward of friction_estimator, made by seal_friction tune.'
+MADE_BY = f'# Feed-forward of friction_estimator, {mark("tune")}.'
 NODE = '/**/friction_estimator'  # in every namespace
-TUNED = ('scale', 'lead_time', 'smoothing_velocity', 'slew_limit')
+TUNED = ('scale', 'lead_time', 'smoothing_velocity', 'slew_limit', 'force_limit')
 PERFORMANCE = ('tracking_rms', 'tracking_peak', 'dwell', 'overshoot', 'limit_cycle_reversals')
 
 
@@ -52,6 +57,13 @@ class TuningTask(NamedTuple):
     seals: str
     before: FeedForwardSettings  # settings before the tuning
     tuned: tuple[str, ...]  # names of the tuned parameters; the others are unchanged
+    has_placeholder: bool  # whether a seal is the placeholder of the default configuration
+
+    def remarks(self, found: TunedFeedForward[Any]) -> str:
+        """Sentences on the force limit and on placeholder seals."""
+        now, was = found.feedforward.force_limit, self.before.force_limit
+        limit = f' force_limit: {now:g} N (was {was:g} N): {FORCE_MARGIN:g} times the largest friction found.'
+        return f'{limit} Warning: {PLACEHOLDER_WARNING}.' if self.has_placeholder else limit
 
 
 class RecordedTrack(NamedTuple):
@@ -81,7 +93,7 @@ class SimulatorTuning:
         """Result as a sentence."""
         was, now = self.found.without, self.found.nominal
         if not self.found.feedforward.scale:
-            return 'No feed-forward is better than none on this plant.'
+            return f'No feed-forward is better than none on this plant.{self.task.remarks(self.found)}'
         worst, better, end = self.found.cases[-1], 'better than none, and at rest,', '.'
         if not self.found.better_in_every_case:
             better, end = 'NOT better than none, or not at rest,', ': see the robustness cases.'
@@ -89,7 +101,7 @@ class SimulatorTuning:
             f'Tracking RMS {was.tracking_rms / MM:.3g} to {now.tracking_rms / MM:.3g} mm, '
             f'dwell per reversal {was.dwell / MS:.3g} to {now.dwell / MS:.3g} ms; '
             f'{better} in every case with a model error up to {100.0 * worst.friction_error:.3g} % and a delay error '
-            f'up to {100.0 * worst.delay_error:.3g} %{end}'
+            f'up to {100.0 * worst.delay_error:.3g} %{end}{self.task.remarks(self.found)}'
         )
 
     @property
@@ -98,6 +110,8 @@ class SimulatorTuning:
         found = self.found
         return {
             'source': 'simulator',
+            'largest_friction': found.largest_friction,
+            'placeholder_seals': self.task.has_placeholder,
             'parameters': asdict(found.feedforward),
             'merit': found.merit,
             **{f'{name}_without': getattr(found.without, name) for name in PERFORMANCE},
@@ -128,7 +142,7 @@ class BagTuning:
     @property
     def summary(self) -> str:
         """Result as a sentence."""
-        was, now = self.found.without, self.found.nominal
+        found, was, now = self.found, self.found.without, self.found.nominal
         text = (
             f'RMS friction left to the controller while sliding {was.sliding:.3g} to {now.sliding:.3g} N, '
             f'near reversals {was.reversal:.3g} to {now.reversal:.3g} N'
@@ -137,7 +151,7 @@ class BagTuning:
             text += f'; not identifiable from the bag and unchanged: {", ".join(unchanged)}'
         if not self.found.better_in_every_case:
             text += '; NOT better than none in every case: see the robustness cases'
-        return f'{text}.'
+        return f'{text}.{self.task.remarks(found)}'
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -146,6 +160,8 @@ class BagTuning:
         return {
             'source': 'bag',
             'bag': self.bag,
+            'largest_friction': found.largest_friction,
+            'placeholder_seals': self.task.has_placeholder,
             'parameters': asdict(found.feedforward),
             'told_by_bag': found.identified,
             **{f'{name}_{which}': None for name in PERFORMANCE for which in ('without', 'with')},
@@ -186,7 +202,9 @@ def tune_simulator(settings: TuningSettings, configuration: Configuration | None
         f'sine of {settings.amplitude / MM:g} mm at {settings.frequency:g} Hz, '
         f'{settings.delay / MS:g} ms from velocity sample to controller, seed {settings.seed}'
     )
-    task = TuningTask('the simulated servo', motion, _seals_text(chosen), parameters.feedforward, TUNED)
+    task = TuningTask(
+        'the simulated servo', motion, _seals_text(chosen), parameters.feedforward, TUNED, chosen.has_placeholder
+    )
     return SimulatorTuning(task, problem, found)
 
 
@@ -212,7 +230,9 @@ def tune_bag(
     tuned = tuple(parameter for parameter, is_identified in found.identified.items() if is_identified)
     motion = f'{len(recording.estimates)} samples, {recording.time[-1]:.3f} s'
     name = bag.resolve().name
-    task = TuningTask(f'bag {name}', motion, _seals_text(recorded), recorded.feedforward, tuned)
+    task = TuningTask(
+        f'bag {name}', motion, _seals_text(recorded), recorded.feedforward, tuned, recorded.has_placeholder
+    )
     return BagTuning(name, task, recording, track, known, found)
 
 
@@ -296,23 +316,6 @@ def _with_reference(conditioned: Reference, sample: Any) -> Reference:
 def page_of(out: Path) -> Path:
     """Page that belongs to a parameter file: beside it, with the suffix ``.html``."""
     return out.with_suffix('.html')
-
-
-def check_target(out: Path) -> None:
-    """Check that parameter file and page can be written; called before the computation.
-
-    Raises:
-        ValueError: A file is not from an earlier tuning, or the folder cannot be written to.
-    """
-    if out.suffix in ('.html', '.htm'):
-        raise ValueError(f'{out}: FILE is the parameter file (.yaml); the report beside it gets the suffix .html')
-    parent = next(parent for parent in out.absolute().parents if parent.exists())
-    if out.is_dir() or not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise ValueError(f'{out}: cannot write a file there')
-    is_own = out.exists() and out.read_text(encoding='utf-8', errors='replace').startswith(MADE_BY)
-    for path in (out, page_of(out)):
-        if path.exists() and not is_own:
-            raise ValueError(f'{path} exists already and is not from tune: not overwriting')
 
 
 def parameter_text(tuning: SimulatorTuning | BagTuning) -> str:

@@ -1,6 +1,5 @@
 """Writer of seal files: each is checked as the node checks it and written atomically."""
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,19 +9,6 @@ import yaml
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import parse_yaml
 from seal_friction_ros.offline.work.atomic_file import write_whole
-
-
-def check_new(out: Path) -> None:
-    """Check before the work that a file can be made.
-
-    Raises:
-        ValueError: It exists already, or its folder cannot be written to.
-    """
-    if out.exists():
-        raise ValueError(f'{out} exists already: not overwriting it')
-    parent = next(parent for parent in out.absolute().parents if parent.exists())
-    if not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise ValueError(f'{out}: cannot write into {parent}')
 
 
 def rounded(value: float, digits: int) -> float:

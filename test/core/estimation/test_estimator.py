@@ -8,7 +8,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
+from seal_friction_ros.core.estimation import estimator
+from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState, step
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, decode, encode
 from seal_friction_ros.core.estimation.records import (
     NO_FORCE,
@@ -43,6 +45,11 @@ def sample(stamp=START, velocity=0.01, pressure=3e6, force=30.0, *, pressure_age
         NO_PRESSURE if pressure is None else Pressure(stamp - pressure_age * MS, a, b),
         NO_FORCE if force is None else Force(stamp - force_age * MS, force),
     )
+
+
+def init(parameters=PARAMETERS) -> EstimatorState:
+    """Before the first sample, but with a velocity whose ripple is known: there is none."""
+    return estimator.init(parameters)._replace(motion=NOT_CONDITIONED._replace(samples=SETTLING))
 
 
 def run(samples, parameters=PARAMETERS) -> list[FrictionEstimate]:

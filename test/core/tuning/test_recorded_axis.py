@@ -19,7 +19,7 @@ from seal_friction_ros.core.tuning.recorded_axis import (
     near_reversals,
     tune_recorded_axis,
 )
-from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
+from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RecordedAxisSettings
 
 RATE, SECONDS = 500.0, 4.0  # [Hz], [s]
 TIME = np.arange(round(RATE * SECONDS)) / RATE
@@ -133,7 +133,7 @@ def test_tuning_takes_the_scale_and_most_of_the_friction():
     found = tune_recorded_axis(recording(noise=1.0), SETTINGS, KNOWN)
     assert found.feedforward.scale == 0.8
     assert found.identified == {
-        'scale': True, 'lead_time': False, 'smoothing_velocity': True, 'slew_limit': True
+        'force_limit': True, 'scale': True, 'lead_time': False, 'smoothing_velocity': True, 'slew_limit': True
     }  # fmt: skip
     assert found.without.sliding == pytest.approx(32.0, rel=0.05)
     assert found.nominal.sliding < 0.1 * found.without.sliding
@@ -190,3 +190,25 @@ def test_friction_against_the_model_is_not_taken_for_a_scale():
 def test_delayed_force_comes_later():
     force = np.arange(5.0)
     np.testing.assert_allclose(delayed(np.arange(5.0), force, 1.5), [0.0, 0.0, 0.5, 1.5, 2.5])
+
+
+def test_force_limit_follows_the_friction_and_cuts_nothing():
+    pressure_part = (275.0 + 55.0 * np.sin(2.0 * TIME)) / (1.0 + 0.1 * np.sin(3.0 * TIME))  # 220 to 330 N in all
+    made = recording(scale=1.0, coulomb=pressure_part, noise=3.0)
+    found = tune_recorded_axis(made, SETTINGS, KNOWN)
+    assert found.largest_friction == pytest.approx(330.0, rel=0.02)
+    assert found.feedforward.force_limit == pytest.approx(500.0, rel=0.03)
+    assert found.identified['force_limit']
+    free = feedforward_force(dataclasses.replace(found.feedforward, force_limit=1e6), made, 0.3)
+    np.testing.assert_array_equal(feedforward_force(found.feedforward, made, 0.3), free)
+    assert np.abs(free).max() > 400.0
+    assert found.nominal.sliding < 0.2 * found.without.sliding
+
+
+def test_force_limit_falls_with_the_friction_and_a_peak_of_noise_does_not_raise_it():
+    made = recording(coulomb=40.0, scale=1.0)
+    force = made.force_sum.copy()
+    force[300] += 1000.0
+    for each in (made, made._replace(force_sum=force)):
+        limit = tune_recorded_axis(each, SETTINGS, KNOWN).feedforward.force_limit
+        assert FORCE_MARGIN * 40.0 <= limit <= FORCE_MARGIN * 50.0 < SETTINGS.force_limit

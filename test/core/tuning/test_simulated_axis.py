@@ -31,6 +31,7 @@ from seal_friction_ros.core.tuning.simulated_axis import (
     NEARLY_AS_GOOD,
     TuningProblem,
     bounded,
+    force_limit,
     merit,
     nearest_preferred,
     preferred,
@@ -229,7 +230,7 @@ def test_force_is_no_sharper_than_it_must_be():
 
 
 def test_other_settings_are_unchanged():
-    tuned = {'scale', 'lead_time', 'smoothing_velocity', 'slew_limit'}
+    tuned = {'scale', 'lead_time', 'smoothing_velocity', 'slew_limit', 'force_limit'}
     for field in dataclasses.fields(FeedForwardSettings):
         if field.name not in tuned:
             assert getattr(found().feedforward, field.name) == getattr(PIPELINE.feedforward, field.name)
@@ -265,3 +266,16 @@ def test_bounds_of_the_settings_are_kept():
     assert bounded('scale', 7.0) == 2.0
     assert bounded('slew_limit', 0.0) == 1e-3
     assert bounded('lead_time', 0.1) == 0.1
+
+
+@pytest.mark.parametrize(
+    ('friction', 'limit'), [(330.0, 500.0), (100.0, 150.0), (1.0, 1.5), (38.5, 58.0), (0.0, 0.001), (1e9, 1e6)]
+)
+def test_force_limit_is_the_margin_over_the_friction_rounded_up_to_two_digits(friction, limit):
+    assert force_limit(friction) == limit
+
+
+def test_force_limit_of_the_search_is_above_the_force_that_it_found():
+    assert found().feedforward.force_limit == force_limit(found().largest_friction)
+    assert 38.0 < found().largest_friction < 50.0
+    assert found().nominal.largest_force < found().feedforward.force_limit

@@ -7,6 +7,7 @@ import pytest
 from harness.example_bags import default_configuration, rewrite, write_inputs, write_recorded
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
@@ -182,3 +183,10 @@ def test_a_bag_of_an_older_version_replays_and_the_version_is_named():
     assert not result.identical
     assert 'version 1 of the algorithm made them, this is version 2' in result.summary(verified=True)
     assert verify(ROOT / 'test' / 'corpus' / 'version_1' / 'faults', bulk_from=0) == result
+
+
+def test_a_replay_of_an_old_bag_is_of_the_present_version_and_verifies(tmp_path: Path):
+    replay(ROOT / 'bags' / 'pull_test', out=tmp_path / 'out')
+    verdict = replay(tmp_path / 'out')
+    assert verdict.identical
+    assert verdict.recorded_version == ALGORITHM_VERSION

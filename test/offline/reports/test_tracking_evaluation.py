@@ -7,12 +7,15 @@ import math
 import numpy as np
 import pytest
 from harness.closed_loop_bags import with_scale, write_closed_loop
+from harness.example_bags import rewrite
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, FEEDFORWARD_TYPE
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.motions import Chirp, Sine
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
+from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.tracking_evaluation import (
     MIN_SAMPLES,
@@ -22,7 +25,7 @@ from seal_friction_ros.offline.reports.tracking_evaluation import (
     periodicity,
     tracking_numbers,
 )
-from seal_friction_ros.offline.reports.tracking_figures import shown_part, tracking_plots
+from seal_friction_ros.offline.reports.tracking_figures import shown_part, tracking_plots, tracking_summary
 
 RATE = 1000  # [Hz]
 PERIOD = 0.2  # [s]
@@ -44,6 +47,7 @@ def recorded_run(seconds=2.0, scales=(), **columns) -> RecordedRun:
         'position': reference,
         'state': np.full(n, int(FrictionState.SLIDING)),
         'feedforward_force': np.full(n, math.nan),
+        'replayed_force': None,
         **columns,
     }
     others = {f.name: np.zeros(n) for f in dataclasses.fields(RecordedRun) if f.name not in values}
@@ -278,3 +282,63 @@ def test_feedforward_cuts_its_error_by_60_and_its_dwell_by_80_percent(closed_loo
     assert compensated.rms_change < -60.0
     assert compensated.dwell_change < -80.0
     assert compensated.feedforward_peak == pytest.approx(38.5, abs=0.5)
+
+
+# -- a replay ---------------------------------------------------------------------------------------------------------
+
+
+def replayed_run(tmp_path, configuration, scales=(0.0, 0.9), **kept) -> RecordedRun:
+    """Run of a replayed bag of a closed loop; ``kept`` says which topics of the recording it is made from."""
+    bag = write_closed_loop(tmp_path / 'recorded', scales)
+    if kept:
+        keep = kept['keep']
+        bag = rewrite(bag, tmp_path / 'partly', lambda _, message: message if keep(message) else None)
+    replay(bag, configuration, tmp_path / 'replayed')
+    return read_run(tmp_path / 'replayed')
+
+
+def test_what_acted_is_what_was_recorded(tmp_path):
+    run = replayed_run(tmp_path, with_scale(0.9), scales=(0.0,))
+    assert np.nanmax(np.abs(run.replayed_force)) > 30.0
+    found = evaluate_tracking(run)
+    (stretch,) = found.stretches
+    assert (stretch.has_feedforward, stretch.feedforward_peak, stretch.settings.scale) == (False, 0.0, 0.0)
+    assert tracking_summary(found).endswith('RMS without feed-forward')
+    assert 'did not act' in found.notes[0]
+    recorded = evaluate_tracking(read_run(tmp_path / 'recorded'))
+    assert (stretch.rms, stretch.dwell) == (recorded.stretches[0].rms, recorded.stretches[0].dwell)
+
+
+def test_a_replay_without_feedforward_keeps_that_of_the_recording_also_when_replayed_again(tmp_path):
+    one = evaluate_tracking(replayed_run(tmp_path, with_scale(0.0)))
+    recorded = evaluate_tracking(read_run(tmp_path / 'recorded'))
+    assert one.stretches == recorded.stretches
+    assert [stretch.settings.scale for stretch in one.stretches] == [0.0, 0.9]
+    replay(tmp_path / 'replayed', with_scale(0.5), tmp_path / 'again')
+    again = read_run(tmp_path / 'again')
+    assert evaluate_tracking(again).stretches == recorded.stretches
+    assert np.nanmax(np.abs(again.replayed_force)) > 10.0
+
+
+@pytest.mark.parametrize(
+    ('missing', 'scales', 'acted'),
+    [
+        ((FEEDFORWARD_TYPE,), (0.9,), None),
+        ((FEEDFORWARD_TYPE,), (0.0,), False),
+        ((FEEDFORWARD_TYPE, CONFIGURATION_TYPE), (0.0,), None),
+        ((CONFIGURATION_TYPE,), (0.9,), True),
+    ],
+)
+def test_a_feedforward_that_was_not_recorded_is_not_known(tmp_path, missing, scales, acted):
+    run = replayed_run(tmp_path, with_scale(0.9), scales, keep=lambda message: message.type_name not in missing)
+    found = evaluate_tracking(run)
+    (stretch,) = found.stretches
+    assert stretch.has_feedforward is acted
+    assert ('feed-forward that acted: not known' in tracking_summary(found)) is (acted is None)
+    json.dumps(tracking_numbers(found), allow_nan=False)
+    replay(tmp_path / 'replayed', with_scale(0.5), tmp_path / 'again')  # a replayed one never becomes one that acted
+    assert evaluate_tracking(read_run(tmp_path / 'again')).stretches == found.stretches
+    with house_style():
+        figures = {plot.name: plot.figure for plot in tracking_plots(run, found)}
+    labels = [line.get_label() for axes in figures['friction_and_feedforward'].axes for line in axes.lines]
+    assert 'replayed, did not act' in labels

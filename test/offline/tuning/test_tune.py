@@ -28,6 +28,7 @@ from seal_friction_ros.core.servo.closed_loop import with_wrong_friction
 from seal_friction_ros.core.servo.motions import Sine, Step
 from seal_friction_ros.core.tuning import simulated_axis
 from seal_friction_ros.core.tuning.settings import TuningSettings
+from seal_friction_ros.core.tuning.simulated_axis import force_limit
 from seal_friction_ros.files import load_parameter_file
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.commands.main import main
@@ -80,6 +81,17 @@ def write_axis(path: Path, wave=None, seconds=2.0, leave_out='', configuration: 
     return path
 
 
+def with_constant_friction(friction: float) -> Configuration:
+    """Two seals with ``friction`` [N] each."""
+    known = default_configuration()
+    names = ('name', 'source', 'uncertainty', 'identified_pressure', 'stiction')
+    seal = {name: known.seal_documents[0][name] for name in names}
+    law = {'coulomb_friction_at_any_pressure': friction}
+    seal |= {'name': 'ram', 'coulomb_law': 'constant_coulomb', 'constant_coulomb': law}
+    selection = dataclasses.replace(known.selection, seals=('ram', 'ram'))
+    return dataclasses.replace(known, selection=selection, seal_documents=(seal, seal))
+
+
 @pytest.fixture(scope='module')
 def axis(tmp_path_factory) -> Path:
     return write_axis(tmp_path_factory.mktemp('bags') / 'axis')
@@ -122,11 +134,13 @@ def test_file_is_a_parameter_file_of_the_node(simulated: Path):
     known = default_configuration()
     assert (selection, settings) == (known.selection, known.settings)
     assert feedforward != known.feedforward
-    assert feedforward.force_limit == known.feedforward.force_limit
+    numbers = json.loads((simulated / 'numbers.json').read_text())
+    assert numbers['largest_force'] < feedforward.force_limit == force_limit(numbers['largest_friction'])
     text = path.read_text()
     assert text.startswith(MADE_BY)
     assert 'sine of 0.5 mm at 10 Hz' in text
-    assert 'ms28775_114 on chamber a' in text
+    assert 'placeholder on chamber a' in text
+    assert 'Warning: the seals are the placeholder' in ' '.join(text.replace('#', ' ').split())
     assert all(len(line) <= 120 for line in text.splitlines())
 
 
@@ -242,13 +256,25 @@ def test_own_file_is_replaced_and_two_runs_write_the_same_bytes(axis: Path, tmp_
 def test_name_of_a_bag_cannot_break_the_file(tmp_path: Path):
     bag = write_axis(tmp_path / 'bag\nforce_limit: 9e9 <b>')
     assert main(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')]) == 0
-    assert load_parameter_file(tmp_path / 'f.yaml')[2].force_limit == default_configuration().feedforward.force_limit
+    assert load_parameter_file(tmp_path / 'f.yaml')[2].force_limit < 100.0
     page = checked_page(tmp_path / 'f.html')
     assert page.texts['h1'] == ['Feed-forward for bag bag force_limit: 9e9 <b>']
     found = page.tiles['friction of the axis over that of the model'].split()[0]
     assert float(found) == pytest.approx(TRUE_SCALE, abs=0.01)
     assert len(page.table('friction model')) == 10
     assert page.figures == ['match', 'law', 'robustness', 'recorded']
+
+
+def test_force_limit_follows_the_friction_of_the_axis_and_the_summary_says_so(tmp_path: Path, capsys):
+    configuration = with_constant_friction(275.0 / TRUE_SCALE / 2.0)
+    bag = write_axis(tmp_path / 'bag', Sine(amplitude=0.005, frequency=2.0), 3.0, configuration=configuration)
+    assert main(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')]) == 0
+    said = capsys.readouterr().out
+    limit = load_parameter_file(tmp_path / 'f.yaml')[2].force_limit
+    assert limit == pytest.approx(1.5 * 275.0, rel=0.1)
+    assert f'force_limit: {limit:g} N (was 150 N): 1.5 times the largest friction found' in said
+    assert 'placeholder' not in said
+    assert f'force_limit: {limit:.1f}' in (tmp_path / 'f.yaml').read_text()
 
 
 def test_friction_against_the_motion_is_a_failed_check(tmp_path: Path, capsys):
