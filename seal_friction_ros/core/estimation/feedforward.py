@@ -32,7 +32,6 @@ from seal_friction_ros.core.friction.states import UNKNOWN
 
 FASTEST = 100.0  # [m/s] no rod is faster
 LONGEST_STEP = 0.02  # [s] after a longer gap the force changes, and fades in, as if this time had passed
-LARGEST_RIPPLE = 0.1  # [-] of the smoothing velocity; see `wanted_velocity`
 
 
 class Limited(IntFlag):
@@ -100,17 +99,6 @@ class FeedForwardSettings:
         check(self)
 
 
-class WantedMotion(NamedTuple):
-    """Motion of the rod that the feed-forward compensates for, conditioned."""
-
-    velocity: float  # [m/s] NaN: not known
-    acceleration: float  # [m/s^2] for ``lead_time``; 0.0 if it is not known
-    ripple: float  # [m/s] ripple of the velocity as it was given; 0.0 for a clean signal
-
-
-NO_MOTION = WantedMotion(math.nan, 0.0, 0.0)
-
-
 class FeedForwardState(NamedTuple):
     """What one step leaves for the next."""
 
@@ -148,19 +136,20 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
 
 
 @compilable
-def wanted_velocity(settings: FeedForwardSettings, motion: WantedMotion) -> float:
-    """Velocity v [m/s] of the equation, ``lead_time`` ahead; NaN if it is not known.
+def wanted_velocity(settings: FeedForwardSettings, velocity: float, acceleration: float) -> float:
+    """Velocity v [m/s] of the equation, ``lead_time`` ahead of the given one; NaN if that is NaN or infinite.
 
-    The lead reverses a clean velocity before the motion does. The lead of a velocity with a ripple that matters to
-    tanh(v / w) stops at 0: a difference of a rounded velocity says nothing about a reversal to come.
+    The lead takes the force away before a reversal, but the force changes its sign only with the reference: a force
+    ahead of it would act against the wanted motion.
     """
-    velocity = motion.velocity
     if not math.isfinite(velocity):
         return math.nan
-    lead = settings.lead_time * motion.acceleration
-    if motion.ripple > LARGEST_RIPPLE * settings.smoothing_velocity:
-        lead = between(-abs(velocity), lead, abs(velocity))
-    return between(-FASTEST, velocity + lead, FASTEST) if math.isfinite(lead) else between(-FASTEST, velocity, FASTEST)
+    led = velocity + settings.lead_time * acceleration
+    if not math.isfinite(led):
+        led = velocity
+    if led * velocity < 0.0:
+        return 0.0
+    return between(-FASTEST, led, FASTEST)
 
 
 @compilable

@@ -33,10 +33,8 @@ from seal_friction_ros.core.estimation.feedforward import (
     FADED_IN,
     FADED_OUT,
     FASTEST,
-    NO_MOTION,
     FeedForwardSettings,
     FeedForwardState,
-    WantedMotion,
     usable,
     wanted_velocity,
 )
@@ -267,8 +265,7 @@ def _feed_forward(
     """Make and emit the feed-forward of this moment."""
     known, guided, friction, pressure, force, reference, receipt, refused, offset = state
     settings = parameters.feedforward
-    motion = _wanted_motion(settings, known, reference, receipt, received)
-    velocity = wanted_velocity(settings, motion)
+    velocity = _wanted_velocity(settings, known, reference, receipt, received)
     ground = friction
     if refused or not _is_fresh(receipt, received, settings.estimate_timeout):
         ground = -1.0
@@ -282,17 +279,17 @@ def _feed_forward(
 
 
 @compilable
-def _wanted_motion(
+def _wanted_velocity(
     settings: FeedForwardSettings, known: EstimatorState, reference: Reference, receipt: ReceiptTimes, received: int
-) -> WantedMotion:
-    """Conditioned motion of the reference, or with ``use_measured_velocity`` of the rod."""
+) -> float:
+    """Conditioned velocity [m/s] of the reference with its lead, or with ``use_measured_velocity`` of the rod."""
     if settings.use_measured_velocity:
-        return WantedMotion(confirmed_velocity(known.motion), 0.0, 0.0)
+        return confirmed_velocity(known.motion)
     if not _is_younger(receipt.reference, received, settings.reference_timeout):
-        return NO_MOTION
+        return math.nan
     given = reference.velocity
     acceleration = reference.acceleration if given.samples >= SETTLING else 0.0
-    return WantedMotion(confirmed_velocity(given), acceleration, given.ripple)
+    return wanted_velocity(settings, confirmed_velocity(given), acceleration)
 
 
 @compilable

@@ -26,7 +26,6 @@ from seal_friction_ros.core.estimation.feedforward import (
     FADED_IN,
     UNUSABLE,
     FeedForwardSettings,
-    WantedMotion,
     usable,
     wanted_velocity,
 )
@@ -54,7 +53,6 @@ class RecordedMotion(NamedTuple):
     reference_acceleration: float = 0.0  # [m/s^2]
     measured_velocity: float = 0.0  # [m/s]
     reference_age: float = 0.0  # [s]
-    ripple: float = 0.0  # [m/s] of the reference velocity
 
 
 class Recording(NamedTuple):
@@ -209,9 +207,9 @@ def feedforward_force(settings: FeedForwardSettings, recording: Recording, frict
         friction = (1.0 + friction_error) * estimate.coulomb_friction if usable(settings, estimate) else -1.0
         velocity = motion.measured_velocity
         if not settings.use_measured_velocity:
-            wanted = WantedMotion(motion.reference_velocity, motion.reference_acceleration, motion.ripple)
             late = abs(motion.reference_age) > settings.reference_timeout
-            velocity = math.nan if late else wanted_velocity(settings, wanted)
+            ahead = wanted_velocity(settings, motion.reference_velocity, motion.reference_acceleration)
+            velocity = math.nan if late else ahead
         state, out = feedforward.step(settings, state, estimate.stamp, estimate.stamp, friction, velocity)
         forces.append(out.force)
     return np.array(forces)

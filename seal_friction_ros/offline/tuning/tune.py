@@ -294,9 +294,7 @@ def read_recording(
                 estimates.append(messages.decode(messages.ESTIMATE_TYPE, data))
                 age = (sample.stamp - reference.stamp) * 1e-9
                 given = conditioned.velocity
-                motions.append(
-                    RecordedMotion(given.velocity, conditioned.acceleration, sample.velocity, age, given.ripple)
-                )
+                motions.append(RecordedMotion(given.velocity, conditioned.acceleration, sample.velocity, age))
                 rows.append((held[Force].force, reference.position, held[Position].position))
     if len(estimates) < 2:
         raise BagError(f'{bag}: fewer than two velocity samples after the first reference')

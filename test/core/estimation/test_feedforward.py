@@ -13,7 +13,6 @@ from seal_friction_ros.core.estimation.feedforward import (
     FADED_OUT,
     FeedForwardSettings,
     Limited,
-    WantedMotion,
     compensation,
     step,
     usable,
@@ -68,20 +67,17 @@ def test_smooth_through_zero(velocity):
     assert abs(change) <= 1.001e-6 * steepest
 
 
-def test_the_lead_of_a_clean_velocity_sees_the_reversal_before_it_comes():
+def test_the_lead_takes_the_force_away_before_a_reversal_but_does_not_reverse_it():
     settings = dataclasses.replace(SHARP, lead_time=0.01)
-    assert wanted_velocity(settings, WantedMotion(0.005, -1.0, 0.0)) == pytest.approx(-0.005)
+    assert wanted_velocity(settings, 0.005, -0.3) == pytest.approx(0.002)
+    assert wanted_velocity(settings, 0.005, -1.0) == 0.0
+    assert wanted_velocity(settings, 0.005, 1.0) == pytest.approx(0.015)
+    assert wanted_velocity(settings, 0.0, -1.0) == pytest.approx(-0.01)  # from rest
 
 
-def test_the_lead_of_a_velocity_with_a_ripple_does_not_reverse_it():
-    settings = dataclasses.replace(SHARP, lead_time=0.01)
-    assert wanted_velocity(settings, WantedMotion(0.005, -1.0, 1e-3)) == 0.0
-    assert wanted_velocity(settings, WantedMotion(0.005, 1.0, 1e-3)) == pytest.approx(0.01)
-
-
-@given(st.floats(), st.floats(), st.floats(0.0, 10.0))
-def test_a_velocity_that_is_not_finite_is_not_known_and_others_are_bounded(velocity, acceleration, ripple):
-    wanted = wanted_velocity(FeedForwardSettings(), WantedMotion(velocity, acceleration, ripple))
+@given(st.floats(), st.floats())
+def test_a_velocity_that_is_not_finite_is_not_known_and_others_are_bounded(velocity, acceleration):
+    wanted = wanted_velocity(FeedForwardSettings(), velocity, acceleration)
     assert abs(wanted) <= 100.0 if math.isfinite(velocity) else math.isnan(wanted)
 
 
