@@ -107,8 +107,11 @@ def graph(
     arguments: tuple[str, ...] = (),
     namespace: str = '',
 ) -> Iterator[Graph]:
-    """Estimator with ROS ``parameters`` and command-line ``arguments`` (remapping), and a probe in ``namespace``."""
-    overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
+    """Estimator with ROS ``parameters`` and command-line ``arguments`` (remapping), and a probe in ``namespace``.
+
+    The age of stamps is not checked: tests choose them.
+    """
+    overrides = [Parameter(name, value=value) for name, value in {'stamp_age_max': 0.0, **(parameters or {})}.items()]
     with ros_context() as context:
         estimator = CountedEstimator(
             context=context, parameter_overrides=overrides, cli_args=['--ros-args', *arguments] if arguments else None

@@ -35,7 +35,7 @@ def test_a_best_effort_publisher_is_heard():
         assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
-def test_a_second_publisher_is_named_and_harmless_unless_refused(tmp_path: Path):
+def test_a_second_publisher_is_named_and_refused_unless_it_is_allowed(tmp_path: Path):
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
         g.connect()
         assert g.estimate(SECOND, 0.1).status == 0
@@ -43,22 +43,24 @@ def test_a_second_publisher_is_named_and_harmless_unless_refused(tmp_path: Path)
         publisher = intruder.create_publisher(RodVelocity, '/rod_velocity', 10)
         words = '/rod_velocity has several publishers: /other/intruder, /probe'
         assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''))
-        assert g.probe.values('estimate')['level'] == '1'
-        assert g.estimate(SECOND + 10**6, 0.1).status == 0
-
-        answer = g.call(
-            SetParametersAtomically,
-            'friction_estimator/set_parameters_atomically',
-            SetParametersAtomically.Request(parameters=[boolean('refuse_second_publisher', True)]),
-        )
-        assert answer.result.successful
-        refused = g.estimate(SECOND + 2 * 10**6, 0.1)
+        assert g.probe.values('estimate')['level'] == '2'
+        refused = g.estimate(SECOND + 10**6, 0.1)
         assert (refused.status, refused.state) == (FrictionEstimate.INPUT_REFUSED, FrictionEstimate.UNKNOWN)
-        assert g.spin_until(lambda: g.probe.values('estimate').get('level') == '2')
 
+        def refuse(value: bool) -> None:
+            request = SetParametersAtomically.Request(parameters=[boolean('refuse_second_publisher', value)])
+            answer = g.call(SetParametersAtomically, 'friction_estimator/set_parameters_atomically', request)
+            assert answer.result.successful
+
+        refuse(False)
+        assert g.estimate(SECOND + 2 * 10**6, 0.1).status == 0
+        assert g.spin_until(lambda: g.probe.values('estimate').get('level') == '1')
+
+        refuse(True)
+        assert g.estimate(SECOND + 3 * 10**6, 0.1).status == FrictionEstimate.INPUT_REFUSED
         intruder.destroy_publisher(publisher)
         assert g.spin_until(lambda: 'several' not in g.probe.values('estimate').get('message', ''))
-        assert g.estimate(SECOND + 3 * 10**6, 0.1).status == 0
+        assert g.estimate(SECOND + 4 * 10**6, 0.1).status == 0
         intruder.destroy_node()
     assert replay(tmp_path / 'bag').identical  # the refusal is in the recording
 
