@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -126,7 +127,8 @@ class FrictionEstimator(ManagedNode):
         self._statistics = EstimatorDiagnostics()
         self._logged_errors.clear()
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
-        self._now = self._ros_time if self.get_parameter('use_sim_time').value else self._steady_time
+        self._received = 0
+        self._now = self._receipt_clock()
         if self.settings(RecordingOptions).record:
             self._start_recording()
         else:
@@ -173,12 +175,24 @@ class FrictionEstimator(ManagedNode):
         if self.active and self._now == self._steady_time:
             offset = time.time_ns() - self._now()
             if abs(offset - self._state.clock_offset) > _LARGEST_CLOCK_STEP:
-                self.get_logger().warning(f'the clock was set by {(offset - self._state.clock_offset) * 1e-9:.3f} s')
-                self._state = self._state._replace(clock_offset=offset)
-                self._publish_configuration()
+                self._follow_clock(offset)
 
-    def _ros_time(self) -> int:
-        return self.get_clock().now().nanoseconds
+    def _follow_clock(self, offset: int) -> None:
+        """Judge the age of stamps by a clock that was set; the time of receipt goes on."""
+        self.get_logger().warning(f'the clock was set by {(offset - self._state.clock_offset) * 1e-9:.3f} s')
+        self._state = self._state._replace(clock_offset=offset)
+        self._publish_configuration()
+
+    def _receipt_clock(self) -> Callable[[], int]:
+        return self._simulated_time if self.get_parameter('use_sim_time').value else self._steady_time
+
+    def _simulated_time(self) -> int:
+        """Time of receipt [ns] with ``use_sim_time``: it increases at every call, as the log time of a bag does."""
+        shown = self.get_clock().now().nanoseconds
+        if shown - self._state.clock_offset < self._received - _LARGEST_CLOCK_STEP:
+            self._follow_clock(shown - self._received)
+        self._received = max(shown - self._state.clock_offset, self._received + 1)
+        return self._received
 
     def _steady_time(self) -> int:
         """Time of receipt [ns]: the clock as it was at activation, which no setting of the clock changes."""

@@ -56,14 +56,21 @@ TRIALS = (
         '-',
         graph.topic_comes_late,
     ),
-    Trial('an input has a second publisher', 'as usual', 'as usual', 'both named; WARN', '-', graph.second_publisher),
     Trial(
-        'an input has a second publisher, refused',
+        'an input has a second publisher',
         'UNKNOWN',
         'fades to 0',
         'both named; `INPUT_REFUSED`, ERROR; as usual once it is gone',
         '-',
-        graph.second_publisher_refused,
+        graph.second_publisher,
+    ),
+    Trial(
+        'an input has a second publisher, `refuse_second_publisher: false`',
+        'as usual',
+        'as usual',
+        'both named; WARN',
+        '-',
+        graph.second_publisher_allowed,
     ),
     Trial(
         'incompatible quality of service or type',
@@ -74,7 +81,12 @@ TRIALS = (
         graph.incompatible_quality,
     ),
     Trial(
-        'a second estimator of the same name', 'as usual', 'as usual', 'both named; WARN', '-', graph.second_estimator
+        'a second estimator of the same name',
+        'UNKNOWN',
+        'fades to 0',
+        'both named; `INPUT_REFUSED`, ERROR; as usual once it is gone',
+        '-',
+        graph.second_estimator,
     ),
     Trial(
         'parameters change in motion',

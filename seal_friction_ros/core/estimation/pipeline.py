@@ -185,10 +185,10 @@ def receive_pressure(
 
 
 @compilable
-def receive_force(_parameters: Any, state: PipelineState, newest: Force, received: int, _emit: Any) -> PipelineState:
+def receive_force(parameters: Any, state: PipelineState, newest: Force, received: int, _emit: Any) -> PipelineState:
     """Keep the force sum for the next velocity sample."""
     known, guided, friction, pressure, force, reference, receipt, refused, offset = state
-    if newest.stamp != force.stamp and math.isfinite(newest.force):
+    if newest.stamp != force.stamp and abs(newest.force) <= parameters.estimator.settings.force_max:
         receipt = ReceiptTimes(receipt.velocity, receipt.pressure, received, receipt.reference)
     return PipelineState(known, guided, friction, pressure, newest, reference, receipt, refused, offset)
 
