@@ -11,18 +11,16 @@ from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 class CountedEstimator(FrictionEstimator):
     """`FrictionEstimator` with ``taken``, the number of input messages taken, and ``sent``, the number of answers.
 
-    Args:
-        clock: Time of receipt [ns] instead of that of the machine.
-        kwargs: Arguments of `FrictionEstimator`.
+    ``clock`` may be set before activation: the time of receipt [ns] instead of that of the machine.
     """
 
-    def __init__(self, clock: Callable[[], int] | None = None, **kwargs: Any) -> None:
+    def __init__(self, **kwargs: Any) -> None:
         self.taken = self.sent = 0
-        self._given_clock = clock
+        self.clock: Callable[[], int] | None = None
         super().__init__(**kwargs)
 
     def _receipt_clock(self) -> Callable[[], int]:
-        return self._given_clock or super()._receipt_clock()
+        return self.clock or super()._receipt_clock()
 
     @property
     def is_tick_due(self) -> bool:

@@ -109,6 +109,16 @@ def swapped(topic: str) -> Callable[[Tick, int], Tick]:
     }
 
 
+def alternating(topic: str) -> Callable[[Tick, int], Tick]:
+    """Every second stamp 5 ms ahead."""
+    return lambda tick, n: {**tick, topic: [m._replace(stamp=m.stamp + 5 * MS * (n % 2)) for m in tick[topic]]}
+
+
+def ahead_once(topic: str) -> Callable[[Tick, int], Tick]:
+    """The first stamp 15 ms ahead."""
+    return lambda tick, n: delayed(topic, 15 * MS)(tick, n) if n == 0 else tick
+
+
 def garbage(topic: str) -> Callable[[Tick, int], Tick]:
     """Bytes that are no message, before each good one."""
     return lambda tick, n: {**tick, topic: [bytes(range(n % 40)), *tick[topic]]}
@@ -272,15 +282,15 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         estimate='with that pressure, marked',
     ),
     Row(
-        'velocity stamped 1 s in the past',
-        delayed('rod_velocity', -1000 * MS),
+        'velocity stamped 0.5 s in the past',
+        delayed('rod_velocity', -500 * MS),
         'PRESSURE_STALE FORCE_STALE STAMP_NOT_INCREASING',
         feedforward='fades',
         estimate='last known friction, marked',
     ),
     Row(
-        'velocity stamped 1 s in the future',
-        delayed('rod_velocity', 1000 * MS),
+        'velocity stamped 0.5 s in the future',
+        delayed('rod_velocity', 500 * MS),
         'PRESSURE_STALE FORCE_STALE',
         feedforward='fades',
         estimate='last known friction, marked',
@@ -307,5 +317,19 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         estimate='as usual while sliding',
     ),
     Row('reference frozen, its stamp too', frozen('servo_reference'), feedforward='fades', estimate='as usual'),
+    Row(
+        'velocity stamps alternate by 5 ms',
+        alternating('rod_velocity'),
+        'STAMP_NOT_INCREASING',
+        estimate='as usual, marked',
+    ),
+    Row(
+        'one velocity stamp 15 ms ahead',
+        ahead_once('rod_velocity'),
+        'STAMP_NOT_INCREASING',
+        estimate='as usual, marked',
+    ),
+    Row('reference stamps alternate by 5 ms', alternating('servo_reference'), level='OK', estimate='as usual'),
+    Row('one reference stamp 15 ms ahead', ahead_once('servo_reference'), level='OK', estimate='as usual'),
     Row('bytes that are no message', garbage('cylinder_pressure'), estimate='as usual; counted and logged'),
 )

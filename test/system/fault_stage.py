@@ -85,7 +85,7 @@ class Stage(SpunNodes):
     def __init__(self, context: Context, estimator: CountedEstimator, driver: Driver) -> None:
         super().__init__(context, estimator, driver)
         self.estimator, self.driver = estimator, driver
-        self.now = self.received = START
+        self.now = self.received = self._last_receipt = START
 
     def connect(self) -> None:
         """Connect estimator and driver; if the estimator is active, send samples until one is answered."""
@@ -93,6 +93,11 @@ class Stage(SpunNodes):
         if self.estimator.active and not self.spin_until(self._is_answered):
             raise RuntimeError('no sample is answered')
         self.driver.outputs.clear()
+
+    def receipt_time(self) -> int:
+        """The moment [ns]; it increases at every call, as the time of the machine does."""
+        self._last_receipt = max(self.received, self._last_receipt + 1)
+        return self._last_receipt
 
     def next_moment(self) -> Tick:
         """The good messages of the next moment, which is 1 ms later."""
@@ -116,11 +121,16 @@ class Stage(SpunNodes):
         """Deactivate and activate the estimator, which forgets all inputs.
 
         Raises:
-            RuntimeError: A transition fails.
+            RuntimeError: A transition fails, or the feed-forward does not end at 0 N.
         """
+        have_arrived = self.all_answers()
         for change in (self.estimator.trigger_deactivate, self.estimator.trigger_activate):
             if change() != TransitionCallbackReturn.SUCCESS:
                 raise RuntimeError(f'{change.__name__} fails')
+        self.spin_until(have_arrived)
+        forces = [output.force for output in self.driver.outputs if isinstance(output, FeedForward)]
+        if forces and forces[-1]:
+            raise RuntimeError(f'deactivated at {forces[-1]} N')
         self.driver.outputs.clear()
 
     def send(self, tick: Tick) -> None:
@@ -180,11 +190,12 @@ def stage(parameters: Mapping[str, Any] | None = None, *, autostart: bool = True
     """Estimator and driver on a ROS domain of their own."""
     values = {**SETTINGS, **(parameters or {})}
     overrides = [Parameter(name, value=value) for name, value in values.items()]
-    clock = None if values.get('use_sim_time') else lambda: made.received
     with ros_context() as context:
-        estimator = CountedEstimator(clock, context=context, parameter_overrides=overrides)
+        estimator = CountedEstimator(context=context, parameter_overrides=overrides)
         driver = Driver(context=context)
         made = Stage(context, estimator, driver)
+        if not values.get('use_sim_time'):
+            estimator.clock = made.receipt_time
         try:
             if autostart and not estimator.autostart():
                 raise RuntimeError('the estimator does not start')

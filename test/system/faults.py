@@ -128,8 +128,8 @@ TRIALS = (
         'verifies',
         process.burst,
     ),
-    Trial('SIGINT', 'ends', 'ends', 'exit code 0', 'finished, verifies', process.interrupted),
-    Trial('SIGTERM', 'ends', 'ends', 'exit code 0', 'finished, verifies', process.terminated),
+    Trial('SIGINT', 'ends', 'fades to 0, then ends', 'exit code 0', 'finished, verifies', process.interrupted),
+    Trial('SIGTERM', 'ends', 'fades to 0, then ends', 'exit code 0', 'finished, verifies', process.terminated),
     Trial('SIGKILL', 'ends', 'ends', 'none', 'recovered up to 1 s before, verifies', process.killed),
     Trial(
         'SIGSTOP and SIGCONT',
