@@ -38,7 +38,7 @@ from seal_friction_ros.core.estimation.node_options import (
     InputOptions,
     RecordingOptions,
 )
-from seal_friction_ros.core.estimation.pipeline import TICK_INTERVAL, init, is_tick_due, receive
+from seal_friction_ros.core.estimation.pipeline import init, is_tick_due, receive
 from seal_friction_ros.core.estimation.records import WatchdogTick
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.nodes import qos
@@ -49,6 +49,7 @@ from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 
 _WATCH_PERIOD = 0.05  # [s]
+_WATCHDOG_PERIOD = 0.01  # [s] more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
 _STOP_PERIOD = 0.005  # [s] between two forces while the node stops
 SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
@@ -103,7 +104,7 @@ class FrictionEstimator(ManagedNode):
         self._topics[TICK_TYPE] = self.resolve_topic_name('~/watchdog_tick')
         self._timers = [
             self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
-            self.create_steady_timer(TICK_INTERVAL * 1e-9, self._on_watchdog),
+            self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog),
         ]
         self._configuration = configuration
 

@@ -60,7 +60,7 @@ from seal_friction_ros.core.friction.actuator import friction_of_seals
 
 ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
 LARGEST_ACCELERATION = 1e6  # [m/s^2] no rod accelerates faster
-TICK_INTERVAL = 10_000_000  # [ns] of the watchdog: it acts if no feed-forward was made for this time
+TICK_INTERVAL = 9_000_000  # [ns] the watchdog acts if no feed-forward was made for this time
 
 Emit = Callable[[Output, bytes], object]
 """Takes what goes out, and the frame name of the message that it answers."""
