@@ -52,6 +52,9 @@ _WATCH_PERIOD = 0.05  # [s]
 _WATCHDOG_PERIOD = 0.01  # [s] more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
 _STOP_PERIOD = 0.005  # [s] between two forces while the node stops
+_LAST_FORCES = (
+    10  # number of forces of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
+)
 SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
 
 
@@ -251,10 +254,11 @@ class FrictionEstimator(ManagedNode):
             return
         self._state = self._state._replace(refused=True)
         self._publish_configuration()  # a replay fades from here on
-        began, start = time.monotonic(), self._now()
-        while self._state.feedforward.fade > 0.0:
+        began, start, left = time.monotonic(), self._now(), _LAST_FORCES
+        while left:
             time.sleep(_STOP_PERIOD)
             self._tick(start + int((time.monotonic() - began) * 1e9))
+            left -= self._state.feedforward.fade == 0.0
 
     def _send(self, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once; the rest waits until all answers are out."""
