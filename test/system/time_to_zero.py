@@ -51,6 +51,7 @@ TOPICS = ('rod_velocity', 'cylinder_pressure', 'force_sum', 'servo_reference')
 PERIOD = 4 * MS  # [ns] between two messages of each publisher
 LONGEST = FeedForwardSettings().fade_time + 0.05  # [s]
 QUIET = 0.3  # [s] 0 N for good
+LONGEST_WAIT = 5.0  # [s] for it
 SLOW_SLEW = 500.0  # [N/s] where stamps alternate
 JITTER = 0.01  # [s] of the receipt
 SHORT_LEASE = '2'  # [s] until a killed publisher is gone from the graph, here
@@ -191,16 +192,16 @@ class Axis(SpunNodes):
         """Time [s] from ``since()`` [ns] until 0 N is received and no other force for `QUIET`; infinite without."""
         start = time.monotonic_ns()
 
-        def last_force() -> int:
-            return max((i for i, (_, force, _) in enumerate(self.received) if force != 0.0), default=-1)
+        def zero() -> int:
+            """Index of the first message after the last force that is not 0 N."""
+            return 1 + max((i for i, (_, force, _) in enumerate(self.received) if force != 0.0), default=-1)
 
         def is_quiet() -> bool:
-            last = self.received[last_force()][0] if last_force() >= 0 else start
-            return time.monotonic_ns() - max(last, start) > QUIET * 1e9
+            last = max(self.received[zero() - 1][0], start) if zero() else start
+            return zero() < len(self.received) and time.monotonic_ns() - last > QUIET * 1e9
 
-        self.spin_until(is_quiet)
-        zero = last_force() + 1
-        return (self.received[zero][0] - since()) * 1e-9 if zero < len(self.received) else float('inf')
+        found = self.spin_until(is_quiet, LONGEST_WAIT)
+        return (self.received[zero()][0] - since()) * 1e-9 if found else float('inf')
 
     def change_state(self, transition: int) -> None:
         """Request a transition of the node, and wait for the answer."""
