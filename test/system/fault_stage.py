@@ -209,8 +209,8 @@ def stage(parameters: Mapping[str, Any] | None = None, *, autostart: bool = True
 
 
 def statuses(outputs: Outputs) -> set[int]:
-    """Status of every estimate."""
-    return {output.status for output in outputs if isinstance(output, FrictionEstimate)}
+    """Status of every estimate, without MOTION_UNCERTAIN, which the first ones after a start have."""
+    return {output.status & ~Status.MOTION_UNCERTAIN for output in outputs if isinstance(output, FrictionEstimate)}
 
 
 def unless(holds: object, difference: str) -> list[str]:
