@@ -42,7 +42,9 @@ def toy_law(tmp_path_factory):
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     FRICTION_LAWS.append(module.TanhLaw)
-    yield module.TanhLaw
+    with pytest.MonkeyPatch.context() as patch:  # other processes cannot load compiled code of a law they do not have
+        patch.setattr('numba.core.caching.IndexDataCacheFile.save', lambda *_: None)
+        yield module.TanhLaw
     FRICTION_LAWS.pop()
     del sys.modules[spec.name]
 

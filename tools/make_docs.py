@@ -115,8 +115,6 @@ def friction_laws() -> str:
 _FEEDFORWARD = {
     'fades': 'fades to 0 within `feedforward.fade_time`',
     'dips': 'fades for that sample',
-    'halves': 'falls by 0.02 s of `feedforward.fade_time`, here to half',
-    'nothing': 'none is published',
 }
 
 

@@ -1,4 +1,7 @@
-"""Entry points of the nodes. A node loads for two seconds: SIGINT ends it until then, without a traceback."""
+"""Entry points of the nodes. A node loads for two seconds: SIGINT ends it until then, without a traceback.
+
+Before, the interpreter itself starts for some 50 ms, in which SIGINT ends it with a traceback of its own.
+"""
 
 import signal
 from importlib import import_module

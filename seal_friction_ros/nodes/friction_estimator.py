@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -37,7 +38,7 @@ from seal_friction_ros.core.estimation.node_options import (
     InputOptions,
     RecordingOptions,
 )
-from seal_friction_ros.core.estimation.pipeline import TICK_INTERVAL, init, is_tick_due, receive
+from seal_friction_ros.core.estimation.pipeline import init, is_tick_due, receive
 from seal_friction_ros.core.estimation.records import WatchdogTick
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.nodes import qos
@@ -48,8 +49,12 @@ from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 
 _WATCH_PERIOD = 0.05  # [s]
+_WATCHDOG_PERIOD = 0.01  # [s] more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
 _STOP_PERIOD = 0.005  # [s] between two forces while the node stops
+_LAST_FORCES = (
+    10  # number of forces of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
+)
 SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
 
 
@@ -102,7 +107,7 @@ class FrictionEstimator(ManagedNode):
         self._topics[TICK_TYPE] = self.resolve_topic_name('~/watchdog_tick')
         self._timers = [
             self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
-            self.create_steady_timer(TICK_INTERVAL * 1e-9, self._on_watchdog),
+            self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog),
         ]
         self._configuration = configuration
 
@@ -126,7 +131,8 @@ class FrictionEstimator(ManagedNode):
         self._statistics = EstimatorDiagnostics()
         self._logged_errors.clear()
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
-        self._now = self._ros_time if self.get_parameter('use_sim_time').value else self._steady_time
+        self._received = 0
+        self._now = self._receipt_clock()
         if self.settings(RecordingOptions).record:
             self._start_recording()
         else:
@@ -173,12 +179,24 @@ class FrictionEstimator(ManagedNode):
         if self.active and self._now == self._steady_time:
             offset = time.time_ns() - self._now()
             if abs(offset - self._state.clock_offset) > _LARGEST_CLOCK_STEP:
-                self.get_logger().warning(f'the clock was set by {(offset - self._state.clock_offset) * 1e-9:.3f} s')
-                self._state = self._state._replace(clock_offset=offset)
-                self._publish_configuration()
+                self._follow_clock(offset)
 
-    def _ros_time(self) -> int:
-        return self.get_clock().now().nanoseconds
+    def _follow_clock(self, offset: int) -> None:
+        """Judge the age of stamps by a clock that was set; the time of receipt goes on."""
+        self.get_logger().warning(f'the clock was set by {(offset - self._state.clock_offset) * 1e-9:.3f} s')
+        self._state = self._state._replace(clock_offset=offset)
+        self._publish_configuration()
+
+    def _receipt_clock(self) -> Callable[[], int]:
+        return self._simulated_time if self.get_parameter('use_sim_time').value else self._steady_time
+
+    def _simulated_time(self) -> int:
+        """Time of receipt [ns] with ``use_sim_time``: it increases at every call, as the log time of a bag does."""
+        shown = self.get_clock().now().nanoseconds
+        if shown - self._state.clock_offset < self._received - _LARGEST_CLOCK_STEP:
+            self._follow_clock(shown - self._received)
+        self._received = max(shown - self._state.clock_offset, self._received + 1)
+        return self._received
 
     def _steady_time(self) -> int:
         """Time of receipt [ns]: the clock as it was at activation, which no setting of the clock changes."""
@@ -236,10 +254,11 @@ class FrictionEstimator(ManagedNode):
             return
         self._state = self._state._replace(refused=True)
         self._publish_configuration()  # a replay fades from here on
-        began, start = time.monotonic(), self._now()
-        while self._state.feedforward.fade > 0.0:
+        began, start, left = time.monotonic(), self._now(), _LAST_FORCES
+        while left:
             time.sleep(_STOP_PERIOD)
             self._tick(start + int((time.monotonic() - began) * 1e9))
+            left -= self._state.feedforward.fade == 0.0
 
     def _send(self, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once; the rest waits until all answers are out."""

@@ -47,6 +47,8 @@ class GraphWatch:
         self._without_node_name: set[str] = set()
         self._incompatible_outputs: set[str] = set()
         self._connections: list[int] = []
+        self._endpoint_counts: list[int] = []
+        self._other_definitions: list[str] = []
 
     def findings(self, silent_inputs: list[str], *, retry: bool) -> GraphFindings:
         """State of the graph.
@@ -58,7 +60,7 @@ class GraphWatch:
         counts = {name: self._publisher_count(name) for name in INPUTS}
         duplicates = self.duplicate_publishers()
         unheard = self._retry_silent_inputs(silent_inputs) if retry else []
-        unheard += self._incompatible_subscribers()
+        unheard += self._incompatible_subscribers() + self._nodes_with_other_definitions()
         return GraphFindings(counts, duplicates, unheard, self._best_effort.copy())
 
     def has_changed(self) -> bool:
@@ -91,6 +93,24 @@ class GraphWatch:
                     who = full_name(subscriber)
                     texts.append(f'{output.topic_name}: {who} wants incompatible quality of service ({reason})')
         return texts
+
+    def _nodes_with_other_definitions(self) -> list[str]:
+        """Nodes with another definition of a message; looked up only after a change of the graph, as it takes 1 ms."""
+        types = {self._inputs[name].topic_name: type_name for name, type_name in INPUTS.items()}
+        types |= {self._outputs[type_name].topic_name: type_name for type_name in OUTPUTS.values()}
+        counts = [
+            count(topic) for topic in types for count in (self._node.count_publishers, self._node.count_subscribers)
+        ]
+        if counts != self._endpoint_counts:
+            endpoints = {
+                topic: [*self._find(topic), *self._node.get_subscriptions_info_by_topic(topic)] for topic in types
+            }
+            me = self._node.get_fully_qualified_name()
+            found = [other_definitions(topic, types[topic], endpoints[topic], me) for topic in types]
+            self._other_definitions = [text for texts in found for text in texts]
+            if all(is_named(endpoint) for topic in types for endpoint in endpoints[topic]):
+                self._endpoint_counts = counts
+        return self._other_definitions
 
     def _retry_silent_inputs(self, silent_inputs: list[str]) -> list[str]:
         """Adapt the reliability of subscriptions to their publishers; the reasons why other inputs are not heard."""
@@ -144,6 +164,18 @@ def is_named(endpoint: TopicEndpointInfo) -> bool:
 def offers_best_effort_only(publisher: TopicEndpointInfo) -> bool:
     """Whether a publisher does not offer reliable delivery."""
     return bool(publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT)
+
+
+def other_definitions(topic: str, type_name: str, endpoints: list[TopicEndpointInfo], me: str) -> list[str]:
+    """Nodes whose definition of a message differs from that of the node ``me``, by the hash of its fields."""
+    hashes = [str(endpoint.topic_type_hash) for endpoint in endpoints]
+    own = next((text for text, endpoint in zip(hashes, endpoints, strict=True) if full_name(endpoint) == me), '')
+    return [
+        f'{topic}: {full_name(endpoint)} has another definition of {type_name} ({text[:15]}, not {own[:15]}): '
+        f'build both from the same messages'
+        for text, endpoint in zip(hashes, endpoints, strict=True)
+        if own and endpoint.topic_type == type_name and text not in (own, 'INVALID')
+    ]
 
 
 def why_unheard(publisher: TopicEndpointInfo, type_name: str, requested: QoSProfile) -> str:

@@ -79,14 +79,16 @@ class Graph(SpunNodes):
         self.probe, self.estimator = probe, estimator
 
     def estimate(self, stamp: int, velocity: float, pressure: float = 1e6, force: float = 0.0) -> FrictionEstimate:
-        """Send the inputs of one moment; the estimate for it."""
+        """Send the inputs of one moment; the estimate for it, without MOTION_UNCERTAIN, which the first ones have."""
         before, taken = len(self.probe.estimates), self.estimator.taken
         self.probe.send_pressure(stamp, pressure)
         self.probe.send_force(stamp, force)
         assert self.spin_until(lambda: self.estimator.taken >= taken + 2)
         self.probe.send_velocity(stamp, velocity)
         assert self.spin_until(lambda: len(self.probe.estimates) > before)
-        return self.probe.estimates[-1]
+        newest = self.probe.estimates[-1]
+        newest.status &= ~FrictionEstimate.MOTION_UNCERTAIN
+        return newest
 
     def call(self, kind: type, name: str, request: Any) -> Any:
         """Call a service of the estimator; its response."""
@@ -107,8 +109,11 @@ def graph(
     arguments: tuple[str, ...] = (),
     namespace: str = '',
 ) -> Iterator[Graph]:
-    """Estimator with ROS ``parameters`` and command-line ``arguments`` (remapping), and a probe in ``namespace``."""
-    overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
+    """Estimator with ROS ``parameters`` and command-line ``arguments`` (remapping), and a probe in ``namespace``.
+
+    The age of stamps is not checked: tests choose them.
+    """
+    overrides = [Parameter(name, value=value) for name, value in {'stamp_age_max': 0.0, **(parameters or {})}.items()]
     with ros_context() as context:
         estimator = CountedEstimator(
             context=context, parameter_overrides=overrides, cli_args=['--ros-args', *arguments] if arguments else None

@@ -23,9 +23,9 @@ _claims: deque[socket.socket] = deque()
 def free_domain() -> int:
     """A ROS domain that no process on this machine uses: 1 to 100, whose ports are below those that Linux assigns.
 
-    The first participant of a domain binds a port of its own (DDS-RTPS 2.5, section 9.6.1.1): the domain is free if
-    that port is. Between this call and the first participant an abstract Unix socket claims the domain, so that
-    parallel test processes never get the same one. A process holds its last claims.
+    Each participant of a domain binds a port of its own (DDS-RTPS 2.5, section 9.6.1.1), Fast DDS not always the first
+    one: the domain is free if all of them are. Between this call and the first participant an abstract Unix socket
+    claims the domain, so that parallel test processes never get the same one. A process holds its last claims.
 
     Raises:
         RuntimeError: All domains from 1 to 100 are in use.
@@ -35,8 +35,9 @@ def free_domain() -> int:
         claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
             claim.bind(f'\0seal_friction_domain_{domain}')
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
-                port.bind(('127.0.0.1', 7410 + 250 * domain))
+            for port in range(7410 + 250 * domain, 7650 + 250 * domain, 2):
+                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                    probe.bind(('127.0.0.1', port))
         except OSError:
             claim.close()
             continue
@@ -115,7 +116,7 @@ def play_live(
     out.parent.mkdir(parents=True, exist_ok=True)
     log = out.with_suffix('.log')
     recording = {'record': True, 'record_directory': str(out.parent), 'record_name': out.name}
-    with node_process('friction_estimator', domain, {**(parameters or {}), **recording}, log):
+    with node_process('friction_estimator', domain, {'stamp_age_max': 0.0, **(parameters or {}), **recording}, log):
         player = [sys.executable, '-m', 'seal_friction_ros.nodes.bag_player', str(bag), '--rate', str(rate)]
         player += ['--wait', '60']
         played = subprocess.run(player, env=graph_environment(domain), capture_output=True, text=True, check=False)

@@ -2,7 +2,9 @@
 
 import json
 import math
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -22,7 +24,7 @@ from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PA
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import default_configuration, load_parameter_file
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
-from seal_friction_ros.offline.bags.bag import bag_topics
+from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.replay.replay import replay
 
 SECOND = 10**9  # [ns]
@@ -46,6 +48,37 @@ def test_each_velocity_sample_is_answered_by_an_estimate_with_its_header():
         assert estimate.coulomb_friction == estimate.friction_force == friction.coulomb_friction
         assert estimate.coulomb_friction_std == friction.coulomb_friction_std
         assert (estimate.state, estimate.direction, estimate.status) == (FrictionEstimate.SLIDING, 1, 0)
+
+
+def test_stamps_of_1970_are_marked_and_warned_of():
+    with graph({'stamp_age_max': EstimatorSettings().stamp_age_max}) as g:
+        g.connect()
+        assert g.estimate(SECOND, 0.1).status == FrictionEstimate.STAMP_AGE
+        assert g.spin_until(lambda: g.probe.values('estimate').get('message') == 'STAMP_AGE')
+        assert g.probe.values('estimate')['level'] == '1'
+        assert g.estimate(time.time_ns(), 0.1).status == 0
+
+
+def test_a_clock_that_is_set_changes_no_time_of_receipt_and_what_was_recorded_verifies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    step = 0
+    clocks = {name: getattr(time, name) for name in ('monotonic', 'monotonic_ns', 'perf_counter_ns', 'sleep')}
+    set_clock = SimpleNamespace(time_ns=lambda: time.time_ns() + step, **clocks)
+    monkeypatch.setattr('seal_friction_ros.nodes.friction_estimator.time', set_clock)
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    with graph({'stamp_age_max': EstimatorSettings().stamp_age_max, **recording}) as g:
+        g.connect()
+        assert g.estimate(time.time_ns(), 0.1).status == 0
+        for number, step in enumerate((100 * SECOND, -100 * SECOND), 2):
+            assert g.spin_until(lambda number=number: len(g.probe.configurations) == number)
+            estimate = g.estimate(time.time_ns() + step, 0.1)
+            assert estimate.status == (FrictionEstimate.STAMP_NOT_INCREASING if step < 0 else 0)
+        g.estimator.finish()
+    times = [message.log_time for message in read_messages(tmp_path / 'bag')]
+    assert times == sorted(times)
+    assert times[-1] - times[0] < 100 * SECOND
+    assert replay(tmp_path / 'bag').identical
 
 
 def test_a_rod_at_rest_is_stuck_or_breaks_away():
@@ -86,7 +119,7 @@ def test_diagnostics_come_once_a_second_with_rates_ages_latency_and_recorder_sta
         assert float(values['rod_velocity rate [Hz]']) > 1.0
         assert 0.0 < float(values['latency p50 [us]']) <= float(values['latency p99 [us]'])
         assert float(values['input age [s]']) >= 0.0
-        assert values['estimates all good'] == '20'
+        assert values['estimates all good'] == '10'  # the first ten have MOTION_UNCERTAIN
         assert g.probe.values('recorder')['message'] == 'not recording'
         assert SECOND in [timer.timer_period_ns for timer in g.estimator.timers]
         count = len(g.probe.diagnostics)
@@ -137,7 +170,7 @@ def test_settings_change_while_running_and_the_new_configuration_is_published():
     ('parameters', 'words'),
     [
         ([double('stick_velocity', 0.5)], ['slip_velocity', '0.002', 'stick_velocity', '0.5']),
-        ([double('force_max', 2e6), double('pressure_timeout', -1.0)], ['pressure_timeout', '-1.0', '0.0001']),
+        ([double('force_max', 2e6), double('pressure_timeout', -1.0)], ['pressure_timeout', '-1.0', '0.001']),
         ([double('force_max', math.nan)], ['force_max', 'nan']),
         (
             [Parameter(name='seals', value=ParameterValue(type=STRING_ARRAY, string_array_value=['x', 'y']))],
@@ -159,14 +192,14 @@ def test_parameters_carry_unit_bounds_and_description():
         request = DescribeParameters.Request(names=['pressure_timeout', 'seals'])
         timeout, seals = g.call(DescribeParameters, 'friction_estimator/describe_parameters', request).descriptors
         assert timeout.description.endswith('[s]')
-        assert timeout.floating_point_range[0].to_value == 60.0
+        assert timeout.floating_point_range[0].to_value == 1.0
         assert 'unconfigured' in seals.additional_constraints
 
 
 @pytest.mark.parametrize(
     ('parameters', 'words'),
     [
-        ({'pressure_timeout': -1.0}, ['pressure_timeout', '-1.0', '0.0001']),
+        ({'pressure_timeout': -1.0}, ['pressure_timeout', '-1.0', '0.001']),
         ({'pressure_timeout': 'soon'}, ['pressure_timeout', 'soon']),
     ],
 )
@@ -185,7 +218,7 @@ def test_an_unknown_parameter_is_logged_with_a_suggestion(capfd):
 
 @pytest.mark.parametrize('nested', [False, True])
 def test_every_parameter_of_the_node_is_accepted_in_a_parameter_file(nested: bool, tmp_path: Path):
-    with graph() as g:
+    with graph({'stamp_age_max': EstimatorSettings().stamp_age_max}) as g:
         names = g.estimator.list_parameters([], 0).names
         values = {name: g.estimator.get_parameter(name).value for name in names}
     assert {'realtime_priority', 'refuse_second_publisher', 'use_sim_time', 'feedforward.lead_time'} <= values.keys()

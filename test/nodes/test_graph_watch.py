@@ -14,7 +14,7 @@ from seal_friction_msgs.msg import FrictionEstimate, RodVelocity
 from std_msgs.msg import Float64
 
 from seal_friction_ros.nodes import qos
-from seal_friction_ros.nodes.graph_watch import full_name, incompatibility, why_unheard
+from seal_friction_ros.nodes.graph_watch import full_name, incompatibility, other_definitions, why_unheard
 from seal_friction_ros.offline.replay.replay import replay
 
 SECOND = 10**9  # [ns]
@@ -35,7 +35,7 @@ def test_a_best_effort_publisher_is_heard():
         assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
-def test_a_second_publisher_is_named_and_harmless_unless_refused(tmp_path: Path):
+def test_a_second_publisher_is_named_and_refused_unless_it_is_allowed(tmp_path: Path):
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
         g.connect()
         assert g.estimate(SECOND, 0.1).status == 0
@@ -43,22 +43,24 @@ def test_a_second_publisher_is_named_and_harmless_unless_refused(tmp_path: Path)
         publisher = intruder.create_publisher(RodVelocity, '/rod_velocity', 10)
         words = '/rod_velocity has several publishers: /other/intruder, /probe'
         assert g.spin_until(lambda: words in g.probe.values('estimate').get('message', ''))
-        assert g.probe.values('estimate')['level'] == '1'
-        assert g.estimate(SECOND + 10**6, 0.1).status == 0
-
-        answer = g.call(
-            SetParametersAtomically,
-            'friction_estimator/set_parameters_atomically',
-            SetParametersAtomically.Request(parameters=[boolean('refuse_second_publisher', True)]),
-        )
-        assert answer.result.successful
-        refused = g.estimate(SECOND + 2 * 10**6, 0.1)
+        assert g.probe.values('estimate')['level'] == '2'
+        refused = g.estimate(SECOND + 10**6, 0.1)
         assert (refused.status, refused.state) == (FrictionEstimate.INPUT_REFUSED, FrictionEstimate.UNKNOWN)
-        assert g.spin_until(lambda: g.probe.values('estimate').get('level') == '2')
 
+        def refuse(value: bool) -> None:
+            request = SetParametersAtomically.Request(parameters=[boolean('refuse_second_publisher', value)])
+            answer = g.call(SetParametersAtomically, 'friction_estimator/set_parameters_atomically', request)
+            assert answer.result.successful
+
+        refuse(False)
+        assert g.estimate(SECOND + 2 * 10**6, 0.1).status == 0
+        assert g.spin_until(lambda: g.probe.values('estimate').get('level') == '1')
+
+        refuse(True)
+        assert g.estimate(SECOND + 3 * 10**6, 0.1).status == FrictionEstimate.INPUT_REFUSED
         intruder.destroy_publisher(publisher)
         assert g.spin_until(lambda: 'several' not in g.probe.values('estimate').get('message', ''))
-        assert g.estimate(SECOND + 3 * 10**6, 0.1).status == 0
+        assert g.estimate(SECOND + 4 * 10**6, 0.1).status == 0
         intruder.destroy_node()
     assert replay(tmp_path / 'bag').identical  # the refusal is in the recording
 
@@ -100,8 +102,12 @@ def test_incompatible_quality_of_service_has_a_reason(offered, requested, reason
     assert bool(incompatibility(offered, requested)) == bool(reason)
 
 
-def endpoint(name: str, namespace: str = '/', topic_type: str = 't', profile: QoSProfile = qos.STREAM):
-    return SimpleNamespace(node_name=name, node_namespace=namespace, topic_type=topic_type, qos_profile=profile)
+def endpoint(
+    name: str, namespace: str = '/', topic_type: str = 't', profile: QoSProfile = qos.STREAM, type_hash: str = 'h'
+):
+    return SimpleNamespace(
+        node_name=name, node_namespace=namespace, topic_type=topic_type, qos_profile=profile, topic_type_hash=type_hash
+    )
 
 
 def test_a_node_is_named_with_its_namespace_once_discovery_knows_it():
@@ -113,3 +119,19 @@ def test_a_publisher_is_unheard_for_its_type_or_its_quality_of_service():
     assert why_unheard(endpoint('a'), 't', qos.STREAM) == ''
     assert why_unheard(endpoint('a'), 'u', qos.STREAM) == '/a publishes t, not u'
     assert why_unheard(endpoint('a'), 't', LATCHED).startswith('/a offers incompatible quality of service (volatile')
+
+
+def test_another_definition_of_a_message_is_reported_with_the_node_and_the_reason():
+    endpoints = [endpoint('a'), endpoint('me'), endpoint('old', type_hash='i'), endpoint('odd', topic_type='u')]
+    endpoints.append(endpoint('no_hash', type_hash='INVALID'))
+    (text,) = other_definitions('/topic', 't', endpoints, '/me')
+    assert text.startswith('/topic: /old has another definition of t (i, not h)')
+
+
+def test_every_topic_has_the_definition_of_this_node():
+    with graph() as g:
+        g.connect()
+        endpoints = g.estimator.get_publishers_info_by_topic('/rod_velocity')
+        endpoints += g.estimator.get_subscriptions_info_by_topic('/rod_velocity')
+        assert all(str(found.topic_type_hash).startswith('RIHS01_') for found in endpoints)
+        assert other_definitions('/rod_velocity', endpoints[0].topic_type, endpoints, '/friction_estimator') == []

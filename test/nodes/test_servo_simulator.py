@@ -143,6 +143,7 @@ def test_every_topic_comes_at_every_sample_and_the_reference_is_the_wave_asked_f
 
 def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_path):
     estimator = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    estimator['refuse_second_publisher'] = False  # the listener publishes, too
     with stage({'sensors.force_noise': 0.5}, estimator) as s:
         s.wait(lambda: s.estimator.sent > 2000)  # estimates and feed-forwards
         s.wait(lambda: abs(float(s.listener.values().get('feed-forward [N]', 0.0))) > 20.0)
@@ -152,7 +153,7 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
     run = read_run(tmp_path / 'bag')
     late = ('PRESSURE_MISSING', 'FORCE_MISSING', 'PRESSURE_STALE', 'FORCE_STALE')  # connected last, or a busy machine
     counts = evaluate_run(run).status_counts
-    assert sum(count for bit, count in counts.items() if bit not in late) == 0
+    assert {bit for bit, count in counts.items() if count} <= {*late, 'MOTION_UNCERTAIN'}  # near rest, at reversals
     assert sum(counts.values()) < 0.1 * verdict.recorded_estimates
     assert float(abs(run.feedforward_force[200:]).max()) == pytest.approx(0.9 * run.coulomb_friction.max(), rel=0.1)
 

@@ -13,7 +13,8 @@ from seal_friction_ros.core.friction.states import FrictionState
 MS = 1_000_000  # [ns] between two ticks: 1 kHz
 TIMEOUT = 0.02  # [s] of pressure, force sum, estimate and reference
 FADE_TIME = 0.04  # [s]
-BEFORE, FAULT, AFTER = 60, 80, 60  # ticks without, with and without the fault, which lasts until the fade has ended
+SLEW_LIMIT = 3e4  # [N/s]
+BEFORE, FAULT, AFTER = 160, 80, 60  # ticks until the force is there, with the fault until it has faded, and after it
 SPEED, PRESSURE, FORCE = 0.05, 3e6, 60.0  # [m/s], [Pa], [N]
 
 Message = Pressure | Force | ServoReference | Velocity | bytes
@@ -43,12 +44,9 @@ class Row:
     state: tuple[FrictionState, ...] = (FrictionState.SLIDING,)
     """exactly the states that are published during the fault"""
     feedforward: str = 'as usual'
-    """``as usual``, ``fades`` (to 0 within the fade time), ``dips`` (by less than a third), ``halves`` (once, and comes
-    back within the fade time) or ``nothing`` (none is published)"""
+    """``as usual``, ``fades`` (to 0 within the fade time) or ``dips`` (by less than a third)"""
     level: str = 'WARN'
     """level of the diagnostics"""
-    shift: int = 0
-    """[ns] by which the clock stays shifted after the fault"""
     estimate: str = ''
     """requirement as text, for the documentation"""
     recovery: str = 'with the next good sample'
@@ -111,6 +109,16 @@ def swapped(topic: str) -> Callable[[Tick, int], Tick]:
     }
 
 
+def alternating(topic: str) -> Callable[[Tick, int], Tick]:
+    """Every second stamp 5 ms ahead."""
+    return lambda tick, n: {**tick, topic: [m._replace(stamp=m.stamp + 5 * MS * (n % 2)) for m in tick[topic]]}
+
+
+def ahead_once(topic: str) -> Callable[[Tick, int], Tick]:
+    """The first stamp 15 ms ahead."""
+    return lambda tick, n: delayed(topic, 15 * MS)(tick, n) if n == 0 else tick
+
+
 def garbage(topic: str) -> Callable[[Tick, int], Tick]:
     """Bytes that are no message, before each good one."""
     return lambda tick, n: {**tick, topic: [bytes(range(n % 40)), *tick[topic]]}
@@ -145,6 +153,7 @@ def _unusable() -> Iterator[Row]:
             f'force sum {words}',
             with_value('force_sum', value),
             f'FORCE_{bit} FORCE_STALE',
+            feedforward='fades',
             estimate='as usual while sliding',
         )
         yield Row(
@@ -152,6 +161,7 @@ def _unusable() -> Iterator[Row]:
             with_value('rod_velocity', value),
             f'VELOCITY_{bit}',
             UNKNOWN,
+            feedforward='fades',
             estimate='UNKNOWN, Coulomb friction as usual',
         )
         if not math.isfinite(value):
@@ -188,6 +198,7 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         'force sum stops',
         without('force_sum'),
         'FORCE_STALE',
+        feedforward='fades',
         estimate='as usual while sliding',
     ),
     Row(
@@ -195,6 +206,7 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         lambda tick, n: {**with_value('rod_velocity', 0.0)(tick, n), 'force_sum': []},
         'FORCE_STALE',
         (FrictionState.BREAKAWAY, FrictionState.UNKNOWN),
+        feedforward='fades',
         estimate='UNKNOWN once stale, Coulomb friction as usual',
     ),
     Row(
@@ -210,10 +222,9 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         'everything stops',
         lambda tick, _: {name: [] for name in tick},
         state=(),
-        feedforward='nothing',
+        feedforward='fades',
         level='STALE',
         estimate='none',
-        recovery='with the next good sample; a controller drops a feed-forward that is old by itself',
     ),
     Row(
         'pressure frozen, its stamp too',
@@ -271,33 +282,54 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         estimate='with that pressure, marked',
     ),
     Row(
-        'velocity stamped 1 s in the past',
-        delayed('rod_velocity', -1000 * MS),
+        'velocity stamped 0.5 s in the past',
+        delayed('rod_velocity', -500 * MS),
         'PRESSURE_STALE FORCE_STALE STAMP_NOT_INCREASING',
         feedforward='fades',
         estimate='last known friction, marked',
     ),
     Row(
-        'velocity stamped 1 s in the future',
-        delayed('rod_velocity', 1000 * MS),
+        'velocity stamped 0.5 s in the future',
+        delayed('rod_velocity', 500 * MS),
         'PRESSURE_STALE FORCE_STALE',
         feedforward='fades',
         estimate='last known friction, marked',
     ),
     Row(
-        'the clock jumps back by 5 s',
+        'all stamps jump back by 5 s',
         delayed('all', -5000 * MS),
-        'STAMP_NOT_INCREASING',
-        shift=-5000 * MS,
-        estimate='as usual, the first one marked',
+        'STAMP_NOT_INCREASING STAMP_AGE',
+        estimate='as usual, marked',
+    ),
+    Row('all stamps jump ahead by 5 s', delayed('all', 5000 * MS), 'STAMP_AGE', estimate='as usual, marked'),
+    Row(
+        'velocity frozen, its stamp too',
+        frozen('rod_velocity'),
+        'PRESSURE_STALE FORCE_STALE STAMP_NOT_INCREASING',
+        feedforward='fades',
+        estimate='as usual, marked',
     ),
     Row(
-        'the clock jumps ahead by 5 s',
-        delayed('all', 5000 * MS),
-        shift=5000 * MS,
-        feedforward='halves',
-        estimate='as usual',
-        recovery='within `feedforward.fade_time`',
+        'force sum frozen, its stamp too',
+        frozen('force_sum'),
+        'FORCE_STALE',
+        feedforward='fades',
+        estimate='as usual while sliding',
     ),
+    Row('reference frozen, its stamp too', frozen('servo_reference'), feedforward='fades', estimate='as usual'),
+    Row(
+        'velocity stamps alternate by 5 ms',
+        alternating('rod_velocity'),
+        'STAMP_NOT_INCREASING',
+        estimate='as usual, marked',
+    ),
+    Row(
+        'one velocity stamp 15 ms ahead',
+        ahead_once('rod_velocity'),
+        'STAMP_NOT_INCREASING',
+        estimate='as usual, marked',
+    ),
+    Row('reference stamps alternate by 5 ms', alternating('servo_reference'), level='OK', estimate='as usual'),
+    Row('one reference stamp 15 ms ahead', ahead_once('servo_reference'), level='OK', estimate='as usual'),
     Row('bytes that are no message', garbage('cylinder_pressure'), estimate='as usual; counted and logged'),
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from fault_rows import AFTER, BEFORE, FADE_TIME, FAULT, MS, TIMEOUT, Row, Tick, good
+from fault_rows import AFTER, BEFORE, FADE_TIME, FAULT, MS, SLEW_LIMIT, TIMEOUT, Row, Tick, good
 from harness.counted_estimator import CountedEstimator
 from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.context import Context
@@ -20,6 +20,7 @@ from rclpy.qos import QoSProfile
 from seal_friction_ros.core.estimation.feedforward import LONGEST_STEP, FeedForward, FeedForwardSettings, Limited
 from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, INPUTS, OUTPUTS, encode
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.replay.replay import replay
@@ -31,10 +32,11 @@ SETTINGS = {
     'feedforward.estimate_timeout': TIMEOUT,
     'feedforward.reference_timeout': TIMEOUT,
     'feedforward.fade_time': FADE_TIME,
+    'feedforward.slew_limit': SLEW_LIMIT,
 }
 LEVELS = {getattr(DiagnosticStatus, name): name for name in ('OK', 'WARN', 'ERROR', 'STALE')}
 DEEP = QoSProfile(depth=10_000)  # the driver must not lose an output
-LOWEST_SHARE = {'as usual': (1.0, 1.0), 'dips': (0.7, 0.99), 'halves': (0.5, 0.5)}
+LOWEST_SHARE = {'as usual': (1.0, 1.0), 'dips': (0.7, 0.99)}
 """Required feed-forward -> bounds of its lowest share of the feed-forward without fault."""
 Outputs = list[FrictionEstimate | FeedForward]
 
@@ -78,12 +80,12 @@ class Driver(Node):
 
 
 class Stage(SpunNodes):
-    """Estimator and driver in this process."""
+    """Estimator and driver in this process. The time of receipt is that of the moment sent, not that of the machine."""
 
     def __init__(self, context: Context, estimator: CountedEstimator, driver: Driver) -> None:
         super().__init__(context, estimator, driver)
         self.estimator, self.driver = estimator, driver
-        self.now = START
+        self.now = self.received = self._last_receipt = START
 
     def connect(self) -> None:
         """Connect estimator and driver; if the estimator is active, send samples until one is answered."""
@@ -92,13 +94,23 @@ class Stage(SpunNodes):
             raise RuntimeError('no sample is answered')
         self.driver.outputs.clear()
 
+    def receipt_time(self) -> int:
+        """The moment [ns]; it increases at every call, as the time of the machine does."""
+        self._last_receipt = max(self.received, self._last_receipt + 1)
+        return self._last_receipt
+
+    def next_moment(self) -> Tick:
+        """The good messages of the next moment, which is 1 ms later."""
+        self.now += MS
+        self.received += MS
+        return good(self.now)
+
     def _is_answered(self) -> bool:
         """Send one moment; whether the estimator takes all of it and answers within some seconds.
 
         The first messages may come in another order than they were sent, those with best effort may be lost.
         """
-        self.now += MS
-        tick = {topic: messages for topic, messages in good(self.now).items() if topic in self.driver.inputs}
+        tick = {topic: messages for topic, messages in self.next_moment().items() if topic in self.driver.inputs}
         wanted, estimates, have_arrived = self.estimator.taken + len(tick), self.driver.estimates, self.all_answers()
         self.driver.publish(tick)
         return self.spin_until(
@@ -109,15 +121,22 @@ class Stage(SpunNodes):
         """Deactivate and activate the estimator, which forgets all inputs.
 
         Raises:
-            RuntimeError: A transition fails.
+            RuntimeError: A transition fails, or the feed-forward does not end at 0 N.
         """
+        have_arrived = self.all_answers()
         for change in (self.estimator.trigger_deactivate, self.estimator.trigger_activate):
             if change() != TransitionCallbackReturn.SUCCESS:
                 raise RuntimeError(f'{change.__name__} fails')
+        self.spin_until(have_arrived)
+        forces = [output.force for output in self.driver.outputs if isinstance(output, FeedForward)]
+        if forces and forces[-1]:
+            raise RuntimeError(f'deactivated at {forces[-1]} N')
         self.driver.outputs.clear()
 
     def send(self, tick: Tick) -> None:
         """Send the messages of one moment; wait until the estimator has taken them and its answers are here.
+
+        Without a velocity the watchdog answers, every 10 ms.
 
         Raises:
             RuntimeError: They are not.
@@ -125,7 +144,9 @@ class Stage(SpunNodes):
         wanted = self.estimator.taken + sum(map(len, tick.values()))
         has_arrived = self.all_answers()
         self.driver.publish(tick)
-        if not self.spin_until(lambda: self.estimator.taken >= wanted and has_arrived()):
+        if not self.spin_until(
+            lambda: self.estimator.taken >= wanted and not self.estimator.is_tick_due and has_arrived()
+        ):
             raise RuntimeError(
                 f'{wanted - self.estimator.taken} inputs not taken, '
                 f'{self.driver.received} outputs received of {self.estimator.sent}'
@@ -136,18 +157,16 @@ class Stage(SpunNodes):
         sent, received = self.estimator.sent, self.driver.received
         return lambda: self.driver.received - received >= self.estimator.sent - sent
 
-    def run(self, ticks: int, spoil: Callable[[Tick, int], Tick] | None = None, shift: int = 0) -> Outputs:
-        """Send ``ticks`` moments 1 ms apart, each changed by ``spoil``, then shift time by ``shift`` [ns].
+    def run(self, ticks: int, spoil: Callable[[Tick, int], Tick] | None = None) -> Outputs:
+        """Send ``ticks`` moments 1 ms apart, each changed by ``spoil``.
 
         Returns:
             The outputs meanwhile.
         """
         first = len(self.driver.outputs)
         for number in range(ticks):
-            self.now += MS
-            tick = good(self.now)
+            tick = self.next_moment()
             self.send(spoil(tick, number) if spoil else tick)
-        self.now += shift
         return self.driver.outputs[first:]
 
     def level(self) -> str:
@@ -174,10 +193,12 @@ def stage(parameters: Mapping[str, Any] | None = None, *, autostart: bool = True
     with ros_context() as context:
         estimator = CountedEstimator(context=context, parameter_overrides=overrides)
         driver = Driver(context=context)
+        made = Stage(context, estimator, driver)
+        if not values.get('use_sim_time'):
+            estimator.clock = made.receipt_time
         try:
             if autostart and not estimator.autostart():
                 raise RuntimeError('the estimator does not start')
-            made = Stage(context, estimator, driver)
             if autostart:
                 made.connect()
             yield made
@@ -188,8 +209,8 @@ def stage(parameters: Mapping[str, Any] | None = None, *, autostart: bool = True
 
 
 def statuses(outputs: Outputs) -> set[int]:
-    """Status of every estimate."""
-    return {output.status for output in outputs if isinstance(output, FrictionEstimate)}
+    """Status of every estimate, without MOTION_UNCERTAIN, which the first ones after a start have."""
+    return {output.status & ~Status.MOTION_UNCERTAIN for output in outputs if isinstance(output, FrictionEstimate)}
 
 
 def unless(holds: object, difference: str) -> list[str]:
@@ -203,16 +224,27 @@ def verified(bag: Path) -> list[str]:
     return unless(result.identical, f'{bag.name}: {result.first_difference or "no estimate in it"}')
 
 
-def broken_invariants(outputs: Outputs) -> list[str]:
-    """What holds for all outputs and does not: every number is finite, the feed-forward keeps limit and slew limit."""
-    settings = FeedForwardSettings()
+def broken_invariants(outputs: Outputs, live_slew_limit: float | None = None) -> list[str]:
+    """What holds for all outputs and does not: numbers are finite, the feed-forward keeps its limits and direction.
+
+    Args:
+        outputs: While the wanted velocity is that of `good`.
+        live_slew_limit: Slew limit [N/s] if the time of receipt is that of the machine. It is not in the outputs, so
+            any step may be the longest one, and a force that is late may fall to 0 at once.
+    """
     wrong = [f'not finite: {output}' for output in outputs if not all(map(math.isfinite, output))]
     forces = [output for output in outputs if isinstance(output, FeedForward)]
+    fade = max((output.force for output in forces), default=0.0) / FADE_TIME
     for before, after in pairwise(forces):
-        elapsed = min(max((after.stamp - before.stamp) * 1e-9, 0.0), LONGEST_STEP)
-        if abs(after.force - before.force) > settings.slew_limit * elapsed + 1e-9:
+        change = after.force - before.force
+        if live_slew_limit is None:
+            step = between(MS * 1e-9, (after.stamp - before.stamp) * 1e-9, LONGEST_STEP)
+            jumps = abs(change) > (SLEW_LIMIT + fade) * step + 1e-9
+        else:
+            jumps = change > (live_slew_limit + fade) * LONGEST_STEP + 1e-9
+        if jumps:
             wrong.append(f'feed-forward jumps from {before.force:.3f} to {after.force:.3f} N at {after.stamp} ns')
-        if abs(after.force) > settings.force_limit:
+        if not 0.0 <= after.force <= FeedForwardSettings().force_limit:
             wrong.append(f'feed-forward of {after.force} N')
     return wrong
 
@@ -222,7 +254,7 @@ def try_row(place: Stage, row: Row) -> list[str]:
     place.restart()
     before = place.run(BEFORE)
     place.level()
-    during = place.run(FAULT, row.spoil, row.shift)
+    during = place.run(FAULT, row.spoil)
     if row.level == 'STALE':
         place.level()  # an interval is STALE if it has no sample at all
     level = place.level()
@@ -256,8 +288,6 @@ def try_row(place: Stage, row: Row) -> list[str]:
 
 def _wrong_feedforward(row: Row, estimates: list[FrictionEstimate], forces: list[FeedForward]) -> list[str]:
     scale = FeedForwardSettings().scale
-    if row.feedforward == 'nothing':
-        return [f'{len(forces)} feed-forwards'] if forces else []
     if not forces:
         return ['no feed-forward']
     last = forces[-1]

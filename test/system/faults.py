@@ -56,14 +56,21 @@ TRIALS = (
         '-',
         graph.topic_comes_late,
     ),
-    Trial('an input has a second publisher', 'as usual', 'as usual', 'both named; WARN', '-', graph.second_publisher),
     Trial(
-        'an input has a second publisher, refused',
+        'an input has a second publisher',
         'UNKNOWN',
         'fades to 0',
         'both named; `INPUT_REFUSED`, ERROR; as usual once it is gone',
         '-',
-        graph.second_publisher_refused,
+        graph.second_publisher,
+    ),
+    Trial(
+        'an input has a second publisher, `refuse_second_publisher: false`',
+        'as usual',
+        'as usual',
+        'both named; WARN',
+        '-',
+        graph.second_publisher_allowed,
     ),
     Trial(
         'incompatible quality of service or type',
@@ -74,7 +81,12 @@ TRIALS = (
         graph.incompatible_quality,
     ),
     Trial(
-        'a second estimator of the same name', 'as usual', 'as usual', 'both named; WARN', '-', graph.second_estimator
+        'a second estimator of the same name',
+        'UNKNOWN',
+        'fades to 0',
+        'both named; `INPUT_REFUSED`, ERROR; as usual once it is gone',
+        '-',
+        graph.second_estimator,
     ),
     Trial(
         'parameters change in motion',
@@ -116,8 +128,8 @@ TRIALS = (
         'verifies',
         process.burst,
     ),
-    Trial('SIGINT', 'ends', 'ends', 'exit code 0', 'finished, verifies', process.interrupted),
-    Trial('SIGTERM', 'ends', 'ends', 'exit code 0', 'finished, verifies', process.terminated),
+    Trial('SIGINT', 'ends', 'fades to 0, then ends', 'exit code 0', 'finished, verifies', process.interrupted),
+    Trial('SIGTERM', 'ends', 'fades to 0, then ends', 'exit code 0', 'finished, verifies', process.terminated),
     Trial('SIGKILL', 'ends', 'ends', 'none', 'recovered up to 1 s before, verifies', process.killed),
     Trial(
         'SIGSTOP and SIGCONT',

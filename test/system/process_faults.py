@@ -25,6 +25,8 @@ from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, INPUTS, de
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.bags.recover import recover
 
+LIVE_SLEW_LIMIT = 100.0  # [N/s] two thirds of the force cannot come back within one step
+LIVE_SETTINGS = {**SETTINGS, 'feedforward.slew_limit': LIVE_SLEW_LIMIT, 'stamp_age_max': 0.0}  # stamps follow no clock
 OWN_MOUNTS = ('unshare', '--map-root-user', '--mount')
 LARGEST_LOSS = 1000  # [samples] of 1 kHz that a killed recording may lose: 1 s
 UNDER_WAY = 20  # samples without answer: well below the depth of the queues
@@ -113,7 +115,7 @@ class EstimatorProcess(SpunNodes):
         while list(latest) != [0] * AT_THE_END and time.monotonic() < end:
             latest.append(self.status_of_one())
         wrong = unless(list(latest) == [0] * AT_THE_END, f'at the end: {set(latest)}')
-        return wrong + broken_invariants(self.driver.outputs) + self.tracebacks()
+        return wrong + broken_invariants(self.driver.outputs, LIVE_SLEW_LIMIT) + self.tracebacks()
 
     def unaccounted(self, *, exactly: bool = True) -> list[str]:
         """Velocity samples neither answered nor reported as missing.
@@ -151,7 +153,13 @@ def estimator_process(
     recording = {'record': True, 'record_directory': directory or str(folder), 'record_name': 'bag'}
     recording['record_free_space'] = free_space
     with (
-        node_process('friction_estimator', domain, {**recording, **SETTINGS}, log, prefix=prefix) as process,
+        node_process(
+            'friction_estimator',
+            domain,
+            {**LIVE_SETTINGS, **recording},
+            log,
+            prefix=prefix,
+        ) as process,
         ros_context(domain) as context,
     ):
         place = EstimatorProcess(process, log, context)
@@ -169,7 +177,11 @@ def ends_by(number: signal.Signals, chance: random.Random, folder: Path) -> list
         place.process.send_signal(number)
         place.flood(100)
         code = place.process.wait(TIMEOUT)
-        wrong = unless(code == 0, f'exit code {code}') + place.tracebacks() + broken_invariants(place.driver.outputs)
+        wrong = (
+            unless(code == 0, f'exit code {code}')
+            + place.tracebacks()
+            + broken_invariants(place.driver.outputs, LIVE_SLEW_LIMIT)
+        )
     return wrong + verified(folder / 'bag')
 
 
@@ -189,7 +201,7 @@ def killed(chance: random.Random, folder: Path) -> list[str]:
         place.run(chance.randrange(1200, 2000))
         place.process.kill()
         place.process.wait()
-        wrong = broken_invariants(place.driver.outputs)
+        wrong = broken_invariants(place.driver.outputs, LIVE_SLEW_LIMIT)
         answered = [o.stamp for o in place.driver.outputs if isinstance(o, records.FrictionEstimate)]
     found = recover(folder / 'bag')
     recovered = [

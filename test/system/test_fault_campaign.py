@@ -1,5 +1,6 @@
 """Every row of docs/degradation.md, tried once on the live node; ``faults.py`` tries each twenty times."""
 
+import math
 from collections.abc import Iterator
 
 import pytest
@@ -38,3 +39,9 @@ def test_a_row_that_requires_what_does_not_happen_fails(place: Stage):
 def test_the_command_reports_a_fault_that_does_as_required():
     found = run_json('test/system/faults.py', '--only', ' no ', '--times', '1')
     assert found == {'bytes that are no message': [[]], 'an input has no publisher at first': [[]]}
+
+
+def test_the_command_measures_the_time_to_zero():
+    found = run_json('test/system/time_to_zero.py', '--only', 'stops', '--times', '1')
+    assert len(found) == 4 + 4  # stops; leaps, then stops
+    assert all(0.2 < seconds < math.inf for (seconds,) in found.values())  # how long depends on the load

@@ -58,7 +58,7 @@ from seal_friction_ros.core.friction.actuator import friction_of_seals
 
 ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
 LARGEST_ACCELERATION = 1e6  # [m/s^2] no rod accelerates faster
-TICK_INTERVAL = 10_000_000  # [ns] of the watchdog: it acts if no feed-forward was made for this time
+TICK_INTERVAL = 9_000_000  # [ns] the watchdog acts if no feed-forward was made for this time
 
 Emit = Callable[[Output, bytes], object]
 """Takes what goes out, and the frame name of the message that it answers."""
@@ -183,10 +183,10 @@ def receive_pressure(
 
 
 @compilable
-def receive_force(_parameters: Any, state: PipelineState, newest: Force, received: int, _emit: Any) -> PipelineState:
+def receive_force(parameters: Any, state: PipelineState, newest: Force, received: int, _emit: Any) -> PipelineState:
     """Keep the force sum for the next velocity sample."""
     known, guided, friction, pressure, force, reference, receipt, refused, offset = state
-    if newest.stamp != force.stamp and math.isfinite(newest.force):
+    if newest.stamp != force.stamp and abs(newest.force) <= parameters.estimator.settings.force_max:
         receipt = ReceiptTimes(receipt.velocity, receipt.pressure, received, receipt.reference)
     return PipelineState(known, guided, friction, pressure, newest, reference, receipt, refused, offset)
 
