@@ -88,7 +88,7 @@ def main() -> int:
         'pull_test': (
             pull_test,
             'Thesis, Table A-1: readings played as signals (import thesis).',
-            {},
+            {'seals': ['ms28775_114', 'ms28775_114']},
         ),
         'faults': (faults, 'Made up: sine waves with one fault after another.', TIGHT),
     }

@@ -62,9 +62,9 @@ def test_beyond_the_pressures_that_were_measured_the_node_says_so(tmp_path):
 
 
 def test_a_bag_of_the_node_identifies_and_its_seal_file_replays(tmp_path):
-    run = Run(tmp_path, str(ROOT / 'bags' / 'pull_test'), '--seal', 'ms28775_114')
+    run = Run(tmp_path, str(ROOT / 'bags' / 'pull_test'))
     assert run.code == 0, run.errors
-    assert run.figures['seal_chambers'] == ['a', 'b']  # from the configuration in the bag
+    assert run.figures['seal_chambers'] == ['a', 'b']  # from the configuration in the bag, as is the geometry
     assert run.ladder('physics_based')['error'] < 0.1
     assert run.figures['measured_N'] == pytest.approx([x * LBF for x in (2.75, 5.0, 6.0)], rel=1e-5)
     assert run.document['stiction'] > 1.0  # [N] the static readings are above the dynamic ones
@@ -72,13 +72,13 @@ def test_a_bag_of_the_node_identifies_and_its_seal_file_replays(tmp_path):
     arguments = ['replay', str(ROOT / 'bags' / 'pull_test'), '--seal', str(run.out), '--out', str(replayed)]
     assert main(arguments) == 0
     assert main(['replay', str(replayed), '--verify']) == 0
-    again = Run(tmp_path, str(replayed), name='again')  # the geometry, too, from the configuration in the bag
+    again = Run(tmp_path, str(replayed), name='again')
     assert again.figures['parameters'] == run.figures['parameters']
 
 
 @pytest.mark.parametrize('version', ['old', 'new'])
 def test_no_geometry_is_taken_from_the_placeholder_seals_of_a_bag(tmp_path, version):
-    bag = ROOT / 'bags' / 'pull_test'  # recorded with the default configuration of version 1
+    bag = ROOT / 'test' / 'corpus' / 'version_1' / 'pull_test'  # recorded with the default configuration
     if version == 'new':
         bag = tmp_path / 'bag'
         replay(ROOT / 'bags' / 'pull_test', default_configuration(), bag)
