@@ -21,6 +21,13 @@ from paths import ROOT
 from rclpy.node import Node
 from seal_friction_msgs.msg import FrictionFeedForward
 
+from seal_friction_ros.core.estimation.feedforward import Limited
+from seal_friction_ros.core.estimation.messages import INPUTS
+from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
+from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
+from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
+from seal_friction_ros.nodes.graph_watch import GraphFindings
 from seal_friction_ros.offline.replay.replay import replay
 
 TIMEOUT = 120.0  # [s] ends a command that hangs
@@ -174,6 +181,39 @@ def test_services_named_in_the_readme_are_those_of_the_node():
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
 def test_tables_are_those_of_the_code(page: Path):
     assert make_docs.filled(page.read_text()) == page.read_text()
+
+
+@pytest.mark.parametrize('page', [*PAGES, ROOT / 'CHANGELOG.rst'], ids=lambda page: page.name)
+def test_parameters_with_a_prefix_exist(page: Path):
+    groups = (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)
+    prefixes = '|'.join({re.escape(group.prefix) for group in groups if group.prefix})
+    named = set(re.findall(rf'`((?:{prefixes})\w+)', page.read_text()))
+    assert named <= {name for group in groups for name in group.names()}
+
+
+def test_parameters_of_the_configuration_are_those_of_the_docs():
+    """Names and defaults; the bounds are checked where the file is loaded."""
+    text = (ROOT / 'config' / 'friction_estimator.yaml').read_text()
+    values = yaml.safe_load(text)['/**']['ros__parameters']
+    values |= {f'feedforward.{name}': value for name, value in values.pop('feedforward').items()}
+    defaults = {
+        name: group.record_type.__dataclass_fields__[field].default
+        for group in FRICTION_ESTIMATOR_PARAMETERS
+        for name, field in group.names().items()
+    }
+    for name, value in values.items():
+        assert (tuple(value) if isinstance(value, list) else value) == defaults[name], name
+
+
+def test_keys_of_the_diagnostics_and_status_bits_are_in_the_docs():
+    report = EstimatorDiagnostics().report(False, False, GraphFindings(dict.fromkeys(INPUTS, 0), [], [], {}))
+    page = (ROOT / 'docs' / 'interfaces.md').read_text()
+    for item in report.values:
+        key = re.sub('|'.join(INPUTS), 'INPUT', item.key)
+        key = re.sub('|'.join(rf'\b{bit.name}\b' for bit in (*Status, *Limited)), 'BIT', key)
+        assert f'`{key}`' in page, item.key
+    for bit in Status:
+        assert f'`{bit.name}`' in (ROOT / 'docs' / 'degradation.md').read_text(), bit
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)

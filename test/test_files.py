@@ -227,7 +227,9 @@ def test_sections_of_other_nodes_in_a_parameter_file_are_ignored(written):
     ('name', 'expected'),
     [
         ('stick_velocty', 'no parameter stick_velocty (did you mean stick_velocity?)'),
-        ('feedforward.coulomb_scal', '(did you mean feedforward.scale?)'),
+        ('feedforward.scal', '(did you mean feedforward.scale?)'),
+        ('feedforward.coulomb_scale', '(replaced by feedforward.scale)'),
+        ('feedforward.viscous_friction', '(replaced by velocity_terms of the seal file)'),
         ('scale', '(did you mean feedforward.scale?)'),
         ('feedforward.stick_velocity', '(did you mean stick_velocity?)'),
         ('refuse_second_publishers', '(did you mean refuse_second_publisher?)'),

@@ -5,6 +5,7 @@ it is held, or moves as a given function of time, and friction opposes the motio
 """
 
 import argparse
+import json
 import math
 import sys
 from collections.abc import Callable, Iterator
@@ -224,6 +225,7 @@ def main() -> int:
     """Run all cases; print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--seconds', type=float, default=60.0, help='length of each case, default 60')
+    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
     arguments = parser.parse_args()
     table = Table('case', 'reversals', 'allowed', 'wrong with status 0', 'status 0', 'largest step [N]', 'holds')
     results = [case() for case in all_cases(arguments.seconds)]
@@ -232,7 +234,10 @@ def main() -> int:
         step = '' if found.largest_step is None else f'{found.largest_step:.2f}'
         verdict = 'yes' if found.holds else 'NO'
         table.add_row(found.case, str(found.reversals), str(found.allowed_reversals), *shares, step, verdict)
-    Console(width=140).print(table)
+    if arguments.json:
+        print(json.dumps([{**found._asdict(), 'holds': found.holds} for found in results]))
+    else:
+        Console(width=140).print(table)
     return 0 if all(found.holds for found in results) else 1
 
 

@@ -1,6 +1,6 @@
 """Transient mixed lubrication of a reciprocating seal, from grease and roughness to a friction map for the node.
 
-Read in this order: `grease`, `topography`, `flow_factors`, `reynolds` (film of a given gap), `elasticity`, `contact`
-(film and seal together, one time step), `shear`, `groove`, `wall`, `kinematics`, `lubrication_case` (all parameters),
-`transient` (a whole motion), `findings`, `study`, `spool`, `friction_map`.
+Read in this order: `grease`, `topography`, `flow_factors`, `reynolds` (film of a given gap), `elasticity`, `krylov`,
+`contact` (film and seal together, one time step), `shear`, `groove`, `wall`, `kinematics`, `lubrication_case` (all
+parameters), `transient` (a whole motion), `findings`, `study`, `spool`, `measuring_chain`, `friction_map`.
 """

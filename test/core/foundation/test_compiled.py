@@ -28,6 +28,11 @@ def test_another_process_makes_the_type_from_its_name(name):
     assert getattr(compiled, made.__qualname__) is made
 
 
+def test_compiled_code_on_disk_may_name_a_law_that_is_gone():
+    made = getattr(compiled, 'bound:no/such/module:law')
+    assert made.__qualname__.encode() in pickle.dumps(made)
+
+
 def test_another_name_is_no_attribute():
     with pytest.raises(AttributeError, match='no_such_name'):
         compiled.no_such_name  # noqa: B018
