@@ -12,7 +12,7 @@ from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 _SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one
-_LARGEST_UNCERTAIN = 0.1  # [-] share of estimates with MOTION_UNCERTAIN; each reversal has some
+_LARGEST_UNCERTAIN = 0.25  # [-] share of estimates with MOTION_UNCERTAIN; each reversal has some
 _LARGEST_SHARE = {
     Limited.CLAMP: 0.01,
     Limited.SLEW: 0.2,

@@ -242,7 +242,7 @@ class FrictionEstimator(ManagedNode):
             self._tick(self._now())
 
     def _tick(self, received: int) -> None:
-        tick = WatchdogTick(received, (received - self._state.feedforward.received) * 1e-9)
+        tick = WatchdogTick(received + self._state.clock_offset, (received - self._state.feedforward.received) * 1e-9)
         self._sent.clear()
         self._state = receive(self._known, self._state, tick, received, self._send)
         self._recording.record(self._topics[TICK_TYPE], TICK_TYPE, received, encode(tick))

@@ -288,8 +288,10 @@ def _wanted_velocity(
     if not _is_younger(receipt.reference, received, settings.reference_timeout):
         return math.nan
     given = reference.velocity
-    acceleration = reference.acceleration if given.samples >= SETTLING else 0.0
-    return wanted_velocity(settings, confirmed_velocity(given), acceleration)
+    velocity, acceleration = confirmed_velocity(given), 0.0
+    if given.samples >= SETTLING and (velocity != 0.0 or given.half_width == 0.0):  # noise at rest is no start
+        acceleration = reference.acceleration
+    return wanted_velocity(settings, velocity, acceleration)
 
 
 @compilable

@@ -83,7 +83,7 @@ class ServoReference(NamedTuple):
 class WatchdogTick(NamedTuple):
     """The watchdog of the node acts: there is a force, and no velocity sample has renewed it."""
 
-    stamp: int  # [ns] when it acts, on the clock of receipt
+    stamp: int  # [ns] when it acts, on the clock of the stamps
     idle_time: float  # [s] since the last feed-forward
     frame_id: Any = b''  # bytes; in compiled code the number of the message
 

@@ -48,7 +48,10 @@ def chosen_configuration(params: Path | None, seal: Path | None) -> Configuratio
     """
     if params is None and seal is None:
         return None
-    selection, settings, feedforward = SealSelection(), EstimatorSettings(), FeedForwardSettings()
+    selection, feedforward = SealSelection(), FeedForwardSettings()
+    settings = EstimatorSettings(
+        stamp_age_max=0.0
+    )  # [s] off: stamps of a bag that was played are older than its receipt
     if params:
         selection, settings, feedforward = load_parameter_file(params)
     if seal:

@@ -8,7 +8,9 @@ from harness.identify_run import BARS, KEYS, THESIS, THESIS_RIG, Run, data, delf
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, step
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init_running
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Status
 from seal_friction_ros.core.foundation.units import LBF
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
@@ -27,7 +29,8 @@ def estimates_of(run: Run, pressure: float, velocity: float, force: float = 0.0)
     selection = SealSelection((str(run.out),) * len(chambers), chambers)
     parameters = load_configuration(selection, EstimatorSettings()).parameters().estimator
     sample = RodSample(10, velocity, Pressure(10, pressure, pressure), Force(10, force))
-    return step(parameters, init(parameters), sample)[1]
+    state = init_running(PipelineParameters(parameters, FeedForwardSettings())).estimator
+    return step(parameters, state, sample)[1]
 
 
 @pytest.mark.parametrize('law', ['constant_coulomb', 'pressure_power_law', 'physics_based', 'physics_based_asymmetric'])
