@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from harness.blocked_disk import BlockedDisk
 from mcap.reader import make_reader
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
@@ -76,28 +77,28 @@ def test_what_was_recorded_is_on_the_disk_within_the_flush_period_however_little
 
 def test_a_disk_that_stalls_delays_nothing_and_what_is_dropped_is_counted(tmp_path: Path, monkeypatch):
     recorder = Recorder(tmp_path / 'bag', queue_length=300)
-    monkeypatch.setattr(mcap_writer, 'os', Disk(delay=0.1))
-    slowest = 0.0
-    for number in range(1500):
-        started = time.perf_counter()
+    disk = BlockedDisk()
+    monkeypatch.setattr(mcap_writer, 'os', disk)
+    record(recorder, 0)
+    disk.wait_until_blocking()
+    for number in range(1, 1500):  # none of them waits for the disk, which is released only after the last
         recorder.record('/t', CONFIGURATION_TYPE, number, bytes(1000))
-        slowest = max(slowest, time.perf_counter() - started)
-        time.sleep(0.0005)
+    disk.release()
     recorder.close()
-    assert slowest < 0.05
-    assert recorder.dropped > 300
+    assert recorder.dropped >= 1500 - 300 - 50  # a full queue, and what the recorder had taken
     assert recorder.written + recorder.dropped == 1500
     assert information(tmp_path / 'bag')['custom_data'] == {'dropped_messages': str(recorder.dropped)}
 
 
 def test_stopping_does_not_wait_for_the_disk(tmp_path: Path, monkeypatch):
     recorder = Recorder(tmp_path / 'bag')
-    monkeypatch.setattr(mcap_writer, 'os', Disk(delay=0.3))
+    disk = BlockedDisk()
+    monkeypatch.setattr(mcap_writer, 'os', disk)
     record(recorder, 0)
-    started = time.perf_counter()
     recorder.stop()
-    assert time.perf_counter() - started < 0.1
+    disk.wait_until_blocking()
     assert not recorder.is_finished
+    disk.release()
     recorder.close()
     assert recorder.is_finished
     assert texts(tmp_path / 'bag') == ['0']

@@ -158,7 +158,7 @@ def test_the_command_prints_a_sheet_and_never_over_a_filled_one(tmp_path, capsys
     before = out.read_bytes()
     assert b'gland_diameter,20.8534,mm' in before
     assert main([*arguments, '--out', str(out)]) == 2
-    assert 'may be filled in' in capsys.readouterr().err
+    assert 'not overwriting it' in capsys.readouterr().err
     assert out.read_bytes() == before
 
 

@@ -87,9 +87,10 @@ def test_the_page_shows_the_numbers_the_seal_and_the_settings(tmp_path):
         assert level['offset'] == pytest.approx(2.0)
     assert page.tiles['mean absolute deviation over the pressures'] == '9.1 %'
     assert page.tiles['measured strokes in the 95 % band'] == '4 of 4'
-    assert page.table('status bit') == [{'status bit': 'velocity not finite', 'estimates': '1', 'share [%]': '0.25'}]
+    bits = {row['status bit']: (row['estimates'], row['share [%]']) for row in page.table('status bit')}
+    assert bits == {'velocity not finite': ('1', '0.25'), 'motion uncertain': ('4', '1.00')}
     assert '/force_sum' in [row['topic'] for row in page.table('topic')]
-    assert page.table('seal') == [{'seal': 'ms28775_114', 'chamber': chamber} for chamber in 'ab']
+    assert page.table('seal') == [{'seal': 'placeholder', 'chamber': chamber} for chamber in 'ab']
     (stick_velocity,) = (row for row in page.table('setting') if row['setting'] == 'stick_velocity')
     assert (stick_velocity['value'], stick_velocity['unit']) == ('0.001', 'm/s')
     assert 'area_deformation_gain' in page.texts['pre'][0]
