@@ -217,18 +217,16 @@ def room_of(file: str) -> str:
     return '/'.join(file.split('/')[:2])
 
 
-def tests_of(file: str) -> list[str]:
+def tests_of(tree: Path, file: str) -> list[str]:
     """Test files of the room of a module; first the mirrored one, then those that name the module."""
     module = Path(file).stem
-    files = [
-        path.relative_to(TREE)
-        for path in sorted((TREE / 'test' / room_of(file)).glob('test_*.py'))
-        if file in COMPILER or not path.as_posix().endswith(NEEDS_COMPILER)
-    ]
+    files = sorted((tree / 'test' / room_of(file)).glob('test_*.py'))
     if file in COMPILER:
         files = [path for path in files if path.name == f'test_{module}.py']
-    files.sort(key=lambda path: (path.name != f'test_{module}.py', module not in (TREE / path).read_text()))
-    return [str(path) for path in files]
+    else:
+        files = [path for path in files if not path.as_posix().endswith(NEEDS_COMPILER)]
+    files.sort(key=lambda path: (path.name != f'test_{module}.py', module not in path.read_text()))
+    return [str(path.relative_to(tree)) for path in files]
 
 
 class _QuickFailure:
@@ -278,8 +276,11 @@ def run_tests(tree: Path, tests: list[str], compiled: bool, seconds: int) -> Run
     _, status, usage = os.wait4(process, 0)
     with suppress(ProcessLookupError):
         os.killpg(process, signal.SIGKILL)
+    output = log.read_text(errors='replace')[-2000:]
+    if os.waitstatus_to_exitcode(status) > pytest.ExitCode.INTERRUPTED:  # else tests failed, or could not be imported
+        raise RuntimeError(f'the tests did not run:\n{output}')
     killed = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
-    return Run(status == 0, killed, usage.ru_utime + usage.ru_stime, log.read_text(errors='replace')[-2000:])
+    return Run(status == 0, killed, usage.ru_utime + usage.ru_stime, output)
 
 
 _tree = Path()
@@ -300,7 +301,7 @@ def _make_copy(folder: str) -> None:
 
 def _baseline(file: str) -> tuple[str, Run]:
     """Run the tests of a module without a mutant."""
-    return file, run_tests(_tree, tests_of(file), file in COMPILER, 3600)
+    return file, run_tests(_tree, tests_of(_tree, file), file in COMPILER, 3600)
 
 
 def _try(task: tuple[Mutant, int]) -> tuple[Mutant, Run]:
@@ -313,7 +314,7 @@ def _try(task: tuple[Mutant, int]) -> tuple[Mutant, Run]:
     sys.dont_write_bytecode = True
     path.write_bytes(source[: mutant.start] + mutant.after.encode() + source[mutant.end :])
     try:
-        return mutant, run_tests(_tree, tests_of(mutant.file), mutant.file in COMPILER, seconds)
+        return mutant, run_tests(_tree, tests_of(_tree, mutant.file), mutant.file in COMPILER, seconds)
     finally:
         path.write_bytes(source)
 

@@ -106,6 +106,16 @@ def test_with_a_reference_each_velocity_makes_both_and_the_force_helps_the_motio
     assert run(ticks(0, 500, speed=-0.05))[-1].feedforward.force == pytest.approx(-last.feedforward.force, rel=1e-6)
 
 
+def test_the_first_velocity_with_pressure_and_force_sum_makes_a_usable_estimate():
+    """The first usable estimate must not come late; until the ripple of the velocity is known, it says so."""
+    answers = run(ticks(0, 120))
+    assert [a.estimate.status for a in answers[:99]] == [Status.MOTION_UNCERTAIN] * 99
+    assert {a.estimate.status for a in answers[99:]} == {0}
+    assert {a.estimate.friction_force for a in answers} == {answers[-1].estimate.coulomb_friction}
+    assert [a.feedforward.scale for a in answers] == pytest.approx([0.9 * i / 200 for i in range(120)])
+    assert [a.feedforward.force > 0.0 for a in answers] == [False] * 99 + [True] * 21
+
+
 def test_the_estimate_is_emitted_before_the_feed_forward():
     emitted, state = [], init(PARAMETERS)
     for message in ticks(0, 1):

@@ -230,6 +230,18 @@ def test_a_spread_that_does_not_scale_is_absolute_and_one_that_does_is_relative(
     assert relative.std(somewhere) == pytest.approx(0.1 * somewhere, rel=0.1)
 
 
+@pytest.mark.parametrize(('readings', 'rank'), [(100, 96), (40, 39), (39, 38), (38, 38), (20, 20), (19, 19), (5, 5)])
+def test_the_band_reaches_to_the_95th_percentile_counted_for_one_more_reading(readings, rank):
+    """Rank and factor of the band: the smallest k with k / (n + 1) >= 95 %, and the scatter of a new group."""
+    deviation = np.random.default_rng(3).permutation(
+        np.arange(1, readings + 1) * np.tile([0.1, -0.1], readings)[:readings]
+    )
+    for groups in (1, 3, 8):
+        band = prediction_uncertainty(np.full(readings, 10.0), deviation, groups)
+        half = BAND_95 * band.std(np.array([10.0]))[0]
+        assert half == pytest.approx(0.1 * rank * np.sqrt(1.0 + 1.0 / groups))
+
+
 def test_what_the_data_cannot_show_is_added_in_square():
     friction, deviation = np.full(100, 10.0), np.tile([0.3, -0.3], 50)
     alone, more = prediction_uncertainty(friction, deviation, 3), prediction_uncertainty(friction, deviation, 3, 0.12)
