@@ -7,8 +7,9 @@ every file has its share. Equivalent mutants, which no test can kill, count as s
 Mutants are in code only: not in docstrings, texts, annotations, decorators, ``raise`` (removed as a whole) and
 ``__all__``. Constants, tuning constants too, are doubled, integers increased by one.
 
-Tests run as plain Python, the modules of `COMPILER` compiled. Own code, as mutmut puts its switch into every function,
-which the compiler refuses, and cosmic-ray changes the working tree and knows one test command for all mutants.
+Tests run as plain Python, the fastest first; slow ones compiled, and only if no other fails. Own code, as mutmut puts
+its switch into every function, which the compiler refuses, and cosmic-ray changes the working tree and knows one test
+command for all mutants.
 """
 
 import argparse
@@ -23,6 +24,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
 from collections.abc import Iterator
 from contextlib import suppress
@@ -48,6 +50,9 @@ COMPILER = ('core/estimation/compiled_pipeline.py', 'core/foundation/compiled.py
 """Modules whose tests run compiled: minutes for each mutant."""
 NEEDS_COMPILER = ('estimation/test_compiled_pipeline.py', 'foundation/test_compiled.py', 'servo/test_compiled.py')
 """Tests that run only there."""
+TABLES = 'test/test_docs.py::test_tables_are_those_of_the_code'
+"""Test for every room: the tables of parameters in docs."""
+SLOW = 10.0  # [s] of processor time: tests that take longer as plain Python run compiled, if no other test fails
 
 
 class Mutant(NamedTuple):
@@ -226,17 +231,46 @@ def tests_of(tree: Path, file: str) -> list[str]:
     else:
         files = [path for path in files if not path.as_posix().endswith(NEEDS_COMPILER)]
     files.sort(key=lambda path: (path.name != f'test_{module}.py', module not in path.read_text()))
-    return [str(path.relative_to(tree)) for path in files]
+    return [*(str(path.relative_to(tree)) for path in files), TABLES]
 
 
-class _QuickFailure:
-    """Plugin: hypothesis does not shrink a failing example."""
+class _Order:
+    """Plugin: fastest tests first, without those that are slow as plain Python; no shrinking of failing examples.
+
+    Args:
+        seconds: Processor time of each test; empty in the run that measures it.
+    """
+
+    def __init__(self, seconds: dict[str, float]) -> None:
+        self.known, self.seconds = seconds, {}
 
     def pytest_sessionstart(self) -> None:
         phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
         profile = hypothesis.settings(hypothesis.settings.get_profile('reproducible'), phases=phases)
         hypothesis.settings.register_profile('quick', profile)
         hypothesis.settings.load_profile('quick')
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        if self.known:
+            items[:] = sorted(
+                (item for item in items if self.known.get(item.nodeid, 0.0) < SLOW),
+                key=lambda item: self.known.get(item.nodeid, 0.0),
+            )
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Iterator[None]:
+        def skip(*_: object) -> None:
+            pytest.skip('slow')
+
+        started = time.process_time()
+        if not self.known:
+            signal.signal(signal.SIGPROF, skip)
+            signal.setitimer(signal.ITIMER_PROF, SLOW)
+        try:
+            return (yield)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            self.seconds[item.nodeid] = time.process_time() - started
 
 
 class Run(NamedTuple):
@@ -249,8 +283,25 @@ class Run(NamedTuple):
     output: str
 
 
-def run_tests(tree: Path, tests: list[str], compiled: bool, seconds: int) -> Run:
-    """Run tests in a copy of the tree, in a process that ends after ``seconds`` of processor time."""
+class Baseline(NamedTuple):
+    """Tests of a room without a mutant."""
+
+    tests: list[str]
+    compiled: bool
+    limit: int
+    """[s] of processor time"""
+    seconds: dict[str, float]
+    """[s] of each test as plain Python"""
+
+    @property
+    def slow(self) -> 'Baseline | None':
+        """The slow tests, compiled."""
+        slow = [name for name, seconds in self.seconds.items() if seconds >= SLOW]
+        return Baseline(slow, True, 1000, {}) if slow and not self.compiled else None
+
+
+def run_tests(tree: Path, baseline: Baseline, *options: str) -> Run:
+    """Run tests in a copy of the tree, in a process that ends after the limit of processor time."""
     log = tree / 'build' / 'mutant.log'
     log.parent.mkdir(exist_ok=True)
     process = os.fork()
@@ -262,13 +313,16 @@ def run_tests(tree: Path, tests: list[str], compiled: bool, seconds: int) -> Run
             output = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
             os.dup2(output, 1)
             os.dup2(output, 2)
-            resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-            signal.alarm(10 * seconds)  # waits for something that does not come
+            resource.setrlimit(resource.RLIMIT_CPU, (baseline.limit, baseline.limit + 5))
+            signal.alarm(10 * baseline.limit)  # waits for something that does not come
             own = str(tree)
-            os.environ |= {'PYTHONPATH': own} | ({} if compiled else {'NUMBA_DISABLE_JIT': '1'})
+            os.environ |= {'PYTHONPATH': own} | ({} if baseline.compiled else {'NUMBA_DISABLE_JIT': '1'})
             sys.path[:1] = [own]
-            options = ['-x', '-q', '--tb=line', '-pno:cacheprovider', '-Wignore::pytest.PytestAssertRewriteWarning']
-            code = int(pytest.main([*options, *tests], [_QuickFailure()]))
+            order = _Order(baseline.seconds)
+            quiet = ['-q', '--tb=line', '-pno:cacheprovider', '-Wignore::pytest.PytestAssertRewriteWarning']
+            code = int(pytest.main([*quiet, *options, *baseline.tests], [order]))
+            if '-x' not in options:
+                (tree / 'build' / 'seconds.json').write_text(json.dumps(order.seconds))
         except BaseException:  # noqa: BLE001  the process must not go on as a worker
             traceback.print_exc()
         sys.stdout.flush()
@@ -299,14 +353,21 @@ def _make_copy(folder: str) -> None:
             shutil.copy2(TREE / name, _tree / name)
 
 
-def _baseline(file: str) -> tuple[str, Run]:
+def _baseline(file: str) -> tuple[str, Baseline]:
     """Run the tests of a module without a mutant."""
-    return file, run_tests(_tree, tests_of(_tree, file), file in COMPILER, 3600)
+    compiled = file in COMPILER
+    baseline = Baseline(tests_of(_tree, file), compiled, 3600, {})
+    run = run_tests(_tree, baseline, *(['-x'] if compiled else []))
+    if not run.passed:
+        raise RuntimeError(f'the tests of {file} fail without a mutant:\n{run.output}')
+    seconds = {} if compiled else json.loads((_tree / 'build' / 'seconds.json').read_text())
+    fast = sum(value for value in seconds.values() if value < SLOW) if seconds else run.seconds
+    return file, baseline._replace(seconds=seconds, limit=int(3.0 * fast) + 40)
 
 
-def _try(task: tuple[Mutant, int]) -> tuple[Mutant, Run]:
+def _try(task: tuple[Mutant, Baseline]) -> tuple[Mutant, Run]:
     """Run the tests of a mutant, in the copy of this worker."""
-    mutant, seconds = task
+    mutant, baseline = task
     path = _tree / PACKAGE / mutant.file
     source = path.read_bytes()
     for stale in (path.parent / '__pycache__').glob(f'{path.stem}.*'):
@@ -314,7 +375,10 @@ def _try(task: tuple[Mutant, int]) -> tuple[Mutant, Run]:
     sys.dont_write_bytecode = True
     path.write_bytes(source[: mutant.start] + mutant.after.encode() + source[mutant.end :])
     try:
-        return mutant, run_tests(_tree, tests_of(_tree, mutant.file), mutant.file in COMPILER, seconds)
+        run = run_tests(_tree, baseline, '-x')
+        if run.passed and baseline.slow:
+            run = run_tests(_tree, baseline.slow, '-x')
+        return mutant, run
     finally:
         path.write_bytes(source)
 
@@ -355,12 +419,9 @@ def main() -> int:
     ):
         # One module of each room stands for its room, but modules that run compiled for themselves.
         kind = {m.file: m.file if m.file in COMPILER else room_of(m.file) for m in mutants}
-        limits = {}
-        for file, run in pool.imap_unordered(_baseline, {room: file for file, room in kind.items()}.values()):
-            if not run.passed:
-                raise SystemExit(f'the tests of {file} fail without a mutant:\n{run.output}')
-            limits[kind[file]] = int(3.0 * run.seconds) + 20
-        tasks = [(mutant, limits[kind[mutant.file]]) for mutant in mutants]
+        files = {room: file for file, room in kind.items()}.values()
+        baselines = {kind[file]: baseline for file, baseline in pool.imap_unordered(_baseline, files)}
+        tasks = [(mutant, baselines[kind[mutant.file]]) for mutant in mutants]
         for mutant, run in pool.imap_unordered(_try, tasks):
             score = scores.setdefault(room_of(mutant.file), Score(room_of(mutant.file)))
             score.mutants += 1
