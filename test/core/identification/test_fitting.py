@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import optimize, stats
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, candidate_laws
@@ -168,6 +169,25 @@ def test_beaten_is_only_what_is_worse_beyond_the_noise_and_by_a_tenth():
     assert not is_beaten(best + 0.02, best)
     assert not is_beaten(best + np.array([2.0, -1.5, 1.0, -0.5]), best)
     assert not is_beaten(best, best)
+
+
+@pytest.mark.parametrize('groups', [2, 4, 7])
+def test_beaten_beyond_the_noise_is_a_one_sided_paired_t_test_at_95_percent(groups: int):
+    best = np.linspace(0.9, 1.1, groups)
+    scatter = np.random.default_rng(groups).normal(size=groups)
+    scatter -= scatter.mean()
+    for share, beaten in ((0.99, False), (1.01, True)):
+        # The mean that this p-value belongs to, by the test of SciPy.
+        mean = optimize.brentq(
+            lambda m: stats.ttest_1samp(scatter + m, 0.0, alternative='greater').pvalue - 0.05, 0.01, 99
+        )
+        assert is_beaten(best + scatter + share * mean, best) is beaten
+
+
+def test_beaten_by_enough_is_a_tenth_of_the_mean_loss():
+    best = np.array([1.0, 1.1, 0.9, 1.0])
+    for more, beaten in ((0.110, False), (0.112, True)):  # 1 / 0.9 - 1 = 0.111
+        assert is_beaten(best + more, best) is beaten
 
 
 def test_leaving_out_predicts_what_was_not_seen():
