@@ -279,6 +279,24 @@ def test_a_tick_is_due_while_there_is_a_force_that_nothing_renews():
     assert not is_tick_due(init(PARAMETERS), 10**12)
 
 
+@pytest.mark.parametrize('kind', [Pressure, Force, ServoReference])
+def test_an_input_that_is_slower_than_the_velocity_counts_for_its_timeout(kind):
+    """The timeouts are 30 ms: at 50 Hz the force stays, at 25 Hz it begins to fade."""
+    for period, stays in ((20, True), (40, False)):
+        slow = [m for m in ticks(0, 1000) if not isinstance(m, kind) or m.stamp // MS % period == 0]
+        scales = [answer.feedforward.scale for answer in run(slow)[900:]]
+        assert (min(scales) == 0.9) is stays
+
+
+@pytest.mark.parametrize('kind', [Pressure, Force, ServoReference])
+def test_the_fade_begins_at_the_timeout(kind):
+    rest = [message for message in ticks(400, 500) if not isinstance(message, kind)]
+    scales = [answer.feedforward.scale for answer in run(ticks(0, 400) + rest)]
+    assert scales[399 + 29] == 0.9
+    assert scales[399 + 41] - scales[399 + 31] == pytest.approx(-0.9 * 0.01 / 0.2)
+    assert 0.88 < scales[399 + 31] < 0.9
+
+
 def test_when_references_stop_velocities_fade_the_force_out():
     answers = run(ticks(0, 400) + ticks(400, 800, reference=False))
     last = answers[-1]
