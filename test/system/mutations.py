@@ -238,11 +238,13 @@ class _Order:
     """Plugin: fastest tests first, without those that are slow as plain Python; no shrinking of failing examples.
 
     Args:
-        seconds: Processor time of each test; empty in the run that measures it.
+        known: Processor time of each test as plain Python [s]; empty: all run, in the order of their files.
+        measures: Whether this run measures these times. A slow test ends early.
     """
 
-    def __init__(self, seconds: dict[str, float]) -> None:
-        self.known, self.seconds = seconds, {}
+    def __init__(self, known: dict[str, float], measures: bool) -> None:
+        self.known, self.measures = known, measures
+        self.seconds: dict[str, float] = {}
 
     def pytest_sessionstart(self) -> None:
         phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
@@ -263,9 +265,9 @@ class _Order:
             pytest.skip('slow')
 
         started = time.process_time()
-        if not self.known:
+        if self.measures:
             signal.signal(signal.SIGPROF, skip)
-            signal.setitimer(signal.ITIMER_PROF, SLOW)
+            signal.setitimer(signal.ITIMER_PROF, SLOW + 0.1)
         try:
             return (yield)
         finally:
@@ -300,7 +302,7 @@ class Baseline(NamedTuple):
         return Baseline(slow, True, 1000, {}) if slow and not self.compiled else None
 
 
-def run_tests(tree: Path, baseline: Baseline, *options: str) -> Run:
+def run_tests(tree: Path, baseline: Baseline, *, measures: bool = False) -> Run:
     """Run tests in a copy of the tree, in a process that ends after the limit of processor time."""
     log = tree / 'build' / 'mutant.log'
     log.parent.mkdir(exist_ok=True)
@@ -318,10 +320,10 @@ def run_tests(tree: Path, baseline: Baseline, *options: str) -> Run:
             own = str(tree)
             os.environ |= {'PYTHONPATH': own} | ({} if baseline.compiled else {'NUMBA_DISABLE_JIT': '1'})
             sys.path[:1] = [own]
-            order = _Order(baseline.seconds)
+            order = _Order(baseline.seconds, measures)
             quiet = ['-q', '--tb=line', '-pno:cacheprovider', '-Wignore::pytest.PytestAssertRewriteWarning']
-            code = int(pytest.main([*quiet, *options, *baseline.tests], [order]))
-            if '-x' not in options:
+            code = int(pytest.main([*quiet, *([] if measures else ['-x']), *baseline.tests], [order]))
+            if measures:
                 (tree / 'build' / 'seconds.json').write_text(json.dumps(order.seconds))
         except BaseException:  # noqa: BLE001  the process must not go on as a worker
             traceback.print_exc()
@@ -357,7 +359,7 @@ def _baseline(file: str) -> tuple[str, Baseline]:
     """Run the tests of a module without a mutant."""
     compiled = file in COMPILER
     baseline = Baseline(tests_of(_tree, file), compiled, 3600, {})
-    run = run_tests(_tree, baseline, *(['-x'] if compiled else []))
+    run = run_tests(_tree, baseline, measures=not compiled)
     if not run.passed:
         raise RuntimeError(f'the tests of {file} fail without a mutant:\n{run.output}')
     seconds = {} if compiled else json.loads((_tree / 'build' / 'seconds.json').read_text())
@@ -375,9 +377,9 @@ def _try(task: tuple[Mutant, Baseline]) -> tuple[Mutant, Run]:
     sys.dont_write_bytecode = True
     path.write_bytes(source[: mutant.start] + mutant.after.encode() + source[mutant.end :])
     try:
-        run = run_tests(_tree, baseline, '-x')
+        run = run_tests(_tree, baseline)
         if run.passed and baseline.slow:
-            run = run_tests(_tree, baseline.slow, '-x')
+            run = run_tests(_tree, baseline.slow)
         return mutant, run
     finally:
         path.write_bytes(source)
