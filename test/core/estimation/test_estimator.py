@@ -333,9 +333,9 @@ def test_a_stale_pressure_keeps_state_and_friction_but_says_so():
 # --- leaps ---
 
 LEAPS = {  # name: (a value far away, bit)
-    'pressure': (1.5e7, Status.PRESSURE_LEAP),
-    'force': (2e5, Status.FORCE_LEAP),
-    'velocity': (-1.2, Status.VELOCITY_LEAP),
+    'pressure': (4e7, Status.PRESSURE_LEAP),
+    'force': (5e5, Status.FORCE_LEAP),
+    'velocity': (-5.0, Status.VELOCITY_LEAP),
 }
 
 
@@ -387,6 +387,20 @@ def test_refused_inputs_leave_no_state_and_no_friction_force():
     assert estimate.coulomb_friction == only(sample()).coulomb_friction
 
 
+@pytest.mark.parametrize('name', LEAPS)
+def test_a_change_is_compared_with_the_largest_rate_over_its_time(name):
+    """100 samples later the change may be 100 times as large, and not more."""
+    start, rate = {'pressure': (0.0, 1e10), 'force': (30.0, 1e8), 'velocity': (0.01, 1e3)}[name]
+    slow = replace(
+        PARAMETERS, settings=EstimatorSettings(pressure_rate_max=1e8, force_rate_max=1e6, acceleration_max=10.0)
+    )
+    for elapsed in (2, 50):
+        for share, leaps in ((0.99, False), (1.01, True)):
+            far = start + share * rate * 1e-2 * elapsed * 1e-3
+            after = last(sample(**{name: start}), sample(START + elapsed * MS, **{name: far}), parameters=slow)
+            assert bool(after.status & LEAPS[name][1]) is leaps
+
+
 # --- unknown ---
 
 REST = {'velocity': 0.0}
@@ -434,6 +448,12 @@ def test_one_unusable_velocity_does_not_make_a_resting_rod_slide(bad):
     estimates = run([sample(START + i * MS, v, force=10.0) for i, v in enumerate(speeds)])
     states = [FrictionState(e.state).name for e in estimates]
     assert states == ['STUCK', 'STUCK', 'UNKNOWN', 'STUCK']
+
+
+def test_the_first_step_of_a_motion_from_rest_may_be_a_ripple():
+    rest = [sample(START + i * MS, 0.0) for i in range(3)]
+    moving = [sample(START + i * MS, 0.01) for i in range(3, 5)]
+    assert [e.status for e in run([*rest, *moving])] == [0, 0, 0, Status.MOTION_UNCERTAIN, 0]
 
 
 # --- age ---

@@ -141,6 +141,17 @@ def test_the_first_force_fades_in():
     assert rows[-1].force == pytest.approx(37.8)
 
 
+def test_the_fade_begins_with_the_first_sample_and_is_done_after_its_time():
+    """The first usable estimate must not come late, not by one sample."""
+    _, rows = run(SHARP, 202, state=FADED_OUT)
+    assert [row.scale for row in rows[:200]] == pytest.approx([0.9 * i / 200 for i in range(200)])
+    assert [row.force for row in rows[:200]] == pytest.approx([37.8 * i / 200 for i in range(200)])
+    assert [row.limited for row in rows[1:199]] == [Limited.FADE] * 198
+    assert rows[201].limited == 0
+    _, out = step(SHARP, FADED_OUT, 0, 5, 42.0, 0.1)  # a clock that does not begin at 0
+    assert out.force == 0.0
+
+
 def test_a_clock_of_receipt_that_goes_back_makes_no_step():
     state, _ = run(SHARP, 10)
     _, out = step(dataclasses.replace(SHARP, slew_limit=1.0), state, 0, -5000 * MS, 42.0, -0.1)

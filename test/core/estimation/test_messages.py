@@ -316,3 +316,10 @@ def test_the_table_of_layouts_is_that_of_the_generated_messages(layout):
 def test_an_empty_frame_name_without_its_end_is_understood():
     data = struct.pack('<4siII4xd', b'\x00\x01\x00\x00', 3, 4, 0, 0.5)
     assert wire.decode(wire.VELOCITY_TYPE, data) == Velocity(3_000_000_004, 0.5, b'')
+
+
+@pytest.mark.parametrize('layout', wire.LAYOUTS, ids=lambda layout: layout.message_type)
+def test_the_size_of_a_message_is_that_of_its_numbers_and_the_padding_between_them(layout):
+    assert layout.size == struct.calcsize('<' + layout.body)
+    assert layout.offsets[0] == 0
+    assert all(offset % struct.calcsize(code) == 0 for offset, code in zip(layout.offsets, layout.codes, strict=True))

@@ -31,11 +31,18 @@ def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
 
 
 @pytest.mark.parametrize(
-    ('split', 'words'), [({'record_split_size': 1000}, '1000000'), ({'record_split_duration': 1.0}, '10')]
+    ('name', 'least', 'below'),
+    [
+        ('record_split_size', 1_000_000, 999_999),
+        ('record_split_duration', 10.0, 9.9),
+        ('record_keep_size', 10_000_000, 9_999_999),
+    ],
 )
-def test_a_split_into_thousands_of_files_is_rejected(split: dict[str, float], words: str):
-    with pytest.raises(ValueError, match=words):
-        RecordingOptions(**split)
+def test_a_split_into_thousands_of_files_is_rejected(name: str, least: float, below: float):
+    for good in (0, least):
+        assert getattr(RecordingOptions(**{name: type(least)(good)}), name) == good
+    with pytest.raises(ValueError, match=f'{name} = {below} makes too many files: 0 or at least {least}'):
+        RecordingOptions(**{name: below})
 
 
 @pytest.mark.parametrize('name', ['../escaped', '/absolute', '..', '.', 'two\nlines'])

@@ -12,13 +12,17 @@ from hypothesis import strategies as st
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Limited
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, type_of
 from seal_friction_ros.core.estimation.pipeline import (
+    NO_REFERENCE,
     TICK_INTERVAL,
     PipelineParameters,
+    condition_reference,
     init,
+    init_running,
     is_tick_due,
     receive,
 )
 from seal_friction_ros.core.estimation.records import (
+    NEVER,
     Force,
     Position,
     Pressure,
@@ -28,6 +32,7 @@ from seal_friction_ros.core.estimation.records import (
     WatchdogTick,
 )
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.files import default_configuration
@@ -106,6 +111,16 @@ def test_with_a_reference_each_velocity_makes_both_and_the_force_helps_the_motio
     assert run(ticks(0, 500, speed=-0.05))[-1].feedforward.force == pytest.approx(-last.feedforward.force, rel=1e-6)
 
 
+def test_the_first_velocity_with_pressure_and_force_sum_makes_a_usable_estimate():
+    """The first usable estimate must not come late; until the ripple of the velocity is known, it says so."""
+    answers = run(ticks(0, 120))
+    assert [a.estimate.status for a in answers[:99]] == [Status.MOTION_UNCERTAIN] * 99
+    assert {a.estimate.status for a in answers[99:]} == {0}
+    assert {a.estimate.friction_force for a in answers} == {answers[-1].estimate.coulomb_friction}
+    assert [a.feedforward.scale for a in answers] == pytest.approx([0.9 * i / 200 for i in range(120)])
+    assert [a.feedforward.force > 0.0 for a in answers] == [False] * 99 + [True] * 21
+
+
 def test_the_estimate_is_emitted_before_the_feed_forward():
     emitted, state = [], init(PARAMETERS)
     for message in ticks(0, 1):
@@ -173,6 +188,80 @@ def test_one_stamp_ahead_makes_no_step():
     assert max(abs(a - b) for a, b in pairwise(forces)) <= 500.0 * 1e-3 + 1e-9
 
 
+# --- the acceleration of the reference ---
+
+
+def condition(*references, state=NO_REFERENCE):
+    """Conditioned reference after (velocity, acceleration) of one millisecond each."""
+    for number, (velocity, acceleration) in enumerate(references):
+        stamp = MS * number if state.velocity.stamp == NEVER else state.velocity.stamp + MS
+        state = condition_reference(state, ServoReference(stamp, 0.0, velocity, acceleration, b''))
+    return state
+
+
+def test_an_acceleration_counts_where_two_references_agree_with_the_smaller_magnitude():
+    for accelerations, agreed in (
+        ((2.0,), 0.0),
+        ((2.0, 3.0), 2.0),
+        ((-3.0, -2.0), -2.0),
+        ((2.0, -3.0), 0.0),
+        ((2.0, 0.0), 0.0),
+        ((2.0, math.nan), 0.0),
+        ((math.nan, 2.0), 0.0),
+        ((2.0, math.nan, 3.0, 3.0), 3.0),
+        ((1e300, 1e300), 1e6),
+        ((-1e300, -1e300), -1e6),
+    ):
+        assert condition(*((0.1, a) for a in accelerations)).acceleration == agreed
+
+
+def test_a_clean_reference_is_kept_as_it_is_within_what_a_rod_can_do():
+    assert condition((0.1, 0.0), (0.3, 0.0)).velocity.velocity == 0.3
+    assert condition((1e300, 0.0)).velocity.velocity == 100.0
+    assert condition((-1e300, 0.0)).velocity.velocity == -100.0
+
+
+def test_the_acceleration_of_a_reference_with_a_ripple_is_smoothed_over_4_times_its_smoothing():
+    state = condition(*((v, 0.0) for v in (0.1, 0.101, 0.1, 0.101, 0.1) * 20))
+    state = condition(*[(0.0, 0.0), (1e-3, 0.0)] * 3)
+    assert state.velocity.half_width > 0.0
+    before = state._replace(acceleration=1.0, last_acceleration=5.0)
+    after = condition((1e-3, 5.0), state=before)
+    share = 1e-3 / (1e-3 + 4.0 * after.velocity.smoothing)
+    assert after.acceleration == pytest.approx(1.0 + share * 4.0, rel=1e-12)
+    assert after.last_acceleration == 5.0
+
+
+def test_the_lead_begins_once_the_reference_has_settled():
+    """Acceleration counts from the sample on with which the velocity does."""
+    leading = PARAMETERS._replace(feedforward=replace(SETTINGS, lead_time=0.01, smoothing_velocity=1.0))
+    plain = PARAMETERS._replace(feedforward=replace(SETTINGS, lead_time=0.0, smoothing_velocity=1.0))
+    moments = [message for ms in range(110) for message in tick(ms * MS)]
+    messages = [m._replace(acceleration=2.0) if isinstance(m, ServoReference) else m for m in moments]
+    with_lead, without = ([a.feedforward.force for a in run(messages, p)] for p in (leading, plain))
+    assert with_lead[:99] == without[:99] == [0.0] * 99
+    assert with_lead[99] / without[99] == pytest.approx(math.tanh(0.07) / math.tanh(0.05))
+
+
+def test_a_simulation_begins_settled_and_faded_in():
+    state = init_running(PARAMETERS)
+    for message in ticks(0, 3):
+        state, answer = receive_one(PARAMETERS, state, message)
+    assert answer.estimate.status == 0
+    assert answer.feedforward.scale == 0.9
+    assert answer.feedforward.force > 10.0
+
+
+def test_the_smallest_friction_is_compensated_too():
+    weak = mounted(coulomb_law=ConstantCoulomb(0.3), velocity_terms=VelocityTerms(asymmetry=-0.5))
+    for speed in (0.05, -0.05):
+        last = run(ticks(0, 400, speed=speed), PARAMETERS._replace(estimator=weak))[-1]
+        both = actuator_friction(weak.seals, 3e6, 3e6, speed)
+        sliding = both.coulomb_friction + both.velocity_friction
+        assert last.feedforward.force == pytest.approx(math.copysign(0.9 * sliding, speed), rel=1e-6)
+        assert 0.2 < sliding < 1.0
+
+
 def test_refused_inputs_fade_the_force_out():
     state = run_state(ticks(0, 400))._replace(refused=True)
     for message in ticks(400, 400 + round(LONGEST * 1e3)):
@@ -188,6 +277,24 @@ def test_a_tick_is_due_while_there_is_a_force_that_nothing_renews():
         state, _ = receive_one(PARAMETERS, state, message)
     assert not is_tick_due(state, 10**12)
     assert not is_tick_due(init(PARAMETERS), 10**12)
+
+
+@pytest.mark.parametrize('kind', [Pressure, Force, ServoReference])
+def test_an_input_that_is_slower_than_the_velocity_counts_for_its_timeout(kind):
+    """The timeouts are 30 ms: at 50 Hz the force stays, at 25 Hz it begins to fade."""
+    for period, stays in ((20, True), (40, False)):
+        slow = [m for m in ticks(0, 1000) if not isinstance(m, kind) or m.stamp // MS % period == 0]
+        scales = [answer.feedforward.scale for answer in run(slow)[900:]]
+        assert (min(scales) == 0.9) is stays
+
+
+@pytest.mark.parametrize('kind', [Pressure, Force, ServoReference])
+def test_the_fade_begins_at_the_timeout(kind):
+    rest = [message for message in ticks(400, 500) if not isinstance(message, kind)]
+    scales = [answer.feedforward.scale for answer in run(ticks(0, 400) + rest)]
+    assert scales[399 + 29] == 0.9
+    assert scales[399 + 41] - scales[399 + 31] == pytest.approx(-0.9 * 0.01 / 0.2)
+    assert 0.88 < scales[399 + 31] < 0.9
 
 
 def test_when_references_stop_velocities_fade_the_force_out():

@@ -3,11 +3,17 @@
 import pickle
 import subprocess
 import sys
+from dataclasses import dataclass
+from typing import ClassVar
 
+import numpy as np
 import pytest
 
 from seal_friction_ros.core.foundation import compiled
-from seal_friction_ros.core.foundation.compiled import bound, for_compiler, keep
+from seal_friction_ros.core.foundation.compiled import bound, evaluate, for_compiler, keep, unrolled
+from seal_friction_ros.core.friction.actuator import numbers_of_law
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable
 from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw, pressure_power_law
 from seal_friction_ros.core.servo.plant import Load
 
@@ -31,6 +37,53 @@ def test_another_process_makes_the_type_from_its_name(name):
 def test_compiled_code_on_disk_may_name_a_law_that_is_gone():
     made = getattr(compiled, 'bound:no/such/module:law')
     assert made.__qualname__.encode() in pickle.dumps(made)
+
+
+@compiled.compiled
+def _value(law, pressure):
+    return evaluate(law, pressure, 0.0)
+
+
+@compiled.compiled
+def _sum(records, pressure):
+    total = 0.0
+    for record in unrolled(records):
+        total += evaluate(record.law, pressure, 0.0) * record.scale
+    return total
+
+
+@compiled.compiled
+def _kept_sum(kept):
+    return kept.value[0] + kept.value[1]
+
+
+def test_compiled_code_evaluates_laws_and_tables_as_python_does():
+    table = CoefficientTable((10.0, 20.0, 40.0), (0.9, 0.5, 0.4))
+    for law, places in ((LAW.bound, (0.0, 1e5, 3e6)), (table.bound, (0.0, 5.0, 10.0, 19.0, 40.0, 99.0))):
+        known = for_compiler(law)
+        for place in places:
+            assert _value(known, place) == law(place, 0.0)
+
+
+def test_compiled_code_loops_over_records_of_different_laws():
+    laws = (LAW, ConstantCoulomb(7.0))
+    seals = tuple(numbers_of_law(law)._replace(scale=scale) for law, scale in zip(laws, (2.0, 3.0), strict=True))
+    expected = 2.0 * LAW.coulomb_friction(1e6) + 3.0 * 7.0
+    assert _sum(for_compiler(seals), 1e6) == expected
+
+
+def test_tuples_of_numbers_become_arrays_and_dataclasses_records():
+    @dataclass(frozen=True)
+    class Part:
+        COMPILED: ClassVar = ('sizes', 'inner')
+        sizes: tuple[float, ...]
+        inner: tuple[int, str]
+        left_out: str = 'not for the compiler'
+
+    record = for_compiler(Part((1.0, 2.0), (3, 'x')))
+    assert record._fields == ('sizes', 'inner')
+    assert (record.sizes.tolist(), record.inner) == ([1.0, 2.0], (3, 'x'))
+    assert _kept_sum(keep(np.array([1.0, 2.0]))) == 3.0
 
 
 def test_another_name_is_no_attribute():

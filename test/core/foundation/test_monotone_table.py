@@ -68,6 +68,7 @@ def test_the_end_slope_is_the_derivative_at_the_last_point():
         ([1.0, 2.0], [1.0], 'as many ordinates, got 2 and 1'),
         ([1.0, 1.0], [1.0, 2.0], 'do not increase'),
         ([2.0, 1.0], [1.0, 2.0], 'do not increase'),
+        ([1.0, 2.0, 2.0], [1.0, 2.0, 3.0], 'do not increase'),
         ([1.0, float('nan')], [1.0, 2.0], 'not every point is finite'),
         ([1.0, 2.0], [1.0, float('inf')], 'not every point is finite'),
     ],

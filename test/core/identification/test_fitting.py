@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import optimize, stats
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, candidate_laws
@@ -170,6 +171,25 @@ def test_beaten_is_only_what_is_worse_beyond_the_noise_and_by_a_tenth():
     assert not is_beaten(best, best)
 
 
+@pytest.mark.parametrize('groups', [2, 4, 7])
+def test_beaten_beyond_the_noise_is_a_one_sided_paired_t_test_at_95_percent(groups: int):
+    best = np.linspace(0.9, 1.1, groups)
+    scatter = np.random.default_rng(groups).normal(size=groups)
+    scatter -= scatter.mean()
+    for share, beaten in ((0.99, False), (1.01, True)):
+        # The mean that this p-value belongs to, by the test of SciPy.
+        mean = optimize.brentq(
+            lambda m: stats.ttest_1samp(scatter + m, 0.0, alternative='greater').pvalue - 0.05, 0.01, 99
+        )
+        assert is_beaten(best + scatter + share * mean, best) is beaten
+
+
+def test_beaten_by_enough_is_a_tenth_of_the_mean_loss():
+    best = np.array([1.0, 1.1, 0.9, 1.0])
+    for more, beaten in ((0.110, False), (0.112, True)):  # 1 / 0.9 - 1 = 0.111
+        assert is_beaten(best + more, best) is beaten
+
+
 def test_leaving_out_predicts_what_was_not_seen():
     """One wild test is badly predicted by the others, however many readings it has."""
     readings = noted(scatter=0.02)
@@ -228,6 +248,18 @@ def test_a_spread_that_does_not_scale_is_absolute_and_one_that_does_is_relative(
     somewhere = np.array([20.0, 50.0, 90.0])
     assert absolute.std(somewhere) == pytest.approx(np.full(3, 3.0), rel=0.1)
     assert relative.std(somewhere) == pytest.approx(0.1 * somewhere, rel=0.1)
+
+
+@pytest.mark.parametrize(('readings', 'rank'), [(100, 96), (40, 39), (39, 38), (38, 38), (20, 20), (19, 19), (5, 5)])
+def test_the_band_reaches_to_the_95th_percentile_counted_for_one_more_reading(readings, rank):
+    """Rank and factor of the band: the smallest k with k / (n + 1) >= 95 %, and the scatter of a new group."""
+    deviation = np.random.default_rng(3).permutation(
+        np.arange(1, readings + 1) * np.tile([0.1, -0.1], readings)[:readings]
+    )
+    for groups in (1, 3, 8):
+        band = prediction_uncertainty(np.full(readings, 10.0), deviation, groups)
+        half = BAND_95 * band.std(np.array([10.0]))[0]
+        assert half == pytest.approx(0.1 * rank * np.sqrt(1.0 + 1.0 / groups))
 
 
 def test_what_the_data_cannot_show_is_added_in_square():

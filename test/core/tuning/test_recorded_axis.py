@@ -70,6 +70,13 @@ def test_stated_deviation_is_that_of_the_scale():
     assert np.std(scales) == pytest.approx(law.scale_std, rel=0.35)
 
 
+@pytest.mark.parametrize(('age', 'usable'), [(0.029, True), (0.031, False), (-0.029, True), (-0.031, False)])
+def test_a_reference_counts_within_its_timeout_before_and_after_the_sample(age, usable):
+    made = recording()
+    aged = made._replace(motions=[motion._replace(reference_age=age) for motion in made.motions])
+    assert bool(np.any(feedforward_force(SETTINGS, aged)[500:])) is usable
+
+
 def test_given_mass_is_taken():
     law = fit_law(recording(), 5.0)
     assert (law.mass, law.mass_is_fitted) == (5.0, False)

@@ -6,6 +6,7 @@ import os
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -73,6 +74,25 @@ def test_what_was_recorded_is_on_the_disk_within_the_flush_period_however_little
     found = recover(tmp_path / 'bag', tmp_path / 'copy')  # as after a kill: the recorder goes on
     assert found.messages == 1
     recorder.close()
+
+
+def test_messages_reach_the_disk_300_ms_after_the_last_flush_and_not_before(tmp_path: Path, monkeypatch):
+    """A kill loses 0.3 s at most, as docs/recording.md says; here a clock that stands and goes decides."""
+    clock, flushes, rounds = SimpleNamespace(now=100.0), [], []
+
+    def monotonic() -> float:
+        rounds.append(clock.now)
+        return clock.now
+
+    monkeypatch.setattr(recorder_module, 'time', SimpleNamespace(monotonic=monotonic))
+    monkeypatch.setattr(BagWriter, 'flush', lambda _: flushes.append(clock.now))
+    recorder = Recorder(tmp_path / 'bag')
+    for now in (100.0, 100.299, 100.301, 100.6, 100.602):
+        clock.now = now
+        passed = len(rounds) + 3  # the round that is under way, one whole round, and the time after its flush
+        wait_until(lambda passed=passed: len(rounds) > passed)
+    recorder.close()
+    assert flushes == [100.301, 100.602]
 
 
 def test_a_disk_that_stalls_delays_nothing_and_what_is_dropped_is_counted(tmp_path: Path, monkeypatch):

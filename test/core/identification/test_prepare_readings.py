@@ -1,0 +1,147 @@
+"""What becomes a reading, in which group, at which level, and of which seal."""
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
+from seal_friction_ros.core.identification.readings import ManualReadings, RecordedLog
+from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
+
+BAR = 1e5  # [Pa]
+RATE = 100.0  # [Hz]
+FRICTION, OFFSET = 8.0, -3.0  # [N]
+
+
+# --- manual readings ---
+
+
+def manual(tests, name='sheet', more=0.0) -> ManualReadings:
+    """Readings of both directions; ``tests`` are the pressures [bar] of each test. Friction 10 N + 1 N/bar."""
+    rows = [(t, p, d) for t, pressures in enumerate(tests) for p in pressures for d in (1, -1)]
+    test, bar, direction = (np.array(column) for column in zip(*rows, strict=True))
+    return ManualReadings(name, test, bar * BAR, direction, 10.0 + more + bar, np.full(len(rows), 0.02))
+
+
+def test_manual_readings_get_the_sign_of_their_direction_and_every_seal_the_pressure():
+    prepared = prepare_manual_readings([manual([(-0.5, 10, 20), (0, 10, 20)])], [], 3)
+    readings = prepared.readings
+    assert readings.at.pressure.shape == (12, 3)
+    assert readings.at.pressure[:, 2].tolist() == [p * BAR for p in (0, 0, 10, 10, 20, 20) * 2]
+    assert readings.at.direction.tolist() == [1.0, -1.0] * 6
+    assert readings.at.velocity.tolist() == [0.02, -0.02] * 6
+    assert readings.force[:4].tolist() == [9.5, -9.5, 20.0, -20.0]
+    assert readings.level.tolist() == [0, 0, 1, 1, 2, 2] * 2
+    assert prepared.chamber_pressures.tolist() == [[p, p] for p in readings.at.pressure[:, 0]]
+    assert (prepared.breakaway, prepared.used, prepared.total) == (None, {'sheet': 12}, {'sheet': 12})
+    assert not readings.are_samples
+
+
+@pytest.mark.parametrize(
+    ('tests', 'kind', 'groups'),
+    [
+        ([(0, 10, 20), (0, 10, 20)], 'test', 2),
+        ([(0, 10, 20), (0, 10)], 'test', 2),
+        ([(0, 10, 20, 30), (0, 10)], 'pressure', 4),  # half of the pressures are not most of them
+        ([(0, 10, 20)], 'pressure', 3),
+    ],
+)
+def test_whole_tests_are_left_out_if_each_has_most_of_the_pressures_else_pressures(tests, kind, groups):
+    readings = prepare_manual_readings([manual(tests)], [], 2).readings
+    assert (readings.left_out_by, len(readings.groups)) == (kind, groups)
+    if kind == 'pressure':
+        assert readings.group.tolist() == readings.level.tolist()
+
+
+def test_tests_of_two_sources_are_different_tests():
+    readings = prepare_manual_readings([manual([(0, 10, 20)], 'one'), manual([(0, 10, 20)], 'other')], [], 1).readings
+    assert readings.names == ('one', 'other')
+    assert readings.source.tolist() == readings.group.tolist() == [0] * 6 + [1] * 6
+
+
+@pytest.mark.parametrize(('tests', 'by'), [([(0, 10, 20)] * 2, 'test'), ([(0, 10, 20)], 'pressure')])
+def test_breakaway_readings_belong_to_the_nearest_level_and_are_left_out_with_it(tests, by):
+    static = manual([(1, 19)], more=5.0)
+    breakaway = prepare_manual_readings([manual(tests)], [static], 2).breakaway
+    assert breakaway.level.tolist() == [0, 0, 2, 2]
+    assert breakaway.force.tolist() == [16.0, -16.0, 34.0, -34.0]
+    assert breakaway.left_out_by == 'pressure'
+    assert breakaway.group.tolist() == ([0, 0, 2, 2] if by == 'pressure' else breakaway.group.tolist())
+
+
+# --- logs ---
+
+
+def log(pressures, name='log', speed=0.03, peak=4.0, swept=False) -> RecordedLog:
+    """Strokes to and fro at each pressure [bar] of chamber a; chamber b has half of it; 1 s of even sliding each."""
+    velocity, force, bar = [], [], []
+    rest, ramp, even = 50, 20, 100
+    for pressure in pressures:
+        for side in (1.0, -1.0):
+            v = np.concatenate([np.zeros(rest), np.linspace(0.0, speed, ramp), np.full(even, speed)])
+            velocity.append(side * np.concatenate([v, np.linspace(speed, 0.0, ramp)]))
+            size = FRICTION + pressure
+            push = np.concatenate([np.linspace(0.0, size + peak, rest), np.full(2 * ramp + even, size)])
+            force.append(OFFSET + side * push)
+            bar.append(np.full(len(push), float(pressure)) if not swept else pressure + np.linspace(0, 9, len(push)))
+    v, f, p = (np.concatenate(parts) for parts in (velocity, force, bar))
+    return RecordedLog(name, Signals(np.arange(len(v)) / RATE, v, p * BAR, 0.5 * p * BAR, f), Sliding())
+
+
+def test_each_stroke_of_a_log_is_a_reading_of_the_chamber_of_each_seal():
+    prepared = prepare_logs([log((5, 15, 30))], ('b', 'a', 'b'))
+    readings = prepared.readings
+    assert (readings.count, readings.are_samples, readings.left_out_by) == (6, False, 'pressure')
+    assert readings.at.direction.tolist() == [1.0, -1.0] * 3
+    assert readings.at.velocity == pytest.approx(np.array([0.03, -0.03] * 3))
+    assert readings.at.pressure[::2] == pytest.approx(np.array([[2.5, 5, 2.5], [7.5, 15, 7.5], [15, 30, 15]]) * BAR)
+    assert prepared.chamber_pressures[::2] == pytest.approx(np.array([[5, 2.5], [15, 7.5], [30, 15]]) * BAR)
+    sizes = FRICTION + np.repeat([5.0, 15.0, 30.0], 2)
+    assert readings.force == pytest.approx(OFFSET + np.tile([1.0, -1.0], 3) * sizes)
+    assert readings.level.tolist() == readings.group.tolist() == [0, 0, 1, 1, 2, 2]
+    assert [len(samples) for samples in readings.samples] == [len(readings.samples[0])] * 6
+    assert prepared.used == {'log': sum(len(samples) for samples in readings.samples)}
+    assert prepared.total == {'log': 6 * 190}
+
+
+def test_each_start_from_rest_is_a_breakaway_reading_of_the_level_it_is_at():
+    prepared = prepare_logs([log((5, 15, 30))], ('a',))
+    breakaway = prepared.breakaway
+    assert breakaway.level.tolist() == breakaway.group.tolist() == [0, 0, 1, 1, 2, 2]
+    assert breakaway.force[:2] == pytest.approx(np.array([OFFSET + 17.0, OFFSET - 17.0]))
+    assert breakaway.samples == ()
+
+
+def test_whole_files_are_left_out_if_each_has_most_of_the_pressures():
+    prepared = prepare_logs([log((5, 15, 30), 'one'), log((5, 15, 30), 'two')], ('a',))
+    assert prepared.readings.left_out_by == 'file'
+    assert prepared.readings.group.tolist() == prepared.breakaway.group.tolist() == [0] * 6 + [1] * 6
+    assert prepared.readings.names == ('one', 'two')
+    assert set(prepared.used) == set(prepared.total) == {'one', 'two'}
+
+
+def test_what_is_not_used_is_counted_by_its_reason():
+    one = log((5, 15, 30))
+    one.signals.force_sum[[7, 8, 120]] = np.nan
+    prepared = prepare_logs([one], ('a',))
+    assert sum(prepared.left_out.values()) + sum(prepared.used.values()) == 6 * 190
+    assert prepared.left_out['not finite'] == 3
+    still = np.abs(one.signals.velocity) <= 3e-3
+    assert prepared.left_out['at rest'] == np.count_nonzero(still & np.isfinite(one.signals.force_sum))
+
+
+def test_a_swept_log_gives_samples_in_ten_blocks_and_too_few_are_refused():
+    prepared = prepare_logs([log((0, 10, 20), 'one', swept=True), log((0, 10, 20), 'two', swept=True)], ('a', 'b'))
+    readings = prepared.readings
+    assert (readings.are_samples, readings.left_out_by, prepared.breakaway) == (True, 'block', None)
+    assert len(readings.groups) == 20
+    sizes = [np.count_nonzero(group) for group in readings.groups]
+    assert max(sizes) - min(sizes) <= 1
+    assert readings.group.tolist() == sorted(readings.group)
+    assert (readings.group >= 10).tolist() == (readings.source == 1).tolist()
+    assert len(readings.levels) == 10
+    assert list(readings.levels) == list(range(10))
+    assert np.all(np.diff(readings.level_pressures) > 0.0)
+    assert readings.at.pressure[:, 1] == pytest.approx(0.5 * readings.at.pressure[:, 0])
+    short = log((0,), swept=True)
+    with pytest.raises(ValueError, match='samples of even sliding, 200 are needed'):
+        prepare_logs([short._replace(signals=short.signals.taken(np.r_[0:150, 190:340]))], ('a',))
