@@ -94,12 +94,13 @@ def test_a_ripple_is_forgotten_with_its_time_constant():
     assert state.last_ripple == pytest.approx(KNOWN.last_ripple / math.e, rel=1e-3)
 
 
+@pytest.mark.parametrize('side', [1.0, -1.0])
 @pytest.mark.parametrize(('ways', 'factor'), [(0.9, 1.5), (1.1, 1.0)])
-def test_a_reversal_after_a_short_way_widens_the_play(ways, factor):
-    state = KNOWN._replace(way=ways * SHORT_WAY * KNOWN.half_width, velocity=1e-4)
-    after = run([-10.0 * ONE], state)[-1]
+def test_a_reversal_after_a_short_way_widens_the_play(ways, factor, side):
+    state = KNOWN._replace(way=side * ways * SHORT_WAY * KNOWN.half_width, velocity=side * 1e-4)
+    after = run([-side * 10.0 * ONE], state)[-1]
     assert after.half_width == pytest.approx(factor * KNOWN.half_width, rel=1e-3)
-    same_way = run([10.0 * ONE], state)[-1]
+    same_way = run([side * 10.0 * ONE], state)[-1]
     assert same_way.half_width == pytest.approx(KNOWN.half_width, rel=1e-3)
 
 

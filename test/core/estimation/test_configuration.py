@@ -14,6 +14,7 @@ from paths import ROOT
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, ConditionedVelocity
 from seal_friction_ros.core.estimation.configuration import (
     Configuration,
+    Recorded,
     SealSelection,
     Snapshot,
     parse_snapshot,
@@ -178,6 +179,12 @@ def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
     taken_up = receive_one(back.configuration.parameters(), back.state, Velocity(200 * MS, 1.5e-3, b'rod'))
     assert straight[1].feedforward.force > 0.0
     assert taken_up == straight
+
+
+@pytest.mark.parametrize('recorded', [None, Recorded(None), Recorded(FeedForwardSettings(scale=0.5))])
+def test_what_acted_in_the_recording_comes_back(recorded):
+    snapshot = Snapshot(CONFIGURATION, init(CONFIGURATION.parameters()), recorded=recorded)
+    assert parse_snapshot(snapshot_text(snapshot)).recorded == recorded
 
 
 @pytest.mark.parametrize('text', ['', '{', 'null', '5', '[]', '{}', '"text"', '{"selection": {}}'])
