@@ -179,7 +179,10 @@ def __getattr__(name: str) -> Any:
     if kind == 'record':
         return _record_type(parts[0], tuple(parts[1:]))
     if kind == 'bound':
-        return _bound_type(resolve_name(':'.join(parts)))
+        try:
+            return _bound_type(resolve_name(':'.join(parts)))
+        except (ImportError, AttributeError):  # a function that is gone: code on disk that calls it fits nothing
+            return _named(type('Gone', (), {}), *name.split(':'))
     if kind in ('KeptStruct', 'KeptProxy'):
         _kept_type()
         return globals()[name]
