@@ -24,7 +24,7 @@ test:
 	$(python) -m ruff format --check .
 	$(python) -m mypy
 	$(python) -m pytest --numprocesses auto --dist loadfile test/core test/offline
-	$(python) -m pytest --ignore test/core --ignore test/offline
+	$(python) -m pytest --numprocesses auto --dist loadfile --ignore test/core --ignore test/offline
 
 bench: setup
 	@$(python) bench/step.py

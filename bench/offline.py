@@ -70,16 +70,16 @@ def _import() -> Callable[[Path], object]:
 
 def _replay() -> Callable[[Path], object]:
     from seal_friction_ros.offline.replay.compiled_replay import compile_now
-    from seal_friction_ros.offline.replay.replay import replay
+    from seal_friction_ros.offline.replay.parallel_replay import verify
 
     compile_now()
-    return lambda folder: replay(folder / 'bag', bulk_from=0)
+    return lambda folder: verify(folder / 'bag', bulk_from=0)
 
 
 def _replay_one_by_one() -> Callable[[Path], object]:
-    from seal_friction_ros.offline.replay.replay import replay
+    from seal_friction_ros.offline.replay.parallel_replay import verify
 
-    return lambda folder: replay(folder / 'bag', bulk_from=sys.maxsize)
+    return lambda folder: verify(folder / 'bag', bulk_from=sys.maxsize)
 
 
 def _replay_to_a_bag() -> Callable[[Path], object]:
@@ -90,14 +90,14 @@ def _replay_to_a_bag() -> Callable[[Path], object]:
 
 def _verify() -> Callable[[Path], object]:
     from seal_friction_ros.offline.replay.compiled_replay import compile_now
-    from seal_friction_ros.offline.replay.replay import replay
+    from seal_friction_ros.offline.replay.parallel_replay import verify
 
-    def verify(folder: Path) -> None:
-        if not replay(folder / 'replayed', bulk_from=0).identical:
+    def check(folder: Path) -> None:
+        if not verify(folder / 'replayed', bulk_from=0).identical:
             raise SystemExit('replay --verify found a difference')
 
     compile_now()
-    return verify
+    return check
 
 
 def _identify() -> Callable[[Path], object]:

@@ -1,5 +1,7 @@
 """Set-up of all tests: reproducible examples, one thread for linear algebra, compiled code on disk."""
 
+import signal
+
 from harness import compiled_code  # noqa: F401  before numba is loaded
 from hypothesis import settings
 
@@ -10,3 +12,4 @@ from seal_friction_ros.nodes.discovery import set_up_discovery
 settings.register_profile('reproducible', derandomize=True, deadline=None, database=None)
 settings.load_profile('reproducible')
 set_up_discovery()
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background inherits an ignored SIGINT

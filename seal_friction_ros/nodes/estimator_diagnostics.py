@@ -2,7 +2,6 @@
 
 import time
 from collections import Counter, deque
-from statistics import median
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -31,14 +30,15 @@ _LARGEST_DELAY = 1_000_000_000  # [ns] a stamp further back than this means that
 class MissingSamples:
     """Missing samples of one input, from the gaps between its stamps (our choice).
 
-    The middleware does not report samples that it discards when the node is too slow. The period is the median of the
-    last steps. Every step longer than 1.5 periods counts as a gap: also a jump of the clock, stamp jitter of a third of
-    the period and more, and the first eight steps at a lower rate. A stamp slightly back is a late sample, which
-    counted as missing before. A stamp far back means that the clock was set: the estimate of the period restarts.
+    The middleware does not report samples that it discards when the node is too slow. The period is the lower quartile
+    of the last 15 steps. Every step longer than 1.5 periods counts as a gap: also a jump of the clock, stamp jitter of
+    a third of the period and more, and the first twelve steps at a lower rate. A stamp slightly back is a late sample,
+    which counted as missing before. A stamp far back means that the clock was set: the period is learnt anew.
     """
 
     def __init__(self) -> None:
         self.count = 0
+        self._count_before = 0  # before the period was learnt
         self._stamp = 0
         self._period = 0.0
         self._steps: deque[int] = deque(maxlen=15)
@@ -48,16 +48,25 @@ class MissingSamples:
         step = stamp - self._stamp if self._stamp else 0
         if -_LARGEST_DELAY <= step < 0:
             self.count = max(self.count - 1, 0)
+            self._count_before -= 1
             return
         self._stamp = stamp
         if step <= 0:
             self._steps.clear()
+            self._count_before = self.count
             return
-        if self._steps and not 0.7 * self._period < step < 1.5 * self._period:  # seldom: the median is slow
-            self._period = median(self._steps)
-            if step > 1.5 * self._period:
-                self.count += round(step / self._period) - 1
+        is_learnt = len(self._steps) == self._steps.maxlen
         self._steps.append(step)
+        if is_learnt and 0.7 * self._period < step < 1.5 * self._period:
+            return
+        self._period = sorted(self._steps)[len(self._steps) // 4]  # seldom: sorting is slow
+        if is_learnt:
+            self.count += self._missing(step)
+        else:
+            self.count = max(self._count_before + sum(map(self._missing, self._steps)), 0)
+
+    def _missing(self, step: int) -> int:
+        return round(step / self._period) - 1 if step > 1.5 * self._period else 0
 
 
 class EstimatorDiagnostics:

@@ -472,7 +472,7 @@ def storage(path: Path) -> Storage:
         names, kind = information.get('relative_file_paths'), information.get('storage_identifier')
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise ValueError('metadata.yaml: relative_file_paths is not a list of names')
-        if kind not in _READERS:
+        if kind not in tuple(_READERS):  # it may be anything, also unhashable
             raise ValueError(f'metadata.yaml: storage_identifier = {kind!r} is neither mcap nor sqlite3')
         mode = str(information.get('compression_mode') or 'none').lower()
         if mode not in ('none', 'message'):

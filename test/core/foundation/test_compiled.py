@@ -89,3 +89,11 @@ def test_tuples_of_numbers_become_arrays_and_dataclasses_records():
 def test_another_name_is_no_attribute():
     with pytest.raises(AttributeError, match='no_such_name'):
         compiled.no_such_name  # noqa: B018
+
+
+def test_compiled_code_on_disk_that_knows_a_removed_law_does_not_stop_another_process():
+    made = compiled._bound_type(pressure_power_law)
+    pickled = pickle.dumps(made).replace(b'pressure_power_law', b'no_longer_here_law')
+    gone = pickle.loads(pickled)  # noqa: S301
+    assert gone is not made
+    assert pickle.loads(pickled) is gone  # noqa: S301
