@@ -274,6 +274,7 @@ def _send(emit: Any, record: Any, frame_id: Any) -> Any:
     write = _writer(layout)
 
     def implementation(emit: Any, record: Any, frame_id: Any) -> None:
+        """What compiled code runs."""
         k = 0
         for value in literal_unroll(record):
             emit.row[k] = value
