@@ -1,7 +1,6 @@
 """YAML files give plain data, valid records, or an error of one line that names the file."""
 
 import os
-import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -243,12 +242,12 @@ def test_an_unknown_parameter_is_rejected_with_a_suggestion(written, name, expec
     assert refusal.endswith(expected)
 
 
-def test_thousands_of_unknown_parameters_are_rejected_without_delay(written):
+def test_of_thousands_of_unknown_parameters_ten_get_a_hint(written):
+    """Comparing every name of a hostile file with all that are known would take minutes."""
     names = ', '.join(f'stick_velocit{number}: 1' for number in range(2500))
-    before = time.monotonic()
     refusal = complaint(load_parameter_file, written(f'/**: {{ros__parameters: {{{names}}}}}'))
-    assert time.monotonic() - before < 2.0  # [s] without the limit on hints: twenty times as long
     assert 'stick_velocit2499' in refusal
+    assert refusal.count('did you mean') == 10
 
 
 def test_a_pipe_is_rejected_without_waiting(tmp_path):

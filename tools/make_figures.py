@@ -56,6 +56,7 @@ def draw_architecture(path: Path) -> None:
         ax.axis('off')
 
         def box(text: str, x: float, y: float, width: float, height: float, colour: str) -> None:
+            """Draw a box with text around its middle."""
             corner, size = (x - width / 2.0, y - height / 2.0), {'width': width, 'height': height}
             edge = style.GREY if colour == style.LIGHT_GREY else colour
             ax.add_patch(

@@ -144,7 +144,6 @@ class _Outbox(NamedTuple):
     row: Any  # an answer as numbers, shape (16,)
     data: Any  # the messages, whose stamps and frame names the answers take over
     message_offsets: Any
-    received: Any
 
 
 def receive_all(
@@ -177,9 +176,8 @@ def receive_all(
         np.zeros(16),
         messages.data,
         messages.offsets,
-        messages.received,
     )
-    state, wrong = _receive_all(for_compiler(parameters), state, messages.kinds, outbox)
+    state, wrong = _receive_all(for_compiler(parameters), state, messages.kinds, messages.received, outbox)
     if wrong >= 0:
         raise UnsuitedError(f'an answer to message {wrong} is not finite')
     (estimates, feedforwards), (estimate_sizes, feedforward_sizes) = places
@@ -255,15 +253,17 @@ def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, receiv
 
 
 @compiled
-def _receive_all(parameters: Any, state: PipelineState, kinds: Bytes, outbox: Any) -> tuple[PipelineState, int]:
+def _receive_all(
+    parameters: Any, state: PipelineState, kinds: Bytes, receipts: Integers, outbox: Any
+) -> tuple[PipelineState, int]:
     """The pass; the number of the first message whose answer is not finite, or -1."""
-    data = outbox.data
+    data, message_offsets, cursor = outbox.data, outbox.message_offsets, outbox.cursor
     first, second, third = 0.0, 0.0, 0.0
     for i in range(len(kinds)):
         kind = kinds[i]
         if not _FORCE <= kind <= _VELOCITY:
             continue
-        offset, received = outbox.message_offsets[i], outbox.received[i]
+        offset, received = message_offsets[i], receipts[i]
         body = offset + 4 + _head_size(_integer(data, offset + 12, 4))
         stamp = _stamp(data, offset)
         first = _number(data, body)
@@ -282,22 +282,24 @@ def _receive_all(parameters: Any, state: PipelineState, kinds: Bytes, outbox: An
         else:
             wanted = ServoReference(stamp, first, second, third, i)
             state = receive_reference(parameters, state, wanted, received, outbox)
-        if outbox.cursor[0] < 0:
+        if cursor[0] < 0:
             return state, i
     return state, -1
 
 
 @overload(send, jit_options={'error_model': 'numpy'})
-def _send(emit: Any, record: Any, frame_id: Any) -> Any:  # noqa: ARG001  the names are those of `send`
+def _send(emit: Any, record: Any, frame_id: Any) -> Any:
     """`pipeline.send` in compiled code: the record goes into the outbox. The frame is the number of the message."""
+    del emit, frame_id  # overload compares the names with those of `send`
     column, layout = _ANSWERS[record.instance_class]
     write = _writer(layout)
 
     def implementation(emit: Any, record: Any, frame_id: Any) -> None:
-        k = 0  # enumerate cannot be unrolled
+        """What compiled code runs."""
+        k = 0
         for value in literal_unroll(record):
             emit.row[k] = value
-            k += 1  # noqa: SIM113
+            k += 1  # noqa: SIM113  enumerate cannot be unrolled
         write(emit, column, frame_id)
 
     return implementation
@@ -305,48 +307,48 @@ def _send(emit: Any, record: Any, frame_id: Any) -> Any:  # noqa: ARG001  the na
 
 @cache
 def _writer(layout: Layout) -> Any:
-    """Function that writes the answer in ``outbox.row`` by its layout."""
-    offsets, sizes = layout.offsets, tuple(struct.calcsize(code) for code in layout.codes)
-    count, size = len(offsets), layout.size
-    padded = (size + 7) // 8 * 8
+    """Function that writes the answer in ``outbox.row`` by its layout.
+
+    It takes the outbox apart at once: each access to an array of a record counts references, which costs more than the
+    writing. Likewise all is one function, with a loop for each size of numbers.
+    """
+    places = list(zip(layout.offsets, map(struct.calcsize, layout.codes), strict=True))
+    eights, fours, ones = (
+        np.array([(k, at) for k, (at, size) in enumerate(places, start=1) if size == wanted], np.int64).reshape(-1, 2)
+        for wanted in (8, 4, 1)
+    )  # which number of the row, and where it goes [bytes]; an empty array compiles, an empty tuple does not
+    size, padded = layout.size, (layout.size + 7) // 8 * 8
 
     @compiled
     def write(outbox: Any, column: int, number: int) -> None:
-        slot = outbox.cursor[0]
-        head = _write_head(outbox.small, slot, outbox.data, outbox.message_offsets[number])
-        outbox.offsets[column, number] = slot + 4
-        outbox.sizes[column, number] = 4 + head + size
+        """Write the answer to message ``number``.
+
+        Stamp and frame name are those of the message; the name ends in a zero byte, whatever its last byte was. The
+        numbers that follow are aligned to 8 bytes.
+        """
+        small, words, numbers, answer_offsets, answer_sizes, cursor, row, data, message_offsets = outbox
+        slot, offset = cursor[0], message_offsets[number]
+        small[slot + 5] = 1  # encapsulation
+        for k in range(8):
+            small[slot + 8 + k] = data[offset + 4 + k]
+        length = max(_integer(data, offset + 12, 4), 1)
+        small[slot + 16] = length & 0xFF
+        small[slot + 17] = length >> 8
+        for k in range(length - 1):
+            small[slot + 20 + k] = data[offset + 16 + k]
+        head = _head_size(length)
+        answer_offsets[column, number] = slot + 4
+        answer_sizes[column, number] = 4 + head + size
         body = slot + 8 + head
         finite = True
-        for k in range(count):
-            value, place = outbox.row[k + 1], body + offsets[k]
+        for i in range(len(eights)):
+            value = row[eights[i, 0]]
             finite = finite and np.isfinite(value)
-            if sizes[k] == 8:
-                outbox.numbers[place // 8] = value
-            elif sizes[k] == 4:
-                outbox.words[place // 4] = np.uint32(value)
-            else:
-                outbox.small[place] = np.uint8(np.int64(value))
-        outbox.cursor[0] = body + padded if finite else -1
+            numbers[(body + eights[i, 1]) // 8] = value
+        for i in range(len(fours)):
+            words[(body + fours[i, 1]) // 4] = np.uint32(row[fours[i, 0]])
+        for i in range(len(ones)):
+            small[body + ones[i, 1]] = np.uint8(np.int64(row[ones[i, 0]]))
+        cursor[0] = body + padded if finite else -1
 
     return write
-
-
-@compiled
-def _write_head(out: Bytes, slot: int, data: Bytes, offset: int) -> int:
-    """Encapsulation, stamp and frame name of the message that is answered, from ``slot`` + 4 on.
-
-    The name ends in a zero byte, whatever its last byte was. The numbers that follow are aligned to 8 bytes.
-
-    Returns:
-        Size of stamp and name [bytes].
-    """
-    out[slot + 5] = 1
-    for k in range(8):
-        out[slot + 8 + k] = data[offset + 4 + k]
-    length = max(_integer(data, offset + 12, 4), 1)
-    out[slot + 16] = length & 0xFF
-    out[slot + 17] = length >> 8
-    for k in range(length - 1):
-        out[slot + 20 + k] = data[offset + 16 + k]
-    return _head_size(length)

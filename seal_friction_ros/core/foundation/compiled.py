@@ -7,6 +7,8 @@
 What a friction law needs beyond numbers is here too: `bound` binds the parameters of a law to its function, `evaluate`
 calls it, `unrolled` loops over records of different types, and `for_compiler` converts records for compiled code.
 
+numba is imported where it is used: it takes half a second, and the live node does without.
+
 With ``NUMBA_DISABLE_JIT=1`` in the environment everything runs as plain Python and gives the same numbers.
 """
 
@@ -45,7 +47,7 @@ def compiled(function: Function) -> Function:
     ``NUMBA_CACHE_DIR`` names a folder for it. Use another folder after every change of the sources, as the tests do:
     numba compares the file of a function, not the files of the functions it calls.
     """
-    import numba  # noqa: PLC0415  half a second, and the live node does without
+    import numba
 
     make_known()
     config: Any = numba.config
@@ -54,7 +56,7 @@ def compiled(function: Function) -> Function:
 
 def make_known() -> None:
     """Let compiled code call every function that was marked `compilable` up to now."""
-    from numba.extending import register_jitable  # noqa: PLC0415
+    from numba.extending import register_jitable
 
     _teach_the_compiler()
     while _waiting:
@@ -135,8 +137,8 @@ def keep(value: Any) -> Any:
 
 @cache
 def _kept_type() -> Any:
-    import numba  # noqa: PLC0415
-    from numba.experimental import structref as untyped  # noqa: PLC0415
+    import numba
+    from numba.experimental import structref as untyped
 
     structref: Any = untyped
     unliteral: Any = numba.types.unliteral
@@ -191,7 +193,7 @@ def __getattr__(name: str) -> Any:
 
 @cache
 def _runs_as_python() -> bool:
-    import numba  # noqa: PLC0415
+    import numba
 
     config: Any = numba.config
     return bool(config.DISABLE_JIT)
@@ -204,7 +206,7 @@ def _with_unrolled_loops(function: Function) -> Function:
     """``function`` itself, or if it loops over `unrolled` records, a copy whose loops the compiler unrolls."""
     if 'unrolled' not in function.__code__.co_names:
         return function
-    from numba import literal_unroll  # noqa: PLC0415
+    from numba import literal_unroll
 
     known = function.__globals__ | {'unrolled': literal_unroll}
     return cast(Function, FunctionType(function.__code__, known, function.__name__, function.__defaults__))
@@ -212,7 +214,7 @@ def _with_unrolled_loops(function: Function) -> Function:
 
 def _stand_in(function: Callable[..., Any], known: Callable[..., Any]) -> None:
     """Compiled code that calls ``function`` calls ``known``."""
-    from numba.extending import overload  # noqa: PLC0415
+    from numba.extending import overload
 
     @overload(function, strict=False, jit_options={'error_model': 'numpy'})
     def _implementation(*_: Any, **__: Any) -> Callable[..., Any]:
@@ -222,10 +224,11 @@ def _stand_in(function: Callable[..., Any], known: Callable[..., Any]) -> None:
 @cache
 def _teach_the_compiler() -> None:
     """Once: what `evaluate` and `bisect_right` are in compiled code."""
-    from numba.extending import overload  # noqa: PLC0415
+    from numba.extending import overload
 
     @overload(evaluate, jit_options={'error_model': 'numpy'})
-    def _evaluate(function: Any, first: Any, second: Any) -> Callable[..., Any]:  # noqa: ARG001
+    def _evaluate(function: Any, first: Any, second: Any) -> Callable[..., Any]:
+        del first, second  # `overload` compares the names with those of `evaluate`
         called = _jitted(function.instance_class.function)
 
         def implementation(function: Any, first: Any, second: Any) -> Any:
@@ -234,7 +237,9 @@ def _teach_the_compiler() -> None:
         return implementation
 
     @overload(bisect_right)
-    def _bisect_right(knots: Any, x: Any) -> Callable[..., Any]:  # noqa: ARG001
+    def _bisect_right(knots: Any, x: Any) -> Callable[..., Any]:
+        del knots, x  # `overload` compares the names with those of `bisect_right`
+
         def implementation(knots: Any, x: Any) -> Any:
             return np.searchsorted(knots, x, side='right')
 
@@ -243,6 +248,6 @@ def _teach_the_compiler() -> None:
 
 @cache
 def _jitted(function: Callable[..., Any]) -> Callable[..., Any]:
-    import numba  # noqa: PLC0415
+    import numba
 
     return cast(Callable[..., Any], numba.njit(error_model='numpy')(function))

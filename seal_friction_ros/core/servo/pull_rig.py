@@ -34,6 +34,7 @@ def pull_rig(plan: PullTest, seals: tuple[MountedSeal, ...], period: float) -> P
     """
 
     def servo(pressure: float) -> ServoParameters:
+        """The rig with both lines at ``pressure`` [Pa]."""
         return ServoParameters(
             valve=ServoValve(supply_pressure=pressure, return_pressure=pressure, rated_flow=2.5e-4),
             cylinder=Cylinder(dead_volume=2e-5),

@@ -200,6 +200,7 @@ def read_data_sheet(path: Path) -> DataSheet:
     remarks = (f'{skipped} readings are marked as not taken',) if skipped else ()
 
     def manual(kind: str) -> ManualReadings:
+        """Readings of one kind, in SI units."""
         chosen = [(r.column.test, r.pressure, DIRECTIONS[r.column.direction], r.force)
                   for r in readings if r.column.kind == kind]  # fmt: skip
         test, pressure, direction, force = np.array(chosen, dtype=np.float64).reshape(-1, 4).T

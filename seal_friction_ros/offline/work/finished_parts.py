@@ -75,6 +75,7 @@ def run_parts(
     missing = [number for number in range(len(parts)) if number not in results]
 
     def keep(place: int, result: Any) -> None:
+        """Take the result of a missing part, and write its file."""
         number, values = missing[place], result._asdict() if hasattr(result, '_asdict') else result
         results[number] = values
         if folder is not None:

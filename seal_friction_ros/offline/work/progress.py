@@ -43,6 +43,7 @@ def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]
         refreshed = time.monotonic()
 
         def advance(steps: float) -> None:
+            """Move the bar on."""
             nonlocal refreshed
             bar.advance(task, steps)
             if shown and time.monotonic() > refreshed + _REFRESH_PERIOD:
@@ -56,6 +57,7 @@ def _shares(total: int | None, report: Callable[[float], None]) -> Callable[[flo
     pending = 0.0
 
     def advance(steps: float) -> None:
+        """Collect steps and report them by whole shares."""
         nonlocal pending
         pending += steps / total if total else 0.0
         if abs(pending) >= _SMALLEST_SHARE:

@@ -181,17 +181,8 @@ def reference_solution(servo, commands, command_time):
         while t < end:
             event = (lambda _, y, *_a: y[1]) if direction else (lambda _, y, *_a: holding(y) - abs(force(y)))
             event.terminal, event.direction = True, -direction if direction else -1
-            solution = solve_ivp(
-                equations,
-                (t, end),
-                y,
-                'DOP853',
-                args=(direction, u),
-                events=event,
-                rtol=1e-10,
-                atol=1e-12,
-                max_step=1e-3,
-            )
+            accuracy = {'rtol': 1e-10, 'atol': 1e-12, 'max_step': 1e-3}
+            solution = solve_ivp(equations, (t, end), y, 'DOP853', args=(direction, u), events=event, **accuracy)
             t, y = solution.t[-1], solution.y[:, -1]
             if solution.status == 1 and direction:
                 y[1] = 0.0
