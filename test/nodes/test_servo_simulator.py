@@ -132,7 +132,8 @@ def test_every_topic_comes_at_every_sample_and_the_reference_is_the_wave_asked_f
         assert all(step % 2_000_000 == 0 for step in steps)  # a busy machine may make it leave ticks out
         wave = Sine(amplitude=0.002, frequency=3.0)
         first = heard['servo_reference'][0]
-        start = next(i for i in range(1000) if wave.at(i * 2e-3).position == pytest.approx(first.position, abs=1e-15))
+        first = pytest.approx((first.position, first.velocity), abs=1e-12)  # the position alone comes twice a period
+        start = next(i for i in range(1000) if (wave.at(i * 2e-3).position, wave.at(i * 2e-3).velocity) == first)
         for stamp, message in zip(stamps[:90], heard['servo_reference'], strict=False):
             wanted = wave.at(start * 2e-3 + (stamp - stamps[0]) * 1e-9)
             assert (message.position, message.velocity) == pytest.approx((wanted.position, wanted.velocity), abs=1e-12)
@@ -151,10 +152,11 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
     assert verdict.identical
     assert verdict.recorded_feedforwards > 0.98 * verdict.recorded_estimates > 900
     run = read_run(tmp_path / 'bag')
-    late = ('PRESSURE_MISSING', 'FORCE_MISSING', 'PRESSURE_STALE', 'FORCE_STALE')  # connected last, or a busy machine
+    late = ('PRESSURE_MISSING', 'FORCE_MISSING', 'PRESSURE_STALE', 'FORCE_STALE', 'STAMP_AGE')  # or a busy machine
     counts = evaluate_run(run).status_counts
     assert {bit for bit, count in counts.items() if count} <= {*late, 'MOTION_UNCERTAIN'}  # near rest, at reversals
-    assert sum(counts.values()) < 0.1 * verdict.recorded_estimates
+    learning = 100  # samples until the ripple of the velocity is known
+    assert sum(counts.values()) < learning + 0.1 * verdict.recorded_estimates
     assert float(abs(run.feedforward_force[200:]).max()) == pytest.approx(0.9 * run.coulomb_friction.max(), rel=0.1)
 
 
