@@ -145,7 +145,7 @@ def test_every_topic_comes_at_every_sample_and_the_reference_is_the_wave_asked_f
 def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_path):
     estimator = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     estimator['refuse_second_publisher'] = False  # the listener publishes, too
-    with stage({'sensors.force_noise': 0.5}, estimator) as s:
+    with stage({'sensors.force_noise': 0.5, 'sine.frequency': 0.83}, estimator) as s:  # not in step with diagnostics
         s.wait(lambda: s.estimator.sent > 2000)  # estimates and feed-forwards
         s.wait(lambda: abs(float(s.listener.values().get('feed-forward [N]', 0.0))) > 20.0)
     verdict = replay(tmp_path / 'bag')
