@@ -21,7 +21,6 @@ from seal_friction_ros.core.friction.laws import FRICTION_LAWS
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.law import FrictionLaw, TypicalReading
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
-from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
 from seal_friction_ros.core.friction.laws.pressure_power_law import ELASTIC_EXPONENT, PressurePowerLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 
@@ -149,6 +148,8 @@ def normal_forces(pressure: FloatArray, geometry: SealGeometry, law: NormalForce
     return np.asarray(forces[back].reshape(pressure.shape))
 
 
+EXPONENTS = {'2_3': ELASTIC_EXPONENT, '1': 1.0, '3_2': 1.5, '2': 2.0}
+"""Suffix of the name -> fixed pressure exponent: O-rings are near 2/3, lip seals near 1 to 3/2 (our choice)."""
 _WITH_SPEEDS = (  # suffix of the name, text of the formula, names of the velocity terms
     ('viscous', 'viscous', ('viscous_friction',)),
     ('stribeck', 'viscous + Stribeck', ('viscous_friction', 'stribeck_friction', 'stribeck_velocity')),
@@ -157,43 +158,74 @@ _WITH_SPEEDS = (  # suffix of the name, text of the formula, names of the veloci
 _WITHOUT_SPEEDS = (('asymmetric', 'asymmetry', ('asymmetry',)),)
 
 
+class Variation(NamedTuple):
+    """What the readings vary, which decides what they can identify."""
+
+    pressures: int = 3  # distinct ones, up to 3: with fewer, the rise over pressure is a prior
+    speeds: bool = True  # the speed varies at one pressure and direction: velocity terms
+    asymmetry: bool = True  # sources hold several pressures: asymmetry, which else is an offset
+    exponent: bool = True  # there are enough pressures for a free pressure exponent
+
+
 def candidate_laws(
-    *,
+    variation: Variation,
     geometry: SealGeometry | None = None,
     normal_force_law: NormalForceLaw | None = None,
-    with_speeds: bool,
-    with_exponent: bool,
 ) -> tuple[CandidateLaw, ...]:
-    """Laws that the data can identify: constant, pressure-dependent, physics-based, each with velocity terms if any.
+    """Laws without velocity terms that the data can identify, from simple to complex, and the constant one with them.
 
-    Laws that need geometry and normal force of the ring are left out without them. ``with_speeds``: the readings differ
-    in speed, so velocity terms are identifiable. ``with_exponent``: there are enough pressures to identify the pressure
-    exponent; otherwise it is 2/3.
+    The pressure power law comes with each of `EXPONENTS`, and with a free one where the data determine it. Laws that
+    need geometry and normal force of the ring are left out without them.
     """
     parts = {'geometry': geometry, 'normal_force_law': normal_force_law} if geometry and normal_force_law else {}
-    bases = [_base(law_type, parts, with_speeds, with_exponent) for law_type in FRICTION_LAWS]
+    bases = [_base(law_type, parts, variation.speeds) for law_type in FRICTION_LAWS]
     constant, *laws = [base for base in bases if base is not None]
-    highest = next(base for base in laws if base.law_type is (PhysicsBased if parts else PressurePowerLaw))
-
-    def extended(base: CandidateLaw, prefix: str) -> list[CandidateLaw]:
-        """The law with each group of velocity terms."""
-        return [
-            replace(
-                base,
-                name=f'{prefix}_{suffix}',
-                formula=f'{base.formula} + {terms}',
-                parameters=(*base.parameters, *(p for p in fitted_parameters(VelocityTerms) if p.name in names)),
-            )
-            for suffix, terms, names in (_WITH_SPEEDS if with_speeds else _WITHOUT_SPEEDS)
-        ]
-
-    on_constant = extended(constant, 'coulomb') if with_speeds else ()
-    return (constant, *on_constant, *laws, *extended(highest, highest.name))
+    if variation.pressures < 3:
+        return (_with_prior(next(law for law in laws if law.law_type is PressurePowerLaw), variation.pressures),)
+    found = [constant, *(with_velocity_terms(constant, variation) if variation.speeds else ())]
+    for law in laws:
+        if law.law_type is PressurePowerLaw:
+            found += [_with_exponent(law, *item) for item in EXPONENTS.items()]
+        if law.law_type is not PressurePowerLaw or variation.exponent:
+            found.append(law)
+    return tuple(found)
 
 
-def _base(
-    law_type: type[FrictionLaw], parts: Mapping[str, Any], with_speeds: bool, with_exponent: bool
-) -> CandidateLaw | None:
+def with_velocity_terms(base: CandidateLaw, variation: Variation) -> tuple[CandidateLaw, ...]:
+    """The law with each group of velocity terms that the data can identify."""
+    prefix = 'coulomb' if base.law_type is ConstantCoulomb else base.name
+    return tuple(
+        replace(
+            base,
+            name=f'{prefix}_{suffix}',
+            formula=f'{base.formula} + {terms}',
+            parameters=(*base.parameters, *(p for p in fitted_parameters(VelocityTerms) if p.name in names)),
+        )
+        for suffix, terms, names in (_WITH_SPEEDS if variation.speeds else _WITHOUT_SPEEDS)
+        if variation.asymmetry or 'asymmetry' not in names
+    )
+
+
+def _with_exponent(law: CandidateLaw, suffix: str, exponent: float) -> CandidateLaw:
+    """The pressure power law with a fixed exponent."""
+    parameters = tuple(p for p in law.parameters if p.name != 'pressure_exponent')
+    name, formula = f'{law.name}_{suffix}', law.formula.replace('^m', f'^({suffix.replace("_", "/")})')
+    return replace(law, name=name, formula=formula, parameters=parameters, fixed={'pressure_exponent': exponent})
+
+
+def _with_prior(law: CandidateLaw, pressures: int) -> CandidateLaw:
+    """The pressure power law with the exponent of an elastic contact; at one pressure without f_0, too.
+
+    Friction proportional to P^(2/3) is the law of an elastic contact that only pressure loads [Schallamach1958]_. Away
+    from the pressures that were measured it is a guess.
+    """
+    fixed = {'pressure_exponent': ELASTIC_EXPONENT} | ({} if pressures == 2 else {'friction_at_no_pressure': 0.0})
+    parameters = tuple(p for p in law.parameters if p.name not in fixed)
+    formula = law.formula.replace('^m', '^(2/3)') + ', rise over pressure from a prior'
+    return replace(law, name=f'{law.name}_2_3', formula=formula, parameters=parameters, fixed=fixed)
+
+
+def _base(law_type: type[FrictionLaw], parts: Mapping[str, Any], with_speeds: bool) -> CandidateLaw | None:
     """A law without velocity terms; None if it has no fitted parameter or needs something unknown."""
     part_name, part_type = law_type.FITTED_PART or ('', law_type)
     parameters = fitted_parameters(part_type)
@@ -201,6 +233,4 @@ def _base(
     depends_on_speed = 'reference_speed' in meanings(law_type)
     if not parameters or not set(needed) <= set(parts) or (depends_on_speed and not with_speeds):
         return None
-    fixed = {'pressure_exponent': ELASTIC_EXPONENT} if law_type is PressurePowerLaw and not with_exponent else {}
-    parameters = tuple(p for p in parameters if p.name not in fixed)
-    return CandidateLaw(law_type.NAME, law_type.FORMULA, law_type, parameters, fixed, {n: parts[n] for n in needed})
+    return CandidateLaw(law_type.NAME, law_type.FORMULA, law_type, parameters, {}, {n: parts[n] for n in needed})

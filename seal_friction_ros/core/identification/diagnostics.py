@@ -1,24 +1,23 @@
-"""Diagnostics of friction readings: repeatability, drift, collinearity, outliers, and changes between sources."""
+"""Diagnostics of friction readings: repeatability, collinearity, outliers, and differences between sources."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
-from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, ParameterValues
-from seal_friction_ros.core.identification.fitting import LawFit, fit, jackknife_errors, offsets_of, root_mean_square
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
+from seal_friction_ros.core.identification.fitting import LawFit, fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 COLLINEAR = 0.9  # correlation above which two regressors are called collinear (our choice)
 TRADED_OFF = 0.95  # correlation above which two fitted parameters cannot be determined separately (our choice)
-ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
-SMALLEST_NOISE = 1e-6  # relative; a smaller residual is rounding (our choice)
+LEVEL_SCATTER = 0.05  # [-] between pressures held one after the other, on one day (our choice)
 OUTLIER = 3.0  # standard deviations from the law of the other pressures (our choice)
-CHANGED = 0.2  # relative difference of two files that are two states; runs on a rig repeat within 10 to 15 %
+CHANGED = 0.2  # relative difference of two files that is worth a warning (our choice)
 SETTLED = 0.1  # relative change of the friction over one run above which the seal has not settled (our choice)
 
 
@@ -46,30 +45,6 @@ def _pooled_std(parts: Iterable[FloatArray], unit: float | None = None) -> float
         squares += float(np.sum((part - mean) ** 2)) / (max(mean**2, 1e-24) if unit is None else 1.0)
         freedom += len(part) - 1
     return math.sqrt(squares / freedom) / (unit or 1.0) if freedom else math.nan
-
-
-def run_drift(readings: FrictionReadings, offsets: FloatArray) -> dict[int, float]:
-    """Relative change of the friction from the first to the last stroke at each pressure level [-].
-
-    It is the slope of a line through the strokes of one source in one direction, in order of time; mean over directions
-    and sources. Levels with fewer than four strokes in a direction are left out.
-    """
-    measured = readings.magnitudes(offsets)
-    result: dict[int, list[float]] = {}
-    for level, inside in readings.levels.items():
-        for source in np.unique(readings.source[inside]):
-            for side in (-1.0, 1.0):
-                run = measured[inside & (readings.source == source) & (readings.at.direction == side)]
-                if len(run) >= 4:
-                    slope = float(np.polyfit(np.arange(len(run)), run, 1)[0])
-                    result.setdefault(level, []).append(slope * (len(run) - 1) / float(run.mean()))
-    return {level: float(np.mean(values)) for level, values in result.items()}
-
-
-def between_runs(readings: FrictionReadings) -> float:
-    """Relative standard deviation of the friction between sources at one pressure [-]; NaN if none was repeated."""
-    frictions = (readings.frictions_of_sources(inside) for inside in readings.levels.values())
-    return _pooled_std(np.array(list(of_source.values())) for of_source in frictions)
 
 
 class CorrelatedPair(NamedTuple):
@@ -123,31 +98,32 @@ class Outlier(NamedTuple):
     standard_deviations: float
 
 
-def outlying_level(
-    law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, floor: float
-) -> Outlier | None:
+def outlying_level(laws: Sequence[CandidateLaw], readings: FrictionReadings) -> Outlier | None:
     """The pressure level that deviates most from the law of the others, if by more than `OUTLIER`; else None.
 
-    Each level is left out and the law is fitted to the rest, from start values ``near``. The standard deviation of the
-    deviation contains the residuals of the rest, the repeatability ``floor`` [-], and the leverage of the level. An
-    outlier also disturbs the law of the rest when another level is left out; only without the outlier do the rest
-    agree. A level at which the law of the rest gives 0 N has no relative deviation: it is not assessed and has no
-    residual. Fewer than four levels have no outlier.
+    Each level is left out, and each of the ``laws`` is fitted to the rest; the one that fits the rest best counts. The
+    standard deviation of the deviation contains the residuals of the rest, the scatter of a pressure held anew
+    (`LEVEL_SCATTER`), and the leverage of the level. A level at which the law of the rest gives 0 N has no relative
+    deviation: it is not assessed and has no residual. Fewer than four levels have no outlier.
     """
     if len(readings.levels) < 4:
         return None
     measured = np.array([readings.half_range(inside).friction for inside in readings.levels.values()])
     found: list[Outlier] = []
     for index, (level, out) in enumerate(readings.levels.items()):
-        of_rest = fit(law, readings.taken(~out), near, is_close=True)
-        expected = _level_means(of_rest, readings)
-        rest = (expected > 0.0) & (np.arange(len(expected)) != index)
+        trained = readings.taken(~out)
+        fits = [fit(law, trained) for law in laws]
+        expectations = [_level_means(each, readings) for each in fits]
+        deviations = [measured / np.where(e > 0.0, e, np.inf) - 1.0 for e in expectations]
+        rests = [(e > 0.0) & (np.arange(len(e)) != index) for e in expectations]
+        errors = [math.hypot(*d[rest]) if rest.any() else math.inf for d, rest in zip(deviations, rests, strict=True)]
+        best = int(np.argmin(errors))
+        expected, deviation, rest = expectations[best], deviations[best], rests[best]
         if expected[index] == 0.0 or not rest.any():
             continue
-        deviation = measured / np.where(expected > 0.0, expected, np.inf) - 1.0
-        residual = math.hypot(*deviation[rest]) / math.sqrt(max(rest.sum() - len(law.parameters), 1))
-        noise = max(math.hypot(residual, floor), SMALLEST_NOISE)
-        slopes = _relative_slopes(of_rest, readings, expected)
+        residual = errors[best] / math.sqrt(max(rest.sum() - len(laws[best].parameters), 1))
+        noise = math.hypot(residual, LEVEL_SCATTER)
+        slopes = _relative_slopes(fits[best], readings, expected)
         leverage = float(slopes[index] @ np.linalg.pinv(slopes[rest].T @ slopes[rest]) @ slopes[index])
         size = abs(float(deviation[index])) / (noise * math.sqrt(1.0 + leverage))
         found.append(Outlier(level, float(measured[index]), float(expected[index]), size))
@@ -170,55 +146,6 @@ def _relative_slopes(found: LawFit, readings: FrictionReadings, means: FloatArra
         moved = replace(found, values=found.values | {parameter.name: value + share * (abs(value) or 1.0)})
         result[:, i] = (_level_means(moved, readings) / np.where(means > 0.0, means, np.inf) - 1.0) / share
     return result
-
-
-class FrictionChange(NamedTuple):
-    """Friction of another source relative to a law."""
-
-    name: str
-    ratio: float  # friction of the source over friction by the law [-]
-    standard_error: float  # of the ratio [-]
-    rms: float  # [N] residual of the law on the source, offset removed
-    own_rms: float  # [N] residual of the same law fitted to the source
-
-    @property
-    def is_change(self) -> bool:
-        """Whether the friction has changed: by more than `CHANGED` and more than twice the standard error."""
-        return abs(self.ratio - 1.0) > max(CHANGED, 2.0 * self.standard_error)
-
-
-def compare_with_law(found: LawFit, fitted: FrictionReadings, other: FrictionReadings) -> FrictionChange:
-    """Compare the samples of another source with a law that was fitted to the readings ``fitted``.
-
-    The ratio comes from least squares, offset eliminated, over the samples up to the highest pressure and speed of the
-    fit; its standard error is that of the jackknife over groups.
-
-    Raises:
-        ValueError: Fewer than 10 % of the samples are at pressures and speeds of the fit.
-    """
-    inside = other.seal_pressure <= fitted.seal_pressure.max()
-    if np.isfinite(other.at.velocity).all() and np.isfinite(fitted.at.velocity).all():
-        inside &= np.abs(other.at.velocity) <= np.abs(fitted.at.velocity).max()
-    if inside.sum() < 0.1 * other.count:
-        raise ValueError(
-            f'{other.names[0]}: {100.0 * inside.mean():.0f} % of its samples are at pressures and speeds of '
-            f'{fitted.names[0]}, so they cannot be compared: identify each separately'
-        )
-    other = other.taken(inside)
-    friction = found.friction(other.at)
-
-    def ratio(index: BoolArray | slice) -> float:
-        """Slope of measured over predicted friction."""
-        x = other.at.direction[index] * friction[index]
-        y = other.force[index]
-        x = x - x.mean()
-        return float(np.sum(x * (y - y.mean())) / np.sum(x * x))
-
-    error = float(jackknife_errors(np.array([ratio(~out) for out in other.groups])))
-    own = fit(found.law, other, found.values, is_close=True)
-    rms = root_mean_square(other.magnitudes(offsets_of(other, friction)) - friction)
-    own_rms = root_mean_square(other.magnitudes(own.offsets) - own.friction(other.at))
-    return FrictionChange(other.names[int(other.source[0])], ratio(slice(None)), error, rms, own_rms)
 
 
 class LevelChange(NamedTuple):

@@ -20,10 +20,12 @@ from seal_friction_ros.core.identification.readings import (
     check_log,
     check_manual_readings,
     check_readings,
+    has_pressures,
 )
 
 BLOCKS = 10  # contiguous parts of a swept log, each predicted from the others
 HELD_LOG = 0.8  # of the even samples in strokes at held speed and pressure: each stroke is a reading (our choice)
+PARTS = 4  # contiguous parts of the strokes at one pressure, each predicted from the others (our choice)
 FEWEST_SWEPT = 200  # samples of even sliding, so that a block has 20 (our choice)
 
 _Rows = Sequence[tuple[int, signal_preparation.SignalReading]]
@@ -72,11 +74,36 @@ def _columns(rows: _Rows, chambers: Sequence[str]) -> tuple[OperatingConditions,
 
 def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> tuple[FrictionReadings, FloatArray]:
     at, pressures, force, source = _columns(rows, chambers)
-    level = signal_preparation.pressure_levels(at.pressure.mean(axis=1))
+    held = at.pressure.mean(axis=1)
+    for number in np.unique(source):
+        inside = source == number
+        held[inside] = signal_preparation.held_pressures(held[inside], at.direction[inside])
+    level = signal_preparation.pressure_levels(held)
     group, by = _groups(level, source, 'file')
     names = tuple(log.name for log in logs)
     samples = tuple(logs[number].signals.force_sum[r.samples] for number, r in rows)
-    return FrictionReadings(at, force, source, group, level, names, by, are_samples=False, samples=samples), pressures
+    ways = [_travel(log.signals) for log in logs]
+    travel = np.array([ways[number][r.samples].mean() for number, r in rows])
+    readings = FrictionReadings(at, force, source, group, level, names, by, False, samples, travel)
+    if by == 'pressure' and not has_pressures(readings):  # a pressure that is left out leaves nothing to predict it by
+        readings = replace(readings, group=_parts_of_strokes(source, level), left_out_by='block')
+    return readings, pressures
+
+
+def _travel(signals: signal_preparation.Signals) -> FloatArray:
+    """Way of the rod since the start [m], shape (n,); a missing velocity counts as rest."""
+    steps = np.diff(signals.time, prepend=signals.time[:1])
+    steps = np.minimum(steps, signal_preparation.LONGEST_GAP)
+    return np.asarray(np.cumsum(np.nan_to_num(np.abs(signals.velocity)) * steps))
+
+
+def _parts_of_strokes(source: IntArray, level: IntArray) -> IntArray:
+    """Number of the part of each stroke: `PARTS` contiguous parts for each source and pressure."""
+    part = np.zeros(len(source), dtype=np.int64)
+    for number, at in np.unique(np.column_stack((source, level)), axis=0):
+        inside = np.flatnonzero((source == number) & (level == at))
+        part[inside] = np.arange(len(inside)) * PARTS // len(inside)
+    return part
 
 
 def _breakaway(
@@ -87,8 +114,10 @@ def _breakaway(
         return None
     at, _, force, source = _columns(rows, chambers)
     level = _nearest_level(at.pressure.mean(axis=1), dynamic)
-    group = source if dynamic.left_out_by == 'file' else level
-    return replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=())
+    several = len(np.unique(source)) > 1
+    group = level if dynamic.left_out_by == 'pressure' else source if several else _parts_of_strokes(source, level)
+    empty = np.empty(0)
+    return replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=(), travel=empty)
 
 
 def _groups(level: IntArray, part: IntArray, kind: str) -> tuple[IntArray, str]:
@@ -175,4 +204,7 @@ def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
     tests = np.unique(np.column_stack((source, test)), axis=0, return_inverse=True)[1].reshape(-1)
     group, by = _groups(level, tests, 'test')
     at = OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64))
-    return FrictionReadings(at, direction * friction, source, group, level, names, by, are_samples=False)
+    readings = FrictionReadings(at, direction * friction, source, group, level, names, by, are_samples=False)
+    if by == 'pressure' and not has_pressures(readings):
+        return replace(readings, group=_parts_of_strokes(source, level), left_out_by='block')
+    return readings

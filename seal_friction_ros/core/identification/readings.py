@@ -3,7 +3,7 @@
 Each error of a check is one line: source, fault, and what to do.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ from seal_friction_ros.core.identification.signal_preparation import (
     longest_stretch,
 )
 
-FEWEST_PRESSURES = 3  # any line fits two points; a third one tests it
+FEWEST_PRESSURES = 3  # any line fits two points; a third one tests it: with fewer a prior takes the place of the third
 LONGEST_NAN = 0.5  # [s] a longer stretch without a value is a sensor fault (our choice)
 LARGEST_NAN_SHARE = 0.01  # of the samples (our choice)
 NARROWEST_PRESSURES = 5e4  # [Pa] from the lowest to the highest; less is one pressure (our choice)
@@ -67,6 +67,8 @@ class FrictionReadings:
     left_out_by: str  # meaning of ``group``: test, pressure, file or block
     are_samples: bool  # samples of a swept log; otherwise strokes or manual readings at held pressures
     samples: tuple[FloatArray, ...] = ()  # [N] force sums behind each reading; empty if there is only the reading
+    travel: FloatArray = field(default_factory=lambda: np.empty(0))
+    """[m] way of the rod since the start of its source, shape (n,); empty if unknown"""
 
     @property
     def count(self) -> int:
@@ -104,6 +106,7 @@ class FrictionReadings:
             group=self.group[where],
             level=self.level[where],
             samples=tuple(self.samples[i] for i in where) if self.samples else (),
+            travel=self.travel[where] if len(self.travel) else self.travel,
         )
 
     def magnitudes(self, offsets: FloatArray) -> FloatArray:
@@ -277,32 +280,20 @@ def _check_bounds(name: str, pressure: FloatArray, speed: FloatArray, force: Flo
             )
 
 
+def has_pressures(readings: FrictionReadings) -> bool:
+    """Whether the readings show how friction depends on pressure: enough pressures, far enough apart."""
+    pressures = readings.seal_pressure
+    wide = float(np.ptp(pressures)) >= max(NARROWEST_PRESSURES, 0.1 * float(pressures.max()))
+    return wide and (readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES)
+
+
 def check_readings(readings: FrictionReadings) -> None:
     """Check that a law can be fitted to readings.
 
     Raises:
-        ValueError: Too few pressures, negative friction, or forces and pressures that do not belong to one seal.
+        ValueError: Negative friction, or forces and pressures that do not belong to one seal.
     """
     where = ', '.join(readings.names)
-    pressures, levels = readings.seal_pressure, readings.levels
-    spanned = float(np.ptp(pressures))
-    if spanned < max(NARROWEST_PRESSURES, 0.1 * float(pressures.max())):
-        raise ValueError(
-            f'{where}: everything was measured at one pressure, {float(np.median(pressures)) / BAR:.4g} bar (within '
-            f'{spanned / BAR:.2g} bar), so the data do not show how friction depends on pressure: measure at '
-            f'{FEWEST_PRESSURES} pressures at least (or is the pressure not in Pa?)'
-        )
-    if not readings.are_samples and len(levels) < FEWEST_PRESSURES:
-        at = ', '.join(f'{pressure / BAR:.4g}' for pressure in readings.level_pressures)
-        raise ValueError(
-            f'{where}: measured at {len(levels)} pressures ({at} bar), which any law fits: measure at '
-            f'{FEWEST_PRESSURES} at least, better at five'
-        )
-    _check_sizes(where, readings)
-
-
-def _check_sizes(where: str, readings: FrictionReadings) -> None:
-    """Check whether friction, offset and pressure can belong to one seal."""
     friction, offsets = np.array([readings.half_range(inside) for inside in readings.levels.values()]).T
     pressure = readings.level_pressures
     negative = np.flatnonzero(friction <= 0.0)
@@ -313,14 +304,14 @@ def _check_sizes(where: str, readings: FrictionReadings) -> None:
             'unit in the force sum'
         )
     spanned, strongest = float(np.ptp(pressure)), float(friction.max())
-    area_error = float(np.polyfit(pressure, offsets, 1)[0])
+    area_error = float(np.polyfit(pressure, offsets, 1)[0]) if has_pressures(readings) else 0.0
     if not readings.are_samples and abs(area_error) * spanned > LARGEST_AREA_ERROR * float(friction.mean()):
         raise ValueError(
             f'{where}: the offset of the force sum changes by {area_error * spanned:.4g} N over the pressures, and the '
             f'friction is {float(friction.mean()):.4g} N: sign, area or unit of the pressure force in the force sum is '
             f'wrong (error {1e6 * area_error:.4g} mm2)'
         )
-    area = float(friction[-1] - friction[0]) / spanned
+    area = float(friction[-1] - friction[0]) / max(spanned, NARROWEST_PRESSURES)
     if abs(area) > LARGEST_SEAL_AREA:
         raise ValueError(
             f'{where}: friction changes by {area * BAR:.4g} N per bar, as for a seal of {1e4 * area:.3g} cm2: force or '

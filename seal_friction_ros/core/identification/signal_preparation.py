@@ -24,6 +24,7 @@ PRESSURE_NOISE = 2e4  # [Pa] a smaller change is noise at any pressure (our choi
 HELD_SHARE = 0.5  # of the samples of a stroke that must be at held speed (our choice)
 LEVEL_GAP = 0.05  # of the pressure: a larger step between sorted pressures separates two levels (our choice)
 LEVEL_GAP_MIN = 1e4  # [Pa] smallest such step: near zero a regulator differs between the directions
+SAME_LEVEL = 0.2  # of the pressure: two directions of one log that differ less are one level (our choice)
 LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp and is divided into equal parts
 
 
@@ -254,6 +255,32 @@ def pressure_levels(pressures: FloatArray) -> IntArray:
         part = np.unique(part, return_inverse=True)[1]
         result[order[cluster]] = used + part
         used += int(part[-1]) + 1
+    return result
+
+
+def held_pressures(pressures: FloatArray, direction: FloatArray) -> FloatArray:
+    """Pressure [Pa] at which each stroke of one log counts as held, shape (n,): the mean of both directions.
+
+    A regulator under a moving piston holds one pressure on extension and another on retraction: 0.95 and 1.06 bar on
+    the Delft rig. If both directions have equally many levels, and each level of one is near that of the other
+    (`SAME_LEVEL`, or twice `LEVEL_GAP_MIN`), the two are one level. Otherwise each stroke has its own pressure.
+    """
+    sides = [np.flatnonzero(direction == side) for side in (-1.0, 1.0)]
+    if not all(len(side) for side in sides):
+        return pressures
+    levels = [pressure_levels(pressures[side]) for side in sides]
+    means = [
+        np.array([pressures[side][level == i].mean() for i in np.unique(level)])
+        for side, level in zip(sides, levels, strict=True)
+    ]
+    if len(means[0]) != len(means[1]):
+        return pressures
+    middle = (means[0] + means[1]) / 2.0
+    if (np.abs(means[1] - means[0]) > np.maximum(SAME_LEVEL * np.abs(middle), 2.0 * LEVEL_GAP_MIN)).any():
+        return pressures
+    result = pressures.copy()
+    for side, level in zip(sides, levels, strict=True):
+        result[side] = middle[level]
     return result
 
 

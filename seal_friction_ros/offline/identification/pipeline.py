@@ -6,7 +6,6 @@ number is rounded to six digits before another number is computed from it: the s
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,11 +18,19 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
+from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
 from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
-from seal_friction_ros.core.identification import diagnostics, fitting
-from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, candidate_laws, normal_forces
-from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
-from seal_friction_ros.core.identification.signal_preparation import offset_line
+from seal_friction_ros.core.identification import diagnostics, fitting, runs, validation
+from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
+from seal_friction_ros.core.identification.candidate_laws import (
+    CandidateLaw,
+    Variation,
+    candidate_laws,
+    normal_forces,
+)
+from seal_friction_ros.core.identification.force_correction import force_correction
+from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings, has_pressures
+from seal_friction_ros.core.identification.selection import NEAR, recommended, rise_over_pressures, score_ladder
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.data_sheet import geometry_of_seal_file
 from seal_friction_ros.offline.identification.results import (
@@ -42,7 +49,9 @@ from seal_friction_ros.offline.identification.sources import SourceOptions, Sour
 from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
 from seal_friction_ros.offline.work.progress import progress
 
-SPEEDS_DIFFER = 1.5  # fastest over slowest reading above which velocity terms are tried (our choice)
+SPEEDS_DIFFER = 1.5  # fastest over slowest reading at one pressure, above which velocity terms are tried (our choice)
+MOST_SAMPLES = 4000  # of swept logs, evenly taken: neighbours at tens of hertz tell the same (our choice)
+MOST_EXTENSIONS = 3  # of a law by velocity terms
 LARGEST_ERROR = 0.5  # out-of-sample error above which a law is not saved (our choice)
 REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is used if no other is known
 
@@ -57,6 +66,7 @@ class IdentifyOptions:
     squeeze_force: bool = False  # compute the normal force from the geometry, even if the seal file has one
     law: str | None = None  # law to save instead of the recommended one
     run_to_run: float | None = None  # [-] relative standard deviation between runs, if known from elsewhere
+    refuse_changed: bool = False  # refuse sources whose friction differs, instead of fitting them together
     name: str = ''  # of the seal; empty: the name of the seal file
 
 
@@ -81,27 +91,37 @@ def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Iden
 
 
 def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationData:
-    """Read the sources and exclude readings that do not belong to one state of one seal.
+    """Read the sources, correct the force sum, and exclude a pressure that does not belong to the others.
 
     Raises:
         ValueError: The data are unfit for identification.
     """
     sources = read_sources(paths, options.sources)
     ring = _ring(sources, options)
-    prepared, changes, kept = _one_state(sources)
+    prepared = sources.prepare()
+    _check_one_seal(prepared.readings, options.refuse_changed)
+    correction = force_correction(prepared)
+    if correction is not None and correction.is_significant:
+        sources = sources.corrected(correction)
+        prepared = sources.prepare()
     readings = _with_normal_force(prepared.readings, ring)
-    outlier, used = None, readings
+    outlier = None
     if not readings.are_samples and len(readings.levels) >= 4:
-        law = next(law for law in _candidates(readings) if law.name == 'pressure_power_law')
-        found = fitting.fit(law, readings)
-        floor = diagnostics.repeatability(readings, found.offsets)
-        outlier = diagnostics.outlying_level(law, readings, found.values, floor if math.isfinite(floor) else 0.0)
+        outlier = diagnostics.outlying_level(_power_laws(readings), readings)
+    used = readings
     if outlier is not None:  # number the levels, and the groups that are levels, without a gap
         used = readings.taken(readings.level != outlier.level)
         level = np.unique(used.level, return_inverse=True)[1]
         group = level if used.left_out_by == 'pressure' else used.group
         used = replace(used, level=level, group=group)
-    return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, changes, kept)
+    if used.are_samples:
+        used = used.taken(np.arange(used.count) % -(-used.count // MOST_SAMPLES) == 0)
+    return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction)
+
+
+def _power_laws(readings: FrictionReadings) -> tuple[CandidateLaw, ...]:
+    """The pressure power law with each fixed exponent."""
+    return tuple(law for law in _candidates(readings) if law.law_type is PressurePowerLaw and law.fixed)
 
 
 def _ring(sources: Sources, options: IdentifyOptions) -> Ring | None:
@@ -129,49 +149,55 @@ def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> Frictio
     return replace(readings, at=readings.at._replace(normal_force=forces))
 
 
-def _one_state(sources: Sources) -> tuple[PreparedReadings, tuple[diagnostics.FrictionChange, ...], tuple[int, ...]]:
-    """Readings of the sources that agree, comparison of each further swept log with the first, and the sources kept.
+def _check_one_seal(readings: FrictionReadings, refuse_changed: bool) -> None:
+    """Check that sources that share a pressure may be runs of one seal.
 
-    Sources with readings at held pressures form one law together, so a disagreement between them is an error. A swept
-    log determines a law by itself: the first one is fitted, each other one is compared with its law and is excluded if
-    its friction has changed.
+    Raises:
+        ValueError: Their friction differs by more than `runs.ANOTHER_SEAL`, or with ``refuse_changed`` by more than
+            `diagnostics.CHANGED`.
     """
-    numbers = tuple(range(len(sources.files)))
-    first = None
-    if len(numbers) > 1:
-        with suppress(ValueError):  # one source by itself may have too few pressures
-            first = sources.prepare([0])
-    if first is None or not first.readings.are_samples:
-        together = sources.prepare()
-        _check_unchanged(together.readings)
-        return together, (), numbers
-    laws = {law.name: law for law in _candidates(first.readings)}
-    found = fitting.fit(laws.get('pressure_power_law_viscous', laws['pressure_power_law']), first.readings)
-    others = (sources.prepare([i]).readings for i in numbers[1:])
-    changes = tuple(diagnostics.compare_with_law(found, first.readings, other) for other in others)
-    kept = (0, *(i for i, change in zip(numbers[1:], changes, strict=True) if not change.is_change))
-    return (sources.prepare(kept) if len(kept) > 1 else first), changes, kept
-
-
-def _check_unchanged(readings: FrictionReadings) -> None:
-    changes = [(c.other_friction / c.friction - 1.0, c) for c in diagnostics.changed_levels(readings)]
-    if changes:
-        change, worst = max(changes, key=lambda pair: abs(pair[0]))
+    most = 1.0 + diagnostics.CHANGED if refuse_changed else runs.ANOTHER_SEAL
+    changes = [(max(c.other_friction / c.friction, c.friction / c.other_friction), c)
+               for c in diagnostics.changed_levels(readings)]  # fmt: skip
+    middle = float(np.median([ratio for ratio, _ in changes])) if changes else 1.0
+    ratio, worst = max(changes, key=lambda pair: pair[0], default=(1.0, None))
+    if worst is not None and (middle if not refuse_changed else ratio) > most:
         raise ValueError(
-            f'the friction has changed: {worst.friction:.4g} N in {worst.name} and {worst.other_friction:.4g} N in '
-            f'{worst.other_name}, {100.0 * change:+.0f} %, both at {worst.pressure / BAR:.3g} bar; runs of one seal '
-            f'repeat within {100.0 * diagnostics.CHANGED:.0f} %, so these are two seals or two states of one seal: '
-            'identify each separately'
+            f'{worst.name} and {worst.other_name} are two seals or two states of one: friction {worst.friction:.4g} N '
+            f'and {worst.other_friction:.4g} N at {worst.pressure / BAR:.3g} bar, {100.0 * (ratio - 1.0):.0f} % more, '
+            f'where {100.0 * (most - 1.0):.0f} % is the most for runs of one seal: identify each separately'
         )
 
 
 def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[CandidateLaw, ...]:
+    return candidate_laws(variation_of(readings), *(ring or ()))
+
+
+def variation_of(readings: FrictionReadings) -> Variation:
+    """What the readings vary.
+
+    Speeds count where they differ at one pressure in one direction: speeds that follow pressure or direction tell
+    nothing apart. One direction has no asymmetry, and if each source holds one pressure, asymmetry is its offset.
+    """
     speed = np.abs(readings.at.velocity)
-    return candidate_laws(
-        **(ring._asdict() if ring else {}),
-        with_speeds=bool(np.isfinite(speed).all()) and float(speed.max()) > SPEEDS_DIFFER * float(speed.min()),
-        with_exponent=readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES_FOR_EXPONENT,
+    faster = []
+    for inside in readings.levels.values():
+        for side in (-1.0, 1.0):
+            of_side = speed[inside & (readings.at.direction == side)]
+            faster.append(bool(len(of_side) > 1 and of_side.max() > SPEEDS_DIFFER * of_side.min()))
+    several = [len(np.unique(readings.level[readings.source == source])) > 1 for source in np.unique(readings.source)]
+    levels = len(readings.levels)
+    return Variation(
+        pressures=3 if has_pressures(readings) else min(levels, 2) if _is_wide(readings) else 1,
+        speeds=bool(np.isfinite(speed).all()) and float(np.mean(faster)) > 0.5,
+        asymmetry=any(several) and all(len(index) for index in readings.two_sided),
+        exponent=readings.are_samples or levels >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
+
+
+def _is_wide(readings: FrictionReadings) -> bool:
+    pressures = readings.seal_pressure
+    return float(np.ptp(pressures)) >= max(NARROWEST_PRESSURES, 0.1 * float(pressures.max()))
 
 
 def select_law(data: IdentificationData, name: str | None) -> LawSelection:
@@ -181,9 +207,9 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
         ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
     laws = _candidates(data.used, data.ring)
-    with progress('fit and leave out', len(laws) * (len(data.used.groups) + 1)) as advance:
-        scores = fitting.score_laws(laws, data.used, advance)
-    best = fitting.recommended(scores)
+    with progress('fit and leave out', len(laws) + MOST_EXTENSIONS) as advance:
+        scores = score_ladder(laws, data.used, variation_of(data.used), advance)
+    best = recommended(scores, rise_over_pressures(data.used))
     by_name = {None: best} | {score.law.name: score for score in scores}
     if name not in by_name:
         raise ValueError(f'law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
@@ -196,54 +222,66 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
             f'{100.0 * selected.validation.error:.0f} % on left-out readings: measure more strokes at each pressure, '
             'in both directions, with a settled seal'
         )
-    return LawSelection(scores, best, selected.fit, selected.validation, fitting.plain_mean(data.used))
+    return LawSelection(scores, best, selected.fit, selected.validation, validation.plain_mean(data.used))
 
 
 def assess(data: IdentificationData, selection: LawSelection, run_to_run: float | None) -> LawQuality:
-    """Uncertainty of the selected law for new readings."""
-    used, found, validation = data.used, selection.fit, selection.validation
+    """Uncertainty of the selected law for readings of a new run."""
+    used, found, left_out = data.used, selection.fit, selection.validation
     groups = len(used.groups)
     everything = data.prepared.readings
     offsets = fitting.offsets_of(everything, found.friction(everything.at))
-    drift = {} if used.are_samples else diagnostics.run_drift(everything, offsets)
-    between, is_drift = _run_to_run(data, drift) if run_to_run is None else (run_to_run, False)
+    friction = found.friction(used.at)
+    between = runs.between_runs(used, friction, fitting.offsets_of(used, friction))
+    if run_to_run is not None:
+        between, of_band = between._replace(std=run_to_run), run_to_run
+    elif data.used.left_out_by in ('test', 'file'):  # groups that are runs: what they deviate by contains it
+        between, of_band = between._replace(std=0.0), 0.0
+    else:
+        of_band = between.of_band
+    told_apart = collinear_spread(selection, used)
+    in_addition = math.hypot(of_band, told_apart)
     with progress('test the band', groups * (groups - 1)) as advance:
-        coverage = fitting.band_coverage(selection.law, used, found.values, between, advance)
+        coverage = validation.band_coverage(selection.law, used, found.values, 0.0, advance)
     names = [parameter.name for parameter in selection.law.parameters]
-    line = None
-    if everything.samples:
-        level_offsets = np.array([everything.half_range(inside).offset for inside in everything.levels.values()])
-        line = offset_line(everything.level_pressures, level_offsets)
     return LawQuality(
-        uncertainty=fitting.prediction_uncertainty(validation.predicted, validation.deviation, groups, between),
-        run_to_run=between,
-        is_drift=is_drift,
+        uncertainty=validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, in_addition),
+        between_runs=between,
+        is_stated=run_to_run is not None,
+        told_apart=told_apart,
         coverage=coverage,
         repeatability=diagnostics.repeatability(used, found.offsets),
-        drift=drift,
+        drifts=[] if used.are_samples else runs.drifts(everything, offsets),
         breakaway=_breakaway(data, found),
-        offset_line=line,
-        standard_errors=dict(zip(names, fitting.jackknife_errors(validation.parameters).tolist(), strict=True)),
+        standard_errors=dict(zip(names, validation.jackknife_errors(left_out.parameters).tolist(), strict=True)),
     )
 
 
-def _run_to_run(data: IdentificationData, drift: Mapping[int, float]) -> tuple[float, bool]:
-    """Relative standard deviation between runs, if each pressure has runs of its own; and whether it is the drift.
+def collinear_spread(selection: LawSelection, used: FrictionReadings) -> float:
+    """Relative spread of laws that fit nearly as well, where speed and pressure part [-]: the data cannot tell them.
 
-    It is measured if pressures were repeated. Otherwise the root mean square drift within the runs is used in its place
-    (our choice): a seal that changes during a measurement differs in the next one. Runs of the Delft O-ring drift by 11
-    to 18 % and repeat within 10 to 15 %.
+    Laws within `NEAR` of the best are compared at every pair of a speed and a pressure (quartiles of each), also those
+    pairs that never occurred: where speed and pressure always changed together, laws agree on the readings and differ
+    there. The spread is the root mean square deviation from the selected law. 0 for held readings.
     """
-    if data.used.left_out_by != 'pressure' or data.used.are_samples or not data.used.samples:
-        return 0.0, False
-    measured = diagnostics.between_runs(data.used)
-    if math.isfinite(measured):
-        return measured, False
-    kept = [change for level, change in drift.items() if not data.is_outlier(level)]
-    return (math.sqrt(sum(change**2 for change in kept) / len(kept)), True) if kept else (0.0, False)
+    if not used.are_samples:
+        return 0.0
+    scored = [score for score in selection.scores if score.fit is not None and score.losses is not None]
+    least = min(float(score.losses.mean()) for score in scored if score.losses is not None)
+    near = [s.fit for s in scored if s.fit is not None and s.losses is not None and s.losses.mean() <= NEAR * least]
+    shares = (0.125, 0.375, 0.625, 0.875)
+    speeds = np.quantile(np.abs(used.at.velocity), shares)
+    order = np.argsort(used.seal_pressure)
+    rows = order[(np.array(shares) * (len(order) - 1)).astype(int)]
+    at = used.taken(np.tile(rows, 2 * len(speeds))).at
+    direction = np.repeat([1.0, -1.0], len(rows) * len(speeds))
+    at = at._replace(velocity=direction * np.tile(np.repeat(speeds, len(rows)), 2), direction=direction)
+    chosen = selection.fit.friction(at)
+    deviations = [(fit.friction(at) - chosen) / chosen.mean() for fit in near]
+    return float(np.sqrt(np.mean(np.square(deviations)))) if deviations else 0.0
 
 
-def _breakaway(data: IdentificationData, found: fitting.LawFit) -> fitting.BreakawayFit | None:
+def _breakaway(data: IdentificationData, found: fitting.LawFit) -> BreakawayFit | None:
     if data.prepared.breakaway is None:
         return None
     readings = _with_normal_force(data.prepared.breakaway, data.ring)
@@ -251,7 +289,7 @@ def _breakaway(data: IdentificationData, found: fitting.LawFit) -> fitting.Break
         readings = readings.taken(readings.level != data.outlier.level)
     if len(readings.groups) < 2:
         return None
-    return fitting.fit_breakaway(readings, found.law.coulomb_friction(readings.at, found.values), found.offsets)
+    return fit_breakaway(readings, found.law.coulomb_friction(readings.at, found.values), found.offsets)
 
 
 def _levels(
@@ -276,7 +314,7 @@ def _levels(
             left_out=left_out,
             offset=math.nan if readings.are_samples else readings.half_range(inside).offset,
             readings=int(inside.sum()),
-            drift=quality.drift.get(level, math.nan),
+            drift=float(np.mean([d.change for d in quality.drifts if d.level == level] or [math.nan])),
             is_used=not data.is_outlier(level),
         )
         for (level, inside), left_out in zip(readings.levels.items(), predicted, strict=True)

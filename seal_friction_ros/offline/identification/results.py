@@ -11,10 +11,14 @@ from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
 from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.identification import fitting
+from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
-from seal_friction_ros.core.identification.diagnostics import FrictionChange, Outlier
+from seal_friction_ros.core.identification.diagnostics import Outlier
+from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
-from seal_friction_ros.core.identification.signal_preparation import OffsetLine
+from seal_friction_ros.core.identification.runs import BetweenRuns, Drift
+from seal_friction_ros.core.identification.selection import LawScore, is_beaten
+from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
 from seal_friction_ros.offline.identification.sources import Sources
 from seal_friction_ros.offline.work.seal_writer import rounded
 
@@ -34,12 +38,11 @@ class IdentificationData:
     """Readings that the law is fitted to, and those that are excluded."""
 
     sources: Sources
-    prepared: PreparedReadings  # every reading of the sources that agree, including outliers
-    used: FrictionReadings  # without outliers
+    prepared: PreparedReadings  # every reading, including outliers
+    used: FrictionReadings  # those that the law is fitted to
     ring: Ring | None
     outlier: Outlier | None
-    changes: tuple[FrictionChange, ...]  # each further swept log against the law of the first one
-    kept: tuple[int, ...]  # numbers of the sources behind ``prepared``
+    correction: ForceCorrection | None  # of an area in the force sum, made if it is significant; None if unknown
 
     def is_outlier(self, level: int) -> bool:
         """Whether a pressure level is the outlier, which the law is not fitted to."""
@@ -50,11 +53,11 @@ class IdentificationData:
 class LawSelection:
     """All candidate laws with their scores, and the law that is saved."""
 
-    scores: tuple[fitting.LawScore, ...]
-    best: fitting.LawScore  # recommended: the simplest law that no other law beats beyond the noise
+    scores: tuple[LawScore, ...]
+    best: LawScore  # recommended: the simplest law that no other law beats beyond the noise
     fit: fitting.LawFit
-    validation: fitting.CrossValidation
-    reference: fitting.CrossValidation | None
+    validation: CrossValidation
+    reference: CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
 
     @property
@@ -67,15 +70,15 @@ class LawSelection:
 class LawQuality:
     """Uncertainty of the selected law."""
 
-    uncertainty: fitting.PredictionUncertainty  # standard deviation of a new reading, all seals
-    run_to_run: float
-    """[-] relative standard deviation between runs, the part that deviations within runs do not contain"""
-    is_drift: bool  # whether the drift within the runs is used in its place
+    uncertainty: PredictionUncertainty  # standard deviation of a new reading, all seals
+    between_runs: BetweenRuns
+    """relative standard deviation between runs that is added to what readings left out deviate by"""
+    is_stated: bool  # whether the user gave it
+    told_apart: float  # [-] relative spread of laws that the data cannot tell apart, added likewise
     coverage: float  # share of the left-out readings inside a 95 % band that was made without them
     repeatability: float  # [-] scatter of repeated readings
-    drift: dict[int, float]  # pressure level -> relative change of the friction over its run
-    breakaway: fitting.BreakawayFit | None  # None if no stroke starts from rest
-    offset_line: OffsetLine | None  # offset of the force sum over pressure; None for swept logs and tables
+    drifts: list[Drift]  # of the friction over each run
+    breakaway: BreakawayFit | None  # None if no stroke starts from rest
     standard_errors: dict[str, float]  # of the parameters, by name
 
 
@@ -120,7 +123,7 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
     """
     seals, law, pressure = len(data.sources.chambers), selection.law, data.used.at.pressure
     values = _json_value(selection.fit.values)
-    files = ', '.join(data.sources.files[i].name for i in data.kept)
+    files = ', '.join(file.name for file in data.sources.files)
     document: dict[str, Any] = {
         'name': name,
         'source': f'Made by seal_friction identify from {files}: law {law.name} ({law.formula}), parameters by least '
@@ -181,7 +184,7 @@ def identification_section(
             'band_coverage': quality.coverage,
             'repeatability': quality.repeatability,
             'readings': data.used.count,
-            'data': [data.sources.files[i]._asdict() for i in data.kept],
+            'data': [file._asdict() for file in data.sources.files],
             'warnings': warnings,
         }
     )
@@ -191,7 +194,7 @@ def identification_section(
 def identification_numbers(found: Identification) -> dict[str, Any]:
     """Numbers for JSON."""
     data, selection, quality, levels = found.data, found.selection, found.quality, found.levels
-    reference, line = selection.reference, quality.offset_line
+    reference, correction = selection.reference, data.correction
     numbers: dict[str, Any] = found.document['identification'] | _json_value(
         {
             'std_N': [level.std for level in levels],
@@ -205,18 +208,58 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'condition_number': selection.fit.condition_number,
             'correlation': selection.fit.correlation.tolist(),
             'offset_N': [level.offset for level in levels],
-            'offset_line': line and {'constant_N': line.constant, 'area_error_m2': line.area_error, 'rms_N': line.rms},
-            'drift': [level.drift for level in levels],
+            'area_correction_m2': correction.area if correction else None,
+            'area_correction': correction and _correction_numbers(correction),
+            'between_run_std': quality.between_runs.std,
+            'between_runs_measured': quality.between_runs.measured,
+            'told_apart_std': quality.told_apart,
+            'drift': [
+                {
+                    'source': data.sources.files[drift.source].name,
+                    'pressure_Pa': data.prepared.readings.level_pressures[drift.level],
+                    'change': drift.change,
+                    'asymptote_N': drift.asymptote,
+                    'length_m': drift.length,
+                }
+                for drift in quality.drifts
+            ],
         }
     )
     return numbers | {
-        'stiction': quality.breakaway and quality.breakaway._asdict(),
-        'changes': [{**c._asdict(), 'is_change': c.is_change} for c in data.changes],
+        'breakaway': quality.breakaway and _breakaway_numbers(found),
         'samples_used': data.prepared.used,
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,
-        'data': [file._asdict() for file in data.sources.files],
         'remarks': list(found.remarks),
+    }
+
+
+def _correction_numbers(correction: ForceCorrection) -> dict[str, Any]:
+    line = correction.line
+    return {
+        'chamber': correction.chamber,
+        'is_made': correction.is_significant,
+        'standard_error_m2': correction.standard_error,
+        'offset_N': correction.offset,
+        'rms_N': line.rms,
+    }
+
+
+def _breakaway_numbers(found: Identification) -> dict[str, Any]:
+    """Law of the breakaway, and the breakaway force of all seals at each pressure, measured and by the law."""
+    law, readings, fit = found.quality.breakaway, found.data.prepared.breakaway, found.selection.fit
+    if law is None or readings is None:
+        return {}
+    measured = readings.magnitudes(fit.offsets)
+    coulomb = fit.law.coulomb_friction(readings.at, fit.values)
+    fitted = coulomb * (1.0 + law.ratio) + law.stiction * readings.at.pressure.shape[1]
+    levels = readings.levels.values()
+    return {
+        **law._asdict(),
+        'standard_errors': list(law.standard_errors),
+        'pressure_Pa': _json_value(readings.level_pressures.tolist()),
+        'measured_N': _json_value([float(measured[inside].mean()) for inside in levels]),
+        'fitted_N': _json_value([float(fitted[inside].mean()) for inside in levels]),
     }
 
 
@@ -225,7 +268,7 @@ def worst_left_out(levels: Sequence[PressureLevel]) -> float:
     return max(abs(level.left_out / level.measured - 1.0) for level in levels if level.is_used)
 
 
-def _ladder_row(score: fitting.LawScore, selection: LawSelection) -> dict[str, Any]:
+def _ladder_row(score: LawScore, selection: LawSelection) -> dict[str, Any]:
     row: dict[str, Any] = {'law': score.law.name, 'parameters': len(score.law.parameters)}
     if score.validation is None or score.fit is None:
         return row | {'why_not': score.why_not}
@@ -235,6 +278,6 @@ def _ladder_row(score: fitting.LawScore, selection: LawSelection) -> dict[str, A
         'rms_N': score.validation.rms,
         'mean_deviation_N': score.validation.mean_deviation,
         'error': score.validation.error,
-        'is_beaten': fitting.is_beaten(score.validation.losses, best),
+        'is_beaten': is_beaten(score.validation.losses, best),
         'condition_number': score.fit.condition_number,
     }

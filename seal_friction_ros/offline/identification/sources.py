@@ -17,6 +17,7 @@ from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, decode, decode_text
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import UNITS
+from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
@@ -60,6 +61,7 @@ class Source(NamedTuple):
     log: RecordedLog | None = None
     manual: tuple[ManualReadings, ManualReadings] | None = None  # running and breakaway friction
     seal_document: Mapping[str, Any] | None = None  # seal file inside a bag or a data sheet
+    pressure_area: float | None = None  # by which the rig file turns pressure into force [m^2]; None if unknown
     remarks: tuple[str, ...] = ()  # assumptions that neither the source nor an option states
 
 
@@ -90,6 +92,19 @@ class Sources:
         with_static = [readings for readings in static if len(readings.friction)]
         return prepare_manual_readings(dynamic, with_static, len(self.chambers))
 
+    @property
+    def pressure_area(self) -> float | None:
+        """Area by which the rig file turns the pressure into force [m^2]; None if the sources have no rig file."""
+        return next((source.pressure_area for source in self.each if source.pressure_area is not None), None)
+
+    def corrected(self, correction: ForceCorrection) -> 'Sources':
+        """The sources with an area of the force sum corrected in every log."""
+        each = tuple(
+            s if s.log is None else s._replace(log=s.log._replace(signals=correction.corrected(s.log.signals)))
+            for s in self.each
+        )
+        return replace(self, each=each)
+
 
 def read_sources(paths: Sequence[Path], options: SourceOptions) -> Sources:
     """Read every source: bags and logs, or tables and data sheets.
@@ -103,6 +118,10 @@ def read_sources(paths: Sequence[Path], options: SourceOptions) -> Sources:
     if twice:
         raise ValueError(f'{twice[0]} is named twice')
     each = tuple(_read(path, options) for path in paths)
+    digests = [source.file.sha256 for source in each]
+    same = next(((i, digests.index(d)) for i, d in enumerate(digests) if digests.index(d) < i), None)
+    if same is not None:
+        raise ValueError(f'{paths[same[0]]} and {paths[same[1]]} are the same bytes: name it once')
     if len({source.log is None for source in each}) > 1:
         raise ValueError('manual readings and recorded signals cannot be fitted together: identify each separately')
     chambers, remark = _chambers(each, options)
@@ -142,7 +161,7 @@ def _read(path: Path, options: SourceOptions) -> Source:
     if TITLE in head[0].lower():
         dynamic, static, chambers, document, remarks = read_data_sheet(path)
         texts = tuple(f'{path.name}: {remark}' for remark in remarks)
-        return Source(_data_file(path), chambers, None, (dynamic, static), document, texts)
+        return Source(_data_file(path), chambers, None, (dynamic, static), document, remarks=texts)
     names = next((line for line in head if not line.startswith('#')), '').lower().split(',')
     if all(any(name.strip().startswith(quantity) for name in names) for quantity in ('pressure', 'friction')):
         return Source(_data_file(path), None, manual=read_table(path))
@@ -174,7 +193,15 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
             check_clipping(path.name, f'signal in column {term.column_name or term.column}', column[moving])
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
-    return Source(_data_file(path), None, RecordedLog(path.name, signals, sliding), remarks=remarks)
+    recorded = RecordedLog(path.name, signals, sliding)
+    return Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
+
+
+def _pressure_area(rig: Rig) -> float | None:
+    """Area of the one chamber under pressure in the force sum [m^2]; None if there is none, or several."""
+    columns = {(t.column, t.column_name) for c in (rig.chamber_a, rig.chamber_b) for t in c.terms}
+    areas = [abs(t.gain) * UNITS[t.gain_unit] for t in rig.force_sum.terms if (t.column, t.column_name) in columns]
+    return areas[0] if len(areas) == 1 else None
 
 
 def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:

@@ -7,9 +7,10 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification import diagnostics
-from seal_friction_ros.core.identification.fitting import is_beaten
+from seal_friction_ros.core.identification.force_correction import ForceCorrection
+from seal_friction_ros.core.identification.readings import FrictionReadings, has_pressures
+from seal_friction_ros.core.identification.selection import is_beaten
 from seal_friction_ros.offline.identification.results import (
-    FEWEST_PRESSURES_FOR_EXPONENT,
     Identification,
     IdentificationData,
     LawQuality,
@@ -17,20 +18,29 @@ from seal_friction_ros.offline.identification.results import (
     PressureLevel,
 )
 
+TOLD_APART = 0.05  # [-] spread of laws from which it is told (our choice)
+
 
 def warnings_of(
     data: IdentificationData, selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]
 ) -> Iterator[str]:
     """Limits of the law that its user has to know, one line each."""
-    first = data.sources.files[0].name
-    yield from (_change_text(first, change) for change in data.changes if abs(change.ratio - 1.0) > 0.0)
     readings = data.prepared.readings
+    yield from _change_texts(readings)
     one_way = [name for name, index in zip(readings.names, readings.two_sided, strict=True) if not len(index)]
     if one_way:
         yield (
             f'{", ".join(one_way)}: readings in one direction only, so an offset of the force counts as friction: '
             'measure the other direction too'
         )
+    if not has_pressures(readings):
+        low, high = (float(end) / BAR for end in (readings.seal_pressure.min(), readings.seal_pressure.max()))
+        yield (
+            f'measured at {low:.4g} to {high:.4g} bar only: there the law holds; how friction rises beyond comes from '
+            'a prior, not from these data: measure at three pressures to know it'
+        )
+    if data.correction is not None and data.correction.is_significant:
+        yield _correction_text(data.correction, data.sources.pressure_area)
     if data.outlier is not None:
         yield _outlier_text(data.outlier, levels)
     yield from _collinearity_texts(data, selection)
@@ -43,14 +53,28 @@ def warnings_of(
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
 
 
-def _change_text(first: str, change: diagnostics.FrictionChange) -> str:
-    percent = f'{100.0 * (change.ratio - 1.0):+.0f} % (standard error {100.0 * change.standard_error:.0f} %)'
-    left = f'the law of {first} leaves an RMS of {change.rms:.3g} N there, one fitted there {change.own_rms:.3g} N'
-    if not change.is_change:
-        return f'{change.name} agrees with {first}: friction {percent}; {left}; both are fitted together'
+def _change_texts(readings: FrictionReadings) -> Iterator[str]:
+    for change in diagnostics.changed_levels(readings):
+        percent = 100.0 * (change.other_friction / change.friction - 1.0)
+        yield (
+            f'friction differs between runs: at {change.pressure / BAR:.3g} bar {change.friction:.3g} N in '
+            f'{change.name} and {change.other_friction:.3g} N in {change.other_name} ({percent:+.0f} %); they are fitted '
+            'together, and the band holds both: if they are two seals, identify each separately'
+        )
+
+
+def _correction_text(correction: ForceCorrection, area: float | None) -> str:
+    change = f'{1e6 * correction.area:+.3g} mm2 (standard error {1e6 * correction.standard_error:.2g} mm2)'
+    text = (
+        f'the area of chamber {correction.chamber} in the force sum is off: its offset follows the pressure, by '
+        f'{change}; the law is fitted with the corrected area'
+    )
+    if area is None:
+        return f'{text}: correct it where the force sum is made'
+    old, new = (1e3 * math.sqrt(4.0 * max(value, 0.0) / math.pi) for value in (area, area + correction.area))
     return (
-        f'the friction has changed: in {change.name} it is {percent} against the law of {first}; {left}; it is another '
-        'state of the machine and was not averaged in: identify it separately'
+        f'{text}: {1e6 * (area + correction.area):.4g} mm2 in place of {1e6 * area:.4g} mm2, the bore is nearer to '
+        f'{new:.3g} than {old:.3g} mm: correct the rig file'
     )
 
 
@@ -86,8 +110,8 @@ def _collinearity_texts(data: IdentificationData, selection: LawSelection) -> It
             f'{pair.one} and {pair.other} trade off (correlation {pair.correlation:+.3f}): the data determine the '
             'friction that they give together, but neither of them alone'
         )
-    if not selection.fit.condition_number <= diagnostics.ILL_CONDITIONED:
-        yield f'the fit is ill-conditioned: condition number {selection.fit.condition_number:.0f} (good below 30)'
+    if selection.fit.why_unsound:
+        yield f'the parameters are not determined: {selection.fit.why_unsound}'
 
 
 def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
@@ -105,24 +129,22 @@ def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
 def _parameter_texts(selection: LawSelection) -> Iterator[str]:
     for parameter in selection.law.parameters:
         value = selection.fit.values[parameter.name]
-        span = parameter.upper - parameter.lower
-        if parameter.upper < 1e3 and value > parameter.upper - 1e-6 * span:
-            yield f'{parameter.name} is at its bound of {parameter.upper:g}: an effect is missing in the law'
-        elif value == 0.0 and parameter.lower == 0.0:
+        if value == 0.0 and parameter.lower == 0.0:
             yield f'{parameter.name} is 0: these data show no such effect'
-    for name in selection.law.fixed:
-        yield (
-            f'{name} is not fitted but set to that of an elastic contact, 2/3: measure at '
-            f'{FEWEST_PRESSURES_FOR_EXPONENT} pressures at least to determine it'
-        )
 
 
 def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]) -> Iterator[str]:
-    if quality.is_drift:
+    between = quality.between_runs
+    if between.std > 0.0 and not between.freedom and not quality.is_stated:
         yield (
-            'every pressure was measured in one run, so the data do not show run-to-run variation: the drift within '
-            f'the runs ({100.0 * quality.run_to_run:.0f} %) is used in its place in the standard deviation; repeat '
-            'runs, or give a known value with --run-to-run'
+            'this is one run, so the data do not show how runs differ (mounted anew, another day): a prior of '
+            f'{100.0 * between.std:.0f} % is in the standard deviation; repeat runs, or give a known value with '
+            '--run-to-run'
+        )
+    if quality.told_apart > TOLD_APART:
+        yield (
+            f'laws that fit these data nearly as well differ by {100.0 * quality.told_apart:.0f} % where speed and '
+            'pressure do not go together as here: that is in the standard deviation'
         )
     drifted = [level for level in levels if level.is_used and abs(level.drift) > diagnostics.SETTLED]
     if drifted:

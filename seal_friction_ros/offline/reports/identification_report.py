@@ -15,8 +15,9 @@ from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGai
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification.candidate_laws import normal_forces
-from seal_friction_ros.core.identification.fitting import CrossValidation, offsets_of
+from seal_friction_ros.core.identification.fitting import offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.validation import CrossValidation
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.pipeline import fitted_readings
 from seal_friction_ros.offline.identification.results import Identification, Ring, worst_left_out
@@ -102,9 +103,12 @@ def _parameter_table(found: Identification) -> Table:
     ]
     rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in selection.law.fixed.items()]
     if breakaway is not None:
-        value, unit = (breakaway.ratio, '1') if breakaway.law == 'load_dependent' else (breakaway.stiction, 'N')
-        name = f'breakaway above Coulomb, {breakaway.law}'
-        rows.append((name, '', f'{value:.5g}', f'{breakaway.standard_error:.2g}', unit))
+        values = zip(('constant', 'share'), breakaway[1:3], breakaway.standard_errors, ('N', '1'), strict=True)
+        rows += [
+            (f'breakaway above Coulomb, {part}', '', f'{value:.5g}', f'{error:.2g}', unit)
+            for part, value, error, unit in values
+            if value
+        ]
     return Table(('parameter of one seal', 'symbol', 'value', 'standard error', 'unit'), rows, (0, 1, 4))
 
 

@@ -1,0 +1,57 @@
+"""Error of an area in the force sum, found from how its offset follows the pressure."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, PreparedReadings
+from seal_friction_ros.core.identification.signal_preparation import OffsetLine, Signals, offset_line
+
+CONFIDENCE = 0.995  # one-sided, that the offset follows the pressure (our choice)
+NOTICED = 0.1  # of the mean friction: a smaller change of the offset over the pressures is left in (our choice)
+
+
+class ForceCorrection(NamedTuple):
+    """What is to be added to the force sum: area * pressure of the chamber + offset."""
+
+    chamber: str  # a or b, the one under pressure
+    area: float  # [m^2] to be added to the area of the chamber in the force sum, with the sign of its force
+    standard_error: float  # of the area [m^2]
+    offset: float  # [N] to be added, of the load cell
+    line: OffsetLine  # offset of the force sum over pressure
+    is_significant: bool  # whether it is beyond the noise, and large enough to matter
+
+    def corrected(self, signals: Signals) -> Signals:
+        """Signals whose force sum has the area corrected; the offset stays, since each source may have its own."""
+        pressure = signals.pressure_a if self.chamber == 'a' else signals.pressure_b
+        return signals._replace(force_sum=signals.force_sum + self.area * pressure)
+
+
+def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
+    """Area error from a line through the offsets of the force sum over the pressure.
+
+    The offset of a level is half the sum of its two directions, in which friction cancels. A wrong area adds a share of
+    the pressure to it; a load cell adds a constant. The area counts as wrong if the slope is beyond the noise of the
+    line (t-test at `CONFIDENCE`) and changes the offset by more than `NOTICED` of the friction.
+
+    Returns:
+        None for swept logs and manual readings, fewer than three pressures, and if both chambers are under pressure, so
+        that it is not known whose area is wrong.
+    """
+    readings, levels = prepared.readings, prepared.readings.levels
+    if not readings.samples or len(levels) < 3:
+        return None
+    spans = np.ptp(prepared.chamber_pressures, axis=0)
+    if np.count_nonzero(spans > NARROWEST_PRESSURES) != 1:
+        return None
+    number = int(np.argmax(spans))
+    pressure = np.array([prepared.chamber_pressures[inside, number].mean() for inside in levels.values()])
+    friction, offset = np.array([readings.half_range(inside) for inside in levels.values()]).T
+    line = offset_line(pressure, offset)
+    freedom = len(levels) - 2
+    spread = float(np.sum((pressure - pressure.mean()) ** 2))
+    error = line.rms * float(np.sqrt(len(levels) / freedom / spread))
+    sure = abs(line.area_error) > float(student_t.ppf(CONFIDENCE, freedom)) * error
+    large = abs(line.area_error) * float(np.ptp(pressure)) > NOTICED * float(friction.mean())
+    return ForceCorrection('ab'[number], -line.area_error, error, -line.constant, line, bool(sure and large))

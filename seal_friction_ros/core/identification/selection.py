@@ -1,0 +1,243 @@
+"""Choice of a law: every candidate is scored on readings left out of its fit, and the simplest that suffices is taken.
+
+Four pressures give four numbers to compare two laws by, which has no power. So whether friction rises with pressure at
+all is tested by what the strokes at one pressure repeat within. A law whose parameters the data do not determine is
+not recommended while a sound one is near.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+from scipy.stats import t as student_t
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.identification.candidate_laws import (
+    EXPONENTS,
+    CandidateLaw,
+    Variation,
+    with_velocity_terms,
+)
+from seal_friction_ros.core.identification.fitting import LawFit, fit
+from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.validation import CrossValidation, Ticks, cross_validate
+
+BEATEN_CONFIDENCE = 0.95  # of the test whether a law is beaten (our choice)
+WORTHWHILE = 0.1  # share of its loss by which a law must be beaten (our choice)
+MANY_TIMES = 2.0  # a law whose loss is as many times that of another is beaten, however few the groups (our choice)
+NEAR = 2.0  # a sound law is near if its loss is at most as many times that of the best (our choice)
+RISES = 2.0  # standard errors of the rise over the pressures from which friction rises (our choice): 2 % false alarms
+OVERDISPERSED = 0.01  # probability of the residuals of a law below which pressures scatter by themselves (our choice)
+PRIOR_SCATTER = 0.05  # [-] of the friction between held pressures, expected with the weight of `PRIOR_FREEDOM`
+PRIOR_FREEDOM = 4.0  # degrees of freedom
+STRATA = 3  # quantiles of speed and of pressure, whose cells of a swept log are left out in turn (our choice)
+
+
+class Rise(NamedTuple):
+    """Rise of the friction from the lowest to the highest pressure."""
+
+    rise: float  # [N]
+    standard_error: float  # [N]
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether friction rises with pressure, beyond what readings repeat within."""
+        return self.rise > RISES * self.standard_error
+
+
+def rise_over_pressures(readings: FrictionReadings) -> Rise | None:
+    """Rise of the friction over held pressures, and its standard error from what readings repeat within.
+
+    A line through the friction at each pressure, weighted by its standard error: the relative scatter of repeated
+    readings (one source, pressure and direction) over the root of their number, which counts less if they follow each
+    other (lag-one autocorrelation). Where even the best of the power laws misses the friction by more than that, each
+    pressure also has a scatter of its own, which is estimated from the residuals of that law and the prior
+    `PRIOR_SCATTER`.
+
+    Returns:
+        None for swept logs, fewer than three pressures, and readings that were never repeated.
+    """
+    if readings.are_samples or len(readings.levels) < 3:
+        return None
+    pressure = readings.level_pressures
+    friction = np.array([readings.half_range(inside).friction for inside in readings.levels.values()])
+    errors = _errors_of_levels(readings, friction)
+    if errors is None or (friction <= 0.0).any():
+        return None
+    residuals = min(
+        (_line(pressure**exponent, friction, errors)[2] for exponent in EXPONENTS.values()),
+        key=lambda found: float(np.sum((found / errors) ** 2)),
+    )
+    error = errors
+    freedom = len(friction) - 2
+    if chi2.sf(float(np.sum((residuals / error) ** 2)), freedom) < OVERDISPERSED:
+        squares = float(np.sum((residuals / friction) ** 2))
+        scatter = math.sqrt((PRIOR_FREEDOM * PRIOR_SCATTER**2 + squares) / (PRIOR_FREEDOM + freedom))
+        error = np.hypot(error, scatter * friction)
+    slope, slope_error, _ = _line(pressure, friction, error)
+    spanned = float(np.ptp(pressure))
+    return Rise(slope * spanned, slope_error * spanned)
+
+
+def _errors_of_levels(readings: FrictionReadings, friction: FloatArray) -> FloatArray | None:
+    """Standard error of the friction at each level [N], from repeated readings; None if nothing was repeated."""
+    squares = products = freedom = 0.0
+    counts = []
+    for inside in readings.levels.values():
+        counts.append(0)
+        for source in np.unique(readings.source[inside]):
+            for side in (-1.0, 1.0):
+                run = readings.force[inside & (readings.source == source) & (readings.at.direction == side)]
+                if len(run) < 2:
+                    continue
+                share = run / friction[len(counts) - 1]
+                share = share - share.mean()
+                squares += float(np.sum(share**2))
+                products += float(np.sum(share[1:] * share[:-1]))
+                freedom += len(run) - 1
+                counts[-1] += len(run)
+    if freedom < 2.0 or not all(counts):
+        return None
+    variance = max(squares / freedom, 1e-12)
+    correlation = min(max(products / max(squares, 1e-300), 0.0), 0.9)
+    worth = np.array(counts) * (1.0 - correlation) / (1.0 + correlation)
+    return np.asarray(friction * np.sqrt(variance / np.maximum(worth, 1.0)))
+
+
+def _line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[float, float, FloatArray]:
+    """Weighted least-squares line: slope, its standard error, residuals."""
+    weight = error**-2
+    centred = x - np.average(x, weights=weight)
+    spread = float(np.sum(weight * centred**2))
+    slope = float(np.sum(weight * centred * y)) / spread
+    residuals = y - np.average(y, weights=weight) - slope * centred
+    return slope, spread**-0.5, np.asarray(residuals)
+
+
+@dataclass(frozen=True, eq=False)
+class LawScore:
+    """Fit and cross-validation of a law, or the reason why there are none."""
+
+    law: CandidateLaw
+    fit: LawFit | None = None
+    validation: CrossValidation | None = None
+    losses: FloatArray | None = None
+    """in each group, and for swept logs in each stratum of speed and pressure and in each file [-]"""
+    why_not: str = ''
+
+
+def score_ladder(
+    laws: Sequence[CandidateLaw], readings: FrictionReadings, variation: Variation, tick: Ticks = lambda _: None
+) -> tuple[LawScore, ...]:
+    """Score every law, then the best law that depends on pressure again with velocity terms; from simple to complex."""
+    scores = score_laws(laws, readings, tick)
+    scored = [score for score in scores if score.losses is not None and score.law.depends_on_pressure]
+    if not scored:
+        return scores
+    sound = [score for score in scored if score.fit is not None and not score.fit.why_unsound]
+    best = min(sound or scored, key=_mean_loss)
+    return (*scores, *score_laws(with_velocity_terms(best.law, variation), readings, tick))
+
+
+def score_laws(
+    laws: Sequence[CandidateLaw], readings: FrictionReadings, tick: Ticks = lambda _: None
+) -> tuple[LawScore, ...]:
+    """Fit and cross-validate every law on readings of at least two groups.
+
+    The laws go from simple to complex; results of simpler laws are start values for the others. ``tick`` is called with
+    1 after each law.
+    """
+    scores: list[LawScore] = []
+    known: dict[str, float] = {}
+    others = regroupings(readings)
+    for law in laws:
+        levels, count = len(readings.levels), len(law.parameters)
+        needed = count + (readings.left_out_by == 'pressure')
+        if not readings.are_samples and levels < needed:
+            scores.append(LawScore(law, why_not=f'{count} parameters need {needed} pressures, there are {levels}'))
+        else:
+            try:
+                found = fit(law, readings, known)
+                validation = cross_validate(law, readings, found.values)
+                more = [cross_validate(law, other, found.values).losses for other in others]
+            except ValueError as error:
+                scores.append(LawScore(law, why_not=str(error)))
+            else:
+                scores.append(LawScore(law, found, validation, np.concatenate((validation.losses, *more))))
+                known |= found.values
+        tick(1)
+    return tuple(scores)
+
+
+def regroupings(readings: FrictionReadings) -> list[FrictionReadings]:
+    """Samples of swept logs with other groups: cells of speed and pressure, and files if there are several.
+
+    Contiguous blocks of one log all hold the same motions. A cell that is left out asks whether the law extrapolates.
+    """
+    if not readings.are_samples:
+        return []
+    cell = np.zeros(readings.count, dtype=np.int64)
+    for values in (np.abs(readings.at.velocity), readings.seal_pressure):
+        edges = np.quantile(values, np.linspace(0.0, 1.0, STRATA + 1)[1:-1])
+        cell = cell * STRATA + np.searchsorted(edges, values)
+    groups = [cell] if len(np.unique(cell)) > 1 else []
+    if len(readings.names) > 1:
+        groups.append(readings.source)
+    return [replace(readings, group=group) for group in groups]
+
+
+def recommended(scores: Sequence[LawScore], rise: Rise | None = None) -> LawScore:
+    """The simplest law that the best law (smallest mean loss) does not beat.
+
+    Laws whose parameters are at a bound or ill-conditioned only compete if no sound law is `NEAR`. Where friction rises
+    significantly, a law without pressure and speed does not compete. Of laws with equally many parameters the one with
+    the smallest mean loss is taken.
+
+    Raises:
+        ValueError: No law was fitted.
+
+    Source: after the one-standard-error rule of [Breiman1984]_; the rest is our choice.
+    """
+    scored = [score for score in scores if score.fit is not None and score.losses is not None]
+    if not scored:
+        reasons = '; '.join(f'{score.law.name}: {score.why_not}' for score in scores)
+        raise ValueError(f'no law could be fitted: {reasons}')
+    rising = [score for score in scored if score.law.depends_on_pressure or score.law.velocity_terms]
+    if rise is not None and rise.is_significant and rising:
+        scored = rising
+    least = min(map(_mean_loss, scored))
+    sound = [score for score in scored if score.fit is not None and not score.fit.why_unsound]
+    if sound and min(map(_mean_loss, sound)) <= NEAR * least:
+        scored = sound
+    best = min(scored, key=_mean_loss)
+    left = [score for score in scored if not is_beaten(_losses(score), _losses(best), many_times=rise is None)]
+    fewest = min(len(score.law.parameters) for score in left)
+    return min((score for score in left if len(score.law.parameters) == fewest), key=_mean_loss)
+
+
+def _losses(score: LawScore) -> FloatArray:
+    return np.zeros(0) if score.losses is None else score.losses
+
+
+def _mean_loss(score: LawScore) -> float:
+    return float(_losses(score).mean())
+
+
+def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = True) -> bool:
+    """Whether the losses of another law are lower beyond the noise, and by enough to justify a term.
+
+    Beyond the noise: by a one-sided paired t-test at `BEATEN_CONFIDENCE`. Enough: `WORTHWHILE` of the mean loss.
+    With ``many_times``, a loss `MANY_TIMES` as large is beaten without a test. Losses are those of each group, shape
+    (groups >= 2,).
+    """
+    difference = losses - others
+    groups = len(difference)
+    error = float(difference.std(ddof=1)) / math.sqrt(groups)
+    noise = float(student_t.ppf(BEATEN_CONFIDENCE, groups - 1)) * error
+    worse = float(difference.mean())
+    if many_times and float(losses.mean()) > MANY_TIMES * float(others.mean()) > 0.0:
+        return True
+    return worse > max(noise, WORTHWHILE * float(losses.mean()))

@@ -1,0 +1,175 @@
+"""Cross-validation of laws, and the uncertainty of a new reading.
+
+Each group of readings is predicted by the law fitted to all others. The computation uses no random numbers: the same
+readings give the same result.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import nnls
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
+from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, ParameterValues
+from seal_friction_ros.core.identification.fitting import fit, offsets_of, root_mean_square
+from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.signal_preparation import half_range
+
+Ticks = Callable[[int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
+    """Prediction of each group of readings from all others."""
+
+    predicted: FloatArray  # [N] shape (n,)
+    deviation: FloatArray  # [N] measured - predicted, shape (n,)
+    losses: FloatArray  # root mean square of the weighted deviation in each group [-], shape (groups,)
+    parameters: FloatArray  # fitted without each group, shape (groups, parameters)
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the deviation [N]."""
+        return root_mean_square(self.deviation)
+
+    @property
+    def error(self) -> float:
+        """Sum of the deviations over the sum of the measured friction [-], both as magnitudes."""
+        return float(np.abs(self.deviation).sum() / np.abs(self.predicted + self.deviation).sum())
+
+    @property
+    def mean_deviation(self) -> float:
+        """Mean magnitude of the deviation [N]."""
+        return float(np.abs(self.deviation).mean())
+
+
+def cross_validate(
+    law: CandidateLaw, readings: FrictionReadings, near: ParameterValues, tick: Ticks = lambda _: None
+) -> CrossValidation:
+    """Predict each group (of two at least) by the law fitted to all other groups.
+
+    The fits start ``near`` the parameters of the fit to all readings. ``tick`` is called with 1 after each fit.
+    """
+    predicted, deviation = np.empty(readings.count), np.empty(readings.count)
+    parameters = []
+    for out in readings.groups:
+        values, predicted[out], deviation[out] = _predict(law, readings.taken(~out), readings.taken(out), near)
+        parameters.append([values[p.name] for p in law.parameters])
+        tick(1)
+    return CrossValidation(predicted, deviation, group_losses(readings, deviation), np.array(parameters))
+
+
+def _predict(
+    law: CandidateLaw, trained: FrictionReadings, tested: FrictionReadings, near: ParameterValues
+) -> tuple[ParameterValues, FloatArray, FloatArray]:
+    """Law fitted to ``trained``: parameters, friction of ``tested``, and measured less predicted friction [N].
+
+    The offset of a source comes from ``trained``. A source that is not in ``trained`` gets its offset from its own
+    readings in both directions, in which the friction cancels.
+    """
+    found = fit(law, trained, near, is_close=True)
+    friction = found.friction(tested.at)
+    signed = tested.force - tested.at.direction * friction
+    offsets = found.offsets.copy()
+    for source in set(range(len(tested.names))) - set(trained.source.tolist()):
+        index = tested.two_sided[source]
+        direction = tested.at.direction[index].astype(np.int64)
+        offsets[source] = half_range(signed[index], direction, of_medians=False).offset if len(index) else 0.0
+    return found.values, friction, tested.magnitudes(offsets) - friction
+
+
+def plain_mean(readings: FrictionReadings) -> CrossValidation | None:
+    """Prediction without a law: each reading by the mean of the readings of other groups at the same pressure.
+
+    None if a pressure is in one group only, or for samples of swept logs.
+    """
+    if readings.are_samples or readings.left_out_by == 'pressure':
+        return None
+    measured = readings.magnitudes(offsets_of(readings, readings.scale))
+    predicted = np.empty(readings.count)
+    for i in range(readings.count):
+        others = (readings.level == readings.level[i]) & (readings.group != readings.group[i])
+        if not others.any():
+            return None
+        predicted[i] = measured[others].mean()
+    losses = group_losses(readings, measured - predicted)
+    return CrossValidation(predicted, measured - predicted, losses, np.empty((len(losses), 0)))
+
+
+def group_losses(readings: FrictionReadings, deviation: FloatArray) -> FloatArray:
+    """Root mean square of the weighted ``deviation`` [N], shape (n,), in each group; shape (groups,)."""
+    return np.array([root_mean_square((deviation / readings.scale)[inside]) for inside in readings.groups])
+
+
+def jackknife_errors(estimates: FloatArray) -> FloatArray:
+    """Standard error by the jackknife, from ``estimates`` without each group, shape (groups, parameters).
+
+    An error that all readings of a group share (a test, a pressure, a minute) counts once, not once for each reading.
+
+    Source: [Efron1982]_.
+    """
+    groups = len(estimates)
+    return np.asarray(np.sqrt((groups - 1) / groups * np.sum((estimates - estimates.mean(axis=0)) ** 2, axis=0)))
+
+
+class PredictionUncertainty(NamedTuple):
+    """Standard deviation of a new reading of all seals: std^2 = (relative f)^2 + absolute^2."""
+
+    relative: float  # [-]
+    absolute: float  # [N]
+
+    def std(self, friction: FloatArray) -> FloatArray:
+        """Standard deviation [N] at a friction [N], shape (n,)."""
+        return np.sqrt((self.relative * friction) ** 2 + self.absolute**2)
+
+
+def prediction_uncertainty(
+    predicted: FloatArray, deviation: FloatArray, groups: int, in_addition: float = 0.0
+) -> PredictionUncertainty:
+    """Standard deviation of new readings, from the deviations of left-out readings.
+
+    Non-negative least squares of the squared deviations over squared friction and 1, iteratively weighted with the
+    resulting variance (ten times), gives the ratio of the two parts. The size is such that 1.96 std holds 95 % of the
+    deviations, counted for one more reading [Vovk2005]_. The factor (1 + 1 / groups) on the variance accounts for a new
+    group. ``in_addition`` is a relative standard deviation that these data cannot show, added in square. ``deviation``
+    is measured - ``predicted`` friction [N], shape (n,).
+    """
+    friction = np.maximum(np.abs(predicted), 0.05 * float(np.abs(predicted).mean()))
+    raw = PredictionUncertainty(0.0, max(root_mean_square(deviation), 1e-12))
+    for _ in range(10):
+        variance = np.maximum(raw.std(friction) ** 2, 1e-24)
+        columns = np.column_stack((friction**2, np.ones_like(friction))) / variance[:, np.newaxis]
+        squares, _ = nnls(columns, deviation**2 / variance)
+        raw = PredictionUncertainty(*(math.sqrt(value) for value in squares))
+    std = np.maximum(raw.std(friction), 1e-12)
+    n = len(deviation)
+    rank = min(math.ceil(0.95 * (n + 1)), n)
+    quantile = float(np.sort(np.abs(deviation) / std)[rank - 1]) / BAND_95
+    size = quantile * math.sqrt(1.0 + 1.0 / groups)
+    return PredictionUncertainty(math.hypot(raw.relative * size, in_addition), raw.absolute * size)
+
+
+def band_coverage(
+    law: CandidateLaw,
+    readings: FrictionReadings,
+    near: ParameterValues,
+    in_addition: float = 0.0,
+    tick: Ticks = lambda _: None,
+) -> float:
+    """Share of the readings inside a 95 % band that was made without them [-].
+
+    For each group, law and uncertainty come from the other groups alone, the uncertainty by leaving out each of those
+    in turn. Two groups are too few for that: the band of all readings is used.
+    """
+    inside = 0
+    for out in readings.groups:
+        trained = readings.taken(~out) if len(readings.groups) >= 3 else readings
+        inner = cross_validate(law, trained, near, tick)
+        band = prediction_uncertainty(inner.predicted, inner.deviation, len(readings.groups) - 1, in_addition)
+        _, friction, deviation = _predict(law, trained, readings.taken(out), near)
+        inside += int(np.count_nonzero(np.abs(deviation) <= BAND_95 * band.std(friction)))
+    return inside / readings.count
