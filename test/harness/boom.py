@@ -18,7 +18,8 @@ STROKE = 0.9  # [m]
 RATE = 100  # [Hz]
 STEP = 5e-4  # [s]
 BULK = 1.2e9  # [Pa]
-DEAD_VOLUME = 2e-3  # [m3] at each end
+DEAD_VOLUME = 4e-3  # [m3] at each end
+DAMPING = 4e-10  # [m3/(s Pa)] of the pressure feedback above 0.3 Hz
 TANK, FEED = 3 * BAR, 12 * BAR
 SHORTEST = 1.2  # [m] cylinder between its eyes, rod in
 
@@ -117,6 +118,7 @@ def simulate(boom=Boom(), motion='both', payload=()):
     x, v = float(reference[0]), 0.0
     p_b = 6 * BAR
     p_a = (np.interp(x, grid, loads) + p_b * AREA_B) / AREA_A
+    slow = p_a
     every = round(1 / RATE / STEP)
     rows = []
     changes = list(payload)
@@ -134,10 +136,11 @@ def simulate(boom=Boom(), motion='both', payload=()):
             rows.append((i * STEP, x, v, p_a, p_b, load, friction))
         v += STEP * (p_a * AREA_A - p_b * AREA_B - friction - load - 0.5 * slopes[k] * v * v) / mass
         x += STEP * v
-        line, valve = (TANK, 2.0e-6) if v_ref >= 0 else (FEED, 4.0e-6)
-        q_a = AREA_A * (v_ref + 4.0 * (x_ref - x)) - 2e-11 * p_a + 2e-11 * 20 * BAR
+        line, valve = (TANK, 3.0e-6) if v_ref >= 0 else (FEED, 6.0e-6)
+        slow += STEP / 0.5 * (p_a - slow)
+        q_a = AREA_A * (v_ref + 4.0 * (x_ref - x)) - DAMPING * (p_a - slow)
         drop = line - p_b
-        q_b = valve * drop / math.sqrt(abs(drop) + 2e4)
+        q_b = valve * drop / math.sqrt(abs(drop) + 1e6)
         p_a += STEP * BULK / (DEAD_VOLUME + AREA_A * x) * (q_a - AREA_A * v)
         p_b += STEP * BULK / (DEAD_VOLUME + AREA_B * (STROKE - x + 0.05)) * (q_b + AREA_B * v)
     return BoomRun(*np.array(rows).T)

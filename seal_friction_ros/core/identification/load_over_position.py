@@ -43,6 +43,8 @@ SURE_CHANGE = 4.0  # standard errors, from which a load change is no noise (our 
 LARGEST_FRICTION_ERROR = 0.2  # of the friction: standard error above which it is lost in the noise (our choice)
 COLLINEAR_INERTIA = 0.98  # share of the acceleration that is a function of position (our choice)
 NOTICED_INERTIA = 0.04  # [m/s2] RMS acceleration from which inertia matters (our choice: 2 % of a load with a 5:1 lever)
+ILL_CONDITIONED = 30.0  # condition number of a model that the log does not determine; after [Belsley1980]_
+NEGLIGIBLE_LOSS = 0.01  # of the loss: for less, no term is added (our choice)
 INTERVALS = (1, 2, 3, 4, 6, 8, 12)  # of the spline
 EXPONENTS = (2.0 / 3.0, 1.0, 1.5, 2.0)  # of the pressure
 STRIBECK_SPEEDS = (0.05, 0.15, 0.4)  # of the fastest speed
@@ -67,7 +69,7 @@ class LoadOverPosition:
     forces: FloatArray  # [N] load at the knots, positive if it pushes the rod in, shape (k,)
     std: FloatArray  # [N] standard deviation of the load at the knots, by the jackknife over strokes, shape (k,)
     mass: float  # [kg] equivalent mass in the middle of the knots; 0 if the log shows none
-    mass_slope: float  # [kg/m] of the equivalent mass over position
+    mass_change: tuple[float, float]  # [kg/m, kg/m^2] of the equivalent mass over position from the middle
     mass_std: float  # [kg]
     friction: FrictionTerms
     noise: float  # [N] residual of a mean over `MEAN_OVER`
@@ -93,10 +95,16 @@ def inertia_at(
 ) -> FloatArray:
     """Inertia force m(x) a + m'(x) v^2 / 2 [N], shape (n,), from position [m], velocity [m/s], acceleration [m/s2].
 
-    Source: Lagrange's equation of one degree of freedom with mass m(x); m linear in x is our choice.
+    Source: Lagrange's equation of one degree of freedom with mass m(x); a parabola for m(x) is our choice.
     """
-    mass = load.mass + load.mass_slope * (position - load.middle)
-    return np.asarray(mass * acceleration + 0.5 * load.mass_slope * velocity**2)
+    terms = _inertia_terms(position - load.middle, velocity, acceleration)
+    return np.asarray(terms @ np.array([load.mass, *load.mass_change]))
+
+
+def _inertia_terms(place: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> FloatArray:
+    """Inertia force of the masses 1, x and x^2, shape (n, 3)."""
+    of_slope = place * acceleration + 0.5 * velocity**2
+    return np.column_stack((acceleration, of_slope, place * (place * acceleration + velocity**2)))
 
 
 def fit_load(signals: Signals, position: FloatArray, chambers: Sequence[str], sliding: Sliding) -> LoadOverPosition:
@@ -311,70 +319,90 @@ def _spline_knots(low: float, high: float, intervals: int) -> FloatArray:
     return np.concatenate(([low, low + width / 2.0], ends[1:-1], [high - width / 2.0, high]))
 
 
-def _pressure_choices(means: _Means, chambers: Sequence[str]) -> list[tuple[tuple[str, ...], FloatArray]]:
-    """Names and columns of the pressure-dependent friction: none, or the sum of P^m over the seals, or one chamber."""
+_Terms = list[tuple[str, FloatArray]]  # name and column of each
+_Choices = list[tuple[int, ...]]  # numbers of the terms of each choice
+
+
+def _pressure_terms(means: _Means, chambers: Sequence[str]) -> tuple[_Terms, _Choices]:
+    """Friction over pressure: none, P^m summed over the seals, or of one chamber; one exponent at a time."""
     bar = means.pressures / BAR
-    found: list[tuple[tuple[str, ...], FloatArray]] = [((), np.empty((len(bar), 0)))]
-    mixes = [('seals', ['ab'.index(chamber) for chamber in chambers]), ('a', [0]), ('b', [1])]
-    tried: set[tuple[int, ...]] = set()
-    for name, index in mixes:
-        if tuple(sorted(set(index))) in tried or not np.ptp(bar[:, index]) > 0.0:
-            continue
-        tried.add(tuple(sorted(set(index))))
-        found += [((f'P_{name}^{m:.3g}',), (bar[:, index] ** m).sum(axis=1, keepdims=True)) for m in EXPONENTS]
-    return found
+    mixes = {tuple(sorted('ab'.index(chamber) for chamber in chambers)): 'seals'}
+    mixes = {(0,): 'a', (1,): 'b'} | mixes
+    terms = [
+        (f'P_{name}^{m:.3g}', (bar[:, index] ** m).sum(axis=1))
+        for index, name in sorted(mixes.items(), key=lambda mix: mix[1] != 'seals')
+        for m in EXPONENTS
+        if np.ptp(bar[:, index]) > 0.0
+    ]
+    return terms, [(), *((i,) for i in range(len(terms)))]
 
 
-def _speed_choices(means: _Means) -> list[tuple[tuple[str, ...], FloatArray]]:
-    """Names and columns of the friction over speed: none, viscous, viscous and Stribeck."""
-    speed = means.speed
-    fastest = float(np.quantile(speed, 0.95))
-    found = [((), np.empty((len(speed), 0))), (('viscous',), speed[:, np.newaxis])]
-    for share in STRIBECK_SPEEDS:
-        falling = np.exp(-speed / (share * fastest))
-        found.append((('viscous', f'Stribeck {share * fastest:.3g} m/s'), np.column_stack((speed, falling))))
-    return found
+def _speed_terms(means: _Means) -> tuple[_Terms, _Choices]:
+    """Friction over speed: none, viscous, viscous and Stribeck."""
+    fastest = float(np.quantile(means.speed, 0.95))
+    scales = [share * fastest for share in STRIBECK_SPEEDS]
+    falling = [(f'Stribeck {scale:.3g} m/s', np.exp(-means.speed / scale)) for scale in scales]
+    return [('viscous', means.speed), *falling], [(), (0,), *((0, i + 1) for i in range(len(falling)))]
 
 
 def _choose(means: _Means, chambers: Sequence[str], low: float, high: float) -> _Model:
     """The simplest model within one standard error of the best on left-out pairs of strokes."""
-    middle = (low + high) / 2.0
-    slope = means.of((means.position - middle) * means.sample_acceleration + 0.5 * means.velocity**2)
-    inertias = [np.empty((len(slope), 0)), means.acceleration[:, np.newaxis]]
-    inertias.append(np.column_stack((means.acceleration, slope)))
-    pressures, speeds = _pressure_choices(means, chambers), _speed_choices(means)
-    groups = len(np.unique(means.group))
-    models: list[tuple[int, FloatArray, _Model]] = []
+    inertia = means.of(
+        _inertia_terms(means.position - (low + high) / 2.0, means.velocity, means.sample_acceleration)
+    )
+    (over_pressure, pressures), (over_speed, speeds) = _pressure_terms(means, chambers), _speed_terms(means)
+    terms = [('constant', np.ones(len(inertia))), *over_pressure, *over_speed]
+    friction = means.direction[:, np.newaxis] * np.column_stack([column for _, column in terms])
+    frictions = [
+        (0, *(1 + i for i in p), *(1 + len(over_pressure) + i for i in v)) for p, v in product(pressures, speeds)
+    ]
+    choices: list[tuple[FloatArray, FloatArray, int, tuple[int, ...]]] = []
+    losses: list[FloatArray] = []
     for intervals in INTERVALS:
         if intervals + 3 > len(means.force) // 8:
             break
         knots = _spline_knots(low, high, intervals)
         of_load = means.of(CubicSpline(knots, np.eye(len(knots)), bc_type='not-a-knot')(means.position))
-        for inertia, (p_names, p), (v_names, v) in product(inertias, pressures, speeds):
-            of_friction = means.direction[:, np.newaxis] * np.column_stack((np.ones(len(slope)), p, v))
-            columns = np.column_stack((of_load, inertia, of_friction))
-            model = _Model(knots, columns, inertia.shape[1], ('constant', *p_names, *v_names))
-            models.append((columns.shape[1], _left_out_losses(columns, means), model))
-    best = min((losses for _, losses, _ in models), key=np.mean)
-    near = []
-    for terms, losses, model in models:
-        excess = losses - best
-        error = float(excess.std(ddof=1)) / np.sqrt(groups)
-        if float(excess.mean()) <= error:
-            near.append((terms, float(losses.mean()), model))
-    return min(near, key=lambda choice: choice[:2])[2]
+        k, everything = len(knots), np.column_stack((of_load, inertia, friction))
+        normal = _normal(everything, means)
+        for masses, chosen in product(range(4), frictions):
+            index = np.array([*range(k + masses), *(k + 3 + i for i in chosen)])
+            if not choices or _condition_number(normal, index) <= ILL_CONDITIONED:
+                choices.append((knots, everything, masses, chosen))
+                losses.append(_left_out_losses(normal, index))
+    excess = np.array(losses) - min(losses, key=np.mean)
+    error = excess.std(axis=1, ddof=1) / np.sqrt(excess.shape[1])
+    count = np.array([len(knots) + masses + len(chosen) for knots, _, masses, chosen in choices])
+    near = np.flatnonzero(excess.mean(axis=1) <= np.minimum(error, NEGLIGIBLE_LOSS * min(map(np.mean, losses))))
+    knots, everything, masses, chosen = choices[min(near, key=lambda i: (count[i], excess[i].mean()))]
+    k = len(knots)
+    columns = everything[:, [*range(k + masses), *(k + 3 + i for i in chosen)]]
+    return _Model(knots, columns, masses, tuple(terms[i][0] for i in chosen))
 
 
-def _normal(columns: FloatArray, means: _Means) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Length of the columns, and of each group: normal matrix, right side, square of the forces; columns scaled."""
+class _Normal(NamedTuple):
+    """Normal equations of each group of strokes, columns of unit length."""
+
+    size: FloatArray  # length of the columns, shape (terms,)
+    matrices: FloatArray  # shape (groups, terms, terms)
+    sides: FloatArray  # shape (groups, terms)
+    squares: FloatArray  # [N2] of the force, shape (groups,)
+    counts: FloatArray  # samples, shape (groups,)
+
+
+def _normal(columns: FloatArray, means: _Means) -> _Normal:
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0.0, size, 1.0)
-    weight = np.sqrt(means.count)[:, np.newaxis]
-    x, y = columns / size * weight, means.force * weight[:, 0]
+    weight = np.sqrt(means.count)
+    x, y = columns / size * weight[:, np.newaxis], means.force * weight
     parts = [means.group == group for group in np.unique(means.group)]
-    matrices = np.array([x[part].T @ x[part] for part in parts])
-    sides = np.array([x[part].T @ y[part] for part in parts])
-    return size, matrices, sides, np.array([float(y[part] @ y[part]) for part in parts])
+    return _Normal(
+        size,
+        np.array([x[part].T @ x[part] for part in parts]),
+        np.array([x[part].T @ y[part] for part in parts]),
+        np.array([float(y[part] @ y[part]) for part in parts]),
+        np.array([means.count[part].sum() for part in parts]),
+    )
 
 
 def _solved(matrices: FloatArray, sides: FloatArray) -> FloatArray:
@@ -383,20 +411,26 @@ def _solved(matrices: FloatArray, sides: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(matrices + ridge, sides[..., np.newaxis])[..., 0])
 
 
-def _left_out_losses(columns: FloatArray, means: _Means) -> FloatArray:
-    """Mean squared deviation [N2] of each group, predicted from the others, shape (groups,)."""
-    _, matrices, sides, squares = _normal(columns, means)
+def _condition_number(normal: _Normal, index: IntArray) -> float:
+    """Condition number of the columns ``index``, each of unit length."""
+    values = np.linalg.eigvalsh(normal.matrices.sum(axis=0)[index[:, np.newaxis], index])
+    return float(np.sqrt(values[-1] / max(values[0], 1e-300)))
+
+
+def _left_out_losses(normal: _Normal, index: IntArray) -> FloatArray:
+    """Mean squared deviation [N2] of each group, predicted from the others by the terms ``index``, shape (groups,)."""
+    matrices, sides = normal.matrices[:, index[:, np.newaxis], index], normal.sides[:, index]
     found = _solved(matrices.sum(axis=0) - matrices, sides.sum(axis=0) - sides)
     fitted = np.einsum('gi,gij,gj->g', found, matrices, found)
-    counts = np.bincount(np.unique(means.group, return_inverse=True)[1], weights=means.count)
-    return np.asarray((squares - 2.0 * np.einsum('gi,gi->g', found, sides) + fitted) / counts)
+    return np.asarray((normal.squares - 2.0 * np.einsum('gi,gi->g', found, sides) + fitted) / normal.counts)
 
 
 def _fitted(model: _Model, means: _Means) -> LoadOverPosition:
-    size, matrices, sides, _ = _normal(model.columns, means)
+    size, matrices, sides, *_ = _normal(model.columns, means)
     values = _solved(matrices.sum(axis=0), sides.sum(axis=0)) / size
     estimates = _solved(matrices.sum(axis=0) - matrices, sides.sum(axis=0) - sides) / size
     k, m = len(model.knots), model.inertia
+    masses = np.concatenate((values[k : k + m], np.zeros(3 - m)))
     weights = means.count / means.count.sum()
     friction_columns = means.direction[:, np.newaxis] * model.columns[:, k + m :]
     at_mean = weights @ friction_columns
@@ -407,8 +441,8 @@ def _fitted(model: _Model, means: _Means) -> LoadOverPosition:
         knots=model.knots,
         forces=values[:k],
         std=errors[:k],
-        mass=float(values[k]) if m else 0.0,
-        mass_slope=float(values[k + 1]) if m == 2 else 0.0,
+        mass=float(masses[0]),
+        mass_change=(float(masses[1]), float(masses[2])),
         mass_std=float(errors[k]) if m else 0.0,
         friction=FrictionTerms(
             model.names, values[k + m :], float(values[k + m :] @ at_mean), float(errors[-1])
@@ -461,10 +495,10 @@ def _check_same_load(model: _Model, means: _Means, load: LoadOverPosition) -> No
     Raises:
         ValueError: The load changed.
     """
-    columns = model.columns[:, len(model.knots) :]
-    values = np.concatenate(([load.mass, load.mass_slope][: model.inertia], load.friction.values))
-    of_load = model.columns[:, : len(model.knots)] @ load.forces
-    residual = means.force - of_load - columns @ values
+    k = len(model.knots)
+    of_load = model.columns[:, :k] @ load.forces
+    masses = np.array([load.mass, *load.mass_change])[: model.inertia]
+    residual = means.force - of_load - model.columns[:, k:] @ np.concatenate((masses, load.friction.values))
     strokes = np.unique(means.stroke)
     direction = np.array([means.direction[means.stroke == s][0] for s in strokes])
     mean = np.array([np.average(residual[inside], weights=means.count[inside]) for inside in _each(means, strokes)])
