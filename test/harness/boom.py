@@ -16,7 +16,7 @@ AREA_B = math.pi / 4 * (0.150**2 - 0.100**2)  # [m2]
 BAR = 1e5
 STROKE = 0.9  # [m]
 RATE = 100  # [Hz]
-STEP = 5e-4  # [s]
+STEP = 1e-3  # [s]
 BULK = 1.2e9  # [Pa]
 DEAD_VOLUME = 4e-3  # [m3] at each end
 DAMPING = 4e-10  # [m3/(s Pa)] of the pressure feedback above 0.3 Hz
@@ -76,7 +76,7 @@ class BoomRun(NamedTuple):
 
 
 def trapezoids(speeds, low=0.05, high=0.85, ramp=0.5, rest=0.6):
-    """Position over time [m], 2 kHz: to and fro at each speed."""
+    """Position over time [m], 1 kHz: to and fro at each speed."""
     start = np.full(int(rest / STEP), low)
     parts = [start]
     for speed in speeds:
@@ -93,7 +93,7 @@ def trapezoids(speeds, low=0.05, high=0.85, ramp=0.5, rest=0.6):
 
 
 def sines(periods, low=0.05, high=0.85, cycles=2):
-    """Position over time [m], 2 kHz."""
+    """Position over time [m], 1 kHz."""
     parts = []
     for period in periods:
         t = np.arange(0, cycles * period, STEP)
@@ -136,11 +136,11 @@ def simulate(boom=Boom(), motion='both', payload=()):
             rows.append((i * STEP, x, v, p_a, p_b, load, friction))
         v += STEP * (p_a * AREA_A - p_b * AREA_B - friction - load - 0.5 * slopes[k] * v * v) / mass
         x += STEP * v
-        line, valve = (TANK, 3.0e-6) if v_ref >= 0 else (FEED, 6.0e-6)
+        line, valve = (TANK, 5.0e-6) if v_ref >= 0 else (FEED, 8.0e-6)
         slow += STEP / 0.5 * (p_a - slow)
         q_a = AREA_A * (v_ref + 4.0 * (x_ref - x)) - DAMPING * (p_a - slow)
         drop = line - p_b
-        q_b = valve * drop / math.sqrt(abs(drop) + 1e6)
+        q_b = valve * drop / math.sqrt(abs(drop) + 4e6)
         p_a += STEP * BULK / (DEAD_VOLUME + AREA_A * x) * (q_a - AREA_A * v)
         p_b += STEP * BULK / (DEAD_VOLUME + AREA_B * (STROKE - x + 0.05)) * (q_b + AREA_B * v)
     return BoomRun(*np.array(rows).T)

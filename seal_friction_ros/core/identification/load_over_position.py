@@ -41,6 +41,7 @@ SMALLEST_SHARE = 0.5  # of the travel that both directions must share (our choic
 LARGEST_LOAD_CHANGE = 0.02  # of the mean load, between strokes (our choice)
 SURE_CHANGE = 4.0  # standard errors, from which a load change is no noise (our choice)
 LARGEST_FRICTION_ERROR = 0.2  # of the friction: standard error above which it is lost in the noise (our choice)
+KNOWN_INERTIA = 0.02  # of the friction: standard error of an inertia force that is known (our choice)
 COLLINEAR_INERTIA = 0.98  # share of the acceleration that is a function of position (our choice)
 NOTICED_INERTIA = 0.04  # [m/s2] RMS acceleration from which inertia matters (our choice: 2 % of a load with a 5:1 lever)
 ILL_CONDITIONED = 30.0  # condition number of a model that the log does not determine; after [Belsley1980]_
@@ -137,9 +138,9 @@ def fit_load(signals: Signals, position: FloatArray, chambers: Sequence[str], sl
 def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition, sliding: Sliding) -> Signals:
     """Signals whose force sum is without load and inertia: what is left while the rod slides is friction.
 
-    Samples beyond the positions of the load are left out, so there may be fewer rows. While the rod slides, pressures
-    and the force that is left are centred means over `MEAN_OVER` within one motion: the noise of two pressures times
-    their areas is often as large as the friction (our choice).
+    Samples beyond the positions of the load are left out. While the rod moves, velocity, pressures and the force that
+    is left are centred means over `MEAN_OVER` within one motion, and four such samples a window are kept: the noise of
+    two pressures times their areas is often as large as the friction (our choice).
 
     Args:
         signals: Signals of the log, with load.
@@ -149,23 +150,28 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
     """
     inertia = inertia_at(load, position, signals.velocity, np.gradient(signals.velocity, signals.time))
     force = signals.force_sum - load_at(load, position) - inertia
-    columns = [signals.pressure_a.copy(), signals.pressure_b.copy(), force]
+    cleaned = Signals(signals.time, signals.velocity.copy(), signals.pressure_a.copy(), signals.pressure_b.copy(), force)
+    kept = np.isfinite(load_at(load, position)) | ~np.isfinite(position)
+    usable = np.isfinite(cleaned).all(axis=0)
     for direction, run in motions(signals, sliding):
-        if direction == 0:
+        inside = run[usable[run]]
+        if direction == 0 or len(inside) < 3:
             continue
-        inside = run[np.isfinite(force[run])]
+        step = float(np.median(np.diff(signals.time[inside])))
         for part in np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1):
-            if len(part) > 2:
-                for column in columns:
-                    column[part] = _centred_mean(signals.time[part], column[part])
-    known = (position >= load.knots[0]) & (position <= load.knots[-1])
-    cleaned = Signals(signals.time, signals.velocity, *columns)
-    return cleaned.taken(np.flatnonzero(known | ~np.isfinite(position)))
+            for column in cleaned[1:]:
+                column[part] = _centred_mean(column[part], max(round(MEAN_OVER / 2.0 / step), 1))
+            kept[part] &= np.arange(len(part)) % max(round(MEAN_OVER / 4.0 / step), 1) == 0
+    return cleaned.taken(kept)
 
 
-def _centred_mean(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Mean over `MEAN_OVER` around each sample; narrower towards the ends, so that it stays centred."""
-    half = int(MEAN_OVER / 2.0 / max(float(np.median(np.diff(time))), 1e-9))
+def known_acceleration(load: LoadOverPosition) -> float:
+    """Acceleration [m/s2] up to which the inertia is known to `KNOWN_INERTIA` of the friction; 0 without a mass."""
+    return KNOWN_INERTIA * load.friction.mean / load.mass_std if load.mass_std > 0.0 else 0.0
+
+
+def _centred_mean(values: FloatArray, half: int) -> FloatArray:
+    """Mean over ``half`` samples on either side; fewer towards the ends, on both sides alike, so that it stays centred."""
     place = np.arange(len(values))
     reach = np.minimum(half, np.minimum(place, place[::-1]))
     total = np.concatenate(([0.0], np.cumsum(values)))

@@ -15,6 +15,7 @@ from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
 from seal_friction_ros.core.identification.diagnostics import FrictionChange, Outlier
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.signal_preparation import OffsetLine
+from seal_friction_ros.offline.identification.load_numbers import load_numbers
 from seal_friction_ros.offline.identification.sources import Sources
 from seal_friction_ros.offline.work.seal_writer import rounded
 
@@ -210,6 +211,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         }
     )
     return numbers | {
+        'load': load_numbers([(source.file.name, source.load) for source in data.sources.each]),
         'stiction': quality.breakaway and quality.breakaway._asdict(),
         'changes': [{**c._asdict(), 'is_change': c.is_change} for c in data.changes],
         'samples_used': data.prepared.used,
