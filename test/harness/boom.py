@@ -82,10 +82,8 @@ def trapezoids(speeds, low=0.05, high=0.85, ramp=0.5, rest=0.6):
     for speed in speeds:
         span = high - low
         held = span / speed - ramp
-        v = np.concatenate(
-            [np.linspace(0, speed, int(ramp / STEP)), np.full(int(held / STEP), speed)]
-            + [np.linspace(speed, 0, int(ramp / STEP)), np.zeros(int(rest / STEP))]
-        )
+        up = np.linspace(0, speed, int(ramp / STEP))
+        v = np.concatenate([up, np.full(int(held / STEP), speed), up[::-1], np.zeros(int(rest / STEP))])
         way = np.cumsum(v) * STEP
         way *= span / way[-1]
         parts += [low + way, high - way]
@@ -173,7 +171,8 @@ def measured(run, seed, *, of_range=0.003, of_reading=0.0, full_scale=100 * BAR,
     """Log of a run: pressure noise as shares of full scale and of the reading, encoder step [m]."""
     random = np.random.default_rng(seed)
     pressures = [
-        p + random.standard_normal(len(p)) * (of_range * full_scale + of_reading * np.abs(p)) for p in (run.p_a, run.p_b)
+        p + random.standard_normal(len(p)) * (of_range * full_scale + of_reading * np.abs(p))
+        for p in (run.p_a, run.p_b)
     ]
     position = np.round(run.position / step) * step
     velocity = np.round(run.velocity / 2e-4) * 2e-4

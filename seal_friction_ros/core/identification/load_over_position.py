@@ -33,6 +33,8 @@ from seal_friction_ros.core.identification.signal_preparation import (
 )
 
 MEAN_OVER = 0.2  # [s] samples are averaged over this time before the fit (our choice)
+LONGEST_MEAN = 1.0  # [s] of the friction that is left (our choice)
+WANTED_NOISE = 0.05  # of the friction, in that mean (our choice)
 FEWEST_STROKES = 2  # in each direction: each is predicted from the others
 SHORTEST_STROKE = 0.05  # of the travel; a shorter motion is part of no stroke (our choice)
 MOST_GROUPS = 20  # of strokes, each left out in turn (our choice)
@@ -43,7 +45,7 @@ SURE_CHANGE = 4.0  # standard errors, from which a load change is no noise (our 
 LARGEST_FRICTION_ERROR = 0.2  # of the friction: standard error above which it is lost in the noise (our choice)
 KNOWN_INERTIA = 0.02  # of the friction: standard error of an inertia force that is known (our choice)
 COLLINEAR_INERTIA = 0.98  # share of the acceleration that is a function of position (our choice)
-NOTICED_INERTIA = 0.04  # [m/s2] RMS acceleration from which inertia matters (our choice: 2 % of a load with a 5:1 lever)
+NOTICED_INERTIA = 0.04  # [m/s2] RMS: 2 % of a load on a lever of 5 to 1 (our choice)
 ILL_CONDITIONED = 30.0  # condition number of a model that the log does not determine; after [Belsley1980]_
 NEGLIGIBLE_LOSS = 0.01  # of the loss: for less, no term is added (our choice)
 INTERVALS = (1, 2, 3, 4, 6, 8, 12)  # of the spline
@@ -112,9 +114,10 @@ def fit_load(signals: Signals, position: FloatArray, chambers: Sequence[str], sl
     """Fit load and inertia over position, together with friction, to a log without load cell.
 
     The samples of each motion are averaged over `MEAN_OVER` (all terms alike, so nothing is blurred; a mean of the
-    acceleration is a difference of velocities). Number of intervals of the spline, terms of the inertia and terms of the
-    friction are those with which left-out pairs of strokes are predicted best; of models within one standard error of
-    the best, the one with the fewest terms is taken [Breiman1984]_.
+    acceleration is a difference of velocities). The number of intervals of the spline and the terms of inertia and
+    friction are those with which left-out pairs of strokes are predicted best; of models within one standard error and
+    `NEGLIGIBLE_LOSS` of the best, the one with the fewest terms is taken, after [Breiman1984]_; the second bound and
+    the limit `ILL_CONDITIONED` are our choice.
 
     Args:
         signals: Signals of the log; the force sum is p_a A_a - p_b A_b.
@@ -139,8 +142,8 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
     """Signals whose force sum is without load and inertia: what is left while the rod slides is friction.
 
     Samples beyond the positions of the load are left out. While the rod moves, velocity, pressures and the force that
-    is left are centred means over `MEAN_OVER` within one motion, and four such samples a window are kept: the noise of
-    two pressures times their areas is often as large as the friction (our choice).
+    is left are centred means over `averaging_window` within one motion, and one sample is kept in a quarter of
+    `MEAN_OVER`: the noise of two pressures times their areas is often as large as the friction (our choice).
 
     Args:
         signals: Signals of the log, with load.
@@ -150,8 +153,9 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
     """
     inertia = inertia_at(load, position, signals.velocity, np.gradient(signals.velocity, signals.time))
     force = signals.force_sum - load_at(load, position) - inertia
-    cleaned = Signals(signals.time, signals.velocity.copy(), signals.pressure_a.copy(), signals.pressure_b.copy(), force)
-    kept = np.isfinite(load_at(load, position)) | ~np.isfinite(position)
+    cleaned = Signals(signals.time, *(column.copy() for column in (*signals[1:4], force)))
+    kept: BoolArray = np.logical_or(np.isfinite(load_at(load, position)), ~np.isfinite(position))
+    window = averaging_window(load)
     usable = np.isfinite(cleaned).all(axis=0)
     for direction, run in motions(signals, sliding):
         inside = run[usable[run]]
@@ -160,9 +164,15 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
         step = float(np.median(np.diff(signals.time[inside])))
         for part in np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1):
             for column in cleaned[1:]:
-                column[part] = _centred_mean(column[part], max(round(MEAN_OVER / 2.0 / step), 1))
+                column[part] = _centred_mean(column[part], max(round(window / 2.0 / step), 1))
             kept[part] &= np.arange(len(part)) % max(round(MEAN_OVER / 4.0 / step), 1) == 0
     return cleaned.taken(kept)
+
+
+def averaging_window(load: LoadOverPosition) -> float:
+    """Time [s] over which the mean noise is `WANTED_NOISE` of the friction; from `MEAN_OVER` to `LONGEST_MEAN`."""
+    wanted = WANTED_NOISE * max(load.friction.mean, 1e-12)
+    return min(MEAN_OVER * max((load.noise / wanted) ** 2, 1.0), LONGEST_MEAN)
 
 
 def known_acceleration(load: LoadOverPosition) -> float:
@@ -171,7 +181,7 @@ def known_acceleration(load: LoadOverPosition) -> float:
 
 
 def _centred_mean(values: FloatArray, half: int) -> FloatArray:
-    """Mean over ``half`` samples on either side; fewer towards the ends, on both sides alike, so that it stays centred."""
+    """Mean over ``half`` samples on either side; fewer towards the ends, on both sides alike."""
     place = np.arange(len(values))
     reach = np.minimum(half, np.minimum(place, place[::-1]))
     total = np.concatenate(([0.0], np.cumsum(values)))
@@ -201,7 +211,7 @@ def _strokes(signals: Signals, position: FloatArray, sliding: Sliding) -> _Motio
     usable = known & np.isfinite(signals).all(axis=0)
     moved = [(side, run[usable[run]]) for side, run in motions(signals, sliding) if side]
     moved = [(side, run) for side, run in moved if len(run) > 2]
-    places = [np.concatenate([position[run] for side, run in moved if side == s] or [[]]) for s in (1, -1)]
+    places = [np.concatenate([np.empty(0), *(position[run] for side, run in moved if side == s)]) for s in (1, -1)]
     travel = float(np.ptp(np.concatenate(places))) if moved else 0.0
     if travel <= 0.0:
         raise ValueError('the position does not change: record that of the rod, or drive strokes in both directions')
@@ -251,7 +261,7 @@ class _Means(NamedTuple):
     """Means over `MEAN_OVER`, one row each, and the samples that they are made from."""
 
     starts: IntArray  # first sample of each row
-    count: FloatArray  # samples of each row, shape (rows,)
+    counts: FloatArray  # samples of each row, shape (rows,)
     stroke: IntArray  # shape (rows,)
     direction: FloatArray  # shape (rows,)
     group: IntArray  # strokes out and back are left out together, shape (rows,)
@@ -265,7 +275,7 @@ class _Means(NamedTuple):
 
     def of(self, values: FloatArray) -> FloatArray:
         """Mean of ``values``, shape (samples, ...), in each row."""
-        count = self.count.reshape(-1, *[1] * (values.ndim - 1))
+        count = self.counts.reshape(-1, *[1] * (values.ndim - 1))
         return np.asarray(np.add.reduceat(values, self.starts, axis=0) / count)
 
 
@@ -316,8 +326,10 @@ class _Model(NamedTuple):
 
 
 def _spline_knots(low: float, high: float, intervals: int) -> FloatArray:
-    """Points of a not-a-knot spline that has ``intervals`` equal polynomials: all points but the second and last but one
-    are ends of intervals, so there are ``intervals`` + 3."""
+    """Points of a not-a-knot spline that has ``intervals`` equal polynomials, shape (intervals + 3,).
+
+    All points but the second and the last but one are ends of intervals.
+    """
     if intervals == 1:
         return np.linspace(low, high, 4)
     ends = np.linspace(low, high, intervals + 1)
@@ -353,9 +365,7 @@ def _speed_terms(means: _Means) -> tuple[_Terms, _Choices]:
 
 def _choose(means: _Means, chambers: Sequence[str], low: float, high: float) -> _Model:
     """The simplest model within one standard error of the best on left-out pairs of strokes."""
-    inertia = means.of(
-        _inertia_terms(means.position - (low + high) / 2.0, means.velocity, means.sample_acceleration)
-    )
+    inertia = means.of(_inertia_terms(means.position - (low + high) / 2.0, means.velocity, means.sample_acceleration))
     (over_pressure, pressures), (over_speed, speeds) = _pressure_terms(means, chambers), _speed_terms(means)
     terms = [('constant', np.ones(len(inertia))), *over_pressure, *over_speed]
     friction = means.direction[:, np.newaxis] * np.column_stack([column for _, column in terms])
@@ -399,7 +409,7 @@ class _Normal(NamedTuple):
 def _normal(columns: FloatArray, means: _Means) -> _Normal:
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0.0, size, 1.0)
-    weight = np.sqrt(means.count)
+    weight = np.sqrt(means.counts)
     x, y = columns / size * weight[:, np.newaxis], means.force * weight
     parts = [means.group == group for group in np.unique(means.group)]
     return _Normal(
@@ -407,7 +417,7 @@ def _normal(columns: FloatArray, means: _Means) -> _Normal:
         np.array([x[part].T @ x[part] for part in parts]),
         np.array([x[part].T @ y[part] for part in parts]),
         np.array([float(y[part] @ y[part]) for part in parts]),
-        np.array([means.count[part].sum() for part in parts]),
+        np.array([means.counts[part].sum() for part in parts]),
     )
 
 
@@ -437,7 +447,7 @@ def _fitted(model: _Model, means: _Means) -> LoadOverPosition:
     estimates = _solved(matrices.sum(axis=0) - matrices, sides.sum(axis=0) - sides) / size
     k, m = len(model.knots), model.inertia
     masses = np.concatenate((values[k : k + m], np.zeros(3 - m)))
-    weights = means.count / means.count.sum()
+    weights = means.counts / means.counts.sum()
     friction_columns = means.direction[:, np.newaxis] * model.columns[:, k + m :]
     at_mean = weights @ friction_columns
     errors = jackknife_errors(np.column_stack((estimates, estimates[:, k + m :] @ at_mean)))
@@ -450,9 +460,7 @@ def _fitted(model: _Model, means: _Means) -> LoadOverPosition:
         mass=float(masses[0]),
         mass_change=(float(masses[1]), float(masses[2])),
         mass_std=float(errors[k]) if m else 0.0,
-        friction=FrictionTerms(
-            model.names, values[k + m :], float(values[k + m :] @ at_mean), float(errors[-1])
-        ),
+        friction=FrictionTerms(model.names, values[k + m :], float(values[k + m :] @ at_mean), float(errors[-1])),
         noise=float(np.sqrt(weights @ residual**2)),
         condition_number=float(np.linalg.cond(scaled)),
         strokes=int(means.stroke.max()) + 1,
@@ -464,26 +472,24 @@ def _inertia_warning(model: _Model, means: _Means) -> list[str]:
     """A warning if the acceleration follows the position, as with one sine: then inertia counts as load."""
     k = len(model.knots)
     acceleration = means.acceleration
-    size = float(np.sqrt(np.average(acceleration**2, weights=means.count)))
+    size = float(np.sqrt(np.average(acceleration**2, weights=means.counts)))
     if size < NOTICED_INERTIA:
         return []
     of_position = model.columns[:, :k]
     left = acceleration - of_position @ np.linalg.lstsq(of_position, acceleration, rcond=1e-10)[0]
-    share = 1.0 - float(np.average(left**2, weights=means.count)) / size**2
+    share = 1.0 - float(np.average(left**2, weights=means.counts)) / size**2
     if share < COLLINEAR_INERTIA:
         return []
-    return [
-        f'the acceleration is {100.0 * share:.0f} % a function of position, so load and inertia cannot be told apart '
-        '(the friction can): drive strokes at two speeds'
-    ]
+    text = f'the acceleration is {100.0 * share:.0f} % a function of position, so load and inertia cannot be told apart'
+    return [f'{text} (the friction can): drive strokes at two speeds']
 
 
 def _check_friction(load: LoadOverPosition) -> None:
     friction = load.friction
     if friction.mean <= 0.0:
         raise ValueError(
-            f'half the difference of the directions is {friction.mean:.4g} N, so friction would drive the rod: the sign '
-            'of force sum, position or velocity is wrong (all are positive on extension), or an area'
+            f'half the difference of the directions is {friction.mean:.4g} N, so friction would drive the rod: the '
+            'sign of force sum, position or velocity is wrong (all are positive on extension), or an area'
         )
     if friction.standard_error > LARGEST_FRICTION_ERROR * friction.mean:
         raise ValueError(
@@ -507,13 +513,13 @@ def _check_same_load(model: _Model, means: _Means, load: LoadOverPosition) -> No
     residual = means.force - of_load - model.columns[:, k:] @ np.concatenate((masses, load.friction.values))
     strokes = np.unique(means.stroke)
     direction = np.array([means.direction[means.stroke == s][0] for s in strokes])
-    mean = np.array([np.average(residual[inside], weights=means.count[inside]) for inside in _each(means, strokes)])
+    mean = np.array([np.average(residual[inside], weights=means.counts[inside]) for inside in _each(means, strokes)])
     scatter = np.array([residual[inside].std() / np.sqrt(inside.sum()) for inside in _each(means, strokes)])
     next_is_back = np.flatnonzero(direction[:-1] != direction[1:])
     offsets = (mean[next_is_back] + mean[next_is_back + 1]) / 2.0
-    errors = np.hypot(scatter[next_is_back], scatter[next_is_back + 1])  # twice that of white noise: means are correlated
+    errors = np.hypot(scatter[next_is_back], scatter[next_is_back + 1])  # twice that of white noise: rows correlate
     change = np.abs(offsets - np.median(offsets))
-    size = float(np.average(np.abs(of_load), weights=means.count))
+    size = float(np.average(np.abs(of_load), weights=means.counts))
     worst = int(np.argmax(change - SURE_CHANGE * errors))
     if change[worst] > max(LARGEST_LOAD_CHANGE * size, SURE_CHANGE * errors[worst]):
         span = float(np.ptp(offsets))
