@@ -156,7 +156,7 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
     cleaned = Signals(signals.time, *(column.copy() for column in (*signals[1:4], force)))
     kept: BoolArray = np.logical_or(np.isfinite(load_at(load, position)), ~np.isfinite(position))
     window = averaging_window(load)
-    usable = np.isfinite(cleaned).all(axis=0)
+    usable: BoolArray = np.logical_and.reduce([np.isfinite(column) for column in cleaned])
     for direction, run in motions(signals, sliding):
         inside = run[usable[run]]
         if direction == 0 or len(inside) < 3:
@@ -165,7 +165,7 @@ def without_load(signals: Signals, position: FloatArray, load: LoadOverPosition,
         for part in np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1):
             for column in cleaned[1:]:
                 column[part] = _centred_mean(column[part], max(round(window / 2.0 / step), 1))
-            kept[part] &= np.arange(len(part)) % max(round(MEAN_OVER / 4.0 / step), 1) == 0
+            kept[part] = kept[part] & (np.arange(len(part)) % max(round(MEAN_OVER / 4.0 / step), 1) == 0)
     return cleaned.taken(kept)
 
 

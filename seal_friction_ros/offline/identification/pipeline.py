@@ -181,6 +181,8 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
         ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
     laws = _candidates(data.used, data.ring)
+    if data.sources.has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
+        laws = tuple(law for law in laws if 'asymmetry' not in law.velocity_terms)
     with progress('fit and leave out', len(laws) * (len(data.used.groups) + 1)) as advance:
         scores = fitting.score_laws(laws, data.used, advance)
     best = fitting.recommended(scores)

@@ -86,6 +86,11 @@ class Sources:
         """Name and digest of each source."""
         return tuple(source.file for source in self.each)
 
+    @property
+    def has_fitted_load(self) -> bool:
+        """Whether a load over position was fitted to a log; friction larger in one direction counts as load there."""
+        return any(source.load is not None for source in self.each)
+
     def prepare(self, index: Sequence[int] | None = None) -> PreparedReadings:
         """Readings of all sources, or of those numbered in ``index``.
 

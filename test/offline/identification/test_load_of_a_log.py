@@ -50,6 +50,7 @@ def test_identify_gives_friction_and_load_without_a_load_cell(tmp_path, rig):
     assert np.sqrt(np.mean((np.array(load['force_N']) - truth) ** 2)) < 0.02 * truth.mean()
     assert load['mass_kg'] == pytest.approx(machine.mass(0.45), rel=0.1)
     assert len(load['std_N']) == len(load['position_m'])
+    assert not any('asymmetric' in rung['law'] for rung in run.figures['ladder'])
     assert any('were fitted and taken out of the force sum' in remark for remark in run.figures['remarks'])
 
 
