@@ -17,6 +17,8 @@ The rig file describes the columns of the log, their units, signs and areas. The
       terms: [{column: 4, unit: mm, gain: -1.0}]
       savitzky_golay: {window: 0.2, order: 2, largest_gap: 0.05} # absent: the terms are a velocity
     sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # for identification; absent: these values
+    position: {terms: [{column: 4, unit: mm, gain: -1.0}]} # absent: that of the velocity, if it is made from position
+    load: position              # for identification; the force sum holds a load that follows position; absent: none
 """
 
 from array import array
@@ -43,6 +45,7 @@ _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one beyond the int32 secon
 _LONGEST_LINE = 1 << 18  # characters
 _SHOWN = 40  # characters of an invalid cell in an error message
 _PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
+_LOADS = ('none', 'position')
 _HEADERS = ('none', 'row', 'comment')
 _QUANTITIES = {
     'number': ('1',),
@@ -125,6 +128,8 @@ class Rig(CheckedParameters):
     velocity: Combination
     savitzky_golay: SavitzkyGolay | None
     sliding: Sliding
+    position: Combination | None = None
+    load: str = 'none'
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -133,7 +138,12 @@ class Rig(CheckedParameters):
         if not self.frame_id.isprintable() or len(self.frame_id) > 255:
             raise ValueError(f'Rig.frame_id = {self.frame_id[:_SHOWN]!r} is not up to 255 printable characters')
         wanted = {'time': 'time', 'chamber_a': 'pressure', 'chamber_b': 'pressure', 'force_sum': 'force'}
+        if self.load not in _LOADS:
+            raise ValueError(f'Rig.load = {self.load!r} is not one of {", ".join(_LOADS)}')
+        if self.load == 'position' and self.position is None and self.savitzky_golay is None:
+            raise ValueError('Rig.load = position but the rig file has no position: add the column of the position')
         wanted['velocity'] = 'velocity' if self.savitzky_golay is None else 'length'
+        wanted['position'] = 'length'
         for where, term in self.terms():
             quantity = wanted[where.split('.')[0]]
             if not term.is_a(quantity):
@@ -150,6 +160,13 @@ class Rig(CheckedParameters):
         for part in _PARTS[1:]:
             for number, term in enumerate(getattr(self, part).terms):
                 yield f'{part}.terms[{number}]', term
+        for number, term in enumerate(() if self.position is None else self.position.terms):
+            yield f'position.terms[{number}]', term
+
+    @property
+    def known_position(self) -> Combination | None:
+        """Position of the rod: that of the rig file, or the one that the velocity is made from; None without either."""
+        return self.velocity if self.position is None and self.savitzky_golay is not None else self.position
 
 
 class ImportSummary(NamedTuple):
@@ -193,6 +210,7 @@ class ReadLog(NamedTuple):
 
     samples: 'Samples'
     columns: dict[Term, FloatArray]  # values in the log, in the units of the terms
+    position: FloatArray | None = None  # [m] shape (n,); None if the rig file has none
 
 
 def read_samples(log: Path, rig: Rig) -> ReadLog:
@@ -202,7 +220,10 @@ def read_samples(log: Path, rig: Rig) -> ReadLog:
         ValueError: The log cannot be read or is invalid; one line that names file and field or line.
     """
     cells = _read_cells(log, rig)
-    return ReadLog(_samples(log, rig, cells), cells.columns)
+    position = rig.known_position
+    with np.errstate(invalid='ignore', over='ignore'):
+        places = None if position is None else _combined(position, cells.columns, len(cells.line_numbers))
+    return ReadLog(_samples(log, rig, cells), cells.columns, places)
 
 
 def read_rig(path: Path) -> Rig:
@@ -220,9 +241,11 @@ def read_rig(path: Path) -> Rig:
     velocity, filter_values = _taken_out(document['velocity'], 'savitzky_golay')
     parts = {part: _combination(document[part], f'{path}: {part}') for part in _PARTS[1:-1]}
     parts['velocity'] = _combination(velocity, f'{path}: velocity')
+    if 'position' in document:
+        parts['position'] = _combination(document['position'], f'{path}: position')
     return from_mapping(
         Rig,
-        {key: value for key, value in document.items() if key not in (*_PARTS, 'sliding')},
+        {key: value for key, value in document.items() if key not in (*_PARTS, 'sliding', 'position')},
         str(path),
         time=from_mapping(Term, document['time'], f'{path}: time'),
         savitzky_golay=None

@@ -206,9 +206,12 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
     Raises:
         ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
-    laws = _candidates(data.used, data.ring)
+    variation = variation_of(data.used)
+    if data.sources.has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
+        variation = variation._replace(asymmetry=False)
+    laws = candidate_laws(variation, *(data.ring or ()))
     with progress('fit and leave out', len(laws) + MOST_EXTENSIONS) as advance:
-        scores = score_ladder(laws, data.used, variation_of(data.used), advance)
+        scores = score_ladder(laws, data.used, variation, advance)
     best = recommended(scores, rise_over_pressures(data.used))
     by_name = {None: best} | {score.law.name: score for score in scores}
     if name not in by_name:

@@ -19,6 +19,7 @@ from seal_friction_ros.core.identification.readings import FrictionReadings, Pre
 from seal_friction_ros.core.identification.runs import BetweenRuns, Drift
 from seal_friction_ros.core.identification.selection import LawScore, is_beaten
 from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
+from seal_friction_ros.offline.identification.load_numbers import load_numbers
 from seal_friction_ros.offline.identification.sources import Sources
 from seal_friction_ros.offline.work.seal_writer import rounded
 
@@ -227,6 +228,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
     )
     return numbers | {
         'breakaway': quality.breakaway and _breakaway_numbers(found),
+        'load': load_numbers([(source.file.name, source.load) for source in data.sources.each]),
         'samples_used': data.prepared.used,
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,

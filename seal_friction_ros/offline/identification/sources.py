@@ -18,6 +18,12 @@ from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import UNITS
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
+from seal_friction_ros.core.identification.load_over_position import (
+    LoadOverPosition,
+    fit_load,
+    known_acceleration,
+    without_load,
+)
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
@@ -26,8 +32,10 @@ from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_samples
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
+from seal_friction_ros.offline.identification.load_numbers import load_text
 from seal_friction_ros.offline.work.progress import progress
 
+LARGEST_ACCELERATION = 1.0  # [m/s2] limit with known inertia (our choice)
 DIRECTIONS = {'extend': 1, 'ext': 1, '1': 1, '+1': 1, 'retract': -1, 'ret': -1, '-1': -1}
 KINDS = {'dynamic': 0, 'static': 1}
 PRESSURE_UNITS = {'psig': 'psi', 'psi': 'psi', 'bar': 'bar', 'kpa': 'kPa', 'mpa': 'MPa', 'pa': 'Pa'}
@@ -63,6 +71,8 @@ class Source(NamedTuple):
     seal_document: Mapping[str, Any] | None = None  # seal file inside a bag or a data sheet
     pressure_area: float | None = None  # by which the rig file turns pressure into force [m^2]; None if unknown
     remarks: tuple[str, ...] = ()  # assumptions that neither the source nor an option states
+    load_position: FloatArray | None = None  # [m] of each sample, if the force sum holds a load that follows it
+    load: LoadOverPosition | None = None  # the load that was taken out of the force sum of the log
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +87,11 @@ class Sources:
     def files(self) -> tuple[DataFile, ...]:
         """Name and digest of each source."""
         return tuple(source.file for source in self.each)
+
+    @property
+    def has_fitted_load(self) -> bool:
+        """Whether a load over position was fitted to a log; friction larger in one direction counts as load there."""
+        return any(source.load is not None for source in self.each)
 
     def prepare(self, index: Sequence[int] | None = None) -> PreparedReadings:
         """Readings of all sources, or of those numbered in ``index``.
@@ -125,6 +140,7 @@ def read_sources(paths: Sequence[Path], options: SourceOptions) -> Sources:
     if len({source.log is None for source in each}) > 1:
         raise ValueError('manual readings and recorded signals cannot be fitted together: identify each separately')
     chambers, remark = _chambers(each, options)
+    each = tuple(without_load_of(source, chambers, options) for source in each)
     return Sources(each, chambers, tuple(dict.fromkeys([*(r for source in each for r in source.remarks), *remark])))
 
 
@@ -168,6 +184,29 @@ def _read(path: Path, options: SourceOptions) -> Source:
     return _read_log(path, options)
 
 
+def without_load_of(source: Source, chambers: Sequence[str], options: SourceOptions) -> Source:
+    """The source with load and inertia taken out of its force sum, if that holds a load which follows position.
+
+    With known inertia, samples at higher accelerations are used too, unless the options limit them.
+
+    Raises:
+        ValueError: The load cannot be told from friction; names the log.
+    """
+    if source.log is None or source.load_position is None:
+        return source
+    name, signals, sliding = source.log
+    try:
+        load = fit_load(signals, source.load_position, chambers, sliding)
+    except ValueError as error:
+        raise ValueError(f'{name}: {error}') from None
+    cleaned = without_load(signals, source.load_position, load, sliding)
+    texts = tuple(f'{name}: {text}' for text in (load_text(load), *load.warnings))
+    if options.largest_acceleration is None:
+        limit = min(max(sliding.largest_acceleration, known_acceleration(load)), LARGEST_ACCELERATION)
+        sliding = replace(sliding, largest_acceleration=limit)
+    return source._replace(log=RecordedLog(name, cleaned, sliding), load=load, remarks=(*source.remarks, *texts))
+
+
 def _data_file(path: Path) -> DataFile:
     """Name and digest of a file, or of the data files of a bag in order of name."""
     digest = hashlib.sha256()
@@ -194,7 +233,8 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
     recorded = RecordedLog(path.name, signals, sliding)
-    return Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
+    source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
+    return source._replace(load_position=log.position) if rig.load == 'position' else source
 
 
 def _pressure_area(rig: Rig) -> float | None:

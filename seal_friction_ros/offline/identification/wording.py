@@ -58,8 +58,8 @@ def _change_texts(readings: FrictionReadings) -> Iterator[str]:
         percent = 100.0 * (change.other_friction / change.friction - 1.0)
         yield (
             f'friction differs between runs: at {change.pressure / BAR:.3g} bar {change.friction:.3g} N in '
-            f'{change.name} and {change.other_friction:.3g} N in {change.other_name} ({percent:+.0f} %); they are fitted '
-            'together, and the band holds both: if they are two seals, identify each separately'
+            f'{change.name} and {change.other_friction:.3g} N in {change.other_name} ({percent:+.0f} %); they are '
+            'fitted together, and the band holds both: if they are two seals, identify each separately'
         )
 
 
