@@ -189,7 +189,8 @@ def prepare_manual_readings(
     breakaway = _joined(static, seals) if static and len(static[0].friction) else None
     if breakaway is not None:
         breakaway = replace(breakaway, level=_nearest_level(breakaway.seal_pressure, readings))
-        if readings.left_out_by == 'pressure':
+        several = len(np.unique(breakaway.level)) > 1
+        if several and (readings.left_out_by == 'pressure' or breakaway.left_out_by != 'test'):
             breakaway = replace(breakaway, group=breakaway.level, left_out_by='pressure')
     counts = {manual.name: len(manual.friction) for manual in dynamic}
     return PreparedReadings(readings, np.repeat(readings.at.pressure[:, :1], 2, axis=1), breakaway, counts, counts, {})

@@ -226,7 +226,7 @@ def _mean_loss(score: LawScore) -> float:
     return float(_losses(score).mean())
 
 
-def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = True) -> bool:
+def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = False) -> bool:
     """Whether the losses of another law are lower beyond the noise, and by enough to justify a term.
 
     Beyond the noise: by a one-sided paired t-test at `BEATEN_CONFIDENCE`. Enough: `WORTHWHILE` of the mean loss.

@@ -107,7 +107,10 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
     readings = _with_normal_force(prepared.readings, ring)
     outlier = None
     if not readings.are_samples and len(readings.levels) >= 4:
-        outlier = diagnostics.outlying_level(_power_laws(readings), readings)
+        laws = _power_laws(readings)
+        offsets = fitting.fit(laws[0], readings).offsets
+        floor = diagnostics.repeatability(readings, offsets)
+        outlier = diagnostics.outlying_level(laws, readings, floor if math.isfinite(floor) else 0.0)
     used = readings
     if outlier is not None:  # number the levels, and the groups that are levels, without a gap
         used = readings.taken(readings.level != outlier.level)

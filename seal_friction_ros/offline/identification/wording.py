@@ -9,7 +9,6 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, has_pressures
-from seal_friction_ros.core.identification.selection import is_beaten
 from seal_friction_ros.offline.identification.results import (
     Identification,
     IdentificationData,
@@ -123,7 +122,7 @@ def _pressure_gain(selection: LawSelection) -> tuple[str, bool] | None:
         return None
     (name, validation), (other_name, other) = best[True], best[False]
     text = f'out of sample {validation.rms:.3g} N RMS remain with pressure ({name}) and {other.rms:.3g} N without'
-    return f'{text} ({other_name})', is_beaten(other.losses, validation.losses)
+    return f'{text} ({other_name})', selection.best.law.depends_on_pressure
 
 
 def _parameter_texts(selection: LawSelection) -> Iterator[str]:

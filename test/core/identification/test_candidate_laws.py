@@ -11,8 +11,10 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification.candidate_laws import (
     COMPILED_FROM,
     OperatingConditions,
+    Variation,
     candidate_laws,
     normal_forces,
+    with_velocity_terms,
 )
 
 THESIS_RING = SealGeometry(0.106 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
@@ -30,7 +32,8 @@ VALUES = {
     'asymmetry': 0.1,
 }
 NORMAL_FORCE_LAW = AreaDeformationGain(0.3925, 9.3)
-ALL = candidate_laws(geometry=THESIS_RING, normal_force_law=NORMAL_FORCE_LAW, with_speeds=True, with_exponent=True)
+BASES = candidate_laws(Variation(), THESIS_RING, NORMAL_FORCE_LAW)
+ALL = (*BASES, *with_velocity_terms(BASES[-1], Variation()))
 
 
 def conditions(rows=50) -> OperatingConditions:
@@ -49,7 +52,8 @@ def seal_of(law):
         'constant_coulomb': {'constant_coulomb': {'coulomb_friction_at_any_pressure': 12.0}},
         'pressure_power_law': {
             'pressure_power_law': {
-                key: VALUES[key] for key in ('friction_at_no_pressure', 'friction_at_one_bar', 'pressure_exponent')
+                key: (VALUES | law.fixed)[key]
+                for key in ('friction_at_no_pressure', 'friction_at_one_bar', 'pressure_exponent')
             }
         },
         'physics_based': {
@@ -82,7 +86,7 @@ def test_what_is_fitted_is_what_the_node_runs(law):
     for (a, b), v in zip(at.pressure, at.velocity, strict=True):
         found = actuator_friction(mounted, a, b, v)
         node.append(found.coulomb_friction + found.velocity_friction)
-    assert law.friction(at, VALUES) == pytest.approx(np.array(node), rel=1e-12)
+    assert law.friction(at, VALUES | law.fixed) == pytest.approx(np.array(node), rel=1e-12)
 
 
 def test_the_candidates_are_ordered_from_constant_to_physics_based():
@@ -95,16 +99,32 @@ def test_the_candidates_are_ordered_from_constant_to_physics_based():
 
 
 def test_without_geometry_or_speeds_the_laws_that_need_them_are_not_there():
-    bare = candidate_laws(with_speeds=False, with_exponent=True)
-    assert [law.name for law in bare] == ['constant_coulomb', 'pressure_power_law', 'pressure_power_law_asymmetric']
-    assert not any(law.parts or 'viscous_friction' in law.velocity_terms for law in bare)
+    bare = candidate_laws(Variation(speeds=False))
+    names = ['pressure_power_law_2_3', 'pressure_power_law_1', 'pressure_power_law_3_2', 'pressure_power_law_2']
+    assert [law.name for law in bare] == ['constant_coulomb', *names, 'pressure_power_law']
+    assert not any(law.parts or law.velocity_terms for law in bare)
 
 
-def test_few_pressures_get_the_exponent_of_an_elastic_contact():
-    (law,) = (r for r in candidate_laws(with_speeds=False, with_exponent=False)
-              if r.name == 'pressure_power_law')  # fmt: skip
-    assert [p.name for p in law.parameters] == ['friction_at_no_pressure', 'friction_at_one_bar']
-    assert law.fixed == {'pressure_exponent': pytest.approx(2.0 / 3.0)}
+def test_few_pressures_get_fixed_exponents():
+    laws = [law for law in candidate_laws(Variation(exponent=False)) if law.name.startswith('pressure_power_law')]
+    assert [law.fixed['pressure_exponent'] for law in laws] == pytest.approx([2.0 / 3.0, 1.0, 1.5, 2.0])
+    for law in laws:
+        assert [p.name for p in law.parameters] == ['friction_at_no_pressure', 'friction_at_one_bar']
+
+
+@pytest.mark.parametrize(
+    ('pressures', 'fitted'), [(1, ['friction_at_one_bar']), (2, ['friction_at_no_pressure', 'friction_at_one_bar'])]
+)
+def test_one_or_two_pressures_get_the_exponent_of_a_prior(pressures, fitted):
+    (law,) = candidate_laws(Variation(pressures=pressures))
+    assert [p.name for p in law.parameters] == fitted
+    assert law.fixed['pressure_exponent'] == pytest.approx(2.0 / 3.0)
+
+
+def test_asymmetry_is_tried_only_where_it_is_no_offset():
+    law = candidate_laws(Variation())[-1]
+    assert [each.name for each in with_velocity_terms(law, Variation(speeds=False, asymmetry=False))] == []
+    assert len(with_velocity_terms(law, Variation())) == 3
 
 
 def test_at_no_pressure_and_at_one_bar_the_power_law_is_what_its_parameters_say():

@@ -1,37 +1,49 @@
 """Identification on readings whose law is known: what it finds, what it does not claim, and how sure it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import optimize, stats
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
-from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, candidate_laws
+from seal_friction_ros.core.identification.breakaway import fit_breakaway
+from seal_friction_ros.core.identification.candidate_laws import (
+    OperatingConditions,
+    Variation,
+    candidate_laws,
+    with_velocity_terms,
+)
 from seal_friction_ros.core.identification.diagnostics import (
     changed_levels,
     collinear_regressors,
-    compare_with_law,
     outlying_level,
     repeatability,
-    run_drift,
     traded_off,
 )
-from seal_friction_ros.core.identification.fitting import (
+from seal_friction_ros.core.identification.fitting import fit
+from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.runs import PRIOR_STD, between_runs, drifts
+from seal_friction_ros.core.identification.selection import (
+    is_beaten,
+    recommended,
+    rise_over_pressures,
+    score_ladder,
+    score_laws,
+)
+from seal_friction_ros.core.identification.validation import (
     band_coverage,
     cross_validate,
-    fit,
-    fit_breakaway,
-    is_beaten,
     jackknife_errors,
     plain_mean,
     prediction_uncertainty,
-    recommended,
-    score_laws,
 )
-from seal_friction_ros.core.identification.readings import FrictionReadings
 
 POWER = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 0.65}
 CONSTANT = 'coulomb_friction_at_any_pressure'
-LAWS = {r.name: r for r in candidate_laws(with_speeds=True, with_exponent=True)}
+BASES = candidate_laws(Variation())
+LAWS = {r.name: r for r in (*BASES, *with_velocity_terms(BASES[-1], Variation()))}
+ELASTIC = LAWS['pressure_power_law_2_3']
 LAW = LAWS['pressure_power_law']
 
 
@@ -278,12 +290,96 @@ def test_repeatability_of_a_swept_log_is_the_scatter_within_a_cell():
     assert repeatability(readings, np.array([200.0])) == pytest.approx(20.0 / 800.0, rel=0.1)
 
 
+def ran_in(share, length=0.5, count=20, scatter=0.005, seed=0):
+    """Strokes at one pressure whose friction approaches 10 N over the travel; ``share``: start over end, less 1."""
+    readings = noted(pressures=1, count=count, law=LAWS['constant_coulomb'], values={CONSTANT: 5.0})
+    travel = 0.1 * np.arange(readings.count)
+    noise = 1.0 + scatter * np.random.default_rng(seed).normal(size=readings.count)
+    force = readings.force * (1.0 + share * np.exp(-travel / length)) * noise
+    return replace(readings, force=force, travel=travel)
+
+
+def test_the_friction_of_the_settled_seal_is_the_asymptote_of_its_run_in():
+    for share in (-0.3, 0.3):
+        (drift,) = drifts(ran_in(share), np.zeros(1))
+        assert drift.asymptote == pytest.approx(10.0, rel=0.02)
+        assert drift.length == pytest.approx(0.5, rel=0.3)
+        assert np.sign(drift.change) == -np.sign(share)
+
+
+def test_a_drift_that_goes_on_has_no_asymptote():
+    (drift,) = drifts(ran_in(0.3, length=40.0), np.zeros(1))
+    assert np.isnan(drift.asymptote)
+    assert drift.settled_share == 1.0
+
+
 def test_drift_is_the_change_over_the_run():
     readings = noted(pressures=3, count=10, offset=1.0)
     rising = readings.force + 0.02 * readings.group * (readings.force - 1.0)
-    drift = run_drift(FrictionReadings(**{**vars(noted(pressures=3, count=10)), 'force': rising}), np.array([1.0]))
-    assert set(drift) == {0, 1, 2}
-    assert list(drift.values()) == pytest.approx([0.18 / 1.09] * 3, rel=1e-6)
+    found = drifts(replace(noted(pressures=3, count=10), force=rising), np.array([1.0]))
+    assert [drift.level for drift in found] == [0, 1, 2]
+    assert [drift.change for drift in found] == pytest.approx([0.18 / 1.09] * 3, rel=1e-6)
+
+
+def test_runs_that_were_never_repeated_differ_by_the_prior_and_many_by_what_they_show():
+    one = noted(scatter=0.01)
+    alone = between_runs(one, LAW.friction(one.at, POWER), np.zeros(1))
+    assert (alone.std, alone.freedom) == (PRIOR_STD, 0)
+    assert np.isnan(alone.measured)
+    many = noted(scatter=0.0, test_scatter=0.05, count=40, pressures=3)
+    of_runs = replace(many, source=many.group, names=tuple(map(str, range(40))))
+    found = between_runs(of_runs, LAW.friction(many.at, POWER), np.zeros(40))
+    assert found.measured == pytest.approx(0.05, rel=0.2)
+    assert found.std == pytest.approx(0.06, abs=0.015)
+    assert found.of_band < alone.of_band
+
+
+# --- whether friction rises ---
+
+
+def repeated(truth, pressures, noise, seed, count=5):
+    """Readings at held pressures [bar], repeated within one source, left out by pressure."""
+    rng = np.random.default_rng(seed)
+    pressure = np.repeat(np.array(pressures, dtype=float), 2 * count) * 1e5
+    n = len(pressure)
+    direction = np.tile([1.0, -1.0], n // 2)
+    at = OperatingConditions(pressure[:, np.newaxis], None, 0.01 * direction, direction)
+    level = np.repeat(np.arange(len(pressures)), 2 * count)
+    force = direction * truth(pressure / 1e5) * (1.0 + noise * rng.normal(size=n))
+    return FrictionReadings(at, force, np.zeros(n, dtype=int), level, level, ('made',), 'pressure', are_samples=False)
+
+
+HELD = Variation(speeds=False, asymmetry=False, exponent=False)
+
+
+@pytest.mark.parametrize('pressures', [(1, 3, 5), (1, 3, 5, 7)])
+@pytest.mark.parametrize('noise', [0.01, 0.1])
+@pytest.mark.parametrize(('truth', 'rises'), [(lambda p: 1.9 + 0.65 * p, True), (lambda p: 2.0 + 0.1 * p**1.5, True),
+                                              (lambda p: 3.0 + 0.0 * p, False)])  # fmt: skip
+def test_a_law_rises_where_the_friction_rises_beyond_what_strokes_repeat_within(truth, rises, noise, pressures):
+    right = 0
+    for seed in range(10):
+        readings = repeated(truth, pressures, noise, seed)
+        found = recommended(score_ladder(candidate_laws(HELD), readings, HELD), rise_over_pressures(readings))
+        right += found.law.depends_on_pressure is rises
+    assert right >= 9
+
+
+def test_with_little_noise_the_exponent_is_that_of_the_friction():
+    for exponent, name in ((1.0, '1'), (1.5, '3_2'), (2.0, '2')):
+        readings = repeated(lambda p, m=exponent: 2.0 + 0.1 * p**m, (1, 3, 5, 7), 0.01, 0)
+        found = recommended(score_ladder(candidate_laws(HELD), readings, HELD), rise_over_pressures(readings))
+        assert found.law.name == f'pressure_power_law_{name}'
+
+
+def test_a_law_at_a_bound_or_ill_conditioned_is_not_recommended_while_a_sound_one_is_near():
+    values = POWER | {'viscous_friction': 500.0, 'pressure_exponent': 2.0 / 3.0}
+    law = with_velocity_terms(ELASTIC, Variation())[0]
+    tied = swept(values, law, scatter=20.0, tied=True)
+    scores = score_ladder(BASES, tied, Variation())
+    chosen = recommended(scores)
+    assert not chosen.fit.why_unsound
+    assert any(score.fit is not None and score.fit.why_unsound for score in scores)
 
 
 # --- what the data cannot tell ---
@@ -303,8 +399,7 @@ def test_speed_that_goes_with_pressure_is_said_to_be_collinear():
 
 def test_a_fit_to_collinear_data_is_ill_conditioned_and_trades_its_parameters():
     values = POWER | {'viscous_friction': 50.0, 'pressure_exponent': 2.0 / 3.0}
-    law = {r.name: r for r in candidate_laws(with_speeds=True, with_exponent=False)}
-    law = law['pressure_power_law_viscous']
+    law = with_velocity_terms(ELASTIC, Variation())[0]
     tied, free = (fit(law, swept(values, law, scatter=1.0, tied=tied)) for tied in (True, False))
     assert tied.condition_number > 4.0 * free.condition_number
     assert {pair[:2] for pair in traded_off(tied)} >= {('friction_at_one_bar', 'viscous_friction')}
@@ -314,43 +409,16 @@ def test_a_fit_to_collinear_data_is_ill_conditioned_and_trades_its_parameters():
 
 @pytest.mark.parametrize('level', [0, 2, 3])
 def test_the_one_pressure_that_disagrees_is_the_outlier(level):
-    law = {r.name: r for r in candidate_laws(with_speeds=False, with_exponent=False)}['pressure_power_law']
-    readings = noted(scatter=0.03, pressures=5, law=law, values=POWER | {'pressure_exponent': 2.0 / 3.0})
+    laws = [law for law in BASES if law.name.startswith('pressure_power_law_')]
+    readings = noted(scatter=0.03, pressures=5, law=ELASTIC, values=POWER | {'pressure_exponent': 2.0 / 3.0})
     force = np.where(readings.level == level, 1.7 * readings.force, readings.force)
     spoiled = FrictionReadings(**{**vars(noted(pressures=5)), 'force': force})
-    values = fit(law, spoiled).values
-    assert outlying_level(law, spoiled, values, 0.04).level == level
-    assert outlying_level(law, readings, fit(law, readings).values, 0.04) is None
+    assert outlying_level(laws, spoiled, 0.04).level == level
+    assert outlying_level(laws, readings, 0.04) is None
 
 
 def test_three_pressures_have_no_outlier():
-    law = {r.name: r for r in candidate_laws(with_speeds=False, with_exponent=False)}['pressure_power_law']
-    readings = noted(pressures=3)
-    assert outlying_level(law, readings, fit(law, readings).values, 0.04) is None
-
-
-@pytest.mark.parametrize('ratio', [0.6, 0.95, 1.5])
-def test_friction_that_changed_between_two_logs_is_told_by_how_much(ratio):
-    law = LAWS['coulomb_viscous']
-    first = swept({CONSTANT: 200.0, 'viscous_friction': 1000.0}, law)
-    other = swept(
-        {CONSTANT: 200.0 * ratio, 'viscous_friction': 1000.0 * ratio},
-        law,
-        seed=1,
-        offset=-50.0,
-    )
-    change = compare_with_law(fit(law, first), first, other)
-    assert change.ratio == pytest.approx(ratio, abs=0.02)
-    assert change.is_change == (ratio != 0.95)
-    assert change.own_rms == pytest.approx(20.0, rel=0.05)
-
-
-def test_logs_under_other_conditions_are_not_compared():
-    law = LAWS['coulomb_viscous']
-    values = {CONSTANT: 200.0, 'viscous_friction': 1000.0}
-    first, other = swept(values, law), swept(values, law, least=1.0)
-    with pytest.raises(ValueError, match='cannot be compared'):
-        compare_with_law(fit(law, first), first, other)
+    assert outlying_level([ELASTIC], noted(pressures=3), 0.04) is None
 
 
 def test_sources_that_disagree_at_a_pressure_are_named():
@@ -369,12 +437,13 @@ def test_sources_that_disagree_at_a_pressure_are_named():
 # --- breakaway ---
 
 
-@pytest.mark.parametrize('law', ['constant', 'load_dependent'])
-def test_breakaway_is_constant_unless_it_follows_the_load(law):
+@pytest.mark.parametrize(('law', 'stiction', 'ratio'), [('constant', 1.5, 0.0), ('load_dependent', 0.0, 0.15),
+                                                        ('both', 1.5, 0.15)])  # fmt: skip
+def test_breakaway_is_constant_or_follows_the_load_or_both(law, stiction, ratio):
     readings = noted(scatter=0.01)
     friction = LAW.friction(readings.at, POWER)
-    more = 3.0 if law == 'constant' else 0.15 * friction
+    more = 2.0 * stiction + ratio * friction
     static = FrictionReadings(**{**vars(noted()), 'force': readings.force + readings.at.direction * more})
     found = fit_breakaway(static, friction, np.zeros(1))
     assert found.law == law
-    assert (found.stiction, found.ratio) == pytest.approx((1.5, 0.0) if law == 'constant' else (0.0, 0.15), rel=0.1)
+    assert (found.stiction, found.ratio) == pytest.approx((stiction, ratio), rel=0.1)
