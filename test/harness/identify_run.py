@@ -14,8 +14,13 @@ from seal_friction_ros.offline.commands.main import main
 DATA = ROOT.parent / 'shared' / 'data'
 THESIS = ROOT / 'data' / 'thesis' / 'friction_tests.csv'
 BARS = (1, 3, 5, 7)
-DELFT = {'O-ring257': [4.7, 5.8, 7.1, 7.9], 'X-ring257': [4.6, 6.5, 8.6, 15.5]}
-"""[N] half-range friction at 1, 3, 5, 7 bar; README of the data"""
+DELFT = {
+    'O-ring257': [4.7, 5.8, 7.1, 7.9],
+    'X-ring257': [4.6, 6.5, 8.6, 15.5],
+    'NAPN': [3.35, 6.91, 9.73, 11.93],
+    'Stadium_lc': [4.78, 5.07, 6.38, 8.04, 10.47],
+}
+"""[N] half-range friction at 1, 3, 5, 7 bar, of Stadium_lc at 1 to 5 bar; README of the data"""
 FRICTION_ID, OTHER = 'FrictionIDMovesWithBiasCurr.exp', '2022.01.28T16.46.31_new.exp'
 KEYS = ('law', 'parameters', 'standard_errors', 'pressure_Pa', 'measured_N', 'fitted_N', 'cross_validation_error',
         'warnings')  # fmt: skip

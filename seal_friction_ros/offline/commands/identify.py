@@ -33,6 +33,11 @@ def add_parser(commands: Any) -> None:
         metavar='SHARE',
         help='relative standard deviation between runs, if known',
     )
+    parser.add_argument(
+        '--refuse-changed',
+        action='store_true',
+        help='refuse sources whose friction differs by more than 15 %% instead of fitting them together',
+    )
     parser.add_argument('--name', default='', help='name of the seal; default: that of the file')
     parser.add_argument('--slowest', type=cli.non_negative, metavar='M/S', help='a slower rod counts as at rest')
     parser.add_argument(

@@ -13,7 +13,7 @@ from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.identification import fitting
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
-from seal_friction_ros.core.identification.diagnostics import Outlier
+from seal_friction_ros.core.identification.diagnostics import Outlier, changed_levels
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.runs import BetweenRuns, Drift
@@ -211,10 +211,12 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'offset_N': [level.offset for level in levels],
             'area_correction_m2': correction.area if correction else None,
             'area_correction': correction and _correction_numbers(correction),
+            'offset_line': correction and _line_numbers(correction),
             'between_run_std': quality.between_runs.std,
             'between_runs_measured': quality.between_runs.measured,
             'told_apart_std': quality.told_apart,
-            'drift': [
+            'drift': [level.drift for level in levels],
+            'run_in': [
                 {
                     'source': data.sources.files[drift.source].name,
                     'pressure_Pa': data.prepared.readings.level_pressures[drift.level],
@@ -228,6 +230,8 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
     )
     return numbers | {
         'breakaway': quality.breakaway and _breakaway_numbers(found),
+        'stiction': quality.breakaway and quality.breakaway._asdict(),
+        'changes': [change._asdict() for change in changed_levels(data.prepared.readings)],
         'load': load_numbers([(source.file.name, source.load) for source in data.sources.each]),
         'samples_used': data.prepared.used,
         'samples_total': data.prepared.total,
@@ -237,14 +241,17 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
 
 
 def _correction_numbers(correction: ForceCorrection) -> dict[str, Any]:
-    line = correction.line
     return {
         'chamber': correction.chamber,
         'is_made': correction.is_significant,
         'standard_error_m2': correction.standard_error,
         'offset_N': correction.offset,
-        'rms_N': line.rms,
     }
+
+
+def _line_numbers(correction: ForceCorrection) -> dict[str, float]:
+    line = correction.line
+    return {'constant_N': line.constant, 'area_error_m2': line.area_error, 'rms_N': line.rms}
 
 
 def _breakaway_numbers(found: Identification) -> dict[str, Any]:

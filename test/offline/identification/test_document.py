@@ -33,7 +33,9 @@ def estimates_of(run: Run, pressure: float, velocity: float, force: float = 0.0)
     return step(parameters, state, sample)[1]
 
 
-@pytest.mark.parametrize('law', ['constant_coulomb', 'pressure_power_law', 'physics_based', 'physics_based_asymmetric'])
+@pytest.mark.parametrize(
+    'law', ['constant_coulomb', 'pressure_power_law_2_3', 'physics_based', 'physics_based_asymmetric']
+)
 def test_the_node_says_what_was_fitted(law, tmp_path):
     run = Run(tmp_path, str(THESIS), *THESIS_RIG, '--law', law)
     for pressure, fitted, std in zip(*(run.figures[k] for k in ('pressure_Pa', 'fitted_N', 'std_N')), strict=True):
@@ -138,7 +140,7 @@ def test_the_uncertainty_of_the_seals_adds_up_to_that_of_the_rig(tmp_path):
 
 def test_a_law_by_name_is_saved_and_the_recommended_one_still_told(tmp_path):
     run = Run(tmp_path, str(THESIS), '--law', 'constant_coulomb')
-    assert (run.figures['law'], run.figures['recommended_law']) == ('constant_coulomb', 'pressure_power_law')
+    assert (run.figures['law'], run.figures['recommended_law']) == ('constant_coulomb', 'pressure_power_law_2_3')
     assert Run(tmp_path, str(THESIS), '--law', 'magic').code == 2
 
 

@@ -1,13 +1,21 @@
 """Identification from real measurements, against what is known of them."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from harness.identify_run import BARS, DELFT, FRICTION_ID, OTHER, THESIS, THESIS_RIG, Run, data, delft
 
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import LBF, PSI
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.identification.fitting import offsets_of
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
+from seal_friction_ros.offline.identification.pipeline import fitted_readings
+from seal_friction_ros.offline.identification.sources import SourceOptions, read_sources
 
 # --- thesis ---
 
@@ -38,14 +46,22 @@ def test_thesis_fit_is_within_four_percent_of_every_mean(thesis):
     assert np.abs(shares - 1.0).max() <= 0.041
 
 
-def test_thesis_stiction_is_half_a_pound_for_each_seal(thesis):
-    assert thesis.figures['stiction']['law'] == 'constant'
-    assert thesis.document['stiction'] / LBF == pytest.approx(1.11 / 2.0, abs=0.02)
+def test_thesis_breakaway_is_within_eight_percent_at_every_pressure(thesis):
+    breakaway = thesis.figures['breakaway']
+    assert breakaway['law'] == 'both'
+    off = np.array(breakaway['fitted_N']) / np.array(breakaway['measured_N']) - 1.0
+    assert np.abs(off).max() <= 0.08
+    seal = parse_seal(thesis.document)
+    both = (MountedSeal(seal, 'a'), MountedSeal(seal, 'b'))
+    of_node = [actuator_friction(both, p, p) for p in breakaway['pressure_Pa']]
+    assert breakaway['fitted_N'] == pytest.approx([f.coulomb_friction + f.stiction for f in of_node], rel=1e-4)
+    more = np.array(breakaway['fitted_N']) - np.array(thesis.figures['fitted_N'])
+    assert more.mean() / LBF == pytest.approx(1.11, abs=0.1)
 
 
 def test_thesis_constant_friction_is_beaten_and_the_repeatability_is_the_floor(thesis):
     assert thesis.ladder('constant_coulomb')['is_beaten']
-    assert thesis.figures['recommended_law'] == 'pressure_power_law'
+    assert thesis.figures['recommended_law'] == 'physics_based'
     assert not thesis.ladder('physics_based')['is_beaten']
     assert thesis.figures['repeatability'] == pytest.approx(0.085, abs=0.005)
     assert thesis.ladder('physics_based')['error'] < thesis.figures['repeatability']
@@ -75,10 +91,10 @@ def test_thesis_as_a_bag_gives_the_same_law_as_the_table(tmp_path):
 # --- Delft ---
 
 
-@pytest.mark.parametrize('ring', DELFT)
+@pytest.mark.parametrize('ring', ['O-ring257', 'X-ring257', 'NAPN'])
 def test_delft_half_range_friction_is_recovered(ring, tmp_path):
     run = Run(tmp_path, *delft(ring))
-    assert run.figures['measured_N'] == pytest.approx(DELFT[ring], abs=0.2)
+    assert run.figures['measured_N'] == pytest.approx(DELFT[ring], abs=0.3)
     assert np.array(run.figures['pressure_Pa']) / 1e5 == pytest.approx(BARS, abs=0.1)
 
 
@@ -99,7 +115,7 @@ def test_delft_standard_deviation_covers_runs_that_repeat_within_10_to_15_percen
     run = Run(tmp_path, *delft('O-ring257'))
     shares = np.array(run.figures['std_N']) / np.array(run.figures['fitted_N'])
     assert 0.10 <= shares.min() <= shares.max() <= 0.20
-    assert run.has_warning('every pressure was measured in one run', 'drift')
+    assert run.has_warning('one run', 'a prior of 15 %')
     known = Run(tmp_path, *delft('O-ring257'), '--run-to-run', '0.05', name='known')
     assert known.figures['relative_std'] < run.figures['relative_std']
 
@@ -110,6 +126,41 @@ def test_delft_offsets_of_the_force_sum_are_told(tmp_path):
     line = run.figures['offset_line']
     assert line['area_error_m2'] * 1e6 == pytest.approx(-1.1, abs=0.4)  # [mm2] of a bore of 519
     assert line['constant_N'] == pytest.approx(-1.35, abs=0.2)
+    assert not run.has_warning('area')  # too little to matter
+
+
+def test_delft_a_wrong_bore_is_found_told_and_corrected(tmp_path):
+    """The cylinder has 490.9 mm2, the rig file 518.7 mm2; README of the data."""
+    run = Run(tmp_path, *delft('NAPN'))
+    assert run.figures['area_correction_m2'] * 1e6 == pytest.approx(-24.0, abs=4.0)
+    assert run.has_warning('the bore is nearer to 25.1 than 25.7 mm')
+    offsets = np.array(run.figures['offset_N'])
+    assert np.ptp(offsets) < 0.1 * max(run.figures['measured_N'])
+
+
+def test_delft_both_directions_of_a_held_file_are_one_level(tmp_path):
+    run = Run(tmp_path, *(str(data(f'delft/Stadium_lc_{bar}bar.csv')) for bar in range(1, 6)))
+    assert np.array(run.figures['pressure_Pa']) / 1e5 == pytest.approx([1, 2, 3, 4, 5], abs=0.1)
+    assert run.figures['measured_N'] == pytest.approx(DELFT['Stadium_lc'], abs=0.3)
+
+
+def test_delft_two_runs_of_one_ring_are_fitted_together_and_the_band_holds_the_other_run(tmp_path):
+    runs = [delft('O-ring257'), delft('O-ring257_run2')]
+    both = Run(tmp_path, *runs[0], *runs[1])
+    assert 0.10 <= both.figures['between_run_std'] <= 0.20
+    assert both.has_warning('friction differs between runs')
+    refused = Run(tmp_path, *runs[0], *runs[1], '--refuse-changed', name='refused')
+    assert refused.code == 2
+    assert 'two seals or two states of one' in refused.errors
+    for first, other in (runs, runs[::-1]):
+        alone = Run(tmp_path, *first, name='alone')
+        half_width = BAND_95 * np.array(alone.figures['std_N']) / np.array(alone.figures['fitted_N'])
+        assert half_width.max() <= 0.45
+        log = read_sources([Path(path) for path in other], SourceOptions(rig='delft')).prepare()
+        mounted = (MountedSeal(parse_seal(alone.document), 'a'),)
+        fitted, std = fitted_readings(mounted, log.chamber_pressures, log.readings.at.velocity)
+        strokes = log.readings.magnitudes(offsets_of(log.readings, fitted))
+        assert np.mean(np.abs(strokes - fitted) <= BAND_95 * std) >= 0.9
 
 
 def test_delft_x_ring_at_7_bar_is_an_outlier_with_a_reason_to_look(tmp_path):
@@ -123,11 +174,34 @@ def test_delft_x_ring_at_7_bar_is_an_outlier_with_a_reason_to_look(tmp_path):
     assert run.document['identified_pressure'][1] < 5.2e5  # nothing is claimed up there
 
 
-def test_delft_o_ring_and_x_ring_are_not_averaged(tmp_path):
-    run = Run(tmp_path, *delft('O-ring257'), *delft('X-ring257'))
+@pytest.mark.parametrize('seal', DELFT)
+def test_delft_a_left_out_pressure_is_predicted_within_15_percent(seal, tmp_path):
+    """Outliers aside, one a seal; runs of that rig repeat no better. The law rises where the friction does."""
+    bars = range(1, 6) if seal == 'Stadium_lc' else BARS
+    run = Run(tmp_path, *(str(data(f'delft/{seal}_{bar}bar.csv')) for bar in bars))
+    off = np.array(run.figures['left_out_N']) / np.array(run.figures['measured_N']) - 1.0
+    used = ~np.array(run.figures['is_outlier'])
+    assert np.count_nonzero(~used) <= 1
+    assert np.abs(off[used]).max() <= 0.15
+    assert run.figures['fitted_N'] == sorted(run.figures['fitted_N'])
+    assert run.figures['fitted_N'][-1] > 1.3 * run.figures['fitted_N'][0]
+
+
+def test_the_same_bytes_given_twice_are_refused(tmp_path):
+    copy = tmp_path / 'copy.csv'
+    copy.write_bytes(data('delft/O-ring257_1bar.csv').read_bytes())
+    run = Run(tmp_path, *delft('O-ring257'), str(copy))
     assert run.code == 2
-    assert 'the friction has changed: 7.912 N in O-ring257_7bar.csv and 15.63 N in X-ring257_7bar.csv' in run.errors
-    assert not run.out.exists()
+    assert 'are the same bytes: name it once' in run.errors
+
+
+def test_one_pressure_gives_a_law_that_holds_there_and_says_so(tmp_path):
+    run = Run(tmp_path, str(data('delft/O-ring257_3bar.csv')))
+    assert run.code == 0, run.errors
+    assert run.figures['fitted_N'] == pytest.approx([5.85], abs=0.2)
+    low, high = run.document['identified_pressure']
+    assert 2.8e5 < low < high < 3.2e5
+    assert run.has_warning('there the law holds', 'from a prior')
 
 
 # --- tables ---
@@ -179,7 +253,6 @@ def test_mbari_blocks_are_predicted_from_the_others(name, bar, table, request):
     assert run.has_warning('velocity and pressure difference are collinear')
     assert 0.90 <= run.figures['band_coverage'] <= 0.99
     with_pressure = run.figures['law'].startswith('pressure')
-    assert with_pressure == (name == 'friction_id')  # there it pays out of sample, in the other it does not
     assert run.has_warning('no gain is claimed for pressure') == (not with_pressure)
     pays = [remark for remark in run.figures['remarks'] if remark.startswith('pressure pays')]
     assert bool(pays) == with_pressure
@@ -194,11 +267,22 @@ def test_mbari_uses_the_samples_that_the_bars_are_over(friction_id):
     assert sum(friction_id.figures['samples_left_out'].values()) == int((~chosen).sum())
 
 
-def test_mbari_friction_has_changed_between_the_files_and_is_not_averaged(tmp_path, friction_id):
+def test_mbari_the_law_of_one_log_is_sound_and_its_band_holds_the_other(friction_id):
+    assert friction_id.figures['condition_number'] < 30.0
+    assert not friction_id.has_warning('are not determined')
+    chambers = tuple(friction_id.figures['seal_chambers'])
+    log = read_sources([data(f'mbari/{OTHER}')], SourceOptions(rig='mbari')).prepare()
+    chosen = np.arange(0, log.readings.count, 7)
+    mounted = tuple(MountedSeal(parse_seal(friction_id.document), chamber) for chamber in chambers)
+    fitted, std = fitted_readings(mounted, log.chamber_pressures[chosen], log.readings.at.velocity[chosen])
+    signed = log.readings.force[chosen] - log.readings.at.direction[chosen] * fitted
+    deviation = signed - signed.mean()
+    assert np.sqrt(np.mean(deviation**2)) < 460.0  # [N] the laws with a constant or a free exponent leave 418 to 560 N
+    assert np.mean(np.abs(deviation) <= BAND_95 * std) >= 0.9
+
+
+def test_mbari_two_logs_are_fitted_together_and_their_difference_is_in_the_band(tmp_path, friction_id):
     both = Run(tmp_path, *(str(data(f'mbari/{name}')) for name in (FRICTION_ID, OTHER)))
-    (change,) = both.figures['changes']
-    assert change['is_change']
-    assert change['ratio'] == pytest.approx(0.64, abs=0.05)
-    assert both.has_warning('the friction has changed', '-36 %', 'was not averaged in')
-    assert both.figures['parameters'] == friction_id.figures['parameters']
-    assert [file['name'] for file in both.document['identification']['data']] == [FRICTION_ID]
+    assert both.figures['between_runs_measured'] > 0.15
+    assert both.figures['between_run_std'] > friction_id.figures['between_run_std']
+    assert len(both.document['identification']['data']) == 2
