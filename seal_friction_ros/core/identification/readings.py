@@ -3,6 +3,7 @@
 Each error of a check is one line: source, fault, and what to do.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -20,6 +21,7 @@ from seal_friction_ros.core.identification.signal_preparation import (
     clipped_share,
     even_sliding,
     half_range,
+    is_ambient,
     longest_stretch,
 )
 
@@ -32,6 +34,7 @@ LARGEST_SPEED = 10.0  # [m/s] likewise
 LARGEST_FORCE = 1e6  # [N] likewise
 LARGEST_SEAL_AREA = 2e-3  # [m^2] friction over pressure: no seal is larger (our choice)
 SMALLEST_SEAL_AREA = 6e-8  # [m^2] friction over pressure: no seal is smaller (our choice)
+LARGEST_SCATTER = 0.3  # of the friction at one pressure, where only one was measured (our choice)
 LARGEST_AREA_ERROR = 5.0  # of the friction: largest change of the offset over the pressures (our choice)
 
 
@@ -224,17 +227,20 @@ def check_log(log: RecordedLog) -> None:
         )
     moving = np.abs(signals.velocity) > sliding.slowest
     check_clipping(name, 'force sum', signals.force_sum[moving])
-    check_clipping(name, 'pressure of chamber a', signals.pressure_a[moving])
-    check_clipping(name, 'pressure of chamber b', signals.pressure_b[moving])
+    check_clipping(name, 'pressure of chamber a', signals.pressure_a[moving], is_pressure=True)
+    check_clipping(name, 'pressure of chamber b', signals.pressure_b[moving], is_pressure=True)
 
 
-def check_clipping(name: str, what: str, column: FloatArray) -> None:
-    """Check the signal ``what`` of the source ``name``: samples while the rod moves, shape (n,).
+def check_clipping(name: str, what: str, column: FloatArray, *, is_pressure: bool = False) -> None:
+    """Check the signal ``what`` of the source ``name``: samples while the rod moves, shape (n,); a pressure in Pa.
+
+    A pressure may stand at that of the air: a vented chamber does.
 
     Raises:
         ValueError: The sensor is clipped.
     """
-    share = clipped_share(column)
+    low_is_real = is_pressure and is_ambient(float(np.nanmin(column, initial=np.inf)))  # a vented chamber
+    share = clipped_share(column, low_is_real=low_is_real)
     if share:
         ends = f'{float(np.nanmin(column)):.6g} or {float(np.nanmax(column)):.6g}'
         raise ValueError(
@@ -287,6 +293,29 @@ def has_pressures(readings: FrictionReadings) -> bool:
     return wide and (readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES)
 
 
+def _check_pressures(where: str, readings: FrictionReadings) -> None:
+    """Check readings that do not show how friction depends on pressure."""
+    if has_pressures(readings):
+        return
+    pressures = readings.seal_pressure
+    if float(pressures.max()) < NARROWEST_PRESSURES:
+        raise ValueError(
+            f'{where}: everything was measured at {float(pressures.min()) / BAR:.2g} to '
+            f'{float(pressures.max()) / BAR:.2g} bar, as without pressure: drive under pressure (or is the pressure '
+            'not in Pa?)'
+        )
+    if readings.are_samples:
+        return
+    for inside in readings.levels.values():
+        force = readings.at.direction[inside] * (readings.force[inside] - readings.half_range(inside).offset)
+        scatter = float(force.std() / abs(force.mean())) if force.mean() else math.inf
+        if scatter > LARGEST_SCATTER:
+            raise ValueError(
+                f'{where}: at {float(pressures[inside].mean()) / BAR:.4g} bar readings scatter by '
+                f'{100.0 * scatter:.0f} %, so the friction depends on something else than was recorded: record the pressure of each reading'
+            )
+
+
 def check_readings(readings: FrictionReadings) -> None:
     """Check that a law can be fitted to readings.
 
@@ -294,6 +323,7 @@ def check_readings(readings: FrictionReadings) -> None:
         ValueError: Negative friction, or forces and pressures that do not belong to one seal.
     """
     where = ', '.join(readings.names)
+    _check_pressures(where, readings)
     friction, offsets = np.array([readings.half_range(inside) for inside in readings.levels.values()]).T
     pressure = readings.level_pressures
     negative = np.flatnonzero(friction <= 0.0)

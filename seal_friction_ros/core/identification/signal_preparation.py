@@ -25,6 +25,8 @@ HELD_SHARE = 0.5  # of the samples of a stroke that must be at held speed (our c
 LEVEL_GAP = 0.05  # of the pressure: a larger step between sorted pressures separates two levels (our choice)
 LEVEL_GAP_MIN = 1e4  # [Pa] smallest such step: near zero a regulator differs between the directions
 SAME_LEVEL = 0.2  # of the pressure: two directions of one log that differ less are one level (our choice)
+AMBIENT = 1.0e5  # [Pa] of the air, absolute
+AMBIENT_WIDTH = 1.2e4  # [Pa] from it, by weather, altitude and sensor (our choice)
 LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp and is divided into equal parts
 
 
@@ -294,19 +296,24 @@ def longest_stretch(wrong: BoolArray) -> tuple[int, int]:
     return int(first[longest]), int(last[longest] - first[longest])
 
 
-def clipped_share(values: FloatArray) -> float:
+def is_ambient(pressure: float) -> bool:
+    """Whether a pressure [Pa], gauge or absolute, is that of the air: where a vented chamber stands."""
+    return any(abs(pressure - ambient) < AMBIENT_WIDTH for ambient in (0.0, AMBIENT))
+
+
+def clipped_share(values: FloatArray, *, low_is_real: bool = False) -> float:
     """Share of the samples at which the sensor is saturated (clipped); 0.0 if it is not.
 
     A sensor is saturated if its signal changes with nearly every sample but stays for five or more samples at its
     highest or lowest value. Signals that also stay constant elsewhere (coarse or held signals) are not assessed, and
-    less than 1 % of the samples is ignored (our choice).
+    less than 1 % of the samples is ignored (our choice). With ``low_is_real`` only the highest value is looked at.
     """
     finite = values[np.isfinite(values)]
     if len(finite) < 100 or np.ptp(finite) == 0.0:
         return 0.0
     still = np.diff(finite, prepend=np.nan) == 0.0
     share = 0.0
-    for extreme in (finite.max(), finite.min()):
+    for extreme in (finite.max(),) if low_is_real else (finite.max(), finite.min()):
         at_end = finite == extreme
         if longest_stretch(at_end)[1] >= 5 and np.mean(still[~at_end]) < 0.5:
             share += float(np.mean(at_end))

@@ -39,6 +39,7 @@ LARGEST_ACCELERATION = 1.0  # [m/s2] limit with known inertia (our choice)
 DIRECTIONS = {'extend': 1, 'ext': 1, '1': 1, '+1': 1, 'retract': -1, 'ret': -1, '-1': -1}
 KINDS = {'dynamic': 0, 'static': 1}
 PRESSURE_UNITS = {'psig': 'psi', 'psi': 'psi', 'bar': 'bar', 'kpa': 'kPa', 'mpa': 'MPa', 'pa': 'Pa'}
+PRESSURES = frozenset(PRESSURE_UNITS.values())
 FRICTION_UNITS = {'lbf': 'lbf', 'n': 'N', 'kn': 'kN'}
 VELOCITY_UNITS = {'m_per_s': 'm/s', 'mm_per_s': 'mm/s', 'in_per_s': 'in/s'}
 
@@ -229,7 +230,8 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
     moving = np.abs(samples.velocity) > sliding.slowest
     for term, column in log.columns.items():
         if term is not rig.time:
-            check_clipping(path.name, f'signal in column {term.column_name or term.column}', column[moving])
+            where, is_pressure = f'signal in column {term.column_name or term.column}', term.unit in PRESSURES
+            check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
     recorded = RecordedLog(path.name, signals, sliding)

@@ -12,6 +12,8 @@ from seal_friction_ros.core.identification.signal_preparation import (
     clipped_share,
     even_sliding,
     half_range,
+    held_pressures,
+    is_ambient,
     longest_stretch,
     motions,
     offset_line,
@@ -130,6 +132,24 @@ def test_a_ramp_is_cut_into_levels():
     labels = pressure_levels(np.linspace(1e6, 2e6, 1001))
     assert len(np.unique(labels)) >= 5
     assert list(labels) == sorted(labels)
+
+
+def test_both_directions_of_a_held_log_are_one_level():
+    direction = np.tile([1.0, -1.0], 10)
+    held = np.where(direction > 0.0, 0.95e5, 1.06e5)
+    assert held_pressures(held, direction) == pytest.approx(np.full(20, 1.005e5))
+    stepped = np.concatenate((held, held + 1e5))
+    both = held_pressures(stepped, np.tile(direction, 2))
+    assert len(set(pressure_levels(both))) == 2
+    two = np.where(direction > 0.0, 1e5, 2e5)  # two pressures, one for each direction: not one level
+    assert held_pressures(two, direction) == pytest.approx(two)
+
+
+@pytest.mark.parametrize(('ambient', 'clipped'), [(99.5e3, False), (0.2e3, False), (3e5, True)])
+def test_a_vented_chamber_stands_at_the_pressure_of_the_air_and_is_not_clipped(ambient, clipped):
+    swinging = ambient + 4e5 * np.maximum(np.sin(np.arange(2000) / 50.0), 0.0)
+    assert is_ambient(ambient) is not clipped
+    assert (clipped_share(swinging, low_is_real=is_ambient(ambient)) > 0.0) is clipped
 
 
 def test_longest_stretch():
