@@ -17,6 +17,7 @@ from seal_friction_ros.core.friction.laws import FRICTION_LAWS
 from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.mounting import Mounting
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.core.lubrication.grease import Grease
@@ -56,6 +57,7 @@ RECORDS = (
     PowerLaw,
     CoefficientTable,
     VelocityTerms,
+    Mounting,
     Uncertainty,
     Groove,
     Rubber,

@@ -12,8 +12,8 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     uncertainty: {relative_std: 0.08, absolute_std: 0.3}
     identified_pressure: [0.0, 6.9e+6]
 
-``velocity_terms`` and ``stiction_ratio`` are optional, as is ``identification``: what ``seal_friction identify``
-reports about its data. This module ignores it.
+``velocity_terms``, ``stiction_ratio`` and ``mounting`` are optional, as is ``identification``: what ``seal_friction
+identify`` reports about its data. This module ignores it.
 """
 
 import dataclasses
@@ -21,7 +21,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from seal_friction_ros.core.foundation.parameters import check_names, from_mapping, meanings, name_and_source
+from seal_friction_ros.core.foundation.parameters import (
+    check_names,
+    from_mapping,
+    meanings,
+    name_and_source,
+    printable,
+)
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws import FRICTION_LAWS
@@ -29,10 +35,11 @@ from seal_friction_ros.core.friction.laws.friction_coefficient import FRICTION_C
 from seal_friction_ros.core.friction.laws.law import FrictionLaw, Law
 from seal_friction_ros.core.friction.laws.normal_force import NORMAL_FORCE_LAWS, NormalForceLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.mounting import Mounting
 
 _COMMON = {
     'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
-    'identified_pressure', 'identification',
+    'identified_pressure', 'identification', 'mounting',
 }  # fmt: skip
 _PARTS: dict[type, str] = {
     SealGeometry: 'geometry',
@@ -72,10 +79,22 @@ def parse_seal(document: Any) -> Seal:
     pressures = document.get('identified_pressure')
     if not isinstance(pressures, list | tuple) or len(pressures) != 2:
         raise ValueError(f'{where}: identified_pressure = {pressures!r} is not a list of two pressures [Pa]')
+    mounting_of(document)
     numbers = {'pressure_min': pressures[0], 'pressure_max': pressures[1]}
     numbers |= {key: document[key] for key in ('stiction', 'stiction_ratio') if key in document}
     made = {'name': name, 'coulomb_law': law, 'uncertainty': uncertainty, 'velocity_terms': terms}
     return from_mapping(Seal, numbers, where, **made)
+
+
+def mounting_of(document: Any) -> Mounting | None:
+    """How the seals of a seal file are mounted; None if its document does not tell.
+
+    Raises:
+        ValueError: The mounting is not valid; the message names the seal and the chamber.
+    """
+    if not isinstance(document, Mapping) or 'mounting' not in document:
+        return None
+    return from_mapping(Mounting, document['mounting'], f'seal {printable(document.get("name"))}: mounting')
 
 
 def law_document(law: FrictionLaw) -> dict[str, Any]:
@@ -90,7 +109,7 @@ def law_document(law: FrictionLaw) -> dict[str, Any]:
 
 
 def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:
-    """Seals of an actuator from their documents and the chamber (``a`` or ``b``) of each.
+    """Seals of an actuator from their documents and the chamber of each, one of `CHAMBERS`.
 
     Raises:
         ValueError: There are not as many chambers as seals, or a document or chamber is not valid.

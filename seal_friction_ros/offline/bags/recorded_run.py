@@ -14,6 +14,7 @@ from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import DECODERS
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, read_messages
 from seal_friction_ros.offline.bags.topics import RECORDED, Topics, find_topics
 from seal_friction_ros.offline.work.progress import progress
@@ -60,10 +61,8 @@ class RecordedRun:
     @cached_property
     def pressure(self) -> FloatArray:
         """Mean of the pressures at the seals [Pa, gauge]."""
-        share_a = self.chambers.count('a') / len(self.chambers)
-        if share_a in (0.0, 1.0):  # 0 * NaN is NaN: a chamber without a seal must not count
-            return self.pressure_a if share_a else self.pressure_b
-        return share_a * self.pressure_a + (1.0 - share_a) * self.pressure_b
+        mean: FloatArray = pressures_at_seals(self.chambers, self.pressure_a, self.pressure_b).mean(axis=1)
+        return mean
 
 
 def read_run(bag: Path, namespace: str = '') -> RecordedRun:

@@ -288,7 +288,8 @@ def _notes(
         text = 'estimates have unusable inputs and are left out of the measured friction.'
         notes.append(f'{left_out} of {len(usable)} {text}')
     same_pressures = np.allclose(run.pressure_a, run.pressure_b, rtol=0.02, atol=5e3, equal_nan=True)
-    if not same_pressures and {'a', 'b'} <= {*run.chambers}:
+    chambers = {*run.chambers}
+    if len(chambers) > 1 and not (same_pressures and chambers == {'a', 'b'}):
         notes.append('The seals see different pressures: the pressure of a level is the mean over the seals.')
     return tuple(notes)
 

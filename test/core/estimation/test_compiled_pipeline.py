@@ -81,9 +81,12 @@ SEALS |= {
 }
 
 
+MOUNTED_ON = {'from_elsewhere': 'difference', 'constant': 'ambient'}
+
+
 def with_seals(names: Sequence[str], **changes: object) -> PipelineParameters:
-    """The default settings, changed, with these seals in chambers a, b, a, ..."""
-    seals = tuple(MountedSeal(SEALS[name], 'ab'[i % 2]) for i, name in enumerate(names))
+    """The default settings, changed, with these seals on `MOUNTED_ON` or else in chambers a, b, a, ..."""
+    seals = tuple(MountedSeal(SEALS[name], MOUNTED_ON.get(name, 'ab'[i % 2])) for i, name in enumerate(names))
     known = {f.name for f in dataclasses.fields(DEFAULT.feedforward)}
     guiding = {name: value for name, value in changes.items() if name in known}
     rest = {name: value for name, value in changes.items() if name not in known}
