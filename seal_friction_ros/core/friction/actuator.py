@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import Bound, compilable, evaluate, unrolled
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
+from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, IdentifiedMotion
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import (
@@ -54,6 +56,8 @@ class Seal(CheckedParameters):
     velocity_terms: VelocityTerms | None = None
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
+    identified_motion: IdentifiedMotion = ANY_MOTION
+    force_sum_correction: ForceSumCorrection | None = None  # of the machine that the seal was measured in
 
     def __post_init__(self) -> None:
         super().__post_init__()
