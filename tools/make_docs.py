@@ -12,6 +12,7 @@ from pathlib import Path
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.friction.actuator import Uncertainty
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws import FRICTION_LAWS
 from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
@@ -58,6 +59,7 @@ RECORDS = (
     CoefficientTable,
     VelocityTerms,
     Mounting,
+    ForceSumCorrection,
     Uncertainty,
     Groove,
     Rubber,
