@@ -2,12 +2,13 @@
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection
+from seal_friction_ros.core.estimation.configuration import MOUNTING, Configuration, SealSelection, mounted
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import (
@@ -17,6 +18,7 @@ from seal_friction_ros.core.estimation.node_options import (
 )
 from seal_friction_ros.core.foundation.parameters import from_mapping, printable, similar_names
 from seal_friction_ros.core.friction.actuator import MountedSeal
+from seal_friction_ros.core.friction.seal_file import mounting_of
 
 _CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # PyYAML raises these for '!!int foo'
 DEFAULT_FEEDFORWARD = FeedForwardSettings()
@@ -130,12 +132,23 @@ def load_configuration(
         ValueError: A seal file cannot be read or is invalid; one line that names file, field, value and bound.
     """
     paths = [config_path('seals', name) for name in selection.seals]
-    configuration = Configuration(selection, tuple(read_yaml(path) for path in paths), settings, feedforward)
+    documents = [read_yaml(path) for path in paths]
     try:
+        configuration = Configuration(*mounted(selection, documents), settings, feedforward)
         configuration.parameters()
     except ValueError as error:
         raise ValueError(f'{", ".join(sorted({str(p) for p in paths}))}: {error}') from None
     return configuration
+
+
+def with_seal(selection: SealSelection, seal: str) -> SealSelection:
+    """Selection with a seal file for every seal; its mounting says how many they are, unless chambers are given.
+
+    Raises:
+        ValueError: The seal file cannot be read, or its mounting is not valid.
+    """
+    by_file = selection.seal_chambers == MOUNTING and mounting_of(read_yaml(config_path('seals', seal)))
+    return replace(selection, seals=(seal,) * (1 if by_file else len(selection.seals)))
 
 
 def load_seals(selection: SealSelection) -> tuple[MountedSeal, ...]:

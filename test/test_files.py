@@ -22,6 +22,7 @@ from seal_friction_ros.files import (
     read_yaml,
     share_directory,
 )
+from seal_friction_ros.offline.replay.replay import chosen_configuration
 
 GOOD = (ROOT / 'config' / 'seals' / 'ms28775_114.yaml').read_text()
 
@@ -37,11 +38,16 @@ def written(tmp_path):
 
 
 def complaint(function, path: Path) -> str:
-    with pytest.raises(ValueError) as refusal:
-        function(path)
-    text = str(refusal.value)
-    assert '\n' not in text
+    text = refusal(function, path)
     assert str(path) in text
+    return text
+
+
+def refusal(function, value) -> str:
+    with pytest.raises(ValueError) as refused:
+        function(value)
+    text = str(refused.value)
+    assert '\n' not in text
     return text
 
 
@@ -142,6 +148,83 @@ def test_the_default_configuration_is_a_placeholder_with_the_numbers_of_the_thes
     thesis = load_seals(SealSelection(('ms28775_114', 'ms28775_114')))
     assert [replace(m.seal, name='ms28775_114') for m in seals] == [m.seal for m in thesis]
     assert not load_configuration(SealSelection(('ms28775_114',), ('a',)), EstimatorSettings()).has_placeholder
+
+
+# --- mounting ---
+
+
+@pytest.fixture
+def seal_file(tmp_path):
+    def write(name: str, *chambers: str) -> str:
+        path = tmp_path / f'{name}.yaml'
+        path.write_text(GOOD + (f'mounting: {{chambers: [{", ".join(chambers)}]}}\n' if chambers else ''))
+        return str(path)
+
+    return write
+
+
+def mounted_on(selection: SealSelection) -> list[tuple[str, str]]:
+    configuration = load_configuration(selection, EstimatorSettings())
+    mounted = configuration.parameters().estimator.seals
+    assert len(mounted) == len(configuration.selection.seals) == len(configuration.seal_documents)
+    assert tuple(m.chamber for m in mounted) == configuration.selection.seal_chambers
+    return list(
+        zip([Path(name).stem for name in configuration.selection.seals], [m.chamber for m in mounted], strict=True)
+    )
+
+
+def test_seals_are_mounted_as_their_files_say_unless_chambers_are_given(seal_file):
+    rod, piston = seal_file('rod', 'a', 'a'), seal_file('piston', 'difference')
+    assert mounted_on(SealSelection((piston,))) == [('piston', 'difference')]
+    assert mounted_on(SealSelection((rod, piston))) == [('rod', 'a'), ('rod', 'a'), ('piston', 'difference')]
+    assert mounted_on(SealSelection((rod, piston, rod))) == mounted_on(SealSelection((rod, piston)))
+    assert mounted_on(SealSelection((piston,), ('b',))) == [('piston', 'b')]
+    assert mounted_on(SealSelection((rod,), ('ambient',))) == [('rod', 'ambient')]
+
+
+def test_two_seals_without_mounting_are_one_at_each_end_and_others_need_their_chambers(seal_file):
+    plain, other, rod = seal_file('plain'), seal_file('other'), seal_file('rod', 'a')
+    assert mounted_on(SealSelection((plain, other))) == [('plain', 'a'), ('other', 'b')]
+    for seals in ((plain,), (plain, plain, other), (plain, rod)):
+        assert f'{plain} has no mounting: give seal_chambers' in refusal(mounted_on, SealSelection(seals))
+
+
+def test_a_file_named_more_often_than_it_has_chambers_is_refused(seal_file):
+    rod = seal_file('rod', 'a')
+    expected = f'seals has {rod} 2 times but its mounting has 1 chambers: name it once, or give seal_chambers'
+    assert expected in refusal(mounted_on, SealSelection((rod, rod)))
+
+
+@pytest.mark.parametrize(
+    ('mounting', 'expected'),
+    [
+        ('{chambers: [c]}', "mounting: Mounting.chambers = ['c']: 'c' is not a, b, difference or ambient"),
+        ('{chambers: []}', 'mounting: Mounting.chambers is empty: give one chamber a seal'),
+        ('{chambers: a}', "mounting.chambers = 'a' is not a list"),
+        ('[a]', 'mounting is not a mapping of names to values'),
+        ('{}', 'mounting lacks chambers'),
+        ('{chambers: [a], chamber: b}', 'mounting has no chamber: it has chambers; did you mean chambers?'),
+    ],
+)
+def test_a_wrong_mounting_is_refused_also_where_chambers_are_given(written, mounting, expected):
+    path = written(f'{GOOD}mounting: {mounting}\n')
+    assert expected in complaint(load, path)
+    assert expected in refusal(mounted_on, SealSelection((str(path),)))
+
+
+def test_a_replay_with_a_seal_file_has_as_many_seals_as_the_file_says(seal_file, tmp_path):
+    one, plain = seal_file('one', 'a'), seal_file('plain')
+    params = tmp_path / 'params.yaml'
+
+    def replayed(seal: str, text: str = '') -> tuple[str, ...]:
+        params.write_text(f'/**:\n  ros__parameters: {{{text}}}\n')
+        configuration = chosen_configuration(params if text else None, Path(seal))
+        return configuration.selection.seal_chambers
+
+    assert replayed(one) == ('a',)
+    assert replayed(plain) == ('a', 'b')
+    assert replayed(one, 'seals: [x, x, x]') == ('a',)
+    assert replayed(one, 'seals: [x, x], seal_chambers: [b, ambient]') == ('b', 'ambient')
 
 
 @pytest.mark.parametrize(
@@ -279,7 +362,7 @@ def test_a_file_that_is_not_a_parameter_file_is_rejected(written, content):
         ('{stick_velocity: fast}', "stick_velocity = 'fast' is not a number"),
         ('{use_stiction: 1}', 'use_stiction = 1 is not true or false'),
         ('{seals: ms28775_114}', "seals = 'ms28775_114' is not a list"),
-        ('{seals: [x]}', 'has 2 entries but there are 1 seals'),
+        ('{seals: [x], seal_chambers: [a, b]}', 'has 2 entries but there are 1 seals'),
         ('{realtime_priority: 100}', 'StartOptions.realtime_priority = 100  is above its upper bound 99'),
         ('{record_split_size: 5}', 'record_split_size = 5 makes too many files'),
         ('{refuse_second_publisher: 1}', 'refuse_second_publisher = 1 is not true or false'),

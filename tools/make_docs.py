@@ -12,11 +12,13 @@ from pathlib import Path
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.friction.actuator import Uncertainty
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws import FRICTION_LAWS
 from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.mounting import Mounting
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.core.lubrication.grease import Grease
@@ -56,6 +58,8 @@ RECORDS = (
     PowerLaw,
     CoefficientTable,
     VelocityTerms,
+    Mounting,
+    ForceSumCorrection,
     Uncertainty,
     Groove,
     Rubber,

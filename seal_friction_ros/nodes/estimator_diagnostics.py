@@ -11,7 +11,11 @@ from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 _SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one
-_LARGEST_UNCERTAIN = 0.25  # [-] share of estimates with MOTION_UNCERTAIN; each reversal has some
+_LARGEST_NEAR_REST = 0.25  # [-] of the estimates, for each status bit of `_NEAR_REST_MESSAGES`; each reversal has some
+_NEAR_REST_MESSAGES = {
+    Status.MOTION_UNCERTAIN: 'of rod_velocity near rest or too noisy to tell rest from motion',
+    Status.SLOWER_THAN_IDENTIFIED: 'of rod_velocity slower than the seals were identified',
+}
 _LARGEST_SHARE = {
     Limited.CLAMP: 0.01,
     Limited.SLEW: 0.2,
@@ -155,15 +159,18 @@ class EstimatorDiagnostics:
         status = 0
         for bits in estimates:
             status |= bits
-        if status & ~Status.MOTION_UNCERTAIN:
-            return DiagnosticStatus.WARN, str(Status(status & ~Status.MOTION_UNCERTAIN).name)
+        status &= ~sum(_NEAR_REST_MESSAGES)
+        if status:
+            return DiagnosticStatus.WARN, str(Status(status).name)
         if self._malformed != self._malformed_before:
             names = ', '.join(sorted((self._malformed - self._malformed_before).keys()))
             return DiagnosticStatus.WARN, f'malformed messages on {names}'
         findings = self._feedforward_findings(seconds)
-        uncertain = _share(estimates, Status.MOTION_UNCERTAIN)
-        if uncertain > _LARGEST_UNCERTAIN:
-            findings.append(f'{uncertain:.0%} of rod_velocity near rest or too noisy to tell rest from motion')
+        findings += [
+            f'{_share(estimates, bit):.0%} {message}'
+            for bit, message in _NEAR_REST_MESSAGES.items()
+            if _share(estimates, bit) > _LARGEST_NEAR_REST
+        ]
         return (DiagnosticStatus.WARN, '; '.join(findings)) if findings else (DiagnosticStatus.OK, 'estimating')
 
     def _feedforward_findings(self, seconds: float) -> list[str]:

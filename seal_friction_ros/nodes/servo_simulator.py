@@ -15,6 +15,7 @@ from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, INPUTS, REFERENCE_TYPE, decode, encode
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, measured_force_sum, one_correction
 from seal_friction_ros.core.servo.controller import Limited
 from seal_friction_ros.core.servo.motions import PullTest, Setpoint, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
@@ -77,6 +78,7 @@ class ServoSimulator(ManagedNode):
     def _make_servo(self) -> None:
         period = 1.0 / self._settings.rate
         seals = load_seals(self.settings(SealSelection))
+        self._lacking = one_correction(mounted.seal.force_sum_correction for mounted in seals) or NO_CORRECTION
         self._rig: PullRig | None = None
         if self._settings.wave == 'pull_test':
             self._rig = pull_rig(self.settings(PullTest), seals, period)
@@ -226,7 +228,9 @@ class ServoSimulator(ManagedNode):
         stamp = self._origin + self._index * self._period
         reference = self._reference_at(stamp)
         true, limited = self._outputs, 0
-        readings = Readings((true.pressure_a, true.pressure_b), true.velocity, true.force_sum, true.position)
+        pressures = true.pressure_a, true.pressure_b
+        force_sum = measured_force_sum(self._lacking, true.force_sum, *pressures)
+        readings = Readings(pressures, true.velocity, force_sum, true.position)
         self._delayed.append((stamp, read(self._sensors, self._index, readings)))
         if self._clock_publisher is not None:
             seconds, nanoseconds = divmod(stamp, _SECOND)

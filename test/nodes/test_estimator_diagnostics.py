@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 
-from seal_friction_ros.nodes.estimator_diagnostics import MissingSamples
+from seal_friction_ros.core.estimation.messages import INPUTS
+from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
+from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, MissingSamples
+from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 PERIOD = 1_000_000  # [ns]
 
@@ -21,3 +25,25 @@ def test_samples_lost_in_bursts_are_counted_from_the_first_samples_on(loss, seed
         lost += number - last - 1
         last = number
     assert missing.count == lost
+
+
+def level_of(bit: Status, share: float) -> tuple[bytes, str]:
+    """Level and message of a second in which this share of the estimates had the bit."""
+    diagnostics = EstimatorDiagnostics()
+    for i in range(100):
+        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(bit) if i < 100 * share else 0), 1000)
+    report = diagnostics.report(True, False, GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {}))
+    return report.level, report.message
+
+
+@pytest.mark.parametrize('bit', [Status.MOTION_UNCERTAIN, Status.SLOWER_THAN_IDENTIFIED])
+def test_slow_motion_as_each_reversal_has_it_is_no_warning_and_a_quarter_of_a_second_is(bit):
+    assert level_of(bit, 0.2) == (DiagnosticStatus.OK, 'estimating')
+    level, message = level_of(bit, 0.3)
+    assert level == DiagnosticStatus.WARN
+    assert message.startswith('30% of rod_velocity')
+
+
+@pytest.mark.parametrize('bit', [Status.FASTER_THAN_IDENTIFIED, Status.DIRECTION_NOT_IDENTIFIED])
+def test_one_estimate_beyond_the_identified_motion_is_a_warning(bit):
+    assert level_of(bit, 0.01) == (DiagnosticStatus.WARN, bit.name)

@@ -6,7 +6,8 @@ A bag therefore carries everything needed to replay it, also when parameters cha
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, get_type_hints
 
@@ -15,7 +16,8 @@ from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
 from seal_friction_ros.core.estimation.records import Force, Pressure
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
-from seal_friction_ros.core.friction.seal_file import mount_seals
+from seal_friction_ros.core.friction.mounting import CHAMBERS_TEXT, check_chambers
+from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of
 
 PLACEHOLDER = 'placeholder'
 """Seal file of the default configuration."""
@@ -23,6 +25,9 @@ PLACEHOLDER_WARNING = (
     'the seals are the placeholder of the default configuration, not those of your machine: name their seal files in '
     'the parameter seals'
 )
+MOUNTING = ('mounting',)
+"""Value of `SealSelection.seal_chambers`: the chambers are those of the seal files."""
+_USUAL_CHAMBERS = ('a', 'b')  # of two seals whose files do not tell: one at each end of the cylinder (our choice)
 _DEFAULT_OF_VERSION_1 = ('ms28775_114', 'ms28775_114')
 
 
@@ -31,7 +36,7 @@ class SealSelection:
     """Which seals the actuator has, one ROS parameter per field.
 
     Raises:
-        ValueError: There are not as many chambers as seals, or none.
+        ValueError: There are not as many chambers as seals, or none, or a chamber is not known.
     """
 
     seals: tuple[str, ...] = parameter(
@@ -41,33 +46,79 @@ class SealSelection:
         description='Seal file of each seal: a path, or the name of one in config/seals.',
     )
     seal_chambers: tuple[str, ...] = parameter(
-        ('a', 'b'), unit='', live=False, description='Chamber whose pressure each seal sees: a or b.'
+        MOUNTING,
+        unit='',
+        live=False,
+        description=f'Chamber whose pressure each seal sees: {CHAMBERS_TEXT}; [mounting]: as the seal files say.',
     )
 
     def __post_init__(self) -> None:
         check(self)
         if not self.seals:
             raise ValueError('SealSelection.seals is empty: name at least one seal')
+        if self.seal_chambers == MOUNTING:
+            return
         if len(self.seals) != len(self.seal_chambers):
             raise ValueError(
                 f'SealSelection.seal_chambers = {list(self.seal_chambers)} has {len(self.seal_chambers)} entries '
                 f'but there are {len(self.seals)} seals: give one chamber a seal'
             )
-        wrong = [chamber for chamber in self.seal_chambers if chamber not in ('a', 'b')]
-        if wrong:
+        check_chambers('SealSelection.seal_chambers', self.seal_chambers)
+
+
+def mounted(
+    selection: SealSelection, documents: Sequence[Mapping[str, Any]]
+) -> tuple[SealSelection, tuple[Mapping[str, Any], ...]]:
+    """Selection and documents with one entry for each seal, and its chamber.
+
+    With `MOUNTING`, a seal file that is named once stands for as many seals as its ``mounting`` has chambers. Two seals
+    whose files have no mounting are on chambers a and b.
+
+    Args:
+        selection: As the parameters have it.
+        documents: Seal file of each of its entries.
+
+    Raises:
+        ValueError: Only some of the files have a mounting, a file is named another number of times, or the chambers of
+            other than two seals are not known.
+    """
+    if selection.seal_chambers != MOUNTING:
+        return selection, tuple(documents)
+    named = Counter(selection.seals)
+    files = dict(zip(selection.seals, documents, strict=True))
+    mountings = {name: mounting_of(document) for name, document in files.items()}
+    if not any(mountings.values()) and len(documents) == len(_USUAL_CHAMBERS):
+        return dataclasses.replace(selection, seal_chambers=_USUAL_CHAMBERS), tuple(documents)
+    seals: list[tuple[str, str]] = []
+    for name, mounting in mountings.items():
+        if mounting is None:
+            raise ValueError(f'{name} has no mounting: give seal_chambers with one chamber for each entry of seals')
+        if named[name] not in (1, len(mounting.chambers)):
             raise ValueError(
-                f'SealSelection.seal_chambers = {list(self.seal_chambers)}: {wrong[0]!r} is neither a nor b'
+                f'seals has {name} {named[name]} times but its mounting has {len(mounting.chambers)} chambers: name it '
+                'once, or give seal_chambers'
             )
+        seals += [(name, chamber) for chamber in mounting.chambers]
+    names, chambers = zip(*seals, strict=True)
+    return SealSelection(names, chambers), tuple(files[name] for name in names)
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """Seals and settings of the estimator, the seals as the documents of their files."""
+    """Seals and settings of the estimator, the seals as the documents of their files.
+
+    Raises:
+        ValueError: The selection does not have the chamber of each seal, see `mounted`.
+    """
 
     selection: SealSelection
     seal_documents: tuple[Mapping[str, Any], ...]
     settings: EstimatorSettings
     feedforward: FeedForwardSettings
+
+    def __post_init__(self) -> None:
+        if self.selection.seal_chambers == MOUNTING:
+            raise ValueError('Configuration.selection does not have the chamber of each seal')
 
     @property
     def has_placeholder(self) -> bool:

@@ -34,6 +34,13 @@ from seal_friction_ros.core.friction.actuator import (
     friction_of_seals,
     numbers_of_seals,
 )
+from seal_friction_ros.core.friction.force_sum_correction import (
+    NO_CORRECTION,
+    ForceSumCorrection,
+    corrected_force_sum,
+    one_correction,
+)
+from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, MotionLimits, motion_limits
 from seal_friction_ros.core.friction.states import UNKNOWN, StateFriction, is_at_rest, state_friction
 
 
@@ -123,23 +130,47 @@ class EstimatorParameters:
     """Settings of the estimator and the seals of the actuator.
 
     Raises:
-        ValueError: There is no seal.
+        ValueError: There is no seal, or two seals have different corrections of the force sum.
     """
 
-    COMPILED: ClassVar = ('settings', 'seal_numbers', 'depends_on_velocity')
+    COMPILED: ClassVar = (
+        'settings',
+        'seal_numbers',
+        'depends_on_velocity',
+        'corrects_force_sum',
+        'force_sum_correction',
+        'limits_motion',
+        'motion_limits',
+    )
 
     settings: EstimatorSettings
     seals: tuple[MountedSeal, ...]
     seal_numbers: tuple[SealNumbers, ...] = field(init=False, repr=False, compare=False)
     depends_on_velocity: bool = field(init=False, repr=False, compare=False)
     """whether the sliding friction of a seal does"""
+    corrects_force_sum: bool = field(init=False, repr=False, compare=False)
+    """whether a seal file has a ``force_sum_correction``; without one the force sum keeps its bytes, as -0.0 does"""
+    force_sum_correction: ForceSumCorrection = field(init=False, repr=False, compare=False)
+    limits_motion: bool = field(init=False, repr=False, compare=False)
+    """whether a seal file tells in which motion the seal was identified"""
+    motion_limits: MotionLimits = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not self.seals:
             raise ValueError('EstimatorParameters.seals is empty: name at least one seal')
-        object.__setattr__(self, 'seal_numbers', numbers_of_seals(self.seals))
-        depends = any(mounted.seal.depends_on_velocity for mounted in self.seals)
-        object.__setattr__(self, 'depends_on_velocity', depends)
+        seals = [mounted.seal for mounted in self.seals]
+        correction = one_correction(seal.force_sum_correction for seal in seals)
+        motions = [seal.identified_motion for seal in seals]
+        derived = {
+            'seal_numbers': numbers_of_seals(self.seals),
+            'depends_on_velocity': any(seal.depends_on_velocity for seal in seals),
+            'corrects_force_sum': correction is not None,
+            'force_sum_correction': correction or NO_CORRECTION,
+            'limits_motion': any(motion != ANY_MOTION for motion in motions),
+            'motion_limits': motion_limits(motions),
+        }
+        for name, value in derived.items():
+            object.__setattr__(self, name, value)
 
 
 class Speed(NamedTuple):
@@ -171,6 +202,7 @@ class Observation(NamedTuple):
 
     stamp: int  # [ns]
     velocity: float  # [m/s] at which the seals slide, conditioned; 0.0 at rest and where it is not known
+    force_sum: float  # [N] corrected
     status: int  # bits of `Status`
     input_age: float  # [s] as in `FrictionEstimate`
 
@@ -202,6 +234,9 @@ _VELOCITY_LEAP = int(Status.VELOCITY_LEAP)
 _INPUT_REFUSED = int(Status.INPUT_REFUSED)
 _STAMP_AGE = int(Status.STAMP_AGE)
 _MOTION_UNCERTAIN = int(Status.MOTION_UNCERTAIN)
+_FASTER_THAN_IDENTIFIED = int(Status.FASTER_THAN_IDENTIFIED)
+_SLOWER_THAN_IDENTIFIED = int(Status.SLOWER_THAN_IDENTIFIED)
+_DIRECTION_NOT_IDENTIFIED = int(Status.DIRECTION_NOT_IDENTIFIED)
 
 NO_VELOCITY = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
 """Status bits of a velocity that is not used."""
@@ -240,20 +275,24 @@ def step(
 
     Source: thesis, chapter 7 (Figures 20 and 21); what is done with unusable inputs is our choice.
     """
-    settings = parameters.settings
-    state, seen = assess_inputs(settings, state, sample)
+    state, seen = assess_inputs(parameters, state, sample)
     friction = _NO_FRICTION
     if not seen.status & _PRESSURE_MISSING:
         pressure = state.pressure
         friction = friction_of_seals(parameters.seal_numbers, pressure.chamber_a, pressure.chamber_b, seen.velocity)
-    return state, estimate_of(settings, state, seen, friction)
+    return state, estimate_of(parameters, seen, friction)
 
 
 @compilable
 def assess_inputs(
-    settings: EstimatorSettings, state: EstimatorState, sample: RodSample
+    parameters: EstimatorParameters, state: EstimatorState, sample: RodSample
 ) -> tuple[EstimatorState, Observation]:
-    """First half of a step: choose the inputs in use, flag their faults, decide whether the rod moves."""
+    """First half of a step: choose the inputs in use, flag their faults, decide whether the rod moves.
+
+    The force sum is checked as measured, since its limits are those of a sensor, then corrected with the
+    pressure in use.
+    """
+    settings = parameters.settings
     status = _INPUT_REFUSED if sample.refused else 0
     if state.stamp != NEVER and sample.stamp <= state.stamp:
         status |= _STAMP_NOT_INCREASING
@@ -273,6 +312,11 @@ def assess_inputs(
     input_age = pressure_age if pressure_age >= force_age else force_age
     if status & (_PRESSURE_MISSING | _FORCE_MISSING):
         input_age = -1.0
+    force_sum = force.force
+    if parameters.corrects_force_sum and force.stamp != NEVER:
+        force_sum = corrected_force_sum(
+            parameters.force_sum_correction, force_sum, pressure.chamber_a, pressure.chamber_b
+        )
 
     newest = Speed(sample.stamp, sample.velocity)
     velocity, leapt_velocity, fault = _usable_velocity(settings, newest, state.velocity, state.leapt_velocity)
@@ -285,12 +329,25 @@ def assess_inputs(
         if uncertain:
             status |= _MOTION_UNCERTAIN
         # Friction never drives: a rod in the band of rest that moves against the force sum slides.
-        if not at_rest or (uncertain and motion.velocity * force.force < 0.0):
+        if not at_rest or (uncertain and motion.velocity * force_sum < 0.0):
             sliding_velocity = motion.velocity
     state = EstimatorState(
         sample.stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion
     )
-    return state, Observation(sample.stamp, sliding_velocity, status, input_age)
+    return state, Observation(sample.stamp, sliding_velocity, force_sum, status, input_age)
+
+
+@compilable
+def _unidentified_motion(limits: MotionLimits, velocity: float) -> int:
+    """Status bits of sliding at ``velocity`` [m/s] that no seal file covers."""
+    status, speed = 0, abs(velocity)
+    if speed > limits.fastest:
+        status |= _FASTER_THAN_IDENTIFIED
+    if 0.0 < speed < limits.slowest:
+        status |= _SLOWER_THAN_IDENTIFIED
+    if (velocity > 0.0 and not limits.extends) or (velocity < 0.0 and not limits.retracts):
+        status |= _DIRECTION_NOT_IDENTIFIED
+    return status
 
 
 @compilable
@@ -307,19 +364,19 @@ def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_r
 
 
 @compilable
-def estimate_of(
-    settings: EstimatorSettings, state: EstimatorState, seen: Observation, friction: ActuatorFriction
-) -> FrictionEstimate:
+def estimate_of(parameters: EstimatorParameters, seen: Observation, friction: ActuatorFriction) -> FrictionEstimate:
     """Second half of a step: friction that acts on the rod, from the friction of all seals at the pressure in use."""
     status = seen.status
     coulomb = friction.coulomb_friction
-    breakaway = coulomb + friction.stiction if settings.use_stiction else coulomb
+    breakaway = coulomb + friction.stiction if parameters.settings.use_stiction else coulomb
     if not friction.in_identified_range:
         status |= _OUTSIDE_IDENTIFIED_RANGE
+    if parameters.limits_motion:
+        status |= _unidentified_motion(parameters.motion_limits, seen.velocity)
     acting, slides = _UNKNOWN, seen.velocity != 0.0
     if not status & _NO_STATE and (slides or not status & _NO_FORCE_SUM):
         sliding = coulomb + friction.velocity_friction
-        acting = state_friction(seen.velocity, state.force.force, not slides, sliding, breakaway)
+        acting = state_friction(seen.velocity, seen.force_sum, not slides, sliding, breakaway)
     return FrictionEstimate(
         seen.stamp,
         coulomb,

@@ -34,6 +34,18 @@ class Status(IntFlag):
     INPUT_REFUSED = 32768
     STAMP_AGE = 65536
     MOTION_UNCERTAIN = 131072
+    FASTER_THAN_IDENTIFIED = 262144
+    SLOWER_THAN_IDENTIFIED = 524288
+    DIRECTION_NOT_IDENTIFIED = 1048576
+
+
+EXTRAPOLATED = (
+    Status.OUTSIDE_IDENTIFIED_RANGE
+    | Status.FASTER_THAN_IDENTIFIED
+    | Status.SLOWER_THAN_IDENTIFIED
+    | Status.DIRECTION_NOT_IDENTIFIED
+)
+"""Status bits of good inputs that are outside what a law was identified with."""
 
 
 class Pressure(NamedTuple):

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import Bound, compilable, evaluate, unrolled
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
+from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, IdentifiedMotion
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import (
@@ -14,6 +16,7 @@ from seal_friction_ros.core.friction.laws.velocity_terms import (
     VelocityTerms,
     with_velocity_terms,
 )
+from seal_friction_ros.core.friction.mounting import CHAMBERS, CHAMBERS_TEXT, pressure_at_seal
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,8 @@ class Seal(CheckedParameters):
     velocity_terms: VelocityTerms | None = None
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
+    identified_motion: IdentifiedMotion = ANY_MOTION
+    force_sum_correction: ForceSumCorrection | None = None  # of the machine that the seal was measured in
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -90,7 +95,7 @@ class SealNumbers(NamedTuple):
     law_depends_on_speed: bool
     velocity_terms: VelocityTermNumbers = NO_VELOCITY_TERMS
     depends_on_velocity: bool = False  # whether the sliding friction differs from the Coulomb friction
-    is_on_chamber_a: bool = True
+    chamber: int = 0  # index in `CHAMBERS`
     scale: float = 1.0  # [-] factor on all friction of the seal
     stiction: float = 0.0  # [N]
     stiction_ratio: float = 0.0
@@ -120,10 +125,10 @@ NO_SEALS = (numbers_of_law(ConstantCoulomb(0.0)),)
 
 @dataclass(frozen=True)
 class MountedSeal:
-    """A seal and the chamber whose pressure it sees.
+    """A seal and the chamber whose pressure it sees, one of `CHAMBERS`.
 
     Raises:
-        ValueError: The chamber is neither ``a`` nor ``b``.
+        ValueError: The chamber is not one of them.
     """
 
     seal: Seal
@@ -132,12 +137,12 @@ class MountedSeal:
     numbers: SealNumbers = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if self.chamber not in ('a', 'b'):
-            raise ValueError(f'chamber = {self.chamber!r} of seal {self.seal.name} is neither a nor b')
+        if self.chamber not in CHAMBERS:
+            raise ValueError(f'chamber = {self.chamber!r} of seal {self.seal.name} is not {CHAMBERS_TEXT}')
         seal = self.seal
         margin = 0.01 * (seal.pressure_max - seal.pressure_min)
         numbers = numbers_of_law(seal.coulomb_law, seal.velocity_terms)._replace(
-            is_on_chamber_a=self.chamber == 'a',
+            chamber=CHAMBERS.index(self.chamber),
             scale=self.friction_scale,
             stiction=seal.stiction,
             stiction_ratio=seal.stiction_ratio,
@@ -184,8 +189,8 @@ def friction_of_seal(
 ) -> tuple[float, float, float, bool, float]:
     """The numbers of `ActuatorFriction` for one seal; arguments as for `friction_of_seals`."""
     # One unpacking takes a quarter of the time of an attribute each.
-    law, coulomb_speed, _, _, depends, on_a, scale, stiction, ratio, relative_std, variance, square, low, high = seal
-    pressure = pressure_a if on_a else pressure_b
+    law, coulomb_speed, _, _, depends, chamber, scale, stiction, ratio, relative_std, variance, square, low, high = seal
+    pressure = pressure_at_seal(chamber, pressure_a, pressure_b)
     pressing = 0.0 if pressure < 0.0 else pressure
     by_law = evaluate(law, pressing, coulomb_speed)
     coulomb = by_law * scale
@@ -240,7 +245,7 @@ def sliding_friction_of_seals(
     """
     total = 0.0
     for seal in unrolled(seals):
-        pressure = pressure_a if seal.is_on_chamber_a else pressure_b
+        pressure = pressure_at_seal(seal.chamber, pressure_a, pressure_b)
         pressing = 0.0 if pressure < 0.0 else pressure
         friction = evaluate(seal.law, pressing, seal.coulomb_speed)
         if seal.depends_on_velocity:

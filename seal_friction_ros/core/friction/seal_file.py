@@ -12,8 +12,9 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     uncertainty: {relative_std: 0.08, absolute_std: 0.3}
     identified_pressure: [0.0, 6.9e+6]
 
-``velocity_terms`` and ``stiction_ratio`` are optional, as is ``identification``: what ``seal_friction identify``
-reports about its data. This module ignores it.
+Optional are ``velocity_terms``, ``stiction_ratio``, ``identified_speed``, ``identified_directions``, ``mounting``,
+``force_sum_correction``, and ``identification``: what ``seal_friction identify`` reports about its data. This module
+ignores the latter.
 """
 
 import dataclasses
@@ -21,18 +22,28 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from seal_friction_ros.core.foundation.parameters import check_names, from_mapping, meanings, name_and_source
+from seal_friction_ros.core.foundation.parameters import (
+    check_names,
+    from_mapping,
+    meanings,
+    name_and_source,
+    printable,
+)
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.identified_motion import IdentifiedMotion
 from seal_friction_ros.core.friction.laws import FRICTION_LAWS
 from seal_friction_ros.core.friction.laws.friction_coefficient import FRICTION_COEFFICIENT_LAWS, FrictionCoefficientLaw
 from seal_friction_ros.core.friction.laws.law import FrictionLaw, Law
 from seal_friction_ros.core.friction.laws.normal_force import NORMAL_FORCE_LAWS, NormalForceLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.mounting import Mounting
 
 _COMMON = {
     'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
-    'identified_pressure', 'identification',
+    'identified_pressure', 'identified_speed', 'identified_directions', 'identification', 'mounting',
+    'force_sum_correction',
 }  # fmt: skip
 _PARTS: dict[type, str] = {
     SealGeometry: 'geometry',
@@ -65,17 +76,51 @@ def parse_seal(document: Any) -> Seal:
     terms = None
     if 'velocity_terms' in document:
         terms = from_mapping(VelocityTerms, document['velocity_terms'], f'{where}: velocity_terms')
+    correction = None
+    if 'force_sum_correction' in document:
+        given = document['force_sum_correction']
+        correction = from_mapping(ForceSumCorrection, given, f'{where}: force_sum_correction')
     about = document.get('identification', {})
     if not isinstance(about, Mapping) or not _can_be_recorded(about):
         raise ValueError(f'{where}: identification is not a mapping of texts, finite numbers, and lists of them')
     uncertainty = from_mapping(Uncertainty, document.get('uncertainty'), f'{where}: uncertainty')
-    pressures = document.get('identified_pressure')
-    if not isinstance(pressures, list | tuple) or len(pressures) != 2:
-        raise ValueError(f'{where}: identified_pressure = {pressures!r} is not a list of two pressures [Pa]')
+    pressures = _ends(document, 'identified_pressure', 'pressures [Pa]', where)
+    mounting_of(document)
     numbers = {'pressure_min': pressures[0], 'pressure_max': pressures[1]}
     numbers |= {key: document[key] for key in ('stiction', 'stiction_ratio') if key in document}
-    made = {'name': name, 'coulomb_law': law, 'uncertainty': uncertainty, 'velocity_terms': terms}
+    motion: dict[str, Any] = {}
+    if 'identified_speed' in document:
+        motion['slowest'], motion['fastest'] = _ends(document, 'identified_speed', 'speeds [m/s]', where)
+    if 'identified_directions' in document:
+        motion['directions'] = document['identified_directions']
+    made = {
+        'name': name,
+        'coulomb_law': law,
+        'uncertainty': uncertainty,
+        'velocity_terms': terms,
+        'identified_motion': from_mapping(IdentifiedMotion, motion, f'{where}: identified'),
+        'force_sum_correction': correction,
+    }
     return from_mapping(Seal, numbers, where, **made)
+
+
+def _ends(document: Mapping[str, Any], key: str, what: str, where: str) -> Any:
+    """The two ends of an identified range."""
+    ends = document.get(key)
+    if not isinstance(ends, list | tuple) or len(ends) != 2:
+        raise ValueError(f'{where}: {key} = {ends!r} is not a list of two {what}')
+    return ends
+
+
+def mounting_of(document: Any) -> Mounting | None:
+    """How the seals of a seal file are mounted; None if its document does not tell.
+
+    Raises:
+        ValueError: The mounting is not valid; the message names the seal and the chamber.
+    """
+    if not isinstance(document, Mapping) or 'mounting' not in document:
+        return None
+    return from_mapping(Mounting, document['mounting'], f'seal {printable(document.get("name"))}: mounting')
 
 
 def law_document(law: FrictionLaw) -> dict[str, Any]:
@@ -90,7 +135,7 @@ def law_document(law: FrictionLaw) -> dict[str, Any]:
 
 
 def mount_seals(documents: tuple[Any, ...], chambers: tuple[str, ...]) -> tuple[MountedSeal, ...]:
-    """Seals of an actuator from their documents and the chamber (``a`` or ``b``) of each.
+    """Seals of an actuator from their documents and the chamber of each, one of `CHAMBERS`.
 
     Raises:
         ValueError: There are not as many chambers as seals, or a document or chamber is not valid.

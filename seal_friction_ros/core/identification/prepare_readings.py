@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.core.identification import signal_preparation
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import (
@@ -33,7 +34,7 @@ _Rows = Sequence[tuple[int, signal_preparation.SignalReading]]
 
 
 def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> PreparedReadings:
-    """Readings from logs, one for each source; ``chambers`` (a or b) are those of the seals.
+    """Readings from logs, one for each source; ``chambers`` (of `CHAMBERS`) are those of the seals.
 
     Raises:
         ValueError: A log is unfit for identification; one line with the reason and what to measure instead.
@@ -59,7 +60,7 @@ def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> Prepar
 
 def _seal_pressures(chamber_pressures: FloatArray, chambers: Sequence[str]) -> FloatArray:
     """Pressure of each seal [Pa, gauge, >= 0], shape (n, k); negative gauge pressure counts as zero."""
-    return np.maximum(chamber_pressures[:, ['ab'.index(chamber) for chamber in chambers]], 0.0)
+    return np.maximum(pressures_at_seals(chambers, *chamber_pressures.T), 0.0)
 
 
 def _columns(rows: _Rows, chambers: Sequence[str]) -> tuple[OperatingConditions, FloatArray, FloatArray, IntArray]:

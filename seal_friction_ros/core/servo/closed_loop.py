@@ -21,6 +21,7 @@ from seal_friction_ros.core.estimation.messages import Input, Output
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
 from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.friction.force_sum_correction import measured_force_sum
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.motions import Setpoint, Sine, Step, Trapezoid, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters
@@ -86,6 +87,7 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
             [Pa], chamber b [Pa], force sum [N], velocity [m/s]. None: no errors.
     """
     plant, parameters = axis
+    lacking = parameters.estimator.force_sum_correction
     period = plant.control_period
     whole, part = divmod(delay / period + 1e-9, 1.0)
     back = int(whole)
@@ -107,7 +109,7 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
         a, b, f, v = errors[i % len(errors)]
         messages: list[Input] = [
             Pressure(stamp, out.pressure_a + a, out.pressure_b + b),
-            Force(stamp, out.force_sum + f),
+            Force(stamp, measured_force_sum(lacking, out.force_sum, out.pressure_a, out.pressure_b) + f),
         ]
         messages += [ServoReference(stamp, *setpoint), Velocity(stamp, out.velocity + v)]
         for message in messages:

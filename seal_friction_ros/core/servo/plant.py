@@ -498,12 +498,15 @@ def fastest_rate(
 
 
 def steepest_friction(seals: tuple[MountedSeal, ...], highest_pressure: float) -> float:
-    """Largest slope of the seal friction over speed [N s/m], on a grid of speeds and pressures (our choice)."""
+    """Largest slope of the seal friction over speed [N s/m], on a grid of speeds and pressures (our choice).
+
+    Both chambers have the pressure, or chamber a alone, for seals that see the difference.
+    """
     if not any(mounted.seal.depends_on_velocity for mounted in seals):
         return 0.0
     numbers, speeds = numbers_of_seals(seals), np.geomspace(1e-6, 10.0, 141)
     steepest = 0.0
-    for p, direction in product(np.linspace(0.0, highest_pressure, 5).tolist(), (-1, 1)):
-        friction = [sliding_friction_of_seals(numbers, p, p, v, direction) for v in speeds.tolist()]
+    for p, share, direction in product(np.linspace(0.0, highest_pressure, 5).tolist(), (1.0, 0.0), (-1, 1)):
+        friction = [sliding_friction_of_seals(numbers, p, share * p, v, direction) for v in speeds.tolist()]
         steepest = max(steepest, float(np.max(np.diff(friction) / np.diff(speeds))))
     return steepest

@@ -3,6 +3,7 @@
 import math
 from array import array
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +15,9 @@ from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import DECODERS
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.friction.actuator import MountedSeal
+from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum, one_correction
+from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, read_messages
 from seal_friction_ros.offline.bags.topics import RECORDED, Topics, find_topics
 from seal_friction_ros.offline.work.progress import progress
@@ -37,13 +41,13 @@ class RecordedRun:
     frames: tuple[str, ...]  # frame names of the velocity samples, the first ten
     configurations: tuple[tuple[float, str], ...]  # time [s] and JSON text of each change of configuration
     configuration_rows: tuple[int, ...]  # number of estimates before each change, in the order of the bag
-    chambers: tuple[str, ...]  # chamber of each seal
+    chambers: tuple[str, ...]  # chamber of each seal in the last configuration; a and b without one
     start: int  # [ns] stamp of the first estimate
     time: FloatArray  # [s] since the first estimate
     velocity: FloatArray  # [m/s]
     pressure_a: FloatArray  # [Pa, gauge]
     pressure_b: FloatArray  # [Pa, gauge]
-    force_sum: FloatArray  # [N]
+    force_sum: FloatArray  # [N] corrected as by the estimator
     position: FloatArray  # [m]
     reference: FloatArray  # [m] reference position
     coulomb_friction: FloatArray  # [N]
@@ -60,10 +64,8 @@ class RecordedRun:
     @cached_property
     def pressure(self) -> FloatArray:
         """Mean of the pressures at the seals [Pa, gauge]."""
-        share_a = self.chambers.count('a') / len(self.chambers)
-        if share_a in (0.0, 1.0):  # 0 * NaN is NaN: a chamber without a seal must not count
-            return self.pressure_a if share_a else self.pressure_b
-        return share_a * self.pressure_a + (1.0 - share_a) * self.pressure_b
+        mean: FloatArray = pressures_at_seals(self.chambers, self.pressure_a, self.pressure_b).mean(axis=1)
+        return mean
 
 
 def read_run(bag: Path, namespace: str = '') -> RecordedRun:
@@ -162,6 +164,11 @@ class _RunCollector:
         if not any(_is_replayed(text) for _, _, text in self._configurations[:1]):
             values |= {'feedforward_force': values['replayed_force'], 'replayed_force': None}
         start = int(stamps[0])
+        seals = _seals([text for _, _, text in self._configurations])
+        correction = one_correction(mounted.seal.force_sum_correction for mounted in seals)
+        if correction is not None:
+            pressures = values['pressure_a'], values['pressure_b']
+            values['force_sum'] = corrected_force_sum(correction, values['force_sum'], *pressures)
         # A configuration has no stamp: the time at which it was recorded counts.
         changes = tuple((round((t - start) * 1e-9, 6), text) for t, _, text in self._configurations)
         return RecordedRun(
@@ -170,7 +177,7 @@ class _RunCollector:
             frames=tuple(frame.decode(errors='replace') for frame in self._frames),
             configurations=changes,
             configuration_rows=tuple(row for _, row, _ in self._configurations),
-            chambers=_chambers(changes),
+            chambers=tuple(mounted.chamber for mounted in seals) or ('a', 'b'),
             start=start,
             time=np.asarray((stamps - start) * 1e-9, dtype=np.float64),
             **values,
@@ -185,11 +192,9 @@ def _is_replayed(text: str) -> bool:
         return False
 
 
-def _chambers(configurations: Sequence[tuple[float, str]]) -> tuple[str, ...]:
-    """Chamber of each seal in the last configuration; without one that can be parsed, one seal on each chamber."""
+def _seals(configurations: Sequence[str]) -> tuple[MountedSeal, ...]:
+    """Seals of the last configuration; empty without one that can be parsed."""
     if configurations:
-        try:
-            return parse_snapshot(configurations[-1][1]).configuration.selection.seal_chambers
-        except (ValueError, LookupError, TypeError):
-            pass  # the report shows the text; a bag of another version is still worth a report
-    return ('a', 'b')
+        with suppress(ValueError, LookupError, TypeError):  # a bag of another version is still worth a report
+            return parse_snapshot(configurations[-1]).configuration.parameters().estimator.seals
+    return ()

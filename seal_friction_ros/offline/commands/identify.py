@@ -24,7 +24,11 @@ def add_parser(commands: Any) -> None:
         '--squeeze-force', action='store_true', help='normal force from the geometry, even if --seal has one'
     )
     parser.add_argument(
-        '--seal-chambers', dest='chambers', type=_chambers, metavar='a,b', help='chamber of each seal, one letter each'
+        '--seal-chambers',
+        dest='chambers',
+        type=_chambers,
+        metavar='a,b',
+        help='what each seal sees: a, b, difference or ambient',
     )
     parser.add_argument('--law', help='law to save instead of the recommended one')
     parser.add_argument(
@@ -47,9 +51,11 @@ def add_parser(commands: Any) -> None:
 
 
 def _chambers(text: str) -> tuple[str, ...]:
+    from seal_friction_ros.core.friction.mounting import CHAMBERS, CHAMBERS_TEXT
+
     chambers = tuple(text.split(','))
-    if not set(chambers) <= {'a', 'b'}:
-        raise argparse.ArgumentTypeError(f'{text} is not a list like a,b')
+    if not {*chambers} <= {*CHAMBERS}:
+        raise argparse.ArgumentTypeError(f'{text} is not a list like a,b; a seal sees {CHAMBERS_TEXT}')
     return chambers
 
 

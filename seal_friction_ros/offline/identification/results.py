@@ -130,6 +130,7 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
         'source': f'Made by seal_friction identify from {files}: law {law.name} ({law.formula}), parameters by least '
         f'squares over {data.used.count} readings, uncertainty from readings left out.',
     }
+    document['mounting'] = {'chambers': list(data.sources.chambers)}
     if data.ring is not None:
         document['geometry'] = asdict(data.ring.geometry)
     document |= law_document(law.friction_law(values))

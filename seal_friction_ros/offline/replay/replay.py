@@ -25,7 +25,7 @@ from seal_friction_ros.core.estimation.messages import (
     encode_text,
 )
 from seal_friction_ros.core.estimation.pipeline import answered, init
-from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file
+from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file, with_seal
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
     BagError,
@@ -55,7 +55,7 @@ def chosen_configuration(params: Path | None, seal: Path | None) -> Configuratio
     if params:
         selection, settings, feedforward = load_parameter_file(params)
     if seal:
-        selection = SealSelection((str(seal),) * len(selection.seals), selection.seal_chambers)
+        selection = with_seal(selection, str(seal))
     return load_configuration(selection, settings, feedforward)
 
 

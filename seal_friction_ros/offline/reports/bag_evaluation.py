@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.messages import DECODERS
-from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.estimation.records import EXTRAPOLATED, Status
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR
@@ -33,8 +33,6 @@ LEVEL_GAP = 0.05  # of the pressure: a larger step between sorted pressures sepa
 #                   holds a few per cent more in one direction than in the other, and both are one level
 LEVEL_GAP_MIN = 1e4  # [Pa] so that sensor noise near zero pressure makes no levels
 LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp, and is cut into equal parts
-
-_HARMLESS = int(Status.OUTSIDE_IDENTIFIED_RANGE)  # the inputs are good, the law is extrapolated
 
 
 class Event(NamedTuple):
@@ -150,7 +148,7 @@ def friction_by_pressure(run: RecordedRun) -> FrictionByPressure:
     with the same weight, so a constant offset of the force sum cancels.
     """
     columns = (run.velocity, run.pressure, run.force_sum, run.coulomb_friction, run.coulomb_friction_std)
-    usable = run.status & ~_HARMLESS == 0
+    usable = run.status & ~int(EXTRAPOLATED) == 0  # the inputs are good
     for column in (*columns, run.breakaway_force):
         usable &= np.abs(column) < LARGEST_INPUT
     runs = _runs(run)
@@ -288,7 +286,8 @@ def _notes(
         text = 'estimates have unusable inputs and are left out of the measured friction.'
         notes.append(f'{left_out} of {len(usable)} {text}')
     same_pressures = np.allclose(run.pressure_a, run.pressure_b, rtol=0.02, atol=5e3, equal_nan=True)
-    if not same_pressures and {'a', 'b'} <= {*run.chambers}:
+    chambers = {*run.chambers}
+    if len(chambers) > 1 and not (same_pressures and chambers == {'a', 'b'}):
         notes.append('The seals see different pressures: the pressure of a level is the mean over the seals.')
     return tuple(notes)
 

@@ -150,8 +150,9 @@ class _FittedReadings:
         return np.arange(0, self.readings.count, max(-(-self.readings.count // _DOTS), 1))
 
     def curve(self, pressure: FloatArray, mounted: tuple[MountedSeal, ...]) -> tuple[FloatArray, FloatArray]:
-        """Friction of all seals and its standard deviation [N] at one pressure [Pa] on both sides, at rest."""
-        return fitted_readings(mounted, np.column_stack((pressure, pressure)), np.full(len(pressure), np.nan))
+        """Friction of all seals and its standard deviation [N], each at this pressure [Pa], at rest."""
+        at_pressure = tuple(MountedSeal(one.seal, 'a') for one in mounted)
+        return fitted_readings(at_pressure, np.column_stack((pressure, pressure)), np.full(len(pressure), np.nan))
 
 
 def identification_figures(found: Identification) -> list[Plot]:

@@ -15,13 +15,23 @@ import yaml
 
 from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
 from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, Reference, condition_reference
-from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Position, ServoReference, Velocity
+from seal_friction_ros.core.estimation.records import (
+    NO_PRESSURE,
+    Force,
+    FrictionEstimate,
+    Position,
+    Pressure,
+    ServoReference,
+    Velocity,
+)
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import MM, MS
+from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum
 from seal_friction_ros.core.servo.closed_loop import Axis
 from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
@@ -268,6 +278,7 @@ def read_recording(
         if not topic:
             raise BagError(f'{bag}: no message of {type_name} in it, but {reason}: record this topic too')
     configuration = override or default_configuration()
+    estimator = configuration.parameters().estimator
     held: dict[type, Any] = {Force: Force(0, np.nan), Position: Position(0, np.nan)}
     estimates: list[FrictionEstimate] = []
     conditioned = NO_REFERENCE
@@ -280,6 +291,7 @@ def read_recording(
             message = step.message
             if message.type_name == messages.CONFIGURATION_TYPE:
                 configuration = parse_snapshot(messages.decode_text(message.data)).configuration
+                estimator = configuration.parameters().estimator
                 continue
             if message.topic not in topics:
                 continue
@@ -295,11 +307,20 @@ def read_recording(
                 age = (sample.stamp - reference.stamp) * 1e-9
                 given = conditioned.velocity
                 motions.append(RecordedMotion(given.velocity, conditioned.acceleration, sample.velocity, age))
-                rows.append((held[Force].force, reference.position, held[Position].position))
+                force_sum = _force_sum(estimator, held[Force], held.get(Pressure, NO_PRESSURE))
+                rows.append((force_sum, reference.position, held[Position].position))
     if len(estimates) < 2:
         raise BagError(f'{bag}: fewer than two velocity samples after the first reference')
     force, *track = np.array(rows).T
     return Recording(estimates, motions, force), RecordedTrack(*track), configuration
+
+
+def _force_sum(estimator: EstimatorParameters, force: Force, pressure: Pressure) -> float:
+    """Force sum [N] as the estimator uses it."""
+    if not estimator.corrects_force_sum:
+        return force.force
+    correction = estimator.force_sum_correction
+    return float(corrected_force_sum(correction, force.force, pressure.chamber_a, pressure.chamber_b))
 
 
 def _with_reference(conditioned: Reference, sample: Any) -> Reference:

@@ -36,6 +36,8 @@ from seal_friction_ros.core.estimation.records import NEVER, Force, Pressure, Se
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal, friction_of_seals
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
+from seal_friction_ros.core.friction.identified_motion import IdentifiedMotion
 from seal_friction_ros.core.friction.laws import FRICTION_LAWS
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
@@ -64,7 +66,13 @@ class FromElsewhere(FrictionLaw):
 
 ONE = SEALS['ms28775_114']
 SEALS |= {
-    'power': dataclasses.replace(ONE, coulomb_law=PressurePowerLaw(3.0, 0.4, 2.0 / 3.0), stiction_ratio=0.3),
+    'power': dataclasses.replace(
+        ONE,
+        coulomb_law=PressurePowerLaw(3.0, 0.4, 2.0 / 3.0),
+        stiction_ratio=0.3,
+        force_sum_correction=ForceSumCorrection(3e-6, -2e-5, 4.0),
+        identified_motion=IdentifiedMotion(0.01, 0.03, (1,)),
+    ),
     'constant': dataclasses.replace(ONE, coulomb_law=ConstantCoulomb(7.0)),
     'from_elsewhere': dataclasses.replace(ONE, coulomb_law=FromElsewhere(1.0)),
     'viscous': dataclasses.replace(ONE, velocity_terms=VelocityTerms(120.0, asymmetry=-0.2)),
@@ -81,9 +89,12 @@ SEALS |= {
 }
 
 
+MOUNTED_ON = {'from_elsewhere': 'difference', 'constant': 'ambient'}
+
+
 def with_seals(names: Sequence[str], **changes: object) -> PipelineParameters:
-    """The default settings, changed, with these seals in chambers a, b, a, ..."""
-    seals = tuple(MountedSeal(SEALS[name], 'ab'[i % 2]) for i, name in enumerate(names))
+    """The default settings, changed, with these seals on `MOUNTED_ON` or else in chambers a, b, a, ..."""
+    seals = tuple(MountedSeal(SEALS[name], MOUNTED_ON.get(name, 'ab'[i % 2])) for i, name in enumerate(names))
     known = {f.name for f in dataclasses.fields(DEFAULT.feedforward)}
     guiding = {name: value for name, value in changes.items() if name in known}
     rest = {name: value for name, value in changes.items() if name not in known}

@@ -141,7 +141,7 @@ def test_the_text_is_a_fixed_point(state):
     st.builds(FeedForwardSettings, use_measured_velocity=st.booleans(), scale=st.floats(0.0, 2.0)),
 )
 def test_settings_come_back_exactly(settings, feedforward):
-    configuration = Configuration(SealSelection(), CONFIGURATION.seal_documents, settings, feedforward)
+    configuration = Configuration(CONFIGURATION.selection, CONFIGURATION.seal_documents, settings, feedforward)
     back = parse_snapshot(snapshot_text(SNAPSHOT._replace(configuration=configuration))).configuration
     assert (back.settings, back.feedforward) == (settings, feedforward)
 
@@ -213,6 +213,7 @@ def test_what_is_no_snapshot_is_refused_with_a_value_error(text):
         ('version', 'new', 'invalid literal'),
         ('selection.seals', 'ms28775_114', "configuration: selection.seals = 'ms28775_114' is not a list"),
         ('selection.seal_chambers', ['a'], 'has 1 entries but there are 2 seals'),
+        ('selection.seal_chambers', ['mounting'], 'does not have the chamber of each seal'),
         ('settings.stick_velocity', -1.0, 'stick_velocity = -1.0 m/s is below its lower bound'),
         ('settings.sticky', 1.0, 'configuration: settings has no sticky'),
     ],
@@ -226,8 +227,11 @@ def test_a_damaged_snapshot_is_refused_with_what_is_wrong(path, value, complaint
     ('change', 'complaint'),
     [
         ({'seals': ()}, 'SealSelection.seals is empty: name at least one seal'),
-        ({'seals': ('x',)}, 'has 2 entries but there are 1 seals: give one chamber a seal'),
-        ({'seal_chambers': ('a', 'c')}, "'c' is neither a nor b"),
+        (
+            {'seals': ('x',), 'seal_chambers': ('a', 'b')},
+            'has 2 entries but there are 1 seals: give one chamber a seal',
+        ),
+        ({'seal_chambers': ('a', 'c')}, "'c' is not a, b, difference or ambient"),
     ],
 )
 def test_a_selection_that_makes_no_sense_is_refused(change, complaint):

@@ -22,6 +22,9 @@ from seal_friction_ros.core.estimation.records import (
     Status,
 )
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
+from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, IdentifiedMotion
+from seal_friction_ros.core.friction.mounting import CHAMBERS
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import read_yaml
@@ -96,9 +99,20 @@ all_settings = st.builds(
 )
 all_parameters = st.builds(EstimatorParameters, all_settings, st.lists(mounted, min_size=1, max_size=3).map(tuple))
 
+corrections = st.none() | st.just(ForceSumCorrection(1.0, -1.0, 1e6))
+motions = st.sampled_from([ANY_MOTION, IdentifiedMotion(1e-3, 0.005, (1,)), IdentifiedMotion(directions=(-1,))])
+told_seals = st.builds(
+    lambda name, correction, motion: replace(SEALS[name], force_sum_correction=correction, identified_motion=motion),
+    st.sampled_from(sorted(SEALS)),
+    corrections,
+    motions,
+)
+any_mounted = st.builds(MountedSeal, told_seals, st.sampled_from(CHAMBERS))
+any_parameters = st.builds(EstimatorParameters, all_settings, st.lists(any_mounted, min_size=1, max_size=3).map(tuple))
+
 
 @settings(max_examples=400)
-@given(all_parameters, st.lists(any_sample, min_size=1, max_size=6))
+@given(any_parameters, st.lists(any_sample, min_size=1, max_size=6))
 @example(PARAMETERS, [RodSample(START, math.nan, Pressure(START, math.nan, math.inf), Force(START, -math.inf))])
 def test_whatever_comes_in_what_goes_out_is_finite_consistent_and_can_be_sent(parameters, samples):
     for one, estimate in zip(samples, run(samples, parameters), strict=True):
@@ -247,18 +261,22 @@ PROVOKED = {
     'INPUT_REFUSED': ([GOOD], sample(START + MS)._replace(refused=True), Status.INPUT_REFUSED),
     'STAMP_AGE': ([GOOD], sample(START + MS)._replace(stamp_age=-1.01), Status.STAMP_AGE),
     'MOTION_UNCERTAIN': ([GOOD], sample(START + MS, velocity=9e-4), Status.MOTION_UNCERTAIN),
+    'FASTER_THAN_IDENTIFIED': ([GOOD], sample(START + MS, velocity=0.06), Status.FASTER_THAN_IDENTIFIED),
+    'SLOWER_THAN_IDENTIFIED': ([GOOD], sample(START + MS, velocity=3e-3), Status.SLOWER_THAN_IDENTIFIED),
 }
+IDENTIFIED = tuple(replace(m, seal=replace(m.seal, identified_motion=IdentifiedMotion(0.005, 0.05))) for m in BOTH)
 
 
 def test_every_status_bit_is_provoked_here():
-    assert set(PROVOKED) == {bit.name for bit in Status}
+    below = {'DIRECTION_NOT_IDENTIFIED'}  # a new direction sets MOTION_UNCERTAIN, too
+    assert {*PROVOKED} == {bit.name for bit in Status} - below
 
 
 @pytest.mark.parametrize('name', PROVOKED)
 def test_a_status_bit_is_set_by_its_cause_alone_and_gone_with_the_next_good_sample(name):
     before, provoking, expected = PROVOKED[name]
     after = sample(START + 2 * MS)
-    estimates = run([*before, provoking, after])
+    estimates = run([*before, provoking, after], replace(PARAMETERS, seals=IDENTIFIED))
     assert [Status(e.status) for e in estimates] == [Status(0)] * len(before) + [expected, Status(0)]
     assert estimates[-1] == only(after)
 
@@ -499,3 +517,92 @@ def test_settings_that_make_no_sense_are_refused_with_field_value_and_bound(chan
 def test_an_actuator_without_seals_is_refused():
     with pytest.raises(ValueError, match=r'^EstimatorParameters.seals is empty'):
         EstimatorParameters(EstimatorSettings(), ())
+
+
+# --- correction of the force sum ---
+
+LACKING = ForceSumCorrection(area_a=2e-4, area_b=-1e-4, offset=15.0)  # of what the rig measures
+
+
+def with_seals(*changes) -> EstimatorParameters:
+    """One seal of the thesis for each of the changes, on chambers a, b, ..."""
+    one = SEALS['ms28775_114']
+    return EstimatorParameters(
+        EstimatorSettings(), tuple(MountedSeal(replace(one, **change), 'ab'[i % 2]) for i, change in enumerate(changes))
+    )
+
+
+def measured(true_force: float, a: float, b: float) -> float:
+    """Force sum [N] of a rig with the areas of `LACKING` wrong."""
+    return true_force - (2e-4 * a - 1e-4 * b + 15.0)
+
+
+CORRECTED = with_seals({'force_sum_correction': LACKING}, {'force_sum_correction': LACKING})
+
+
+@given(st.floats(-10.0, 10.0), st.floats(0.0, 6e6), st.floats(0.0, 6e6))
+def test_a_rod_that_the_seals_hold_is_stuck_whatever_the_pressures_though_the_areas_are_wrong(force, a, b):
+    held = sample(velocity=0.0, pressure=(a, b), force=measured(force, a, b))
+    estimate = only(held, CORRECTED)
+    assert estimate.state == FrictionState.STUCK
+    assert estimate.friction_force == pytest.approx(force, abs=1e-9)
+
+
+def test_without_the_correction_the_same_rod_seems_to_break_away():
+    held = sample(velocity=0.0, pressure=(5e6, 0.0), force=measured(5.0, 5e6, 0.0))
+    assert only(held).state == FrictionState.BREAKAWAY
+    assert only(held, CORRECTED).state == FrictionState.STUCK
+
+
+def test_a_correction_applies_once_however_many_seal_files_have_it():
+    once = with_seals({'force_sum_correction': LACKING}, {})
+    held = sample(velocity=0.0, pressure=(3e6, 1e6), force=measured(8.0, 3e6, 1e6))
+    assert only(held, once) == only(held, CORRECTED)
+
+
+def test_two_different_corrections_are_refused():
+    with pytest.raises(ValueError, match=r'two seals have different force_sum_correction, .*offset=15.0.*offset=0.0'):
+        with_seals({'force_sum_correction': LACKING}, {'force_sum_correction': ForceSumCorrection()})
+
+
+def test_a_force_sum_that_never_came_is_not_made_of_the_correction():
+    estimate = only(sample(velocity=0.0, force=None), CORRECTED)
+    assert estimate.state == FrictionState.UNKNOWN
+    assert estimate.status & Status.FORCE_MISSING
+
+
+def test_without_a_correction_a_force_sum_keeps_every_bit():
+    assert math.copysign(1.0, only(sample(velocity=0.0, force=-0.0)).friction_force) == -1.0
+
+
+# --- motions that were not identified ---
+
+
+def statuses(velocities, *motions) -> list[Status]:
+    parameters = with_seals(*({'identified_motion': motion} for motion in motions))
+    return [Status(only(sample(velocity=v), parameters).status) for v in velocities]
+
+
+def test_a_rod_slides_faster_or_slower_than_the_seal_was_identified():
+    motion = IdentifiedMotion(slowest=0.01, fastest=0.1)
+    slow, fast = Status.SLOWER_THAN_IDENTIFIED, Status.FASTER_THAN_IDENTIFIED
+    speeds = [0.0, 0.005, 0.0089, 0.0091, 0.05, 0.109, 0.111, 1.0]
+    for sign in (1.0, -1.0):
+        assert statuses([sign * v for v in speeds], motion) == [0, slow, slow, 0, 0, 0, fast, fast]
+
+
+def test_a_direction_in_which_a_seal_was_never_measured_is_marked_while_the_rod_slides():
+    for direction in (1, -1):
+        motion = IdentifiedMotion(directions=(direction,))
+        marked = statuses([direction * 0.05, 0.0, -direction * 0.05], motion)
+        assert marked == [0, 0, Status.DIRECTION_NOT_IDENTIFIED]
+
+
+def test_what_one_seal_was_not_measured_in_the_actuator_was_not():
+    marks = statuses([0.05], IdentifiedMotion(0.1, 0.2), IdentifiedMotion(0.01, 0.02, (-1,)))
+    assert marks == [Status.SLOWER_THAN_IDENTIFIED | Status.FASTER_THAN_IDENTIFIED | Status.DIRECTION_NOT_IDENTIFIED]
+
+
+def test_nothing_but_the_status_depends_on_the_identified_motion():
+    told = with_seals({'identified_motion': IdentifiedMotion(0.1, 0.2, (-1,))}, {})
+    assert only(sample(velocity=0.05), told)._replace(status=0) == only(sample(velocity=0.05))

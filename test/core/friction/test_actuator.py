@@ -2,17 +2,26 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty, actuator_friction
+from seal_friction_ros.core.friction.actuator import (
+    MountedSeal,
+    Seal,
+    Uncertainty,
+    actuator_friction,
+    numbers_of_seals,
+    sliding_friction_of_seals,
+)
 from seal_friction_ros.core.friction.geometry import SealGeometry, contact_length, projected_area
 from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain
 from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
+from seal_friction_ros.core.friction.mounting import CHAMBERS, pressures_at_seals
 
 GEOMETRY = SealGeometry(section_diameter=2e-3, ring_inner_diameter=9.8e-3, rod_diameter=10e-3, gland_diameter=13.6e-3)
 LAW = PhysicsBased(GEOMETRY, AreaDeformationGain(0.4, 10.0), PowerLaw(2.0, 0.5))
@@ -45,6 +54,45 @@ def seal(law=None, pressure_min=0.0, pressure_max=1e7) -> Seal:
 
 def on(chamber: str, **kwargs) -> MountedSeal:
     return MountedSeal(seal(**kwargs), chamber)
+
+
+# --- what a seal sees ---
+
+pressures = st.floats(0.0, 9e6)
+
+
+@given(pressures, pressures)
+def test_a_piston_seal_has_the_same_friction_whichever_chamber_has_the_higher_pressure(a, b):
+    piston = (on('difference'),)
+    assert actuator_friction(piston, a, b) == actuator_friction(piston, b, a)
+    assert actuator_friction(piston, a, b) == actuator_friction((on('a'),), abs(a - b), 0.0)
+
+
+@given(pressures, pressures)
+def test_a_wiper_has_the_friction_of_no_pressure_at_any_pressure(a, b):
+    assert actuator_friction((on('ambient'),), a, b) == actuator_friction((on('a'),), 0.0, 0.0)
+
+
+@given(pressures, pressures)
+def test_the_frictions_of_rod_seals_piston_seal_and_wiper_add_up(a, b):
+    seals = [on(chamber) for chamber in CHAMBERS]
+    together = actuator_friction(tuple(seals), a, b)
+    each = [actuator_friction((seal,), a, b) for seal in seals]
+    assert together.coulomb_friction == pytest.approx(sum(one.coulomb_friction for one in each))
+    assert sliding_friction_of_seals(numbers_of_seals(tuple(seals)), a, b, 0.1, 1) == together.coulomb_friction
+
+
+def test_a_piston_seal_is_outside_its_range_by_the_difference_and_not_by_the_pressures():
+    piston = (on('difference', pressure_max=1e6),)
+    assert actuator_friction(piston, 8e6, 7.5e6).in_identified_range
+    assert not actuator_friction(piston, 8e6, 6e6).in_identified_range
+
+
+def test_pressures_at_seals_are_those_that_each_seal_sees_also_where_the_other_chamber_is_not_measured():
+    a, b = np.array([3e6, 1e6, 2e6]), np.array([1e6, 3e6, math.nan])
+    seen = pressures_at_seals(CHAMBERS, a, b)
+    np.testing.assert_array_equal(seen[:2], [[3e6, 1e6, 2e6, 0.0], [1e6, 3e6, 2e6, 0.0]])
+    assert seen[2, [0, 3]].tolist() == [2e6, 0.0]
 
 
 # --- one seal ---
@@ -174,5 +222,5 @@ def test_a_chamber_without_a_seal_has_no_say_in_the_range():
 
 @pytest.mark.parametrize('chamber', ['A', 'c', '', 'ab'])
 def test_a_seal_on_no_chamber_is_refused(chamber):
-    with pytest.raises(ValueError, match=f'^chamber = {chamber!r} of seal test is neither a nor b'):
+    with pytest.raises(ValueError, match=f'^chamber = {chamber!r} of seal test is not a, b, difference or ambient'):
         on(chamber)

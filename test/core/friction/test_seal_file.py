@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from paths import ROOT
 
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
+from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, IdentifiedMotion
 from seal_friction_ros.core.friction.laws.friction_coefficient import CoefficientTable, PowerLaw
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
@@ -278,6 +280,39 @@ def test_a_table_of_normal_forces_that_falls_is_refused():
 def test_a_ring_that_is_not_squeezed_is_refused():
     loose = changed(POWER, 'geometry.section_diameter', 2e-3)
     assert 'SealGeometry.section_diameter = 0.002 m gives a squeeze of' in complaint(loose)
+
+
+def test_correction_and_identified_motion_come_from_the_seal_file():
+    told = {
+        **POWER,
+        'force_sum_correction': {'area_a': 1e-5, 'offset': -3},
+        'identified_speed': [0, 0.2],
+        'identified_directions': [1],
+    }
+    seal = parse_seal(told)
+    assert seal.force_sum_correction == ForceSumCorrection(1e-5, 0.0, -3.0)
+    assert seal.identified_motion == IdentifiedMotion(0.0, 0.2, (1,))
+    assert parse_seal(POWER).force_sum_correction is None
+    assert parse_seal(POWER).identified_motion == ANY_MOTION
+
+
+@pytest.mark.parametrize(
+    ('key', 'value', 'expected'),
+    [
+        ('force_sum_correction', {'area': 1.0}, 'force_sum_correction has no area: it has area_a, area_b, offset'),
+        ('force_sum_correction', {'area_a': 1.5}, 'ForceSumCorrection.area_a = 1.5 m2 is above its upper bound 1.0 m2'),
+        ('force_sum_correction', 5.0, 'force_sum_correction is not a mapping of names to values but 5.0'),
+        ('identified_speed', 0.1, 'identified_speed = 0.1 is not a list of two speeds [m/s]'),
+        ('identified_speed', [0.2, 0.1], 'fastest = 0.1 m/s is below slowest = 0.2 m/s'),
+        ('identified_speed', [-0.1, 0.1], 'slowest = -0.1 m/s is below its lower bound 0.0 m/s'),
+        ('identified_directions', [], 'directions = [] is not [-1], [1] or [-1, 1]'),
+        ('identified_directions', [1, 1], 'directions = [1, 1] is not [-1], [1] or [-1, 1]'),
+        ('identified_directions', [0], 'directions = [0] is not [-1], [1] or [-1, 1]'),
+        ('identified_directions', 1, 'identified.directions = 1 is not a list'),
+    ],
+)
+def test_a_wrong_correction_or_identified_motion_is_refused(key, value, expected):
+    assert expected in complaint({**POWER, key: value})
 
 
 def test_as_many_chambers_as_seals():

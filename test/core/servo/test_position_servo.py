@@ -222,7 +222,9 @@ BY_VELOCITY = {
 
 @pytest.mark.parametrize('name', BY_VELOCITY)
 def test_friction_that_depends_on_the_velocity_is_that_of_the_estimator_and_balances_the_energy(name):
-    servo = ServoParameters(seals=(MountedSeal(BY_VELOCITY[name], 'a'), MountedSeal(SEAL, 'b')), inner_step=2.5e-5)
+    servo = ServoParameters(
+        seals=(MountedSeal(BY_VELOCITY[name], 'a'), MountedSeal(SEAL, 'difference')), inner_step=2.5e-5
+    )
     state = start = init(servo)
     wave, seen = Sine(0.002, 4.0), set()
     for i in range(1500):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import yaml
 from harness.example_bags import STEP, default_configuration, rewrite, write_inputs, write_recorded
 
 from seal_friction_ros.core.estimation.messages import (
@@ -13,10 +14,12 @@ from seal_friction_ros.core.estimation.messages import (
     encode,
 )
 from seal_friction_ros.core.estimation.records import Force, Status
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.recorded_run import LARGEST_INPUT, read_run
-from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
 
 @pytest.fixture(scope='module')
@@ -88,3 +91,28 @@ def test_a_message_that_is_damaged_is_named(recorded, tmp_path):
     bag = rewrite(recorded, tmp_path / 'damaged', damaged)
     with pytest.raises(BagError, match=rf'message on {b.FORCE_TOPIC} at \d+ ns'):
         read_run(bag)
+
+
+def test_the_force_sum_is_corrected_as_by_the_estimator_that_made_the_estimates(recorded, tmp_path):
+    seal = tmp_path / 'seal.yaml'
+    document = read_yaml(config_path('seals', 'ms28775_114'))
+    correction = {'area_a': 2e-6, 'area_b': -1e-6, 'offset': 3.0}
+    seal.write_text(yaml.safe_dump(document | {'force_sum_correction': correction}))
+    replay(recorded, chosen_configuration(None, seal), tmp_path / 'out')
+    assert replay(tmp_path / 'out').identical
+    before, after = read_run(recorded), read_run(tmp_path / 'out')
+    added = 2e-6 * before.pressure_a - 1e-6 * before.pressure_b + 3.0
+    np.testing.assert_allclose(after.force_sum, before.force_sum + added)
+    good = np.isfinite(after.force_sum) & (after.status == 0)
+    stuck = good & (after.state == FrictionState.STUCK)
+    assert stuck.any()
+    np.testing.assert_allclose(after.friction_force[stuck], after.force_sum[stuck])
+
+
+def test_the_pressure_at_a_piston_seal_is_the_difference(recorded, tmp_path):
+    params = tmp_path / 'params.yaml'
+    params.write_text('/**: {ros__parameters: {seals: [ms28775_114], seal_chambers: [difference]}}\n')
+    replay(recorded, chosen_configuration(params, None), tmp_path / 'out')
+    run = read_run(tmp_path / 'out')
+    assert run.chambers == ('difference',)
+    np.testing.assert_array_equal(run.pressure, np.abs(run.pressure_a - run.pressure_b))

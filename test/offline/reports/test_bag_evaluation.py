@@ -18,7 +18,7 @@ from seal_friction_ros.core.estimation.messages import (
     encode,
     encode_text,
 )
-from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
+from seal_friction_ros.core.estimation.records import Force, Pressure, Status, Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags import bag as bags
@@ -173,7 +173,7 @@ def test_rates_shares_ages_and_span_are_those_of_the_bag(tmp_path):
 
 def test_other_bits_of_a_newer_version_are_counted_not_lost(tmp_path):
     run = read_run(make_bag(tmp_path, strokes()))
-    run = dataclasses.replace(run, status=np.full_like(run.status, 1 << 20))
+    run = dataclasses.replace(run, status=np.full_like(run.status, 2 * int(max(Status))))
     assert evaluate_run(run).status_counts['UNKNOWN_BITS'] == len(run.time)
 
 
