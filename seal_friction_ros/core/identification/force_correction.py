@@ -13,12 +13,11 @@ NOTICED = 0.1  # of the mean friction: a smaller change of the offset over the p
 
 
 class ForceCorrection(NamedTuple):
-    """What is to be added to the force sum: area * pressure of the chamber + offset."""
+    """Area that the force sum lacks: area * pressure of the chamber is to be added to it."""
 
     chamber: str  # a or b, the one under pressure
     area: float  # [m^2] to be added to the area of the chamber in the force sum, with the sign of its force
     standard_error: float  # of the area [m^2]
-    offset: float  # [N] to be added, of the load cell
     line: OffsetLine  # offset of the force sum over pressure
     is_significant: bool  # whether it is beyond the noise, and large enough to matter
 
@@ -54,4 +53,4 @@ def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
     error = line.rms * float(np.sqrt(len(levels) / freedom / spread))
     sure = abs(line.area_error) > float(student_t.ppf(CONFIDENCE, freedom)) * error
     large = abs(line.area_error) * float(np.ptp(pressure)) > NOTICED * float(friction.mean())
-    return ForceCorrection('ab'[number], -line.area_error, error, -line.constant, line, bool(sure and large))
+    return ForceCorrection('ab'[number], -line.area_error, error, line, bool(sure and large))

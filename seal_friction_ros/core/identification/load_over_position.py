@@ -27,6 +27,7 @@ from seal_friction_ros.core.identification.signal_preparation import (
     LONGEST_GAP,
     Signals,
     Sliding,
+    even_sliding,
     longest_stretch,
     motions,
 )
@@ -39,6 +40,7 @@ FEWEST_STROKES = 2  # in each direction: each is predicted from the others
 SHORTEST_STROKE = 0.05  # of the travel; a shorter motion is part of no stroke (our choice)
 MOST_GROUPS = 20  # of strokes, each left out in turn (our choice)
 CELLS = 25  # of the travel, in which the directions are compared (our choice)
+LOADED = 2.0  # times the friction: a load that is told without being named (our choice)
 SMALLEST_SHARE = 0.5  # of the travel that both directions must share (our choice)
 LARGEST_LOAD_CHANGE = 0.02  # of the mean load, between strokes (our choice)
 SURE_CHANGE = 4.0  # standard errors, from which a load change is no noise (our choice)
@@ -108,6 +110,26 @@ def _inertia_terms(place: FloatArray, velocity: FloatArray, acceleration: FloatA
     """Inertia force of the masses 1, x and x^2, shape (n, 3)."""
     of_slope = place * acceleration + 0.5 * velocity**2
     return np.column_stack((acceleration, of_slope, place * (place * acceleration + velocity**2)))
+
+
+def follows_position(signals: Signals, position: FloatArray, sliding: Sliding) -> bool:
+    """Whether a force sum holds a load that follows position: the middle of both directions changes with it.
+
+    The samples of even sliding are put into `CELLS` of the travel. Half the sum of the two directions in a cell holds
+    load and offset, half their difference friction. A middle that changes over the travel by more than `LOADED` times
+    the friction is a load (our choice).
+    """
+    even = even_sliding(signals, sliding) & np.isfinite(position)
+    if not even.any() or np.ptp(position[even]) <= 0.0:
+        return False
+    x, force, side = position[even], signals.force_sum[even], signals.velocity[even] > 0.0
+    cell = np.minimum((x - x.min()) / np.ptp(x) * CELLS, CELLS - 1).astype(np.int64)
+    both = [c for c in range(CELLS) if (side & (cell == c)).any() and (~side & (cell == c)).any()]
+    if len(both) < 2:
+        return False
+    means = np.array([[force[(cell == c) & (side == s)].mean() for s in (True, False)] for c in both])
+    middle, friction = means.mean(axis=1), np.abs(means[:, 0] - means[:, 1]) / 2.0
+    return bool(np.ptp(middle) > LOADED * float(np.median(friction)))
 
 
 def fit_load(signals: Signals, position: FloatArray, chambers: Sequence[str], sliding: Sliding) -> LoadOverPosition:

@@ -312,7 +312,8 @@ def _check_pressures(where: str, readings: FrictionReadings) -> None:
         if scatter > LARGEST_SCATTER:
             raise ValueError(
                 f'{where}: at {float(pressures[inside].mean()) / BAR:.4g} bar readings scatter by '
-                f'{100.0 * scatter:.0f} %, so the friction depends on something else than was recorded: record the pressure of each reading'
+                f'{100.0 * scatter:.0f} %, so the friction depends on something else than was recorded: record the '
+                'pressure of each reading'
             )
 
 

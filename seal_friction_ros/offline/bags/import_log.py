@@ -18,7 +18,7 @@ The rig file describes the columns of the log, their units, signs and areas. The
       savitzky_golay: {window: 0.2, order: 2, largest_gap: 0.05} # absent: the terms are a velocity
     sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # for identification; absent: these values
     position: {terms: [{column: 4, unit: mm, gain: -1.0}]} # absent: that of the velocity, if it is made from position
-    load: position              # for identification; the force sum holds a load that follows position; absent: none
+    load: position              # for identification; the force sum holds a load that follows position; absent: auto
 """
 
 from array import array
@@ -45,7 +45,7 @@ _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one beyond the int32 secon
 _LONGEST_LINE = 1 << 18  # characters
 _SHOWN = 40  # characters of an invalid cell in an error message
 _PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
-_LOADS = ('none', 'position')
+_LOADS = ('auto', 'none', 'position')
 _HEADERS = ('none', 'row', 'comment')
 _QUANTITIES = {
     'number': ('1',),
@@ -129,7 +129,7 @@ class Rig(CheckedParameters):
     savitzky_golay: SavitzkyGolay | None
     sliding: Sliding
     position: Combination | None = None
-    load: str = 'none'
+    load: str = 'auto'
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
 from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
@@ -14,7 +15,7 @@ from seal_friction_ros.core.identification import fitting
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
 from seal_friction_ros.core.identification.diagnostics import Outlier, changed_levels
-from seal_friction_ros.core.identification.force_correction import ForceCorrection
+from seal_friction_ros.core.identification.force_correction import NOTICED, ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.runs import BetweenRuns, Drift
 from seal_friction_ros.core.identification.selection import LawScore, is_beaten
@@ -144,8 +145,30 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
     identified = [float(pressure.min()), float(pressure.max())]
     numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
     document |= _json_value({**numbers, 'identified_pressure': identified})
+    speed = np.abs(data.used.at.velocity)
+    if np.isfinite(speed).all():
+        document['identified_speed'] = _json_value([float(speed.min()), float(speed.max())])
+    document['identified_directions'] = [int(side) for side in np.unique(data.used.at.direction)]
+    lacking = _what_the_force_sum_lacks(data, selection.fit)
+    if lacking is not None:
+        document['force_sum_correction'] = asdict(lacking)
     parse_seal(document)
     return document
+
+
+def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> ForceSumCorrection | None:
+    """Area and offset of the logs, if they matter: at rest they would count as force on the rod; None otherwise."""
+    readings = data.used
+    sources = [source for source, index in enumerate(readings.two_sided) if len(index)]
+    if data.sources.each[0].log is None or not sources:
+        return None
+    offset = -float(np.mean(fit.offsets[sources]))
+    friction = float(fit.friction(readings.at).mean())
+    made = data.correction if data.correction is not None and data.correction.is_significant else None
+    areas = {} if made is None else {f'area_{made.chamber}': rounded_value(made.area)}
+    if not areas and abs(offset) < NOTICED * friction:
+        return None
+    return ForceSumCorrection(**areas, offset=rounded_value(offset))
 
 
 def _json_value(value: Any) -> Any:
@@ -246,7 +269,6 @@ def _correction_numbers(correction: ForceCorrection) -> dict[str, Any]:
         'chamber': correction.chamber,
         'is_made': correction.is_significant,
         'standard_error_m2': correction.standard_error,
-        'offset_N': correction.offset,
     }
 
 

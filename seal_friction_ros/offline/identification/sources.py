@@ -21,6 +21,7 @@ from seal_friction_ros.core.identification.force_correction import ForceCorrecti
 from seal_friction_ros.core.identification.load_over_position import (
     LoadOverPosition,
     fit_load,
+    follows_position,
     known_acceleration,
     without_load,
 )
@@ -236,7 +237,10 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
     recorded = RecordedLog(path.name, signals, sliding)
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
-    return source._replace(load_position=log.position) if rig.load == 'position' else source
+    if log.position is None or rig.load == 'none':
+        return source
+    holds = rig.load == 'position' or follows_position(signals, log.position, sliding)
+    return source._replace(load_position=log.position) if holds else source
 
 
 def _pressure_area(rig: Rig) -> float | None:

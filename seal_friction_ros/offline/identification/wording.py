@@ -73,7 +73,7 @@ def _correction_text(correction: ForceCorrection, area: float | None) -> str:
     old, new = (1e3 * math.sqrt(4.0 * max(value, 0.0) / math.pi) for value in (area, area + correction.area))
     return (
         f'{text}: {1e6 * (area + correction.area):.4g} mm2 in place of {1e6 * area:.4g} mm2, the bore is nearer to '
-        f'{new:.3g} than {old:.3g} mm: correct the rig file'
+        f'{new:.3g} than {old:.3g} mm: correct the rig file; the seal file carries the correction for the node'
     )
 
 
@@ -173,8 +173,10 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
     if selection.law.name != selection.best.law.name:
         yield f'{selection.law.name} is saved as asked for with --law; recommended is {selection.best.law.name}'
     chambers = data.sources.chambers
-    mounting = f'seals: [{", ".join(["FILE"] * len(chambers))}], seal_chambers: [{", ".join(chambers)}]'
-    yield f'the law is that of one seal of {len(chambers)}; for the node: {mounting}'
+    yield (
+        f'the law is that of one seal of {len(chambers)}, on chambers {",".join(chambers)}, as the file says: for the node '
+        'name it once, seals: [FILE]'
+    )
     if prepared.breakaway is None and prepared.readings.are_samples:
         yield 'breakaway is not identified from logs without held pressures'
 
