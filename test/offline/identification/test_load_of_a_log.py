@@ -75,7 +75,7 @@ def test_the_position_of_a_log_is_read_in_metres(tmp_path):
     ('text', 'error'),
     [
         ('load: position\n', 'rig file has no position'),
-        (POSITION + 'load: height\n', "Rig.load = 'height' is not one of none, position"),
+        (POSITION + 'load: height\n', "Rig.load = 'height' is not one of auto, none, position"),
         (POSITION.replace('mm', 'bar'), r'position.terms\[0\].unit'),
     ],
 )
