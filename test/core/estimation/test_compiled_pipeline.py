@@ -202,7 +202,7 @@ def runs(draw) -> list[tuple[Kind, bytes]]:
 ACTUATORS = {
     'default': ('ms28775_114', 'ms28775_114'),
     'pressure': ('power', 'viscous', 'from_elsewhere', 'constant'),
-    'tables': ('mapped', 'stribeck', 'ms28775_114_table', 'ms28775_114_prior_art'),
+    'tables': ('mapped', 'stribeck', 'ms28775_114_prior_art'),
 }
 """Every kind of law in few actuators: each actuator is compiled for itself."""
 changes = st.fixed_dictionaries(

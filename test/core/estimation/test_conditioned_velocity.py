@@ -87,6 +87,13 @@ def test_a_resolution_that_is_given_needs_no_learning():
     assert (state.half_width, state.ripple) == (pytest.approx(COUNT), pytest.approx(ONE))
 
 
+def test_the_play_begins_in_its_middle():
+    before = run([0.0, 0.0])[-1]
+    after = run([0.4 * ONE], before, resolution=ONE)[-1]
+    assert (after.velocity, after.slack, after.way) == (0.0, pytest.approx(0.4 * COUNT), 0.0)
+    assert after.last_push == before.stamp
+
+
 def test_a_ripple_is_forgotten_with_its_time_constant():
     samples = round(MEMORY / LONGEST_STEP)
     state = run([0.0] * samples, KNOWN, step=20 * MS)[-1]

@@ -499,3 +499,9 @@ def test_settings_that_make_no_sense_are_refused_with_field_value_and_bound(chan
 def test_an_actuator_without_seals_is_refused():
     with pytest.raises(ValueError, match=r'^EstimatorParameters.seals is empty'):
         EstimatorParameters(EstimatorSettings(), ())
+
+
+def test_parameters_are_compared_and_shown_by_settings_and_seals_alone():
+    again = EstimatorParameters(EstimatorSettings(), BOTH)
+    assert again == PARAMETERS
+    assert repr(again) == f'EstimatorParameters(settings={PARAMETERS.settings!r}, seals={BOTH!r})'
