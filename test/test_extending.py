@@ -1,7 +1,7 @@
 """A friction law is one new module and one registry line: the recipe of docs/extending.md works everywhere.
 
 The toy law of the recipe runs in the live node, in replay message by message and compiled, in the servo simulator and
-in `identify`, and goes through a seal file and back.
+in `identify`, and goes through a seal file and back. One seal, since the time to compile grows with each.
 """
 
 import csv
@@ -88,7 +88,8 @@ def test_the_live_node_runs_it_and_both_replays_give_the_same_bytes(seal_file, t
         'record': True,
         'record_directory': str(tmp_path),
         'record_name': 'bag',
-        'seals': [str(seal_file)] * 2,
+        'seals': [str(seal_file)],
+        'seal_chambers': ['a'],
     }
     with graph(parameters) as g:
         g.connect()
@@ -96,7 +97,7 @@ def test_the_live_node_runs_it_and_both_replays_give_the_same_bytes(seal_file, t
             velocity, pressure = 0.3 * np.sin(0.3 * i), 1e6 + 1e5 * i
             estimate = g.estimate(SECOND + i * 10**7, velocity, pressure=pressure)
             if abs(velocity) > 0.01:
-                expected = 2.0 * friction(pressure, abs(velocity)) * np.sign(velocity)
+                expected = friction(pressure, abs(velocity)) * np.sign(velocity)
                 assert estimate.friction_force == pytest.approx(expected, rel=1e-12)
     one_by_one, compiled = (verify(tmp_path / 'bag', bulk_from=count) for count in (10**9, 0))
     assert one_by_one == compiled
@@ -105,18 +106,17 @@ def test_the_live_node_runs_it_and_both_replays_give_the_same_bytes(seal_file, t
 
 
 def test_the_servo_simulator_runs_it(seal_file):
-    document = read_yaml(seal_file)
-    servo = ServoParameters(seals=mount_seals((document, document), ('a', 'b')))
+    servo = ServoParameters(seals=mount_seals((read_yaml(seal_file),), ('a',)))
     wave, period = Sine(amplitude=0.002, frequency=5.0), servo.control_period
     references = (wave.at(i * period) for i in range(round(0.4 / period)))
     _, run = position_servo.simulate(servo, position_servo.init(servo), references)
     acceleration = np.gradient(run.velocity, period)
     by_momentum = run.force_sum - servo.load.mass * acceleration  # m a = force_sum - friction
-    at_a, at_b = (friction(np.maximum(p, 0.0), np.abs(run.velocity)) for p in (run.pressure_a, run.pressure_b))
+    expected = friction(np.maximum(run.pressure_a, 0.0), np.abs(run.velocity))
     sliding = np.abs(run.velocity) > 0.01  # [m/s]
     assert sliding.mean() > 0.5
-    error = by_momentum[sliding] - np.sign(run.velocity[sliding]) * (at_a + at_b)[sliding]
-    assert np.sqrt(np.mean(error**2)) < 0.02 * np.mean((at_a + at_b)[sliding])
+    error = by_momentum[sliding] - np.sign(run.velocity[sliding]) * expected[sliding]
+    assert np.sqrt(np.mean(error**2)) < 0.02 * np.mean(expected[sliding])
 
 
 def test_identify_finds_its_parameters_again(toy_law, tmp_path):

@@ -8,7 +8,12 @@ from pathlib import Path
 import pytest
 from paths import ROOT
 
-from seal_friction_ros.files import read_yaml
+from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings, step
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init_running
+from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure, RodSample
+from seal_friction_ros.files import load_configuration, read_yaml
 from seal_friction_ros.offline.commands.main import main
 
 DATA = ROOT.parent / 'shared' / 'data'
@@ -60,3 +65,13 @@ class Run:
 
 
 THESIS_RIG = ('--seal', 'ms28775_114', '--seal-chambers', 'a,b')
+
+
+def estimates_of(run: Run, pressure: float, velocity: float, force: float = 0.0) -> FrictionEstimate:
+    """What the estimator says with the identified seals at one sample."""
+    chambers = tuple(run.figures['seal_chambers'])
+    selection = SealSelection((str(run.out),) * len(chambers), chambers)
+    parameters = load_configuration(selection, EstimatorSettings()).parameters().estimator
+    sample = RodSample(10, velocity, Pressure(10, pressure, pressure), Force(10, force))
+    state = init_running(PipelineParameters(parameters, FeedForwardSettings())).estimator
+    return step(parameters, state, sample)[1]

@@ -41,7 +41,8 @@ from seal_friction_ros.offline.bags.recover import recover
 CORPUS = Path(__file__).parents[1] / 'corpus'
 SLOWEST = 1.0  # [s]
 MOST_MEMORY = 200.0  # [MB]
-COMPILER = 120.0  # [MB] more for the compiler in the process of the bulk reader
+COMPILER = 120.0  # [MB] more for readers that load the compiler
+WITH_COMPILER = ('bag_bulk', 'parameters')  # the second one to suggest a name of the simulator for an unknown one
 _HANGS = 5.0  # [s] of the processor after which a case is given up
 _ROOM = 1 << 30  # [bytes] of address space beyond what is in use: a claim of 1 TB fails at once
 _LONGEST_ERROR = 100_000  # characters
@@ -233,7 +234,7 @@ def _change(chance: random.Random, data: bytearray, place: int, seeds: list[byte
 
 def most_memory(reader: str) -> float:
     """Memory limit of a reader [MB]."""
-    return MOST_MEMORY + COMPILER * (reader == 'bag_bulk')
+    return MOST_MEMORY + COMPILER * (reader in WITH_COMPILER)
 
 
 @dataclass

@@ -333,7 +333,8 @@ def run_tests(tree: Path, baseline: Baseline, *, measures: bool = False) -> Run:
     with suppress(ProcessLookupError):
         os.killpg(process, signal.SIGKILL)
     output = log.read_text(errors='replace')[-2000:]
-    if os.waitstatus_to_exitcode(status) > pytest.ExitCode.INTERRUPTED:  # else tests failed, or could not be imported
+    # Otherwise tests failed, or they or their conftest could not be imported.
+    if os.waitstatus_to_exitcode(status) in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.NO_TESTS_COLLECTED):
         raise RuntimeError(f'the tests did not run:\n{output}')
     killed = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
     return Run(status == 0, killed, usage.ru_utime + usage.ru_stime, output)

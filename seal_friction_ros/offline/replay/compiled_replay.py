@@ -121,9 +121,9 @@ def _answered(blocks: Iterator[Messages], override: Configuration | None) -> Ite
     state = init(parameters)
     for block in blocks:
         changes = np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist()
-        for first, end in pairwise([0, *changes, len(block.kinds)]):
+        for first, end in pairwise(sorted({0, *changes, len(block.kinds)})):  # no empty ones, which would compile too
             messages = block.taken(first, end)
-            if end > first and messages.kinds[0] == Kind.CONFIGURATION:
+            if messages.kinds[0] == Kind.CONFIGURATION:
                 configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))[:2]
                 parameters = parameters if override else configuration.parameters()
             state, answers = receive_all(parameters, state, messages)

@@ -69,6 +69,12 @@ def test_a_peak_of_a_motion_that_is_fast_for_it_is_no_ripple():
 # --- learning ---
 
 
+@pytest.mark.parametrize(('peak', 'is_ripple'), [(SLOW_RIPPLE + 0.5, False), (SLOW_RIPPLE - 0.5, True)])
+def test_a_turn_is_compared_with_the_faster_of_its_two_samples(peak, is_ripple):
+    state = run([0.0, peak * ONE, (peak - 1.0) * ONE])[-1]
+    assert (state.last_ripple > 0.0) is is_ripple
+
+
 def test_a_ripple_counts_once_it_came_twice_and_the_smaller_one_counts():
     states = run([0.0, 2 * ONE, 0.0, ONE, ONE])
     assert [s.half_width for s in states[:3]] == [0.0] * 3
@@ -85,6 +91,18 @@ def test_the_half_width_is_the_ripple_times_the_sample_period():
 def test_a_resolution_that_is_given_needs_no_learning():
     state = run([0.0, 0.0], resolution=ONE)[-1]
     assert (state.half_width, state.ripple) == (pytest.approx(COUNT), pytest.approx(ONE))
+
+
+def test_the_play_begins_in_its_middle():
+    before = run([0.0, 0.0])[-1]
+    after = run([0.4 * ONE], before, resolution=ONE)[-1]
+    assert (after.velocity, after.slack, after.way) == (0.0, pytest.approx(0.4 * COUNT), 0.0)
+    assert after.last_push == before.stamp
+
+
+def test_the_way_since_the_last_reversal_lasts_while_nothing_pushes():
+    (state,) = run([0.0], KNOWN._replace(way=5.0 * COUNT))
+    assert state.way == 5.0 * COUNT
 
 
 def test_a_ripple_is_forgotten_with_its_time_constant():

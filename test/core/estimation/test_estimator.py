@@ -606,3 +606,18 @@ def test_what_one_seal_was_not_measured_in_the_actuator_was_not():
 def test_nothing_but_the_status_depends_on_the_identified_motion():
     told = with_seals({'identified_motion': IdentifiedMotion(0.1, 0.2, (-1,))}, {})
     assert only(sample(velocity=0.05), told)._replace(status=0) == only(sample(velocity=0.05))
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize(('share', 'uncertain'), [(0.99, True), (1.01, False)])
+def test_motion_with_a_ripple_is_uncertain_up_to_slip_velocity_and_half_width_over_10_ms(share, uncertain, side):
+    settings, half_width = EstimatorSettings(), 1e-5
+    speed = share * (settings.slip_velocity + half_width / 0.01)
+    motion = NOT_CONDITIONED._replace(samples=SETTLING, half_width=half_width, velocity=side * speed)
+    assert estimator._is_uncertain(settings, motion, False) is uncertain
+
+
+def test_parameters_are_compared_and_shown_by_settings_and_seals_alone():
+    again = EstimatorParameters(EstimatorSettings(), BOTH)
+    assert again == PARAMETERS
+    assert repr(again) == f'EstimatorParameters(settings={PARAMETERS.settings!r}, seals={BOTH!r})'

@@ -41,8 +41,9 @@ def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
 def test_a_split_into_thousands_of_files_is_rejected(name: str, least: float, below: float):
     for good in (0, least):
         assert getattr(RecordingOptions(**{name: type(least)(good)}), name) == good
-    with pytest.raises(ValueError, match=f'{name} = {below} makes too many files: 0 or at least {least}'):
-        RecordingOptions(**{name: below})
+    for bad in (below, type(least)(1)):
+        with pytest.raises(ValueError, match=f'{name} = {bad} makes too many files: 0 or at least {least}'):
+            RecordingOptions(**{name: bad})
 
 
 @pytest.mark.parametrize('name', ['../escaped', '/absolute', '..', '.', 'two\nlines'])

@@ -9,12 +9,15 @@ from harness.answers import NOTHING, receive_one
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Limited
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, type_of
 from seal_friction_ros.core.estimation.pipeline import (
     NO_REFERENCE,
     TICK_INTERVAL,
     PipelineParameters,
+    ReceiptTimes,
+    Reference,
     condition_reference,
     init,
     init_running,
@@ -277,6 +280,17 @@ def test_a_tick_is_due_while_there_is_a_force_that_nothing_renews():
         state, _ = receive_one(PARAMETERS, state, message)
     assert not is_tick_due(state, 10**12)
     assert not is_tick_due(init(PARAMETERS), 10**12)
+    nothing = state._replace(feedforward=state.feedforward._replace(fade=0.5, force=0.0))
+    assert not is_tick_due(nothing, 10**12)
+
+
+@pytest.mark.parametrize(('velocity', 'wanted'), [(0.0, 0.0), (0.05, 0.04)])
+def test_a_reference_with_a_ripple_leads_in_motion_and_not_at_rest(velocity, wanted):
+    leading = PARAMETERS._replace(feedforward=replace(PARAMETERS.feedforward, lead_time=0.01))
+    given_ = NOT_CONDITIONED._replace(stamp=MS, velocity=velocity, half_width=1e-6, samples=SETTLING)
+    state = init(leading)._replace(reference=Reference(given_, -1.0, 0.0), receipt=ReceiptTimes(reference=MS))
+    state, _ = receive_one(leading, state, Velocity(2 * MS, 0.0))
+    assert state.feedforward.velocity == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize('kind', [Pressure, Force, ServoReference])

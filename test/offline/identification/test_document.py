@@ -4,33 +4,20 @@ import shutil
 
 import numpy as np
 import pytest
-from harness.identify_run import BARS, KEYS, THESIS, THESIS_RIG, Run, data, delft
+from harness.identify_run import BARS, KEYS, THESIS, THESIS_RIG, Run, data, delft, estimates_of
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.configuration import SealSelection
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, step
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init_running
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Status
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
+from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.foundation.units import LBF
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.files import default_configuration, load_configuration
+from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay.replay import replay
 
 # --- the file works in the node ---
-
-
-def estimates_of(run: Run, pressure: float, velocity: float, force: float = 0.0):
-    """What the estimator says with the identified seals at one sample."""
-    chambers = tuple(run.figures['seal_chambers'])
-    selection = SealSelection((str(run.out),) * len(chambers), chambers)
-    parameters = load_configuration(selection, EstimatorSettings()).parameters().estimator
-    sample = RodSample(10, velocity, Pressure(10, pressure, pressure), Force(10, force))
-    state = init_running(PipelineParameters(parameters, FeedForwardSettings())).estimator
-    return step(parameters, state, sample)[1]
 
 
 @pytest.mark.parametrize(
@@ -48,17 +35,6 @@ def test_the_node_says_what_was_fitted(law, tmp_path):
     asymmetry = run.figures['parameters'].get('asymmetry', 0.0)
     both = [abs(estimates_of(run, 2e6, side * 0.01).friction_force) for side in (1.0, -1.0)]
     assert both[0] / both[1] == pytest.approx((1.0 + asymmetry) / (1.0 - asymmetry))
-
-
-def test_viscous_friction_acts_in_the_node_and_is_not_in_the_coulomb_friction(friction_id):
-    run = friction_id
-    slow, fast = (estimates_of(run, 2e6, velocity) for velocity in (0.1, 0.4))
-    assert fast.coulomb_friction == slow.coulomb_friction
-    more = 2.0 * run.figures['parameters']['viscous_friction'] * 0.3  # [N] two seals, 0.3 m/s faster
-    assert fast.friction_force - slow.friction_force == pytest.approx(more, rel=1e-5)
-    assert estimates_of(run, 2e6, -0.4).friction_force == pytest.approx(-fast.friction_force)
-    at_rest = estimates_of(run, 2e6, 0.0, force=1e5)
-    assert at_rest.friction_force == at_rest.breakaway_force
 
 
 def test_beyond_the_pressures_that_were_measured_the_node_says_so(tmp_path):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness.identify_run import BARS, DELFT, FRICTION_ID, OTHER, THESIS, THESIS_RIG, Run, data, delft
+from harness.identify_run import BARS, DELFT, FRICTION_ID, OTHER, THESIS, THESIS_RIG, Run, data, delft, estimates_of
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import LBF, PSI
@@ -241,6 +241,11 @@ def test_readings_without_scatter_have_no_outlier(tmp_path):
 
 
 @pytest.fixture(scope='module')
+def friction_id(tmp_path_factory):
+    return Run(tmp_path_factory.mktemp('friction_id'), str(data(f'mbari/{FRICTION_ID}')))
+
+
+@pytest.fixture(scope='module')
 def other(tmp_path_factory):
     return Run(tmp_path_factory.mktemp('mbari'), str(data(f'mbari/{OTHER}')))
 
@@ -286,3 +291,14 @@ def test_mbari_two_logs_are_fitted_together_and_their_difference_is_in_the_band(
     assert both.figures['between_runs_measured'] > 0.15
     assert both.figures['between_run_std'] > friction_id.figures['between_run_std']
     assert len(both.document['identification']['data']) == 2
+
+
+def test_viscous_friction_acts_in_the_node_and_is_not_in_the_coulomb_friction(friction_id):
+    run = friction_id
+    slow, fast = (estimates_of(run, 2e6, velocity) for velocity in (0.1, 0.4))
+    assert fast.coulomb_friction == slow.coulomb_friction
+    more = 2.0 * run.figures['parameters']['viscous_friction'] * 0.3  # [N] two seals, 0.3 m/s faster
+    assert fast.friction_force - slow.friction_force == pytest.approx(more, rel=1e-5)
+    assert estimates_of(run, 2e6, -0.4).friction_force == pytest.approx(-fast.friction_force)
+    at_rest = estimates_of(run, 2e6, 0.0, force=1e5)
+    assert at_rest.friction_force == at_rest.breakaway_force

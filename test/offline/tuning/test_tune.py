@@ -82,14 +82,14 @@ def write_axis(path: Path, wave=None, seconds=2.0, leave_out='', configuration: 
 
 
 def with_constant_friction(friction: float) -> Configuration:
-    """Two seals with ``friction`` [N] each."""
+    """One seal with ``friction`` [N]."""
     known = default_configuration()
     names = ('name', 'source', 'uncertainty', 'identified_pressure', 'stiction')
     seal = {name: known.seal_documents[0][name] for name in names}
     law = {'coulomb_friction_at_any_pressure': friction}
     seal |= {'name': 'ram', 'coulomb_law': 'constant_coulomb', 'constant_coulomb': law}
-    selection = dataclasses.replace(known.selection, seals=('ram', 'ram'))
-    return dataclasses.replace(known, selection=selection, seal_documents=(seal, seal))
+    selection = dataclasses.replace(known.selection, seals=('ram',), seal_chambers=('a',))
+    return dataclasses.replace(known, selection=selection, seal_documents=(seal,))
 
 
 @pytest.fixture(scope='module')
@@ -267,7 +267,7 @@ def test_name_of_a_bag_cannot_break_the_file(tmp_path: Path):
 
 
 def test_force_limit_follows_the_friction_of_the_axis_and_the_summary_says_so(tmp_path: Path, capsys):
-    configuration = with_constant_friction(275.0 / TRUE_SCALE / 2.0)
+    configuration = with_constant_friction(275.0 / TRUE_SCALE)
     bag = write_axis(tmp_path / 'bag', Sine(amplitude=0.005, frequency=2.0), 3.0, configuration=configuration)
     assert main(['tune', '--bag', str(bag), '--out', str(tmp_path / 'f.yaml')]) == 0
     said = capsys.readouterr().out
