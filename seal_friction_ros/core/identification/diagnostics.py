@@ -15,7 +15,7 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 
 COLLINEAR = 0.9  # correlation above which two regressors are called collinear (our choice)
 TRADED_OFF = 0.95  # correlation above which two fitted parameters cannot be determined separately (our choice)
-LEVEL_SCATTER = 0.05  # [-] between pressures held one after the other, on one day (our choice)
+LEVEL_SCATTER = 0.08  # [-] between pressures held one after the other, on one day (our choice)
 OUTLIER = 3.0  # standard deviations from the law of the other pressures (our choice)
 CHANGED = 0.15  # relative difference of two files that is worth a warning (our choice)
 SETTLED = 0.1  # relative change of the friction over one run above which the seal has not settled (our choice)

@@ -1,17 +1,24 @@
 """Fit of a candidate law to friction readings, together with one offset of the force sum for each source."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, nnls
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw, OperatingConditions, ParameterValues
 from seal_friction_ros.core.identification.readings import FrictionReadings
 
 ILL_CONDITIONED = 30.0  # condition number of the scaled Jacobian; after [Belsley1980]_
+LINEAR = {
+    'coulomb_friction_at_any_pressure',
+    'friction_at_no_pressure',
+    'friction_at_one_bar',
+    'viscous_friction',
+}
+"""Parameters in which a law is linear, where all its parameters are of them."""
 _START_FACTORS = (0.2, 1.0, 4.0)  # on the first guess of the Stribeck velocity, each the start of a fit
 
 
@@ -86,6 +93,8 @@ def fit(
     Raises:
         ValueError: The result is not finite.
     """
+    if LINEAR.issuperset(parameter.name for parameter in law.parameters):
+        return _fit_linear(law, readings)
     lower, upper = np.array([(p.lower, p.upper) for p in law.parameters]).T
 
     def residuals(vector: FloatArray) -> FloatArray:
@@ -109,6 +118,21 @@ def fit(
     at_zero = (lower == 0.0) & (np.abs(best.x) < 1e-6 * np.abs(list(first_guess.values())))
     values = law.named(np.where(at_zero, 0.0, best.x))  # exactly 0 for a term without effect, instead of about 1e-18
     return LawFit(law, values, offsets_of(readings, law.friction(readings.at, values)), np.asarray(best.jac))
+
+
+def _fit_linear(law: CandidateLaw, readings: FrictionReadings) -> LawFit:
+    """As `fit`, for a law that is linear in its parameters, none of them negative [LawsonHanson1974]_."""
+    count = len(law.parameters)
+    nothing = replace(readings, force=np.zeros(readings.count))
+    columns = np.empty((readings.count, count))
+    for i, unit in enumerate(np.eye(count)):
+        friction = law.friction(readings.at, law.named(unit))
+        columns[:, i] = (friction - nothing.magnitudes(offsets_of(nothing, friction))) / readings.scale
+    measured = readings.magnitudes(offsets_of(readings, np.zeros(readings.count))) / readings.scale
+    lengths = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    solution = nnls(columns / lengths, measured)[0] / lengths
+    values = law.named(solution)
+    return LawFit(law, values, offsets_of(readings, law.friction(readings.at, values)), columns)
 
 
 def root_mean_square(values: FloatArray) -> float:
