@@ -27,6 +27,7 @@ from seal_friction_ros.core.identification.readings import (
 BLOCKS = 10  # contiguous parts of a swept log, each predicted from the others
 HELD_LOG = 0.8  # of the even samples in strokes at held speed and pressure: each stroke is a reading (our choice)
 PARTS = 4  # contiguous parts of the strokes at one pressure, each predicted from the others (our choice)
+MOST_SWEPT = 40_000  # samples of swept logs, evenly taken: more tell no more and fill the memory (our choice)
 FEWEST_SWEPT = 200  # samples of even sliding, so that a block has 20 (our choice)
 
 _Rows = Sequence[tuple[int, signal_preparation.SignalReading]]
@@ -138,13 +139,15 @@ def _nearest_level(pressure: FloatArray, dynamic: FrictionReadings) -> IntArray:
 def _swept(
     logs: Sequence[RecordedLog], even: Sequence[BoolArray], chambers: Sequence[str]
 ) -> tuple[FrictionReadings, FloatArray]:
-    parts = [log.signals.taken(index) for log, index in zip(logs, even, strict=True)]
-    counts = [len(part.time) for part in parts]
+    counts = [int(index.sum()) for index in even]
     if min(counts) < FEWEST_SWEPT:
         raise ValueError(
             f'{logs[int(np.argmin(counts))].name}: {min(counts)} samples of even sliding, {FEWEST_SWEPT} are needed: '
             'drive longer strokes at even speed, in both directions'
         )
+    every = -(-sum(counts) // MOST_SWEPT)
+    parts = [log.signals.taken(np.flatnonzero(index)[::every]) for log, index in zip(logs, even, strict=True)]
+    counts = [len(part.time) for part in parts]
     joined = signal_preparation.Signals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     both = np.column_stack((joined.pressure_a, joined.pressure_b))
     pressure = _seal_pressures(both, chambers)
@@ -167,7 +170,7 @@ def _left_out(logs: Sequence[RecordedLog], even: Sequence[BoolArray], used: int)
     """Reason -> number of samples not used."""
     counts = {'not finite': 0, 'at rest': 0, 'accelerated': 0, 'in no even stroke': -used}
     for log, index in zip(logs, even, strict=True):
-        finite = np.isfinite(log.signals).all(axis=0)
+        finite = np.logical_and.reduce([np.isfinite(column) for column in log.signals])
         with np.errstate(invalid='ignore'):
             moving = np.abs(log.signals.velocity) > log.sliding.slowest
         masks = (~finite, finite & ~moving, finite & moving & ~index, index)

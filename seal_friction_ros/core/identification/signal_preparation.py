@@ -143,7 +143,7 @@ def even_sliding(signals: Signals, sliding: Sliding) -> BoolArray:
 
     The acceleration is the central difference of the velocity; it is not smoothed further.
     """
-    finite = np.isfinite(signals).all(axis=0)
+    finite = np.logical_and.reduce([np.isfinite(column) for column in signals])
     with np.errstate(invalid='ignore'):
         moving = np.abs(signals.velocity) > sliding.slowest
         even = np.abs(np.gradient(signals.velocity, signals.time)) < sliding.largest_acceleration
