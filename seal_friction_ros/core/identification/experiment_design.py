@@ -1,9 +1,9 @@
 """Experiment design: the next readings that make a law most certain, and what they break.
 
 The criterion is the mean variance of the prediction over a range of pressures and speeds (V-optimality
-[AtkinsonDonevTobias2007]_), of the richest law that is not beaten. Readings are taken one after the other from a grid, each
-time the one that reduces the variance most; a greedy choice is not the best set, but near it, and reproducible. How much
-the laws that are not beaten disagree at each reading (T-optimality [AtkinsonFedorov1975]_) is reported with it.
+[AtkinsonDonevTobias2007]_), of the richest law that is not beaten. Readings are chosen one after the other from a grid,
+each time the one that reduces the variance most. How much the laws that are not beaten disagree at each reading
+(T-optimality [AtkinsonFedorov1975]_) is reported with it.
 """
 
 import math
@@ -83,7 +83,7 @@ class ExperimentDesign:
     condition_before: float  # condition number of the scaled Jacobian; infinite if a parameter is not identifiable
     condition_after: float
     parts: dict[str, float]
-    """[-] relative standard deviations that make the band: by `RUN_TO_RUN`, `LAW` over the identified range, `SCATTER`"""
+    """[-] relative standard deviations in the band: `RUN_TO_RUN`, `LAW` (over the identified range), `SCATTER`"""
     repeated: RepeatedRun | None  # None if the spread between runs is stated, or in the left-out readings
     speed_is_measured: bool
     speed_is_varied: bool
@@ -176,15 +176,16 @@ def design_experiment(
     .. math:: \min \frac1m \sum_{i=1}^m \frac{g_i^T C g_i}{f_i^2}, \qquad
         C^{-1} = \frac{J^T J}{\kappa s^2} + \frac{A^T A}{s^2} + \Lambda
 
-    over m points of the range: :math:`g_i` derivative of the friction :math:`f_i` by the parameters, J and A derivatives of
-    the weighted deviations at hand and of the proposed ones with the offsets eliminated, s the scatter of one reading.
-    :math:`\kappa \ge 1` says how many readings at hand are worth one independent reading: it makes the variance at the
-    readings that of the jackknife [Efron1982]_. :math:`\Lambda` is a weak prior, by which each parameter alone may change
-    the friction by `PRIOR_CHANGE`, so that the variance is finite where the readings do not determine a parameter.
+    over m points of the range: :math:`g_i` derivative of the friction :math:`f_i` [N] by the parameters; J, A
+    derivatives of the weighted deviations [-] of the readings at hand and of the proposed ones, offsets eliminated; s
+    scatter of one reading [-]. :math:`\kappa \ge 1` is the number of readings at hand that are worth one independent
+    reading: with it the variance at the readings is that of the jackknife [Efron1982]_. :math:`\Lambda` is a weak
+    prior: each parameter alone changes the friction by `PRIOR_CHANGE`. It keeps the variance finite where a parameter
+    is not determined.
 
     The range is that of the readings; if they hold one pressure it goes down to 0, if they hold one speed it is that of
-    `SPEED_FACTORS`. If the spread between runs limits the band, the pressures of the readings are proposed once more, for
-    another day, and other speeds only if speed was not varied.
+    `SPEED_FACTORS`. If the spread between runs limits the band, the pressures of the readings are proposed once more,
+    for another day, and other speeds only if speed was not varied.
 
     Args:
         scores: Ladder of laws.
@@ -229,6 +230,7 @@ def design_experiment(
     grid = [point for point in _grid(identified[1], speeds) if point not in repeats]
     more = [] if is_limited_by_runs and is_varied else grid
     points, errors, information = _greedy(model, range_slopes, had + prior, scatter, repeats, more, count)
+    freedom = 1 if readings.are_samples else len(readings.levels)
     names = [parameter.name for parameter in model.law.parameters]
     pair = _broken_pair(had + prior, had + prior + information)
     correlations = [
@@ -252,9 +254,7 @@ def design_experiment(
         condition_before=_condition(had),
         condition_after=_condition(had + information),
         parts=parts,
-        repeated=None
-        if between is None
-        else repeated_run(between, 1 if readings.are_samples else len(readings.levels)),
+        repeated=None if between is None else repeated_run(between, freedom),
         speed_is_measured=is_measured,
         speed_is_varied=is_varied,
     )
@@ -277,10 +277,10 @@ def laws_not_beaten(scores: Sequence[LawScore]) -> list[LawScore]:
 def repeated_run(between: BetweenRuns, freedom: int) -> RepeatedRun:
     r"""Effect of one more run, which adds ``freedom`` degrees of freedom, on the run-to-run part of the band.
 
-    .. math:: \frac{t_{0.975}(\nu + n)}{t_{0.975}(\nu)}, \qquad \sqrt{\nu / (\nu + n)}\,\frac{t_{0.975}(\nu + n)}{t_{0.975}(\nu)}
+    .. math:: r = \frac{t_{0.975}(\nu + n)}{t_{0.975}(\nu)}, \qquad r_0 = r \sqrt{\nu / (\nu + n)}
 
-    with :math:`\nu` those of the prior and of the runs at hand, n = ``freedom``: if runs differ as expected, and if they
-    agree, see `runs.between_runs`.
+    with :math:`\nu` those of the prior and of the runs at hand and n = ``freedom``: r if runs differ as expected,
+    :math:`r_0` if they agree; see `runs.between_runs`.
     """
     had = PRIOR_FREEDOM + between.freedom
     shrink = float(student_t.ppf(0.975, had + freedom) / student_t.ppf(0.975, had))
@@ -467,8 +467,9 @@ def _correlation(information: FloatArray) -> FloatArray:
 
 
 def _broken_pair(before: FloatArray, after: FloatArray) -> tuple[int, int] | None:
-    """The two parameters whose correlation falls most in magnitude; None if there is only one."""
-    fall = np.abs(_correlation(before)) - np.abs(_correlation(after))
+    """The two parameters whose correlation r falls most, by 1 / (1 - r^2) (variance inflation); None for one."""
+    inflation = [-np.log(np.maximum(1.0 - _correlation(m) ** 2, 1e-16)) for m in (before, after)]
+    fall = inflation[0] - inflation[1]
     return max(combinations(range(len(before)), 2), key=lambda pair: float(fall[pair]), default=None)
 
 

@@ -1,8 +1,8 @@
 """Data sheet of the friction test plan of the thesis, Appendix A: make an empty one, read and check a filled one.
 
 A sheet is a CSV file of two tables: the dimensions, and the readings with one row per pressure and one column per test,
-kind of friction and direction. A dash in a cell marks a reading that could not be taken. If speeds are part of the plan,
-the second column is the speed, and there is one row per pressure and speed.
+kind of friction and direction. A dash in a cell marks a reading that could not be taken. If speeds are planned, the
+second column is the speed, and there is one row per pressure and speed.
 """
 
 import csv
@@ -79,7 +79,7 @@ class FrictionTestPlan:
             raise ValueError(f'pressures from {low:g} to {high:g}: give a lowest one of at least 0 and a higher one')
         if list(self.points) != sorted(set(self.points)) or any(p < 0.0 or not v > 0.0 for p, v in self.points):
             raise ValueError(
-                'rows of pressure and speed: sort them, each one once, pressures of at least 0, speeds above 0'
+                'rows of pressure and speed: sort them, each once, pressures of at least 0, speeds above 0'
             )
         steps = {} if self.points else {'pressure steps': (self.steps, FEWEST_PRESSURES - 1, 100)}
         counts = {**steps, 'tests': (self.tests, 1, 20)}
@@ -98,7 +98,7 @@ class FrictionTestPlan:
 
     @property
     def rows(self) -> list[tuple[float, ...]]:
-        """First cells of each row: the pressure in ``pressure_unit``, and the speed in ``speed_unit`` if it is planned."""
+        """First cells of each row: pressure in ``pressure_unit``, and speed in ``speed_unit`` if it is planned."""
         if self.points:
             return [*self.points]
         return [(round(float(p), 9),) for p in np.linspace(self.lowest, self.highest, self.steps + 1)]
@@ -321,35 +321,18 @@ def _heads(path: Path, heads: Sequence[str]) -> tuple[list[SheetColumn], str, st
 def _readings(
     path: Path, rows: Sequence[tuple[int, Sequence[str]]], order: Sequence[SheetColumn], unit: str, speed_unit: str
 ) -> list[_Reading]:
-    """Readings of ``rows``: line number and cells of each; the second cell is a speed if ``speed_unit`` is not empty."""
+    """Readings of ``rows``: line number and cells of each, of which the second is a speed if there is a unit of it."""
     found: list[_Reading] = []
     missing: list[str] = []
-    before, taken = -math.inf, set[float]()
-    for number, (head, *cells) in rows:
+    before: tuple[float, set[float]] = -math.inf, set()
+    for number, (head, *others) in rows:
         place = f'{path}: line {number}'
-        speed = math.nan
-        if speed_unit:
-            text, *cells = cells or ['']
-            speed = parse_number(text, f'{place}: speed')
-            if not 0.0 < speed < math.inf:
-                raise ValueError(f'{place}: speed is {text[:40]!r}, not a magnitude of a speed')
+        speed_text, cells = (''.join(others[:1]), others[1:]) if speed_unit else ('', others)
         if any(cells[len(order) :]):
-            raise ValueError(f'{place}: {len(cells) + 1} cells in {len(order) + 1} columns')
+            raise ValueError(f'{place}: {len(others) + 1} cells in {len(order) + 1 + bool(speed_unit)} columns')
         pressure = parse_number(head, f'{place}: pressure')
-        if speed_unit and pressure == before:
-            if speed in taken:
-                raise ValueError(
-                    f'{place}: {pressure:g} {unit} and {speed:g} {speed_unit} are in a row above: remove one'
-                )
-            taken.add(speed)
-        elif pressure > before:
-            taken = {speed}
-        else:
-            raise ValueError(
-                f'{place}: pressure {pressure:g} {unit} is not above {before:g} {unit} in the previous row: the plan '
-                'raises the pressure from row to row; sort the rows, or look for a typing error'
-            )
-        before = pressure
+        speed = parse_number(speed_text, f'{place}: speed') if speed_unit else math.nan
+        before = _row_in_order(place, (pressure, speed), before, unit, speed_unit)
         for column, cell in zip(order, [*cells, *[''] * len(order)], strict=False):
             where = f'{column.title} at {pressure:g} {unit}{f" and {speed:g} {speed_unit}" if speed_unit else ""}'
             if not cell:
@@ -366,6 +349,28 @@ def _readings(
             'a dash (-) for a reading that could not be taken'
         )
     return found
+
+
+def _row_in_order(
+    place: str, row: tuple[float, float], before: tuple[float, set[float]], unit: str, speed_unit: str
+) -> tuple[float, set[float]]:
+    """Pressure of a ``row`` of pressure and speed, and the speeds there so far; ``before`` is that of the row before.
+
+    Raises:
+        ValueError: The row is out of order, or pressure and speed occur twice.
+    """
+    (pressure, speed), (pressure_before, speeds) = row, before
+    if speed_unit and not 0.0 < speed < math.inf:
+        raise ValueError(f'{place}: the speed is {speed:g} {speed_unit}: give its magnitude, above 0')
+    if pressure > pressure_before:
+        return pressure, {speed}
+    if speed_unit and pressure == pressure_before and speed not in speeds:
+        return pressure, {*speeds, speed}
+    again = f' and {speed:g} {speed_unit} once more' if speed_unit and pressure == pressure_before else ''
+    raise ValueError(
+        f'{place}: pressure {pressure:g} {unit}{again} is not above {pressure_before:g} {unit} in the previous row: '
+        'the plan raises the pressure from row to row; sort the rows, or look for a typing error'
+    )
 
 
 def _check_plausible(readings: Sequence[_Reading], pressure_unit: str, unit: str) -> None:

@@ -95,16 +95,16 @@ def next_texts(found: Identification, design: ExperimentDesign) -> Iterator[str]
     run = design.repeated
     if design.limit == RUN_TO_RUN and run is not None:
         yield (
-            f'repeat the run on another day, mounted anew: its part of the band shrinks to {100.0 * run.shrink:.0f} % if '
-            f'runs differ as expected, and to {100.0 * run.shrink_at_best:.0f} % if they agree'
+            f'repeat the run on another day, mounted anew: its part of the band shrinks to {100.0 * run.shrink:.0f} % '
+            f'if runs differ as expected, and to {100.0 * run.shrink_at_best:.0f} % if they agree'
         )
     elif design.limit == RUN_TO_RUN:
         yield 'the spread between runs is as given with --run-to-run: several runs on other days measure it'
     low, high = (pressure / BAR for pressure in design.pressures)
     slow, fast = (speed / MM for speed in design.speeds)
     yield (
-        f'the standard error of {design.law.name} over {low:.3g} to {high:.3g} bar and {slow:.3g} to {fast:.3g} mm/s is '
-        f'{100.0 * design.error_before:.2g} % of the friction; with the readings of this sheet '
+        f'the standard error of {design.law.name} over {low:.3g} to {high:.3g} bar and {slow:.3g} to {fast:.3g} mm/s '
+        f'is {100.0 * design.error_before:.2g} % of the friction; with the readings of this sheet '
         f'{100.0 * design.error_after:.2g} %'
     )
     before, after = design.correlation_before, design.correlation_after
@@ -115,8 +115,8 @@ def next_texts(found: Identification, design: ExperimentDesign) -> Iterator[str]
         )
     if not design.speed_is_measured:
         yield (
-            f'the readings have no speed: {ASSUMED_SPEED / MM:g} mm/s is assumed, and the speeds are factors of it; write '
-            'down the true speeds, and those of the readings at hand, else the law gets no term of the speed'
+            f'the readings have no speed: {ASSUMED_SPEED / MM:g} mm/s is assumed, and the speeds are factors of it; '
+            'write down the true speeds, and those of the readings at hand, else the law gets no term of the speed'
         )
     elif not design.speed_is_varied:
         yield 'the readings have one speed: the effect of the speed is unknown, so other speeds are among the readings'

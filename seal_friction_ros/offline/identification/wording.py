@@ -174,8 +174,8 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
         yield f'{selection.law.name} is saved as asked for with --law; recommended is {selection.best.law.name}'
     chambers = data.sources.chambers
     yield (
-        f'the law is that of one seal of {len(chambers)}, on chambers {",".join(chambers)}, as the file says: for the node '
-        'name it once, seals: [FILE]'
+        f'the law is that of one seal of {len(chambers)}, on chambers {",".join(chambers)}, as the file says: for the '
+        'node name it once, seals: [FILE]'
     )
     if prepared.breakaway is None and prepared.readings.are_samples:
         yield 'breakaway is not identified from logs without held pressures'

@@ -96,7 +96,7 @@ def test_a_wrong_speed_is_named(old, new, words, proposed, tmp_path):
     text = filled(proposed[1].read_text())
     assert old in text
     (tmp_path / 'filled.csv').write_text(text.replace(old, new))
-    with pytest.raises(ValueError, match='filled.csv') as error:
+    with pytest.raises(ValueError, match=r'filled\.csv') as error:
         read_data_sheet(tmp_path / 'filled.csv')
     assert words in str(error.value)
 
@@ -104,7 +104,7 @@ def test_a_wrong_speed_is_named(old, new, words, proposed, tmp_path):
 def test_a_row_that_is_there_twice_or_has_no_speed_is_named(proposed, tmp_path):
     text = filled(proposed[1].read_text())
     *others, last = text.splitlines()
-    pressure, speed, *cells = last.split(',')
+    pressure, _, *cells = last.split(',')
     path = tmp_path / 'filled.csv'
     for row, words in ((last, 'once more'), (','.join([pressure, '-3', *cells]), 'above 0'),
                        (','.join([pressure, '', *cells]), 'speed is')):  # fmt: skip
