@@ -35,7 +35,10 @@ from seal_friction_ros.core.identification.validation import jackknife_errors
 READINGS = 8  # pressures and speeds that are proposed, each in both directions (our choice)
 GRID_PRESSURES, GRID_SPEEDS = 6, 5  # of the readings to choose from (our choice)
 RANGE_POINTS = 5  # pressures and speeds each at which the prediction variance is averaged (our choice)
-SPEED_VARIES = 1.5  # fastest over slowest reading, above which speed is varied (our choice)
+MOST_SPEEDS = (
+    0.95  # quantile of the speeds that is the fastest one, so that a single stroke does not count (our choice)
+)
+SPEED_VARIES = 1.5  # fastest over slowest speed, above which speed is varied (our choice)
 SPEED_FACTORS = (0.2, 0.5, 1.0, 2.0, 5.0)  # of the used speed, where speed was not varied (our choice)
 SPEED_LIMITS = (1e-4, 1.0)  # [m/s] of the speeds made with these factors (our choice)
 ASSUMED_SPEED = 0.01  # [m/s] of readings without a speed: a slow pull by hand (our choice)
@@ -206,12 +209,13 @@ def design_experiment(
     is_measured = bool(np.isfinite(speed).all())
     at = readings.at if is_measured else readings.at._replace(velocity=ASSUMED_SPEED * readings.at.direction)
     speed = np.abs(at.velocity)
-    is_varied = bool(speed.max() > SPEED_VARIES * speed.min())
+    slowest, fastest = (float(np.quantile(speed, share)) for share in (1.0 - MOST_SPEEDS, MOST_SPEEDS))
+    is_varied = fastest > SPEED_VARIES * slowest
     model = _model(chosen, readings, at)
     scatter = _scatter(chosen, readings)
     identified = (float(readings.seal_pressure.min()), float(readings.seal_pressure.max()))
     low = identified[0] if np.ptp(identified) >= max(NARROWEST_PRESSURES, 0.1 * identified[1]) else 0.0
-    speeds = _grid_speeds(speed, is_varied)
+    speeds = _grid_speeds((slowest, fastest) if is_varied else (float(np.median(speed)),))
     prior = _prior(model, low, identified[1], speeds)
     known = _without_offsets(model.slopes(at), readings) / scatter
     worth = _readings_worth_one(chosen, readings, scatter)
@@ -219,7 +223,7 @@ def design_experiment(
 
     pressures = (low, identified[1])
     range_slopes, identified_slopes = (
-        _relative_slopes(model, *ends) for ends in ((pressures, speeds), (identified, (speed.min(), speed.max())))
+        _relative_slopes(model, *ends) for ends in ((pressures, speeds), (identified, (slowest, fastest)))
     )
     before = _error(range_slopes, had + prior)
     law_error = _error(identified_slopes, had + prior)
@@ -361,13 +365,13 @@ def _readings_worth_one(score: LawScore, readings: FrictionReadings, scatter: fl
     return max(float(np.mean(found**2) / np.mean(independent)), 1.0)
 
 
-def _grid_speeds(speed: FloatArray, is_varied: bool) -> list[float]:
-    """Speeds to choose from [m/s], increasing: of the readings, or `SPEED_FACTORS` times the used one."""
-    if is_varied:
-        slowest = max(float(speed.min()), SPEED_LIMITS[0], 1e-3 * float(speed.max()))
-        made = np.geomspace(slowest, float(speed.max()), GRID_SPEEDS)
+def _grid_speeds(used_speeds: Sequence[float]) -> list[float]:
+    """Speeds to choose from [m/s], increasing: from the slowest to the fastest, or `SPEED_FACTORS` times the only one."""
+    if len(used_speeds) > 1:
+        slowest, fastest = used_speeds
+        made = np.geomspace(max(slowest, SPEED_LIMITS[0], 1e-3 * fastest), fastest, GRID_SPEEDS)
     else:
-        used = float(np.median(speed))
+        (used,) = used_speeds
         made = np.clip(np.array(SPEED_FACTORS) * used, min(SPEED_LIMITS[0], used), max(SPEED_LIMITS[1], used))
     return sorted({_three_digits(value) for value in made.tolist()})
 

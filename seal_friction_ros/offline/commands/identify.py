@@ -66,6 +66,7 @@ def _chambers(text: str) -> tuple[str, ...]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, and write seal file, page and data sheet."""
+    from seal_friction_ros.offline.identification import next_readings
     from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
     from seal_friction_ros.offline.identification.results import identification_numbers
     from seal_friction_ros.offline.identification.sources import SourceOptions
@@ -77,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     source_options = SourceOptions(**cli.options_from(arguments, SourceOptions))
     options = IdentifyOptions(**{**cli.options_from(arguments, IdentifyOptions), 'sources': source_options})
     found = identify(arguments.sources, options, arguments.out.stem)
+    design = next_readings.design_for(found) if arguments.next else None
     written: dict[str, Any] = {'seal_file': arguments.out}
     if arguments.report:
         from seal_friction_ros.offline.reports.identification_report import write_identification_report
@@ -85,22 +87,15 @@ def run(arguments: argparse.Namespace) -> int:
         written |= {'report': arguments.report, 'figures': figures}
     write_seal(found.document, arguments.out, f'Seal file, {mark("identify")}.')
     numbers, text = identification_numbers(found), summary(found)
-    if arguments.next:
+    if design is not None:
         from seal_friction_ros.offline.identification.data_sheet import write_sheet
-        from seal_friction_ros.offline.identification.next_readings import (
-            next_numbers,
-            next_plan,
-            next_readings,
-            next_texts,
-        )
         from seal_friction_ros.offline.reports.data_sheet_page import write_data_sheet_page
 
-        design = next_readings(found)
-        plan, page = next_plan(found, design), arguments.next.with_suffix('.html')
+        plan, page = next_readings.plan_of(found, design), arguments.next.with_suffix('.html')
         write_sheet(plan, arguments.next)
         write_data_sheet_page(plan, page, 'identify')
         written |= {'sheet': arguments.next, 'sheet_page': page}
-        numbers |= next_numbers(design)
-        text = '\n'.join([text, *(f'next: {line}' for line in next_texts(found, design))])
+        numbers |= next_readings.numbers_of(design)
+        text = '\n'.join([text, *(f'next: {line}' for line in next_readings.texts_of(found, design))])
     written_text = ', '.join(str(written[key]) for key in ('seal_file', 'sheet', 'sheet_page') if key in written)
     return cli.print_result(arguments, numbers | written, f'{text}\n{written_text}: written')

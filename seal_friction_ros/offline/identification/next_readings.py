@@ -18,12 +18,12 @@ from seal_friction_ros.offline.identification.results import Identification, rou
 
 LIMITS = {
     RUN_TO_RUN: 'the spread from run to run',
-    LAW: 'the law, which the readings do not determine',
+    LAW: 'the standard error of the law',
     SCATTER: 'the scatter of single readings',
 }
 
 
-def next_readings(found: Identification) -> ExperimentDesign:
+def design_for(found: Identification) -> ExperimentDesign:
     """The design of the next readings for the ladder and the readings of an identification."""
     used, quality = found.data.used, found.quality
     runs_are_left_out = used.left_out_by in ('test', 'file') and not quality.is_stated
@@ -32,7 +32,7 @@ def next_readings(found: Identification) -> ExperimentDesign:
     return design_experiment(found.selection.scores, used, between, of_band)
 
 
-def next_plan(found: Identification, design: ExperimentDesign) -> FrictionTestPlan:
+def plan_of(found: Identification, design: ExperimentDesign) -> FrictionTestPlan:
     """Data sheet of the proposed readings, sorted by pressure and speed, in bar, mm/s and N."""
     points = [(rounded_value(r.pressure / BAR), rounded_value(r.speed / MM)) for r in design.readings]
     name = str(found.document['name']).replace(',', ' ')
@@ -46,11 +46,11 @@ def next_plan(found: Identification, design: ExperimentDesign) -> FrictionTestPl
         force_unit='N',
         length_unit='mm',
         geometry=ring.geometry if ring else None,
-        notes=tuple(next_texts(found, design)),
+        notes=tuple(texts_of(found, design)),
     )
 
 
-def next_numbers(design: ExperimentDesign) -> dict[str, Any]:
+def numbers_of(design: ExperimentDesign) -> dict[str, Any]:
     """Numbers for JSON: ``next``, the readings in the order of their use, and ``next_effect``."""
     before, after = design.correlation_before, design.correlation_after
     pair = before and after and {'parameters': [before.one, before.other], 'before': _rounded(before.correlation),
@@ -88,7 +88,7 @@ def _rounded(value: float) -> float | None:
     return rounded_value(value) if math.isfinite(value) else None
 
 
-def next_texts(found: Identification, design: ExperimentDesign) -> Iterator[str]:
+def texts_of(found: Identification, design: ExperimentDesign) -> Iterator[str]:
     """What limits the band, and what the proposed readings change, one line each."""
     limit = 100.0 * design.parts[design.limit]
     yield f'{LIMITS[design.limit]} limits the band: {limit:.3g} % of the friction'
@@ -104,7 +104,7 @@ def next_texts(found: Identification, design: ExperimentDesign) -> Iterator[str]
     slow, fast = (speed / MM for speed in design.speeds)
     yield (
         f'the standard error of {design.law.name} over {low:.3g} to {high:.3g} bar and {slow:.3g} to {fast:.3g} mm/s '
-        f'is {100.0 * design.error_before:.2g} % of the friction; with the readings of this sheet '
+        f'is {100.0 * design.error_before:.2g} % of the friction; with the proposed readings '
         f'{100.0 * design.error_after:.2g} %'
     )
     before, after = design.correlation_before, design.correlation_after
