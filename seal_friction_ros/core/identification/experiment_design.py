@@ -86,7 +86,7 @@ class ExperimentDesign:
     condition_before: float  # condition number of the scaled Jacobian; infinite if a parameter is not identifiable
     condition_after: float
     parts: dict[str, float]
-    """[-] relative standard deviations in the band: `RUN_TO_RUN`, `LAW` (over the identified range), `SCATTER`"""
+    """[-] relative standard deviations in the band: `RUN_TO_RUN`, `LAW` (where it is identified), `SCATTER`"""
     repeated: RepeatedRun | None  # None if the spread between runs is stated, or in the left-out readings
     speed_is_measured: bool
     speed_is_varied: bool
@@ -209,22 +209,23 @@ def design_experiment(
     is_measured = bool(np.isfinite(speed).all())
     at = readings.at if is_measured else readings.at._replace(velocity=ASSUMED_SPEED * readings.at.direction)
     speed = np.abs(at.velocity)
-    slowest, fastest = (float(np.quantile(speed, share)) for share in (1.0 - MOST_SPEEDS, MOST_SPEEDS))
-    is_varied = fastest > SPEED_VARIES * slowest
+    is_varied = _is_speed_varied(at)
+    used_speeds = _ends(speed) if is_varied else (float(np.median(speed)),)
     model = _model(chosen, readings, at)
     scatter = _scatter(chosen, readings)
     identified = (float(readings.seal_pressure.min()), float(readings.seal_pressure.max()))
     low = identified[0] if np.ptp(identified) >= max(NARROWEST_PRESSURES, 0.1 * identified[1]) else 0.0
-    speeds = _grid_speeds((slowest, fastest) if is_varied else (float(np.median(speed)),))
+    speeds = _grid_speeds(used_speeds)
     prior = _prior(model, low, identified[1], speeds)
-    known = _without_offsets(model.slopes(at), readings) / scatter
+    slopes = model.slopes(at)
+    known = _without_offsets(slopes, readings) / scatter
     worth = _readings_worth_one(chosen, readings, scatter)
     had = known.T @ known / worth
 
     pressures = (low, identified[1])
-    range_slopes, identified_slopes = (
-        _relative_slopes(model, *ends) for ends in ((pressures, speeds), (identified, (slowest, fastest)))
-    )
+    range_slopes = _relative_slopes(model, pressures, speeds)
+    at_readings = slopes / model.friction(at)[:, np.newaxis]
+    identified_slopes = _relative_slopes(model, identified, used_speeds) if is_varied else at_readings
     before = _error(range_slopes, had + prior)
     law_error = _error(identified_slopes, had + prior)
     parts = {RUN_TO_RUN: of_band, LAW: law_error, SCATTER: scatter}
@@ -365,8 +366,19 @@ def _readings_worth_one(score: LawScore, readings: FrictionReadings, scatter: fl
     return max(float(np.mean(found**2) / np.mean(independent)), 1.0)
 
 
+def _ends(speed: FloatArray) -> tuple[float, float]:
+    """Slowest and fastest speed [m/s] without the tails beyond `MOST_SPEEDS`."""
+    return float(np.quantile(speed, 1.0 - MOST_SPEEDS)), float(np.quantile(speed, MOST_SPEEDS))
+
+
+def _is_speed_varied(at: OperatingConditions) -> bool:
+    """Whether the speed varies within one direction; a speed that follows the direction counts as one speed."""
+    ends = [_ends(np.abs(at.velocity[at.direction == side])) for side in np.unique(at.direction)]
+    return any(fastest > SPEED_VARIES * slowest for slowest, fastest in ends)
+
+
 def _grid_speeds(used_speeds: Sequence[float]) -> list[float]:
-    """Speeds to choose from [m/s], increasing: from the slowest to the fastest, or `SPEED_FACTORS` times the only one."""
+    """Speeds to choose from [m/s], increasing: from slowest to fastest, or `SPEED_FACTORS` times the only one."""
     if len(used_speeds) > 1:
         slowest, fastest = used_speeds
         made = np.geomspace(max(slowest, SPEED_LIMITS[0], 1e-3 * fastest), fastest, GRID_SPEEDS)

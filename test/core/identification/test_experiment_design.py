@@ -152,6 +152,15 @@ def test_runs_that_agree_shrink_the_spread_as_predicted_at_best():
     assert both.of_band / alone.of_band == pytest.approx(expected, rel=1e-6)
 
 
+def test_a_speed_that_follows_the_direction_is_not_varied():
+    readings = held()
+    at = readings.at._replace(velocity=np.where(readings.at.direction > 0.0, 0.03, -0.01))
+    readings = replace(readings, at=at)
+    design = design_experiment(score_laws([BASE], readings), readings, NO_RUNS, 0.15)
+    assert not design.speed_is_varied
+    assert design.limit == RUN_TO_RUN
+
+
 @pytest.mark.parametrize('speed', [0.02, float('nan')])
 def test_where_speed_was_not_varied_others_are_proposed(speed):
     readings = held(speed=speed)
