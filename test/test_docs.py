@@ -35,9 +35,9 @@ PAGES = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').g
 README = (ROOT / 'README.md').read_text()
 
 
-def commands(kind: str) -> list[str]:
-    """Lines of the blocks of one kind in the README."""
-    blocks = re.findall(rf'```bash{kind}\n(.*?)```', README, re.DOTALL)
+def commands(kind: str, page: str = README) -> list[str]:
+    """Lines of the blocks of one kind in a page, by default the README."""
+    blocks = re.findall(rf'```bash{kind}\n(.*?)```', page, re.DOTALL)
     return [line for block in blocks for line in block.splitlines()]
 
 
@@ -124,6 +124,14 @@ def test_every_command_of_the_readme_runs(checkout: Path):
         result = run(shortened(command, checkout), checkout)
         expected = (0, 1) if ' compare ' in command else (0,)
         assert result.returncode in expected, f'{command}: {result.stderr}'
+
+
+def test_the_command_that_proposes_the_next_readings_runs(checkout: Path):
+    page = (ROOT / 'docs' / 'identification.md').read_text()
+    (command,) = (line for line in commands('', page) if ' --next ' in line)
+    result = run(f'.venv/bin/{command}', checkout)
+    assert result.returncode == 0, result.stderr
+    assert (checkout / 'next.csv').read_text().startswith('# seal friction data sheet')
 
 
 def test_the_node_runs_as_the_readme_says_and_records(checkout: Path):

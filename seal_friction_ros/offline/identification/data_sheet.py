@@ -1,7 +1,8 @@
 """Data sheet of the friction test plan of the thesis, Appendix A: make an empty one, read and check a filled one.
 
 A sheet is a CSV file of two tables: the dimensions, and the readings with one row per pressure and one column per test,
-kind of friction and direction. A dash in a cell marks a reading that could not be taken.
+kind of friction and direction. A dash in a cell marks a reading that could not be taken. If speeds are planned, the
+second column is the speed, and there is one row per pressure and speed.
 """
 
 import csv
@@ -23,6 +24,7 @@ from seal_friction_ros.files import config_path, read_yaml
 TITLE = 'seal friction data sheet'
 PRESSURE_UNITS = ('psi', 'bar', 'MPa', 'kPa')
 FORCE_UNITS = ('lbf', 'N', 'kN')
+SPEED_UNITS = ('mm/s', 'm/s', 'in/s')
 KINDS = ('static', 'dynamic')
 DIRECTIONS = {'retract': -1, 'extend': 1}
 DIMENSIONS = {
@@ -50,7 +52,7 @@ PROCEDURE = (
 
 @dataclass(frozen=True)
 class FrictionTestPlan:
-    """Readings to be taken, at evenly spaced pressures.
+    """Readings to be taken, at evenly spaced pressures or at given pressures and speeds.
 
     Raises:
         ValueError: A value is invalid.
@@ -66,22 +68,50 @@ class FrictionTestPlan:
     force_unit: str = 'lbf'
     length_unit: str = 'in'
     geometry: SealGeometry | None = None  # filled in, if known
+    points: tuple[tuple[float, float], ...] = ()
+    """pressure and speed of each row, in place of evenly spaced pressures at any speed; increasing"""
+    speed_unit: str = 'mm/s'
+    notes: tuple[str, ...] = ()  # lines above the procedure
 
     def __post_init__(self) -> None:
         low, high, name = self.lowest, self.highest, self.seal_name
-        if not 0.0 <= low < high < math.inf:
+        if not self.points and not 0.0 <= low < high < math.inf:
             raise ValueError(f'pressures from {low:g} to {high:g}: give a lowest one of at least 0 and a higher one')
-        counts = {'pressure steps': (self.steps, FEWEST_PRESSURES - 1, 100), 'tests': (self.tests, 1, 20)}
+        if list(self.points) != sorted(set(self.points)) or any(p < 0.0 or not v > 0.0 for p, v in self.points):
+            raise ValueError(
+                'rows of pressure and speed: sort them, each once, pressures of at least 0, speeds above 0'
+            )
+        steps = {} if self.points else {'pressure steps': (self.steps, FEWEST_PRESSURES - 1, 100)}
+        counts = {**steps, 'tests': (self.tests, 1, 20)}
         for what, (count, least, most) in {**counts, 'seals': (self.seals, 1, MOST_SEALS)}.items():
             if not least <= count <= most:
                 raise ValueError(f'{count} {what}: give {least} to {most}')
         if not name or not name.isprintable() or ',' in name:
             raise ValueError(f'seal name {name!r} is not one line of text without a comma')
 
+    @classmethod
+    def at_points(cls, seal_name: str, points: Sequence[tuple[float, float]], **others: Any) -> 'FrictionTestPlan':
+        """Plan of rows of pressure and speed, in any order; ``others`` are fields of the plan."""
+        rows = tuple(sorted(set(points)))
+        ends = (rows[0][0], rows[-1][0]) if rows else (0.0, 0.0)
+        return cls(seal_name, *ends, max(len(rows) - 1, 0), points=rows, **others)
+
     @property
-    def pressures(self) -> list[float]:
-        """In ``pressure_unit``, increasing."""
-        return [round(float(p), 9) for p in np.linspace(self.lowest, self.highest, self.steps + 1)]
+    def rows(self) -> list[tuple[float, ...]]:
+        """First cells of each row: pressure in ``pressure_unit``, and speed in ``speed_unit`` if it is planned."""
+        if self.points:
+            return [*self.points]
+        return [(round(float(p), 9),) for p in np.linspace(self.lowest, self.highest, self.steps + 1)]
+
+    @property
+    def row_heads(self) -> list[str]:
+        """Headings of the first cells of a row."""
+        return [f'pressure [{self.pressure_unit}]', *([f'speed [{self.speed_unit}]'] if self.points else [])]
+
+    @property
+    def procedure(self) -> list[str]:
+        """Steps of the test."""
+        return [step.replace(' slowly', ' at the speed of the row') if self.points else step for step in PROCEDURE]
 
     def dimension(self, name: str) -> str:
         """Dimension in ``length_unit`` as text; empty if the geometry is unknown."""
@@ -132,11 +162,12 @@ def geometry_of_seal_file(seal: str) -> tuple[SealGeometry, Mapping[str, Any]]:
 def sheet_text(plan: FrictionTestPlan) -> str:
     """CSV of an empty sheet."""
     geometry = plan.geometry
-    heads = [f'pressure [{plan.pressure_unit}]', *(f'{c.title} [{plan.force_unit}]' for c in columns(plan.tests))]
+    readings = [f'{c.title} [{plan.force_unit}]' for c in columns(plan.tests)]
     lines = [
         f'# {TITLE}',
         '# Fill in every empty cell; write a dash (-) for a reading that could not be taken.',
-        *(f'# {number}. {step}' for number, step in enumerate(PROCEDURE, start=1)),
+        *(f'# {note}' for note in plan.notes),
+        *(f'# {number}. {step}' for number, step in enumerate(plan.procedure, start=1)),
         'quantity,value,unit',
         f'seal,{plan.seal_name},',
         f'seals,{plan.seals},',
@@ -144,8 +175,8 @@ def sheet_text(plan: FrictionTestPlan) -> str:
         f'sliding_wall,{geometry.sliding_wall if geometry else "rod"},',
         f'elastic_modulus,{f"{geometry.elastic_modulus / 1e6:.6g}" if geometry else ""},MPa',
         '',
-        ','.join(heads),
-        *(f'{pressure:.6g}{"," * (len(heads) - 1)}' for pressure in plan.pressures),
+        ','.join([*plan.row_heads, *readings]),
+        *(','.join(f'{value:.6g}' for value in row) + ',' * len(readings) for row in plan.rows),
     ]
     return '\n'.join(lines) + '\n'
 
@@ -168,12 +199,13 @@ def write_sheet(plan: FrictionTestPlan, out: Path) -> None:
 
 
 class _Reading(NamedTuple):
-    """One filled cell; pressure and force in the units of the sheet."""
+    """One filled cell; pressure, speed and force in the units of the sheet."""
 
     place: str  # file and line
     pressure: float
     column: SheetColumn
     force: float
+    speed: float  # NaN if the sheet has no speeds
 
 
 def read_data_sheet(path: Path) -> DataSheet:
@@ -192,21 +224,22 @@ def read_data_sheet(path: Path) -> DataSheet:
     if start is None:
         raise ValueError(f'{path}: not a data sheet: no row begins with pressure [unit]')
     chambers, document = _seal(path, {cells[0]: [*cells[1:], '', ''][:2] for _, cells in lines[:start]})
-    order, pressure_unit, force_unit = _heads(path, lines[start][1])
+    speed_unit, heads = _speed_unit(path, lines[start][1])
+    order, pressure_unit, force_unit = _heads(path, heads)
     rows = lines[start + 1 :]
-    readings = _readings(path, rows, order, pressure_unit)
+    readings = _readings(path, rows, order, pressure_unit, speed_unit)
     _check_plausible(readings, pressure_unit, force_unit)
-    skipped = sum(cell == NOT_TAKEN for _, cells in rows for cell in cells[1 : len(order) + 1])
+    skipped = sum(cell == NOT_TAKEN for _, cells in rows for cell in cells[1 : len(order) + 1 + bool(speed_unit)])
     remarks = (f'{skipped} readings are marked as not taken',) if skipped else ()
 
     def manual(kind: str) -> ManualReadings:
         """Readings of one kind, in SI units."""
-        chosen = [(r.column.test, r.pressure, DIRECTIONS[r.column.direction], r.force)
+        chosen = [(r.column.test, r.pressure, DIRECTIONS[r.column.direction], r.force, r.speed)
                   for r in readings if r.column.kind == kind]  # fmt: skip
-        test, pressure, direction, force = np.array(chosen, dtype=np.float64).reshape(-1, 4).T
+        test, pressure, direction, force, speed = np.array(chosen, dtype=np.float64).reshape(-1, 5).T
         pressure, force = pressure * unit_size(pressure_unit), force * unit_size(force_unit)
-        unknown = np.full(len(chosen), np.nan)
-        return ManualReadings(path.name, test.astype(int), pressure, direction.astype(int), force, unknown)
+        speed = speed * unit_size(speed_unit or '1')
+        return ManualReadings(path.name, test.astype(int), pressure, direction.astype(int), force, speed)
 
     return DataSheet(manual('dynamic'), manual('static'), chambers, document, remarks)
 
@@ -256,6 +289,16 @@ def _seal(path: Path, quantities: Mapping[str, list[str]]) -> tuple[tuple[str, .
     return tuple('ab'[i % 2] for i in range(int(count))), {'name': quantities['seal'][0], 'geometry': geometry}
 
 
+def _speed_unit(path: Path, heads: Sequence[str]) -> tuple[str, list[str]]:
+    """Unit of the speeds, empty if the sheet has none, and the headings without that of the speed."""
+    if len(heads) < 2 or not heads[1].startswith('speed'):
+        return '', list(heads)
+    unit = heads[1].partition('[')[2].rstrip('] ')
+    if unit not in SPEED_UNITS:
+        raise ValueError(f'{path}: heading {heads[1][:60]!r}: it needs one of [{"] [".join(SPEED_UNITS)}]')
+    return unit, [heads[0], *heads[2:]]
+
+
 def _heads(path: Path, heads: Sequence[str]) -> tuple[list[SheetColumn], str, str]:
     """Columns of the readings, unit of the pressures, unit of the forces."""
     units = [head.partition('[')[2].rstrip('] ') for head in heads]
@@ -276,32 +319,29 @@ def _heads(path: Path, heads: Sequence[str]) -> tuple[list[SheetColumn], str, st
 
 
 def _readings(
-    path: Path, rows: Sequence[tuple[int, Sequence[str]]], order: Sequence[SheetColumn], unit: str
+    path: Path, rows: Sequence[tuple[int, Sequence[str]]], order: Sequence[SheetColumn], unit: str, speed_unit: str
 ) -> list[_Reading]:
-    """Readings of ``rows``: line number and cells of each."""
+    """Readings of ``rows``: line number and cells of each, of which the second is a speed if there is a unit of it."""
     found: list[_Reading] = []
     missing: list[str] = []
-    before = -math.inf
-    for number, (head, *cells) in rows:
+    before: tuple[float, set[float]] = -math.inf, set()
+    for number, (head, *others) in rows:
         place = f'{path}: line {number}'
+        speed_text, cells = (''.join(others[:1]), others[1:]) if speed_unit else ('', others)
         if any(cells[len(order) :]):
-            raise ValueError(f'{place}: {len(cells) + 1} cells in {len(order) + 1} columns')
+            raise ValueError(f'{place}: {len(others) + 1} cells in {len(order) + 1 + bool(speed_unit)} columns')
         pressure = parse_number(head, f'{place}: pressure')
-        if not pressure > before:
-            raise ValueError(
-                f'{place}: pressure {pressure:g} {unit} is not above {before:g} {unit} in the previous row: the plan '
-                'raises the pressure from row to row; sort the rows, or look for a typing error'
-            )
-        before = pressure
+        speed = parse_number(speed_text, f'{place}: speed') if speed_unit else math.nan
+        before = _row_in_order(place, (pressure, speed), before, unit, speed_unit)
         for column, cell in zip(order, [*cells, *[''] * len(order)], strict=False):
-            where = f'{column.title} at {pressure:g} {unit}'
+            where = f'{column.title} at {pressure:g} {unit}{f" and {speed:g} {speed_unit}" if speed_unit else ""}'
             if not cell:
                 missing.append(where)
             elif cell != NOT_TAKEN:
                 force = parse_number(cell, f'{place}: {where}')
                 if not 0.0 <= force < math.inf:
                     raise ValueError(f'{place}: {where} is {cell[:40]!r}, not a magnitude of a force')
-                found.append(_Reading(place, pressure, column, force))
+                found.append(_Reading(place, pressure, column, force, speed))
     if missing:
         more = f' and {len(missing) - _SHOWN} more' if len(missing) > _SHOWN else ''
         raise ValueError(
@@ -311,15 +351,37 @@ def _readings(
     return found
 
 
+def _row_in_order(
+    place: str, row: tuple[float, float], before: tuple[float, set[float]], unit: str, speed_unit: str
+) -> tuple[float, set[float]]:
+    """Pressure of a ``row`` of pressure and speed, and the speeds there so far; ``before`` is that of the row before.
+
+    Raises:
+        ValueError: The row is out of order, or pressure and speed occur twice.
+    """
+    (pressure, speed), (pressure_before, speeds) = row, before
+    if speed_unit and not 0.0 < speed < math.inf:
+        raise ValueError(f'{place}: the speed is {speed:g} {speed_unit}: give its magnitude, above 0')
+    if pressure > pressure_before:
+        return pressure, {speed}
+    if speed_unit and pressure == pressure_before and speed not in speeds:
+        return pressure, {*speeds, speed}
+    again = f' and {speed:g} {speed_unit} once more' if speed_unit and pressure == pressure_before else ''
+    raise ValueError(
+        f'{place}: pressure {pressure:g} {unit}{again} is not above {pressure_before:g} {unit} in the previous row: '
+        'the plan raises the pressure from row to row; sort the rows, or look for a typing error'
+    )
+
+
 def _check_plausible(readings: Sequence[_Reading], pressure_unit: str, unit: str) -> None:
     """Reject a reading far from the others at its pressure, or a static force below the dynamic one."""
-    static = {(r.pressure, r.column[::2]): r.force for r in readings if r.column.kind == 'static'}
+    static = {(r.place, r.column[::2]): r.force for r in readings if r.column.kind == 'static'}
     for reading in readings:
-        place, pressure, column, force = reading
-        at_pressure = [r for r in readings if r.pressure == pressure and r is not reading]
+        place, pressure, column, force, _ = reading
+        at_pressure = [r for r in readings if r.place == place and r is not reading]  # one row, so one speed
         others = [r.force for r in at_pressure if r.column.kind == column.kind]
         middle = float(np.median(others)) if others else force
-        static_force = static.get((pressure, column[::2]), force)
+        static_force = static.get((place, column[::2]), force)
         doubt = ''
         if len(others) >= 2 and middle > 0.0 and not 1.0 / IMPLAUSIBLE_FACTOR <= force / middle <= IMPLAUSIBLE_FACTOR:
             doubt = f'the other {column.kind} readings there are about {middle:.3g} {unit}'

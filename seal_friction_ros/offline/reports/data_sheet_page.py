@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from seal_friction_ros.offline.identification.data_sheet import DIMENSIONS, PROCEDURE, FrictionTestPlan
+from seal_friction_ros.offline.identification.data_sheet import DIMENSIONS, FrictionTestPlan
 from seal_friction_ros.offline.reports.page import write_page
 
 
-def write_data_sheet_page(plan: FrictionTestPlan, out: Path) -> None:
-    """Write the empty sheet as a page to print; errors as of `write_page`."""
-    write_page(out, 'data_sheet', (), plan=plan, dimensions=DIMENSIONS, procedure=PROCEDURE)
+def write_data_sheet_page(plan: FrictionTestPlan, out: Path, command: str = 'sheet') -> None:
+    """Write the empty sheet as a page to print, made by a ``command``; errors as of `write_page`."""
+    write_page(out, 'data_sheet', (), plan=plan, dimensions=DIMENSIONS, command=command)

@@ -1,0 +1,126 @@
+"""Next readings of an identification: the design, as a data sheet, as numbers for JSON, and in words."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from seal_friction_ros.core.foundation.units import BAR, MM
+from seal_friction_ros.core.identification.experiment_design import (
+    ASSUMED_SPEED,
+    LAW,
+    RUN_TO_RUN,
+    SCATTER,
+    ExperimentDesign,
+    design_experiment,
+)
+from seal_friction_ros.offline.identification.data_sheet import FrictionTestPlan
+from seal_friction_ros.offline.identification.results import Identification, rounded_value
+
+LIMITS = {
+    RUN_TO_RUN: 'the spread from run to run',
+    LAW: 'the standard error of the law',
+    SCATTER: 'the scatter of single readings',
+}
+
+
+def design_for(found: Identification) -> ExperimentDesign:
+    """The design of the next readings for the ladder and the readings of an identification."""
+    used, quality = found.data.used, found.quality
+    runs_are_left_out = used.left_out_by in ('test', 'file') and not quality.is_stated
+    between = None if quality.is_stated or runs_are_left_out else quality.between_runs
+    of_band = between.of_band if between is not None else quality.between_runs.std
+    return design_experiment(found.selection.scores, used, between, of_band)
+
+
+def plan_of(found: Identification, design: ExperimentDesign) -> FrictionTestPlan:
+    """Data sheet of the proposed readings, sorted by pressure and speed, in bar, mm/s and N."""
+    points = [(rounded_value(r.pressure / BAR), rounded_value(r.speed / MM)) for r in design.readings]
+    name = str(found.document['name']).replace(',', ' ')
+    ring = found.data.ring
+    return FrictionTestPlan.at_points(
+        name if name.isprintable() and name.strip() else 'seal',
+        points,
+        tests=1,
+        seals=len(found.data.sources.chambers),
+        pressure_unit='bar',
+        force_unit='N',
+        length_unit='mm',
+        geometry=ring.geometry if ring else None,
+        notes=tuple(texts_of(found, design)),
+    )
+
+
+def numbers_of(design: ExperimentDesign) -> dict[str, Any]:
+    """Numbers for JSON: ``next``, the readings in the order of their use, and ``next_effect``."""
+    before, after = design.correlation_before, design.correlation_after
+    pair = before and after and {'parameters': [before.one, before.other], 'before': _rounded(before.correlation),
+                                 'after': _rounded(after.correlation)}  # fmt: skip
+    return {
+        'next': [
+            {
+                'pressure_Pa': rounded_value(r.pressure),
+                'speed_m_per_s': rounded_value(r.speed),
+                'directions': list(r.directions),
+                'shrink': _rounded(r.shrink),
+                'disagreement': _rounded(r.disagreement),
+                'is_repeated': r.is_repeated,
+            }
+            for r in design.readings
+        ],
+        'next_effect': {
+            'law': design.law.name,
+            'limit': design.limit,
+            'parts': {part: _rounded(value) for part, value in design.parts.items()},
+            'error_before': _rounded(design.error_before),
+            'error_after': _rounded(design.error_after),
+            'shrink': _rounded(design.shrink),
+            'pressures_Pa': [rounded_value(p) for p in design.pressures],
+            'speeds_m_per_s': [rounded_value(v) for v in design.speeds],
+            'correlation': pair,
+            'condition_number_before': _rounded(design.condition_before),
+            'condition_number_after': _rounded(design.condition_after),
+            'another_run': design.repeated and design.repeated._asdict(),
+        },
+    }
+
+
+def _rounded(value: float) -> float | None:
+    return rounded_value(value) if math.isfinite(value) else None
+
+
+def texts_of(found: Identification, design: ExperimentDesign) -> Iterator[str]:
+    """What limits the band, and what the proposed readings change, one line each."""
+    limit = 100.0 * design.parts[design.limit]
+    yield f'{LIMITS[design.limit]} limits the band: {limit:.3g} % of the friction'
+    run = design.repeated
+    if design.limit == RUN_TO_RUN and run is not None:
+        yield (
+            f'repeat the run on another day, mounted anew: its part of the band shrinks to {100.0 * run.shrink:.0f} % '
+            f'if runs differ as expected, and to {100.0 * run.shrink_at_best:.0f} % if they agree'
+        )
+    elif design.limit == RUN_TO_RUN:
+        yield 'the spread between runs is as given with --run-to-run: several runs on other days measure it'
+    low, high = (pressure / BAR for pressure in design.pressures)
+    slow, fast = (speed / MM for speed in design.speeds)
+    yield (
+        f'the standard error of {design.law.name} over {low:.3g} to {high:.3g} bar and {slow:.3g} to {fast:.3g} mm/s '
+        f'is {100.0 * design.error_before:.2g} % of the friction; with the proposed readings '
+        f'{100.0 * design.error_after:.2g} %'
+    )
+    before, after = design.correlation_before, design.correlation_after
+    if before is not None and after is not None and abs(before.correlation) > abs(after.correlation):
+        yield (
+            f'correlation of {before.one} and {before.other}: {before.correlation:+.2f} -> {after.correlation:+.2f}; '
+            f'condition number: {design.condition_before:.3g} -> {design.condition_after:.3g}'
+        )
+    if not design.speed_is_measured:
+        yield (
+            f'the readings have no speed: {ASSUMED_SPEED / MM:g} mm/s is assumed, and the speeds are factors of it; '
+            'write down the true speeds, and those of the readings at hand, else the law gets no term of the speed'
+        )
+    elif not design.speed_is_varied:
+        yield 'the readings have one speed: the effect of the speed is unknown, so other speeds are among the readings'
+    if any(source.log is not None for source in found.data.sources.each):
+        yield 'logs and noted readings are not fitted together: drive these rows while recording, and give all logs'
+    if not {*found.data.sources.chambers} <= {'a', 'b'}:
+        yield 'each pressure is that at the seal: set the chambers such that every seal sees it'
