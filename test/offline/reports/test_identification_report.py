@@ -21,7 +21,8 @@ from seal_friction_ros.offline.reports.identification_report import (
 
 THESIS = ROOT / 'data' / 'thesis' / 'friction_tests.csv'
 ALL = {'fig24_model_over_pressure', 'measured_against_model', 'calibration', 'residuals', 'ladder',
-       'fig16_static_and_dynamic', 'fig17_prior_art_and_tests', 'fig18_coefficient_of_friction', 'fig19_normal_force'}  # fmt: skip
+       'fig16_static_and_dynamic', 'fig17_prior_art_and_tests', 'fig18_coefficient_of_friction',
+       'fig19_normal_force'}  # fmt: skip
 
 
 @pytest.fixture(scope='module')
