@@ -32,7 +32,7 @@ MIN_REST = 0.1  # [s] a shorter stop, as at a reversal, is no rest before a brea
 LEAST_SHARE = 0.1  # of the estimate: a smaller reading gives no percentage (our choice)
 LEAST_FRICTION = 0.02  # of the largest friction of the bag: a smaller reading is near zero, likewise (our choice)
 LEAST_BREAKAWAY = 0.5  # of the measured sliding friction: a smaller force at a start was no breakaway (our choice)
-LARGEST_CONDITION = 30.0  # of the scaled design, up to which an offset is determined; after [Belsley1980]_
+LEAST_OWN = 0.1  # of an offset must be its own, not explained by friction: a variance inflation of 10 (our choice)
 LEVEL_GAP = 0.05  # of the pressure: a larger step between sorted pressures separates two levels; a pressure regulator
 #                   holds a few per cent more in one direction than in the other, and both are one level
 LEVEL_GAP_MIN = 1e4  # [Pa] so that sensor noise near zero pressure makes no levels
@@ -47,6 +47,7 @@ class Event(NamedTuple):
     force_sum: float  # [N] signed: mean of a stroke, peak of a start
     estimated: float  # [N] Coulomb friction of a stroke, breakaway force of a start
     std: float  # [N] one standard deviation of the Coulomb friction
+    speed: float  # [m/s] mean of a stroke, about 0 at a start
     samples: int
     first: int  # index of the first estimate
     last: int  # index of the last estimate
@@ -179,25 +180,26 @@ def friction_by_pressure(run: RecordedRun) -> FrictionByPressure:
 def offset_of_strokes(strokes: Sequence[Event]) -> float | None:
     r"""Constant offset of the force sum [N]: least squares over all strokes, in both directions.
 
-    .. math:: F_i = o + d_i\,(f_0 + k\,p_i)
+    .. math:: F_i = o + d_i\,(f_0 + k\,p_i + c\,v_i)
 
-    where F is the force sum [N], d the direction, p the pressure [Pa] and o the offset [N]. Friction that is linear in
-    the pressure is our choice. None if the strokes do not determine it: a single direction, fewer strokes than a
-    parameter more than the parameters, or directions at pressures too different to tell offset and friction apart.
+    where F is the force sum [N], d the direction, p the pressure [Pa], v the speed [m/s] and o the offset [N]. Friction
+    that is linear in pressure and speed is our choice. None if the strokes do not determine the offset: a single
+    direction, too few strokes, or directions that friction explains nearly as well as an offset does (`LEAST_OWN`).
     """
-    if len(strokes) < 4 or len({stroke.direction for stroke in strokes}) < 2:
+    if len({stroke.direction for stroke in strokes}) < 2:
         return None
-    rows = np.array([(stroke.direction, stroke.pressure, stroke.force_sum) for stroke in strokes])
-    direction, pressure, force = rows.T
-    columns = [np.ones_like(direction), direction]
-    if len(np.unique(pressure_labels(np.sort(pressure)))) > 1:
-        columns.append(direction * pressure)
-    design = np.column_stack(columns)
-    scaled = design / np.linalg.norm(design, axis=0)
-    if not np.linalg.cond(scaled) <= LARGEST_CONDITION:
+    rows = np.array([(stroke.direction, stroke.pressure, stroke.speed, stroke.force_sum) for stroke in strokes])
+    direction, pressure, speed, force = rows.T
+    design = np.column_stack([direction, direction * pressure, direction * speed])
+    design /= np.maximum(np.linalg.norm(design, axis=0), 1e-12)
+    rank = int(np.linalg.matrix_rank(design, tol=1e-3))
+    if len(strokes) < rank + 2:
         return None
-    values, *_ = np.linalg.lstsq(scaled, force, rcond=None)
-    return float(values[0] / np.linalg.norm(design[:, 0]))
+    ones = np.ones_like(direction)
+    own, left = (y - design @ np.linalg.lstsq(design, y, rcond=1e-3)[0] for y in (ones, force))
+    if float(own @ own) < LEAST_OWN * len(strokes):
+        return None
+    return float(own @ left / (own @ own))
 
 
 def _runs(run: RecordedRun) -> list[tuple[int, IntArray]]:
@@ -249,7 +251,8 @@ def _event(
     pressure, force, std = (
         float(column[read].mean()) for column in (run.pressure, run.force_sum, run.coulomb_friction_std)
     )
-    return Event(direction, pressure, force, float(estimated.mean()), std, samples, int(index[0]), int(index[-1]))
+    speed = float(np.abs(run.velocity[read]).mean())
+    return Event(direction, pressure, force, float(estimated.mean()), std, speed, samples, int(index[0]), int(index[-1]))
 
 
 def _levels(events: Sequence[Event], offset: float | None) -> tuple[PressureLevel, ...]:

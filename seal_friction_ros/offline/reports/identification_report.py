@@ -330,8 +330,12 @@ def static_figure(shown: _FittedReadings, breakaway: FrictionReadings) -> Plot:
     """Static and dynamic friction with curves of second order (as Figure 16)."""
     static = breakaway.at.direction * (breakaway.force - shown.found.selection.fit.offsets[breakaway.source])
     unit, size = force_unit(float(static.max()))
-    stiction = float(static.mean() - shown.measured.mean())
-    figure, ax = style.new_figure(f'Static friction is {stiction:.3g} N above dynamic friction, on average', 4.2)
+    dynamic = {level: float(shown.measured[inside].mean()) for level, inside in shown.readings.levels.items()}
+    pairs = zip(static, breakaway.level.tolist(), strict=True)
+    stiction = float(np.mean([force - dynamic[level] for force, level in pairs if level in dynamic]))
+    side = 'above' if stiction >= 0.0 else 'below'
+    title = f'Static friction is {abs(stiction):.3g} N {side} dynamic friction at the same pressure, on average'
+    figure, ax = style.new_figure(title, 4.2)
     for name, pressure, friction, colour, mark in (
         ('static', breakaway.seal_pressure, static, style.ORANGE, 's'),
         ('dynamic', shown.readings.seal_pressure, shown.measured, style.BLUE, 'o'),
