@@ -33,6 +33,7 @@ LEAST_SHARE = 0.1  # of the estimate: a smaller reading gives no percentage (our
 LEAST_FRICTION = 0.02  # of the largest friction of the bag: a smaller reading is near zero, likewise (our choice)
 LEAST_BREAKAWAY = 0.5  # of the measured sliding friction: a smaller force at a start was no breakaway (our choice)
 LEAST_OWN = 0.1  # of an offset must be its own, not explained by friction: a variance inflation of 10 (our choice)
+LARGEST_REMAINDER = 0.1  # of the friction, up to which it is in proportion to the estimate (our choice)
 LEVEL_GAP = 0.05  # of the pressure: a larger step between sorted pressures separates two levels; a pressure regulator
 #                   holds a few per cent more in one direction than in the other, and both are one level
 LEVEL_GAP_MIN = 1e4  # [Pa] so that sensor noise near zero pressure makes no levels
@@ -180,26 +181,40 @@ def friction_by_pressure(run: RecordedRun) -> FrictionByPressure:
 def offset_of_strokes(strokes: Sequence[Event]) -> float | None:
     r"""Constant offset of the force sum [N]: least squares over all strokes, in both directions.
 
-    .. math:: F_i = o + d_i\,(f_0 + k\,p_i + c\,v_i)
+    .. math:: F_i = o + d_i\,(f_0 + k\,p_i + c\,v_i) \quad \text{or} \quad F_i = o + s\,d_i\,\hat F_i
 
-    where F is the force sum [N], d the direction, p the pressure [Pa], v the speed [m/s] and o the offset [N]. Friction
-    that is linear in pressure and speed is our choice. None if the strokes do not determine the offset: a single
-    direction, too few strokes, or directions that friction explains nearly as well as an offset does (`LEAST_OWN`).
+    where F is the force sum [N], d the direction, p the pressure [Pa], v the speed [m/s] and o the offset [N]. The
+    second form, friction in proportion to the estimate, is for strokes whose directions differ in pressure and speed;
+    it counts if it leaves less than `LARGEST_REMAINDER` of the friction. Both forms are our choice. None if the strokes
+    do not determine the offset: a single direction, too few strokes, or an offset that friction explains as well.
     """
     if len({stroke.direction for stroke in strokes}) < 2:
         return None
-    rows = np.array([(stroke.direction, stroke.pressure, stroke.speed, stroke.force_sum) for stroke in strokes])
-    direction, pressure, speed, force = rows.T
-    design = np.column_stack([direction, direction * pressure, direction * speed])
-    design /= np.maximum(np.linalg.norm(design, axis=0), 1e-12)
-    rank = int(np.linalg.matrix_rank(design, tol=1e-3))
-    if len(strokes) < rank + 2:
+    rows = [(s.direction, s.pressure, s.speed, s.direction * s.estimated, s.force_sum) for s in strokes]
+    direction, pressure, speed, estimated, force = np.array(rows).T
+    found = _offset_beside(np.column_stack([direction, direction * pressure, direction * speed]), force)
+    if found is not None:
+        return found[0]
+    found = _offset_beside(estimated[:, np.newaxis], force)
+    return found[0] if found is not None and found[1] <= LARGEST_REMAINDER else None
+
+
+def _offset_beside(friction: FloatArray, force: FloatArray) -> tuple[float, float] | None:
+    """Offset [N] of ``force`` [N], shape (n,), beside the columns of ``friction``, shape (n, columns).
+
+    The second value is the RMS of what remains over the RMS of the friction [-]. None if it is not determined: less
+    than `LEAST_OWN` of a constant is not explained by the friction.
+    """
+    design = friction / np.maximum(np.linalg.norm(friction, axis=0), 1e-12)
+    if len(force) < int(np.linalg.matrix_rank(design, tol=1e-3)) + 2:
         return None
-    ones = np.ones_like(direction)
-    own, left = (y - design @ np.linalg.lstsq(design, y, rcond=1e-3)[0] for y in (ones, force))
-    if float(own @ own) < LEAST_OWN * len(strokes):
+    parts = np.column_stack((np.ones_like(force), force))
+    own, left = (parts - design @ np.linalg.lstsq(design, parts, rcond=1e-3)[0]).T
+    if float(own @ own) < LEAST_OWN * len(force):
         return None
-    return float(own @ left / (own @ own))
+    offset = float(own @ left / (own @ own))
+    remainder, size = float(np.linalg.norm(left - offset * own)), float(np.linalg.norm(force - offset))
+    return offset, remainder / size if size else math.inf
 
 
 def _runs(run: RecordedRun) -> list[tuple[int, IntArray]]:
@@ -252,7 +267,8 @@ def _event(
         float(column[read].mean()) for column in (run.pressure, run.force_sum, run.coulomb_friction_std)
     )
     speed = float(np.abs(run.velocity[read]).mean())
-    return Event(direction, pressure, force, float(estimated.mean()), std, speed, samples, int(index[0]), int(index[-1]))
+    span = int(index[0]), int(index[-1])
+    return Event(direction, pressure, force, float(estimated.mean()), std, speed, samples, *span)
 
 
 def _levels(events: Sequence[Event], offset: float | None) -> tuple[PressureLevel, ...]:

@@ -26,9 +26,11 @@ from seal_friction_ros.offline.bags.bag import BagWriter
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_evaluation import (
+    Event,
     evaluate_run,
     evaluation_numbers,
     friction_by_pressure,
+    offset_of_strokes,
     pressure_labels,
 )
 
@@ -139,6 +141,18 @@ def test_the_offset_of_a_swept_log_is_removed_and_said(tmp_path):
         assert level.deviation_percent == pytest.approx(0.0, abs=6.0)  # the friction is not quite linear in pressure
     (note,) = (note for note in result.notes if 'least squares' in note)
     assert '8 of 8 pressures' in note
+
+
+def test_an_offset_comes_from_the_shape_of_the_estimate_where_directions_differ_in_pressure():
+    """Extension at high pressures, retraction at low ones: a line over pressure cannot tell the offset, a law can."""
+    pressures = [(1, 8e6 + i * 4e5) for i in range(4)] + [(-1, 1e5 + i * 4e5) for i in range(4)]
+    strokes_of = [
+        Event(side, p, 150.0 + 1.2 * side * (p / 1e5) ** 1.5, (p / 1e5) ** 1.5, 1.0, 0.02, 100, 0, 1)
+        for side, p in pressures
+    ]
+    assert offset_of_strokes(strokes_of) == pytest.approx(150.0, abs=1e-6)
+    scattered = [s._replace(estimated=50.0 + 40.0 * (i % 3)) for i, s in enumerate(strokes_of)]
+    assert offset_of_strokes(scattered) is None
 
 
 def test_an_offset_that_the_strokes_do_not_determine_is_left_in(tmp_path):
