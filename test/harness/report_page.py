@@ -28,7 +28,7 @@ class Page(HTMLParser):
             self.tables.append([])
         if tag == 'tr':
             self.tables[-1].append([])
-        if tag not in {'meta', 'img'}:
+        if tag not in {'meta', 'img', 'wbr'}:
             self._open.append([f'{tag}.{attributes["class"]}' if 'class' in attributes else tag, ''])
 
     def handle_data(self, data):

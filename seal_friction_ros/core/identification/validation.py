@@ -153,6 +153,44 @@ def prediction_uncertainty(
     return PredictionUncertainty(math.hypot(raw.relative * size, in_addition), raw.absolute * size)
 
 
+def deviations_in_std(
+    law: CandidateLaw,
+    trained: FrictionReadings,
+    tested: FrictionReadings,
+    near: ParameterValues,
+    in_addition: float = 0.0,
+    tick: Ticks = lambda _: None,
+) -> FloatArray:
+    """Deviations of ``tested`` over the standard deviation of a band that is made from ``trained`` alone [-], (n,).
+
+    The band comes from the groups of ``trained``, each left out in turn. ``in_addition`` is as of
+    `prediction_uncertainty`.
+    """
+    inner = cross_validate(law, trained, near, tick)
+    band = prediction_uncertainty(inner.predicted, inner.deviation, len(trained.groups), in_addition)
+    _, friction, deviation = _predict(law, trained, tested, near)
+    return np.asarray(np.abs(deviation) / np.maximum(band.std(friction), 1e-12))
+
+
+def deviations_of_left_out(
+    law: CandidateLaw,
+    readings: FrictionReadings,
+    near: ParameterValues,
+    in_addition: float = 0.0,
+    tick: Ticks = lambda _: None,
+) -> FloatArray:
+    """Deviations of each group over the standard deviation of a band that was made without it [-], shape (n,).
+
+    For each group, law and uncertainty come from the other groups alone, the uncertainty by leaving out each of those
+    in turn. Two groups are too few for that: the band of all readings is used.
+    """
+    ratios = np.empty(readings.count)
+    for out in readings.groups:
+        trained = readings.taken(~out) if len(readings.groups) >= 3 else readings
+        ratios[out] = deviations_in_std(law, trained, readings.taken(out), near, in_addition, tick)
+    return ratios
+
+
 def band_coverage(
     law: CandidateLaw,
     readings: FrictionReadings,
@@ -160,16 +198,5 @@ def band_coverage(
     in_addition: float = 0.0,
     tick: Ticks = lambda _: None,
 ) -> float:
-    """Share of the readings inside a 95 % band that was made without them [-].
-
-    For each group, law and uncertainty come from the other groups alone, the uncertainty by leaving out each of those
-    in turn. Two groups are too few for that: the band of all readings is used.
-    """
-    inside = 0
-    for out in readings.groups:
-        trained = readings.taken(~out) if len(readings.groups) >= 3 else readings
-        inner = cross_validate(law, trained, near, tick)
-        band = prediction_uncertainty(inner.predicted, inner.deviation, len(readings.groups) - 1, in_addition)
-        _, friction, deviation = _predict(law, trained, readings.taken(out), near)
-        inside += int(np.count_nonzero(np.abs(deviation) <= BAND_95 * band.std(friction)))
-    return inside / readings.count
+    """Share of the readings inside a 95 % band that was made without them [-], as of `deviations_of_left_out`."""
+    return float(np.mean(deviations_of_left_out(law, readings, near, in_addition, tick) <= BAND_95))

@@ -22,6 +22,7 @@ from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowe
 from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
 from seal_friction_ros.core.identification import diagnostics, fitting, runs, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
+from seal_friction_ros.core.identification.calibration import calibration
 from seal_friction_ros.core.identification.candidate_laws import (
     CandidateLaw,
     Variation,
@@ -256,6 +257,7 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
         is_stated=run_to_run is not None,
         told_apart=told_apart,
         coverage=coverage,
+        calibration=calibration(selection.law, used, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
         drifts=[] if used.are_samples else runs.drifts(everything, offsets),
         breakaway=_breakaway(data, found),

@@ -13,6 +13,7 @@ from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
 from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.identification import fitting
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
+from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
 from seal_friction_ros.core.identification.diagnostics import Outlier, changed_levels
 from seal_friction_ros.core.identification.force_correction import NOTICED, ForceCorrection
@@ -78,6 +79,7 @@ class LawQuality:
     is_stated: bool  # whether the user gave it
     told_apart: float  # [-] relative spread of laws that the data cannot tell apart, added likewise
     coverage: float  # share of the left-out readings inside a 95 % band that was made without them
+    calibration: Calibration  # share inside the band at each nominal share, within and between runs
     repeatability: float  # [-] scatter of repeated readings
     drifts: list[Drift]  # of the friction over each run
     breakaway: BreakawayFit | None  # None if no stroke starts from rest
@@ -239,6 +241,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'between_run_std': quality.between_runs.std,
             'between_runs_measured': quality.between_runs.measured,
             'told_apart_std': quality.told_apart,
+            'calibration': {name: getattr(quality.calibration, name).tolist() for name in Calibration._fields[:3]},
             'drift': [level.drift for level in levels],
             'run_in': [
                 {

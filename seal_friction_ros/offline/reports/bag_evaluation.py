@@ -8,7 +8,7 @@ of a start and of one pressure are our choice; see the constants below.
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import chain, groupby, pairwise
 from operator import itemgetter
 from statistics import fmean
@@ -29,6 +29,11 @@ SPEED_TOLERANCE = 0.2  # of the median speed of the rest: within it the rod slid
 STEADY_SHARE = 0.5  # of the rest must slide steadily; a stroke that only accelerates reaches 0.33, a sine 0.82
 MIN_STEADY_SAMPLES = 10
 MIN_REST = 0.1  # [s] a shorter stop, as at a reversal, is no rest before a breakaway
+LEAST_SHARE = 0.1  # of the estimate: a smaller reading gives no percentage (our choice)
+LEAST_FRICTION = 0.02  # of the largest friction of the bag: a smaller reading is near zero, likewise (our choice)
+LEAST_BREAKAWAY = 0.5  # of the measured sliding friction: a smaller force at a start was no breakaway (our choice)
+LEAST_OWN = 0.1  # of an offset must be its own, not explained by friction: a variance inflation of 10 (our choice)
+LARGEST_REMAINDER = 0.1  # of the friction, up to which it is in proportion to the estimate (our choice)
 LEVEL_GAP = 0.05  # of the pressure: a larger step between sorted pressures separates two levels; a pressure regulator
 #                   holds a few per cent more in one direction than in the other, and both are one level
 LEVEL_GAP_MIN = 1e4  # [Pa] so that sensor noise near zero pressure makes no levels
@@ -43,6 +48,7 @@ class Event(NamedTuple):
     force_sum: float  # [N] signed: mean of a stroke, peak of a start
     estimated: float  # [N] Coulomb friction of a stroke, breakaway force of a start
     std: float  # [N] one standard deviation of the Coulomb friction
+    speed: float  # [m/s] mean of a stroke, about 0 at a start
     samples: int
     first: int  # index of the first estimate
     last: int  # index of the last estimate
@@ -55,19 +61,26 @@ class PressureLevel:
     pressure: float  # [Pa, gauge] mean
     measured: float  # [N]
     measured_spread: float | None  # [N] standard deviation between events, offset removed; None with too few events
-    offset: float | None  # [N] removed offset: mean force sum of the two directions; None with one direction
+    offset: float | None
+    """[N] removed offset: mean force sum of the two directions; with one direction that of the bag, None if unknown"""
     estimated: float  # [N]
     estimated_std: float  # [N]
     deviation: float  # [N] estimated minus measured
-    deviation_percent: float | None  # [%] of the measured friction; None where this is not above 0 N
+    deviation_percent: float | None  # [%] of the measured friction; None where this makes no sense
+    why_no_percent: str  # reason; empty if there is a percentage
     in_band: int  # events with their own reading in the 95 % band of the estimate
     samples: int
     events: tuple[Event, ...]
 
     @property
     def both_directions(self) -> bool:
-        """Whether the offset of the force sum could be removed."""
-        return self.offset is not None
+        """Whether events in both directions give the offset of the force sum at this pressure."""
+        return len({event.direction for event in self.events}) == 2
+
+    @property
+    def has_bag_offset(self) -> bool:
+        """Whether the offset of the bag was removed, since this pressure has one direction only."""
+        return self.offset is not None and not self.both_directions
 
     def reading(self, event: Event) -> float:
         """Friction of one event [N], offset removed."""
@@ -77,6 +90,8 @@ class PressureLevel:
 @dataclass(frozen=True)
 class FrictionByPressure:
     """Comparison at every pressure level, with notes for the reader."""
+
+    offset: float | None  # [N] constant offset of the force sum by `offset_of_strokes`; None if not determined
 
     sliding: tuple[PressureLevel, ...]
     breakaway: tuple[PressureLevel, ...]
@@ -145,7 +160,8 @@ def friction_by_pressure(run: RecordedRun) -> FrictionByPressure:
     start is a rest of `MIN_REST` with a stroke after it; its force is the largest in the direction of this stroke.
 
     The measured friction of a level is half the difference of the mean force sums of the two directions, each stroke
-    with the same weight, so a constant offset of the force sum cancels.
+    with the same weight, so a constant offset of the force sum cancels. A level with one direction, as in a swept log,
+    has the offset of `offset_of_strokes` removed.
     """
     columns = (run.velocity, run.pressure, run.force_sum, run.coulomb_friction, run.coulomb_friction_std)
     usable = run.status & ~int(EXTRAPOLATED) == 0  # the inputs are good
@@ -154,8 +170,51 @@ def friction_by_pressure(run: RecordedRun) -> FrictionByPressure:
     runs = _runs(run)
     strokes = [event for motion in runs if (event := _steady_stroke(run, usable, *motion))]
     starts = [event for rest, motion in pairwise(runs) if (event := _start(run, usable, rest, motion))]
-    sliding, breakaway = _levels(strokes), _levels(starts)
-    return FrictionByPressure(sliding, breakaway, _notes(run, usable, sliding, breakaway))
+    offset = offset_of_strokes(strokes)
+    sliding, breakaway = _levels(strokes, offset), _levels(starts, offset)
+    breakaway = tuple(_checked_breakaway(level, sliding) for level in breakaway)
+    largest = max((level.measured for level in chain(sliding, breakaway)), default=0.0)
+    sliding, breakaway = (tuple(_checked_size(one, largest) for one in levels) for levels in (sliding, breakaway))
+    return FrictionByPressure(offset, sliding, breakaway, _notes(run, usable, offset, sliding, breakaway))
+
+
+def offset_of_strokes(strokes: Sequence[Event]) -> float | None:
+    r"""Constant offset of the force sum [N]: least squares over all strokes, in both directions.
+
+    .. math:: F_i = o + d_i\,(f_0 + k\,p_i + c\,v_i) \quad \text{or} \quad F_i = o + s\,d_i\,\hat F_i
+
+    where F is the force sum [N], d the direction, p the pressure [Pa], v the speed [m/s] and o the offset [N]. The
+    second form, friction in proportion to the estimate, is for strokes whose directions differ in pressure and speed;
+    it counts if it leaves less than `LARGEST_REMAINDER` of the friction. Both forms are our choice. None if the strokes
+    do not determine the offset: a single direction, too few strokes, or an offset that friction explains as well.
+    """
+    if len({stroke.direction for stroke in strokes}) < 2:
+        return None
+    rows = [(s.direction, s.pressure, s.speed, s.direction * s.estimated, s.force_sum) for s in strokes]
+    direction, pressure, speed, estimated, force = np.array(rows).T
+    found = _offset_beside(np.column_stack([direction, direction * pressure, direction * speed]), force)
+    if found is not None:
+        return found[0]
+    found = _offset_beside(estimated[:, np.newaxis], force)
+    return found[0] if found is not None and found[1] <= LARGEST_REMAINDER else None
+
+
+def _offset_beside(friction: FloatArray, force: FloatArray) -> tuple[float, float] | None:
+    """Offset [N] of ``force`` [N], shape (n,), beside the columns of ``friction``, shape (n, columns).
+
+    The second value is the RMS of what remains over the RMS of the friction [-]. None if it is not determined: less
+    than `LEAST_OWN` of a constant is not explained by the friction.
+    """
+    design = friction / np.maximum(np.linalg.norm(friction, axis=0), 1e-12)
+    if len(force) < int(np.linalg.matrix_rank(design, tol=1e-3)) + 2:
+        return None
+    parts = np.column_stack((np.ones_like(force), force))
+    own, left = (parts - design @ np.linalg.lstsq(design, parts, rcond=1e-3)[0]).T
+    if float(own @ own) < LEAST_OWN * len(force):
+        return None
+    offset = float(own @ left / (own @ own))
+    remainder, size = float(np.linalg.norm(left - offset * own)), float(np.linalg.norm(force - offset))
+    return offset, remainder / size if size else math.inf
 
 
 def _runs(run: RecordedRun) -> list[tuple[int, IntArray]]:
@@ -207,16 +266,18 @@ def _event(
     pressure, force, std = (
         float(column[read].mean()) for column in (run.pressure, run.force_sum, run.coulomb_friction_std)
     )
-    return Event(direction, pressure, force, float(estimated.mean()), std, samples, int(index[0]), int(index[-1]))
+    speed = float(np.abs(run.velocity[read]).mean())
+    span = int(index[0]), int(index[-1])
+    return Event(direction, pressure, force, float(estimated.mean()), std, speed, samples, *span)
 
 
-def _levels(events: Sequence[Event]) -> tuple[PressureLevel, ...]:
+def _levels(events: Sequence[Event], offset: float | None) -> tuple[PressureLevel, ...]:
     if not events:
         return ()
     ordered = sorted(events, key=lambda event: event.pressure)
     labels = pressure_labels(np.array([event.pressure for event in ordered])).tolist()
     levels = groupby(zip(labels, ordered, strict=True), key=itemgetter(0))
-    return tuple(_level([event for _, event in members]) for _, members in levels)
+    return tuple(_level([event for _, event in members], offset) for _, members in levels)
 
 
 def pressure_labels(pressures: FloatArray) -> IntArray:
@@ -237,16 +298,22 @@ def pressure_labels(pressures: FloatArray) -> IntArray:
     return np.concatenate(labels)
 
 
-def _level(events: Sequence[Event]) -> PressureLevel:
+def _level(events: Sequence[Event], bag_offset: float | None) -> PressureLevel:
     forces = {side: [event.force_sum for event in events if event.direction == side] for side in (1, -1)}
     means = [fmean(values) for values in forces.values() if values]
-    offset = fmean(means) if len(means) == 2 else None
+    both = len(means) == 2
+    offset = fmean(means) if both else bag_offset
     readings = np.array([event.direction * (event.force_sum - (offset or 0.0)) for event in events])
-    measured = (means[0] - means[1]) / 2.0 if offset is not None else fmean(float(r) for r in readings)
+    measured = (means[0] - means[1]) / 2.0 if both else fmean(float(r) for r in readings)
     freedom = len(events) - len(means)  # degrees of freedom
     spread = math.sqrt(float(np.sum((readings - measured) ** 2)) / freedom) if freedom > 0 else None
     pressure, estimated, std = (fmean(getattr(e, name) for e in events) for name in ('pressure', 'estimated', 'std'))
     deviation = estimated - measured
+    why_not = ''
+    if measured <= 0.0:
+        why_not = 'the measured force is against the motion'
+    elif measured < LEAST_SHARE * abs(estimated):
+        why_not = f'the measured force is below {100.0 * LEAST_SHARE:.0f} % of the estimate'
     in_band = sum(abs(e.estimated - r) <= BAND_95 * e.std for e, r in zip(events, readings, strict=True))
     return PressureLevel(
         pressure,
@@ -256,15 +323,43 @@ def _level(events: Sequence[Event]) -> PressureLevel:
         estimated,
         std,
         deviation,
-        100.0 * deviation / measured if measured > 0.0 else None,
+        None if why_not else 100.0 * deviation / measured,
+        why_not,
         int(in_band),
         sum(event.samples for event in events),
         tuple(events),
     )
 
 
+def _checked_breakaway(level: PressureLevel, sliding: Sequence[PressureLevel]) -> PressureLevel:
+    """The level without a percentage where the rod left with less than `LEAST_BREAKAWAY` of the sliding friction.
+
+    Static friction is not below dynamic friction: then friction did not hold the rod. The sliding friction is that of
+    the nearest pressure within `LEVEL_WIDTH`.
+    """
+    near = min(sliding, key=lambda other: abs(other.pressure - level.pressure), default=None)
+    if near is None or level.measured <= 0.0:
+        return level
+    is_near = abs(near.pressure - level.pressure) <= max(LEVEL_WIDTH * abs(level.pressure), 2.0 * LEVEL_GAP_MIN)
+    if not is_near or level.measured >= LEAST_BREAKAWAY * near.measured:
+        return level
+    share = f'{100.0 * LEAST_BREAKAWAY:.0f} % of the sliding friction'
+    return replace(level, deviation_percent=None, why_no_percent=f'no start from rest: the force is below {share}')
+
+
+def _checked_size(level: PressureLevel, largest: float) -> PressureLevel:
+    """The level without a percentage where its friction is near zero, below `LEAST_FRICTION` of the ``largest`` [N]."""
+    if level.why_no_percent or level.measured >= LEAST_FRICTION * largest:
+        return level
+    return replace(level, deviation_percent=None, why_no_percent='the measured friction is near zero')
+
+
 def _notes(
-    run: RecordedRun, usable: BoolArray, sliding: tuple[PressureLevel, ...], breakaway: tuple[PressureLevel, ...]
+    run: RecordedRun,
+    usable: BoolArray,
+    offset: float | None,
+    sliding: tuple[PressureLevel, ...],
+    breakaway: tuple[PressureLevel, ...],
 ) -> tuple[str, ...]:
     notes = []
     if not sliding:
@@ -274,7 +369,13 @@ def _notes(
             f'stroke needs {MIN_STEADY_SAMPLES} usable samples at nearly constant speed.'
         )
     for name, levels in (('sliding', sliding), ('breakaway', breakaway)):
-        if one_sided := _pressures_text(level for level in levels if not level.both_directions):
+        if offset is not None and (taken := sum(level.has_bag_offset for level in levels)):
+            notes.append(
+                f'At {taken} of {len(levels)} pressures the {name} friction was measured in one direction only: the '
+                f'offset of the force sum over all strokes of both directions, {offset:.4g} N by least squares, is '
+                'removed there.'
+            )
+        if one_sided := _pressures_text(level for level in levels if level.offset is None):
             notes.append(
                 f'At {one_sided} the {name} friction was measured in one direction only: the measured value is the '
                 'mean magnitude, and an offset of the force sum remains in it.'
@@ -282,6 +383,14 @@ def _notes(
         if against := _pressures_text(level for level in levels if level.measured <= 0.0):
             text = 'is against the motion: check the signs of force sum and velocity.'
             notes.append(f'At {against} the force sum of {name} {text}')
+        reasons: dict[str, list[PressureLevel]] = {}
+        for level in levels:
+            if level.why_no_percent and level.measured > 0.0:
+                reasons.setdefault(level.why_no_percent, []).append(level)
+        notes += [
+            f'At {_pressures_text(those)} there is no percentage of the {name} friction: {reason}.'
+            for reason, those in reasons.items()
+        ]
     if left_out := np.count_nonzero(~usable):
         text = 'estimates have unusable inputs and are left out of the measured friction.'
         notes.append(f'{left_out} of {len(usable)} {text}')

@@ -72,13 +72,18 @@ def _sentence(text: str) -> str:
     return f'{text[0].upper()}{text[1:]}.'
 
 
+def _mark(level: PressureLevel) -> str:
+    """Mark of a level with one direction: with the offset of the bag removed, or with the offset in the value."""
+    return ' \N{DAGGER}' if level.has_bag_offset else '' if level.both_directions else ' *'
+
+
 def _level_table(levels: Sequence[PressureLevel], events: str) -> Table:
     unit, size = force_unit(max((abs(level.estimated) for level in levels), default=0.0))
     columns: Columns = (
         ('pressure [bar]', lambda level: number(level.pressure, unit=BAR)),
         (
             f'measured [{unit}]',
-            lambda level: number(level.measured, unit=size) + ('' if level.both_directions else ' *'),
+            lambda level: number(level.measured, unit=size) + _mark(level),
         ),
         (f'spread [{unit}]', lambda level: number(level.measured_spread, unit=size)),
         (f'estimated [{unit}]', lambda level: number(level.estimated, unit=size)),

@@ -1,10 +1,12 @@
 """Report of an identification: measured friction, fitted law, and the out-of-sample error of each law."""
 
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy.stats import binom
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
@@ -14,6 +16,7 @@ from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import normal_forces
 from seal_friction_ros.core.identification.fitting import offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
@@ -28,7 +31,10 @@ from seal_friction_ros.offline.reports.page import Columns, Table, table_of, wri
 from seal_friction_ros.offline.work.seal_writer import seal_text
 
 PRIOR_ART_SEAL = 'ms28775_114_prior_art'  # the only ring with known charts
+ONE_RUN = 'one run: a prior stands in'
 PRESSURE_LABEL = 'pressure of the seals [bar, gauge]'
+_FORMULA_WIDTH = 34  # characters on a line of the ladder
+_LINE = 0.19  # [inch] height of a line of the ladder
 _DOTS = 1500  # in a scatter; more hide each other
 _DIRECTIONS = ((1.0, style.BLUE, 'extending'), (-1.0, style.ORANGE, 'retracting'))
 
@@ -159,7 +165,8 @@ def identification_figures(found: Identification) -> list[Plot]:
     """Every figure that the data allow."""
     shown = _FittedReadings(found)
     ring, breakaway = found.data.ring, found.data.prepared.breakaway
-    plots = [fitted_law_figure(shown), agreement_figure(shown), out_of_sample_figure(found), ladder_figure(found)]
+    plots = [fitted_law_figure(shown), agreement_figure(shown), calibration_figure(found)]
+    plots += [out_of_sample_figure(found), ladder_figure(found)]
     if shown.readings.are_samples:
         plots.append(velocity_cloud_figure(shown))
     if breakaway is not None:
@@ -225,6 +232,40 @@ def agreement_figure(shown: _FittedReadings) -> Plot:
     return finished('measured_against_model', figure, ax, xlim=(0.0, None), **labels)
 
 
+def calibration_figure(found: Identification) -> Plot:
+    """Share of the readings inside a band that was made without them, over its nominal share: a reliability diagram.
+
+    The grey region holds 95 % of the shares that groups of a calibrated band show at each nominal share, if the
+    readings of a group are inside or outside together (our choice): binomial quantiles over the number of groups.
+    """
+    curves = found.quality.calibration
+    nominal = 100.0 * curves.nominal
+    at_95 = int(np.searchsorted(curves.nominal, 0.95 - 1e-9))
+    figure, axes = style.new_figure(_calibration_title(curves, at_95), 4.4, ncols=2, sharex=True, sharey=True)
+    for ax, share, groups, colour, name, missing in (
+        (axes[0], curves.within_runs, curves.groups, style.BLUE, 'within runs', 'too few readings in a run'),
+        (axes[1], curves.between_runs, curves.runs, style.ORANGE, 'between runs', ONE_RUN),
+    ):
+        ax.plot([0.0, 100.0], [0.0, 100.0], color=style.BLACK, lw=1.0, label='calibrated')
+        ax.set(xlabel=f'nominal share {name} [%]', aspect='equal', xlim=(0.0, 100.0), ylim=(0.0, 101.0))
+        if np.isfinite(share).all():
+            low, high = (100.0 * binom.ppf(tail, groups, curves.nominal) / groups for tail in (0.025, 0.975))
+            band = {'color': style.LIGHT_GREY, 'alpha': 0.6, 'lw': 0, 'zorder': 0.5}
+            ax.fill_between(nominal, low, high, **band, label=f'chance, {groups} groups')
+            ax.plot(nominal, 100.0 * share, color=colour, lw=2.0, label='readings')
+        else:
+            ax.text(50.0, 20.0, missing, ha='center', va='center', color=style.GREY, backgroundcolor='white')
+    axes[0].set_ylabel('share of the readings inside [%]')
+    return finished('calibration', figure, *axes)
+
+
+def _calibration_title(curves: Calibration, at: int) -> str:
+    """Shares of the readings inside the 95 % band, where they are known."""
+    known = (('within', curves.within_runs[at]), ('between', curves.between_runs[at]))
+    parts = [f'{100.0 * share:.0f} % {name} runs' for name, share in known if np.isfinite(share)]
+    return f'95 % band holds {", ".join(parts)}' if parts else 'Calibration of the band is unknown'
+
+
 def out_of_sample_figure(found: Identification) -> Plot:
     """Residuals out of sample, over pressure and in the order of the readings."""
     used, validation = found.data.used, found.selection.validation
@@ -250,14 +291,19 @@ def ladder_figure(found: Identification) -> Plot:
     """Out-of-sample error of each law."""
     scored = [(score, 100.0 * score.validation.error) for score in found.selection.scores if score.validation]
     errors = [error for _, error in scored]
-    figure, ax = style.new_figure('Error of each law on readings left out of its fit', 1.5 + 0.33 * len(scored))
+    labels = ['\n'.join(wrap(score.law.formula, _FORMULA_WIDTH)) for score, _ in scored]
+    heights = np.array([label.count('\n') + 1.6 for label in labels])  # in lines, with a gap
+    place = (np.cumsum(heights) - 0.5 * heights).tolist()
+    title = 'Error of each law on readings left out of its fit'
+    figure, ax = style.new_figure(title, 1.3 + _LINE * float(heights.sum()))
+    figure.set_layout_engine('constrained', rect=(0.012, 0.0, 0.98, 1.0))  # the widest label is not cut off
     colours = [style.GREEN if score is found.selection.best else style.SKY for score, _ in scored]
-    bars = ax.barh(range(len(scored)), errors, color=colours, height=0.65)
+    bars = ax.barh(place, errors, color=colours, height=1.0)
     ax.bar_label(bars, labels=[f'{error:.1f} %' for error in errors], padding=4)
-    ax.set_yticks(range(len(scored)), [score.law.formula.replace(' + ', '\n+ ') for score, _ in scored])
-    ax.invert_yaxis()
+    ax.set_yticks(place, labels)
     ax.grid(visible=False, axis='y')
-    ax.set(xlim=(None, 1.12 * max(errors)), xlabel='sum of the deviations over sum of the measured friction [%]')
+    ax.set(ylim=(float(heights.sum()), 0.0), xlim=(None, 1.12 * max(errors)))
+    ax.set_xlabel('sum of the deviations over sum of the measured friction [%]')
     if found.selection.reference is None:
         return Plot('ladder', figure)
     reference = 100.0 * found.selection.reference.error
@@ -284,8 +330,12 @@ def static_figure(shown: _FittedReadings, breakaway: FrictionReadings) -> Plot:
     """Static and dynamic friction with curves of second order (as Figure 16)."""
     static = breakaway.at.direction * (breakaway.force - shown.found.selection.fit.offsets[breakaway.source])
     unit, size = force_unit(float(static.max()))
-    stiction = float(static.mean() - shown.measured.mean())
-    figure, ax = style.new_figure(f'Static friction is {stiction:.3g} N above dynamic friction, on average', 4.2)
+    dynamic = {level: float(shown.measured[inside].mean()) for level, inside in shown.readings.levels.items()}
+    pairs = zip(static, breakaway.level.tolist(), strict=True)
+    stiction = float(np.mean([force - dynamic[level] for force, level in pairs if level in dynamic]))
+    side = 'above' if stiction >= 0.0 else 'below'
+    title = f'Static friction is {abs(stiction):.3g} N {side} dynamic friction at the same pressure, on average'
+    figure, ax = style.new_figure(title, 4.2)
     for name, pressure, friction, colour, mark in (
         ('static', breakaway.seal_pressure, static, style.ORANGE, 's'),
         ('dynamic', shown.readings.seal_pressure, shown.measured, style.BLUE, 'o'),

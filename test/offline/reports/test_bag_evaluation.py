@@ -26,9 +26,11 @@ from seal_friction_ros.offline.bags.bag import BagWriter
 from seal_friction_ros.offline.bags.recorded_run import read_run
 from seal_friction_ros.offline.replay.replay import replay
 from seal_friction_ros.offline.reports.bag_evaluation import (
+    Event,
     evaluate_run,
     evaluation_numbers,
     friction_by_pressure,
+    offset_of_strokes,
     pressure_labels,
 )
 
@@ -116,6 +118,72 @@ def test_with_one_direction_the_mean_magnitude_is_used_and_said(tmp_path):
         assert not level.both_directions
         assert level.measured == pytest.approx(friction - OFFSET, rel=1e-9)  # the offset stays in
     assert any('one direction only' in note for note in result.notes)
+
+
+def swept_strokes(directions, pressures=(1e6, 1.5e6, 2.1e6, 2.8e6, 3.6e6, 4.5e6, 5.5e6, 6.6e6)):
+    """Strokes at even speed, each at a pressure of its own, in these directions one after the other, without a rest."""
+    rows = []
+    for i, pressure in enumerate(pressures):
+        direction = directions[i % len(directions)]
+        friction = actuator_friction(SEALS, pressure, pressure).coulomb_friction
+        rows += [(direction * 0.02, pressure, direction * friction + 10.0 * OFFSET)] * RATE
+    return rows
+
+
+def test_the_offset_of_a_swept_log_is_removed_and_said(tmp_path):
+    """Each pressure has one direction; an offset of a multiple of the friction comes from all strokes."""
+    result = evaluated(tmp_path, swept_strokes((1, -1)))
+    assert result.offset == pytest.approx(10.0 * OFFSET, abs=1.0)
+    assert len(result.sliding) == 8
+    for level in result.sliding:
+        assert level.has_bag_offset
+        assert level.offset == result.offset
+        assert level.deviation_percent == pytest.approx(0.0, abs=6.0)  # the friction is not quite linear in pressure
+    (note,) = (note for note in result.notes if 'least squares' in note)
+    assert '8 of 8 pressures' in note
+
+
+def test_an_offset_comes_from_the_shape_of_the_estimate_where_directions_differ_in_pressure():
+    """Extension at high pressures, retraction at low ones: a line over pressure cannot tell the offset, a law can."""
+    pressures = [(1, 8e6 + i * 4e5) for i in range(4)] + [(-1, 1e5 + i * 4e5) for i in range(4)]
+    strokes_of = [
+        Event(side, p, 150.0 + 1.2 * side * (p / 1e5) ** 1.5, (p / 1e5) ** 1.5, 1.0, 0.02, 100, 0, 1)
+        for side, p in pressures
+    ]
+    assert offset_of_strokes(strokes_of) == pytest.approx(150.0, abs=1e-6)
+    scattered = [s._replace(estimated=50.0 + 40.0 * (i % 3)) for i, s in enumerate(strokes_of)]
+    assert offset_of_strokes(scattered) is None
+
+
+def test_an_offset_that_the_strokes_do_not_determine_is_left_in(tmp_path):
+    result = evaluated(tmp_path, swept_strokes((1,)))
+    assert result.offset is None
+    assert all(level.offset is None for level in result.sliding)
+    assert any('offset of the force sum remains' in note for note in result.notes)
+
+
+def test_a_start_that_friction_did_not_hold_has_no_percentage_but_a_reason(tmp_path):
+    rows = []
+    for velocity, pressure, force in strokes(directions=(1, -1, 1, -1)):
+        held = velocity != 0.0 or pressure != LEVELS[1]  # at the second pressure something else starts the rod
+        rows.append((velocity, pressure, force if held else OFFSET + 0.05 * (force - OFFSET)))
+    result = evaluated(tmp_path, rows)
+    first, second, third = result.breakaway
+    assert first.deviation_percent == pytest.approx(0.0, abs=1e-6)
+    assert third.deviation_percent == pytest.approx(0.0, abs=1e-6)
+    assert second.deviation_percent is None
+    assert 'no start from rest' in second.why_no_percent
+    assert any('25.00 bar there is no percentage of the breakaway' in note for note in result.notes)
+    assert all(level.deviation_percent is not None for level in result.sliding)
+
+
+def test_friction_near_zero_has_no_percentage(tmp_path):
+    rows = [(v, p, f if p != LEVELS[0] or v == 0.0 else OFFSET + math.copysign(0.3, v)) for v, p, f in strokes()]
+    low, *others = evaluated(tmp_path, rows).sliding
+    assert low.deviation_percent is None
+    assert low.deviation == pytest.approx(low.estimated - 0.3)
+    assert 'below 10 % of the estimate' in low.why_no_percent
+    assert all(level.deviation_percent is not None for level in others)
 
 
 def test_without_sliding_there_is_a_note_and_no_number(tmp_path):

@@ -1,5 +1,7 @@
 """The page of an identification: every figure that the data allow, said where not, the same bytes each time."""
 
+import itertools
+
 import numpy as np
 import pytest
 from harness.report_page import checked_page
@@ -8,11 +10,19 @@ from paths import ROOT
 from seal_friction_ros.offline.bags.import_log import Samples, write_samples
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
-from seal_friction_ros.offline.reports.identification_report import write_identification_report
+from seal_friction_ros.offline.identification.results import identification_numbers
+from seal_friction_ros.offline.reports.figure_style import house_style, render
+from seal_friction_ros.offline.reports.identification_report import (
+    ONE_RUN,
+    calibration_figure,
+    ladder_figure,
+    write_identification_report,
+)
 
 THESIS = ROOT / 'data' / 'thesis' / 'friction_tests.csv'
-ALL = {'fig24_model_over_pressure', 'measured_against_model', 'residuals', 'ladder', 'fig16_static_and_dynamic',
-       'fig17_prior_art_and_tests', 'fig18_coefficient_of_friction', 'fig19_normal_force'}  # fmt: skip
+ALL = {'fig24_model_over_pressure', 'measured_against_model', 'calibration', 'residuals', 'ladder',
+       'fig16_static_and_dynamic', 'fig17_prior_art_and_tests', 'fig18_coefficient_of_friction',
+       'fig19_normal_force'}  # fmt: skip
 
 
 @pytest.fixture(scope='module')
@@ -32,7 +42,8 @@ def test_the_page_tells_the_check_values_of_the_thesis(thesis):
     page = checked_page(thesis)
     ladder = {row['law']: row for row in page.table('law')}
     assert 'no law: mean of the other readings at the same pressure' in ladder
-    assert {row[''] for row in ladder.values()} == {'', 'recommended', 'saved'}
+    marks = [mark for row in ladder.values() for mark in row[''].split(', ') if mark]
+    assert sorted(marks) == ['recommended', 'saved']
     assert page.tiles['law'] == 'physics_based'
     assert page.tiles['identified pressure'] == '0 to 68.9 bar'
     assert [row['readings'] for row in page.table('pressure [bar]')] == ['6'] * 11
@@ -90,6 +101,28 @@ def test_a_swept_log_shows_friction_over_velocity(tmp_path):
     figures = write_identification_report(found, tmp_path / 'page.html')
     assert 'friction_over_velocity.svg' in {path.name for path in figures}
     assert (tmp_path / 'page.html').stat().st_size < 3_000_000
+    with house_style():
+        _, between = calibration_figure(found).figure.axes
+    assert ONE_RUN in {text.get_text() for text in between.texts}
+    numbers = identification_numbers(found)['calibration']
+    assert set(numbers) == {'nominal', 'within_runs', 'between_runs'}
+    assert set(numbers['between_runs']) == {None}
+    assert all(0.0 <= share <= 1.0 for share in numbers['within_runs'])
+
+
+@pytest.mark.renders
+def test_labels_of_the_ladder_neither_overlap_nor_leave_the_figure(tmp_path):
+    write_samples(tmp_path / 'bag', swept(), 'rod')
+    found = identify([tmp_path / 'bag'], IdentifyOptions(), 'swept')
+    with house_style():
+        figure = ladder_figure(found).figure
+        render(figure)
+        figure.draw_without_rendering()
+        labels = figure.axes[0].get_yticklabels()
+        boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: -box.y1)
+    assert len(boxes) >= 9
+    assert min(box.x0 for box in boxes) >= 0.0
+    assert all(upper.y0 > lower.y1 for upper, lower in itertools.pairwise(boxes))
 
 
 def test_nothing_is_left_of_a_report_that_cannot_be_written(tmp_path, capsys):

@@ -98,3 +98,12 @@ def test_a_page_that_is_there_is_replaced_and_one_that_cannot_be_written_is_one_
     with pytest.raises(ValueError, match='cannot write') as error:
         write_page(tmp_path / 'page.html' / 'page.html', everything, [plot()], **values)
     assert '\n' not in str(error.value)
+
+
+def test_a_tile_breaks_a_long_name_at_its_underscores_only(everything):
+    """Inside a tile a name like that of a law is neither cut off nor broken inside a word."""
+    made = render_page(everything, {}, name='pressure_power_law_2_3_asymmetric', missing='', rows=Table((), ()))
+    assert '<div class="tile name"><b>pressure_<wbr>power_<wbr>law_<wbr>2_<wbr>3_<wbr>asymmetric</b>' in made
+    assert 'minmax(min(11rem, 100%), 1fr)' in made
+    plain = render_page(everything, {}, name='12 bar', missing='', rows=Table((), ()))
+    assert '<div class="tile"><b>12 bar</b>' in plain

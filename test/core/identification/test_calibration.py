@@ -1,0 +1,131 @@
+"""Calibration of the band: on made readings, the share inside is the nominal share, and a run effect shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.identification.calibration import (
+    NOMINAL,
+    between_runs,
+    calibration,
+    repeated_runs,
+    runs_of,
+    shares_inside,
+    within_run,
+)
+from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, Variation, candidate_laws
+from seal_friction_ros.core.identification.fitting import fit
+from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.validation import deviations_in_std
+
+LAW = next(law for law in candidate_laws(Variation()) if law.name == 'pressure_power_law_2_3')
+TRUTH = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 2.0 / 3.0}
+
+
+def strokes(runs=6, scatter=0.05, run_scatter=0.0, seed=0, pressures=5, count=8, one_pressure=False):
+    """Strokes of some runs in both directions; each run is a file, or a file for each pressure if ``one_pressure``."""
+    rng = np.random.default_rng(seed)
+    level = np.tile(np.repeat(np.arange(pressures), count), runs)
+    run = np.repeat(np.arange(runs), pressures * count)
+    source = run * pressures + level if one_pressure else run
+    direction = np.tile([1.0, -1.0], len(run) // 2)
+    at = OperatingConditions((1e5 + 1e6 * level)[:, np.newaxis], None, 0.01 * direction, direction)
+    effect = run_scatter * rng.normal(size=int(source.max()) + 1)[source]
+    shares = 1.0 + scatter * rng.normal(size=len(run)) + effect
+    return FrictionReadings(
+        at=at,
+        force=2.0 + direction * LAW.friction(at, TRUTH) * shares,
+        source=source,
+        group=level if one_pressure else run,
+        level=level,
+        names=tuple(f'run {i}' for i in np.unique(source)),
+        left_out_by='pressure' if one_pressure else 'file',
+        are_samples=False,
+    )
+
+
+def mean_shares(seeds, judged, **made):
+    """Mean over some seeds of the curve that ``judged`` gives for readings and parameters."""
+    curves = []
+    for seed in range(seeds):
+        readings = strokes(seed=seed, **made)
+        curves.append(shares_inside(np.concatenate(list(judged(readings, fit(LAW, readings).values)))))
+    return np.mean(curves, axis=0)
+
+
+def judged_within(readings, values):
+    return (within_run(LAW, run, values)[0] for run in runs_of(readings))
+
+
+def judged_between(readings, values):
+    for others, left_out in repeated_runs(readings):
+        yield between_runs(LAW, readings.taken(others), readings.taken(left_out), values)
+
+
+def test_shares_of_normal_deviations_are_the_nominal_shares():
+    shares = shares_inside(np.abs(np.random.default_rng(0).normal(size=20000)))
+    assert shares == pytest.approx(NOMINAL, abs=0.015)
+    assert np.isnan(shares_inside(np.empty(0))).all()
+    assert (NOMINAL[0], NOMINAL[-1], len(NOMINAL)) == (0.10, 0.99, 90)
+
+
+def test_with_normal_scatter_alone_both_curves_are_near_the_diagonal():
+    made = {'runs': 4, 'pressures': 8, 'count': 10}
+    assert mean_shares(2, judged_within, **made) == pytest.approx(NOMINAL, abs=0.13)
+    assert mean_shares(2, judged_between, **made) == pytest.approx(NOMINAL, abs=0.13)
+
+
+def test_with_an_effect_of_the_run_the_curve_between_runs_stays_near_the_diagonal():
+    made = {'runs': 8, 'pressures': 3, 'count': 2, 'scatter': 0.02, 'run_scatter': 0.2}
+    assert mean_shares(6, judged_between, **made) == pytest.approx(NOMINAL, abs=0.12)
+
+
+def test_with_an_effect_of_the_run_the_band_of_one_run_is_too_narrow_for_the_others():
+    shares = []
+    for seed in range(4):
+        readings = strokes(scatter=0.02, run_scatter=0.2, seed=seed, runs=4)
+        one = readings.taken(readings.group == 0)
+        one = replace(one, group=one.level, left_out_by='pressure')
+        others = readings.taken(readings.group != 0)
+        shares.append(shares_inside(deviations_in_std(LAW, one, others, fit(LAW, one).values)))
+    at_95 = float(np.mean(shares, axis=0)[np.argmin(np.abs(NOMINAL - 0.95))])
+    assert at_95 < 0.5
+
+
+def test_a_run_is_not_judged_by_the_scatter_of_another():
+    """Within runs the effect of the run cancels: the band is that of the scatter, not wider."""
+    readings = strokes(scatter=0.02, run_scatter=0.2, runs=2)
+    law_values = fit(LAW, readings).values
+    same = [within_run(LAW, run, law_values)[0] for run in runs_of(readings)]
+    quiet = strokes(scatter=0.02, runs=2)
+    alone = [within_run(LAW, run, law_values)[0] for run in runs_of(quiet)]
+    assert np.concatenate(same).mean() == pytest.approx(np.concatenate(alone).mean(), rel=0.05)
+
+
+def test_runs_at_one_pressure_each_are_repeated_where_they_share_it():
+    readings = strokes(runs=2, one_pressure=True, count=16, run_scatter=0.1)
+    found = calibration(LAW, readings, fit(LAW, readings).values)
+    assert (found.groups, found.runs) == (40, 10)
+    assert np.isfinite(found.within_runs).all()
+    assert found.between_runs[-1] == 1.0
+    alone = readings.taken((readings.source != 3) & (readings.source != 4))
+    assert len(repeated_runs(alone)) == 6  # pressures 3 and 4 are in one run only
+
+
+def test_one_run_has_no_curve_between_runs():
+    readings = replace(strokes(runs=1), left_out_by='pressure')
+    readings = replace(readings, group=readings.level)
+    found = calibration(LAW, readings, fit(LAW, readings).values)
+    assert np.isfinite(found.within_runs).all()
+    assert np.isnan(found.between_runs).all()
+    assert (found.groups, found.runs) == (5, 0)
+
+
+def test_a_stated_deviation_between_runs_makes_the_band():
+    readings = strokes(runs=3, run_scatter=0.1)
+    values = fit(LAW, readings).values
+    (others, left_out), *_ = repeated_runs(readings)
+    parts = readings.taken(others), readings.taken(left_out)
+    narrow, wide = (between_runs(LAW, *parts, values, stated).max() for stated in (0.1, 1.0))
+    assert wide < 0.3 * narrow
