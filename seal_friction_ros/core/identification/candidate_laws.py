@@ -209,7 +209,8 @@ def with_velocity_terms(base: CandidateLaw, variation: Variation) -> tuple[Candi
 def _with_exponent(law: CandidateLaw, suffix: str, exponent: float) -> CandidateLaw:
     """The pressure power law with a fixed exponent."""
     parameters = tuple(p for p in law.parameters if p.name != 'pressure_exponent')
-    name, formula = f'{law.name}_{suffix}', law.formula.replace('^m', f'^({suffix.replace("_", "/")})')
+    power = {'1': '', '2': '^2'}.get(suffix, f'^({suffix.replace("_", "/")})')
+    name, formula = f'{law.name}_{suffix}', law.formula.replace('^m', power)
     return replace(law, name=name, formula=formula, parameters=parameters, fixed={'pressure_exponent': exponent})
 
 

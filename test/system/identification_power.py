@@ -1,0 +1,110 @@
+"""How often ``identify`` finds the right kind of law: seals whose law is known, at few pressures, with noise.
+
+``python test/system/identification_power.py --draws 200``. Noise is of each reading, five in each direction at each
+pressure, or of a whole pressure, as if it was held on another day. Exit code 1 if a flat law is recommended where the
+rise exceeds four standard errors.
+"""
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.identification import diagnostics
+from seal_friction_ros.core.identification.candidate_laws import candidate_laws
+from seal_friction_ros.core.identification.prepare_readings import prepare_manual_readings
+from seal_friction_ros.core.identification.readings import FrictionReadings, ManualReadings
+from seal_friction_ros.core.identification.selection import Rise, recommended, rise_over_pressures, score_ladder
+from seal_friction_ros.offline.identification.pipeline import variation_of
+
+SEALS: dict[str, Callable[[float], float]] = {
+    '1.9 + 0.65 P': lambda p: 1.9 + 0.65 * p,
+    '2 + 0.1 P^1.5': lambda p: 2.0 + 0.1 * p**1.5,
+    '3': lambda _: 3.0,
+}
+"""Friction [N] over pressure [bar]."""
+PRESSURES = {3: (1.0, 3.0, 5.0), 4: (1.0, 3.0, 5.0, 7.0), 5: (1.0, 2.0, 3.0, 5.0, 7.0)}  # [bar]
+NOISES = (0.01, 0.03, 0.1)
+REPEATED = 5  # readings in each direction at each pressure
+REPEATS_WITHIN = 0.01  # scatter of the readings where a whole pressure is off
+
+
+def readings_of(
+    seal: str, pressures: tuple[float, ...], noise: float, of_pressure: bool, seed: int
+) -> FrictionReadings:
+    """One draw: readings in both directions, with a relative noise of each reading or of each pressure."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for pressure in pressures:
+        level = 1.0 + (noise * rng.normal() if of_pressure else 0.0)
+        for direction in (1, -1) * REPEATED:
+            scatter = 1.0 + (REPEATS_WITHIN if of_pressure else noise) * rng.normal()
+            rows.append((pressure * BAR, direction, SEALS[seal](pressure) * level * scatter))
+    pressure, direction, friction = np.array(rows).T
+    test, unknown = np.zeros(len(rows), dtype=np.int64), np.full(len(rows), np.nan)
+    manual = ManualReadings('draw', test, pressure, direction.astype(np.int64), friction, unknown)
+    return prepare_manual_readings([manual], [], 1).readings
+
+
+def law_of(readings: FrictionReadings) -> tuple[str, Rise | None, bool]:
+    """Recommended law, rise over the pressures, and whether a pressure was taken for an outlier."""
+    laws = candidate_laws(variation_of(readings))
+    outlier = diagnostics.outlying_level([law for law in laws if law.fixed], readings)
+    if outlier is not None:
+        readings = readings.taken(readings.level != outlier.level)
+        level = np.unique(readings.level, return_inverse=True)[1]
+        readings = replace(readings, level=level, group=level)
+    rise, variation = rise_over_pressures(readings), variation_of(readings)
+    return (
+        recommended(score_ladder(candidate_laws(variation), readings, variation), rise).law.name,
+        rise,
+        outlier is not None,
+    )
+
+
+def campaign(draws: int) -> Iterator[tuple[list[str], int]]:
+    """One row a case: its texts, and how often a flat law was recommended against four standard errors."""
+    for of_pressure in (False, True):
+        for seal in SEALS:
+            for count, pressures in PRESSURES.items():
+                for noise in NOISES:
+                    found = [law_of(readings_of(seal, pressures, noise, of_pressure, seed)) for seed in range(draws)]
+                    flat = [name == 'constant_coulomb' for name, _, _ in found]
+                    wrong = sum(
+                        is_flat and rise is not None and rise.rise > 4.0 * rise.standard_error
+                        for is_flat, (_, rise, _) in zip(flat, found, strict=True)
+                    )
+                    right = np.mean(flat) if seal == '3' else 1.0 - np.mean(flat)
+                    names = Counter(name.removeprefix('pressure_power_law_') for name, _, _ in found)
+                    texts = [
+                        'pressure' if of_pressure else 'reading', seal, str(count), f'{100.0 * noise:g}',
+                        f'{100.0 * right:.1f}', f'{100.0 * np.mean([out for _, _, out in found]):.1f}', str(wrong),
+                        ', '.join(f'{name} {n}' for name, n in names.most_common()),
+                    ]  # fmt: skip
+                    yield texts, wrong
+
+
+def main() -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--draws', type=int, default=200)
+    heads = ('noise of each', 'friction [N]', 'pressures', 'noise [%]', 'right kind [%]', 'outlier [%]', 'flat', 'laws')
+    table, wrong = Table(*heads), 0
+    for texts, bad in campaign(parser.parse_args().draws):
+        table.add_row(*texts)
+        wrong += bad
+    Console(width=150).print(table)
+    return 1 if wrong else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

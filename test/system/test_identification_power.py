@@ -1,0 +1,9 @@
+"""The campaign of known seals, with two draws a case."""
+
+from system.identification_power import campaign
+
+
+def test_no_flat_law_where_friction_rises_by_four_standard_errors():
+    rows = list(campaign(2))
+    assert len(rows) == 54
+    assert not any(wrong for _, wrong in rows)
