@@ -407,11 +407,11 @@ def test_a_fit_to_collinear_data_is_ill_conditioned_and_trades_its_parameters():
     assert np.diag(tied.correlation) == pytest.approx(np.ones(3))
 
 
-@pytest.mark.parametrize('level', [0, 2, 3])
-def test_the_one_pressure_that_disagrees_is_the_outlier(level):
+@pytest.mark.parametrize(('level', 'factor'), [(0, 2.5), (2, 1.7), (3, 1.7)])  # below all others it is an extrapolation
+def test_the_one_pressure_that_disagrees_is_the_outlier(level, factor):
     laws = [law for law in BASES if law.name.startswith('pressure_power_law_')]
     readings = noted(scatter=0.03, pressures=5, law=ELASTIC, values=POWER | {'pressure_exponent': 2.0 / 3.0})
-    force = np.where(readings.level == level, 1.7 * readings.force, readings.force)
+    force = np.where(readings.level == level, factor * readings.force, readings.force)
     spoiled = FrictionReadings(**{**vars(noted(pressures=5)), 'force': force})
     assert outlying_level(laws, spoiled, 0.04).level == level
     assert outlying_level(laws, readings, 0.04) is None
