@@ -188,12 +188,13 @@ def variation_of(readings: FrictionReadings) -> Variation:
     for inside in readings.levels.values():
         for side in (-1.0, 1.0):
             of_side = speed[inside & (readings.at.direction == side)]
-            faster.append(bool(len(of_side) > 1 and of_side.max() > SPEEDS_DIFFER * of_side.min()))
+            if len(of_side) > 1:
+                faster.append(bool(of_side.max() > SPEEDS_DIFFER * of_side.min()))
     several = [len(np.unique(readings.level[readings.source == source])) > 1 for source in np.unique(readings.source)]
     levels = len(readings.levels)
     return Variation(
         pressures=3 if has_pressures(readings) else min(levels, 2) if _is_wide(readings) else 1,
-        speeds=bool(np.isfinite(speed).all()) and float(np.mean(faster)) > 0.5,
+        speeds=bool(np.isfinite(speed).all()) and float(np.mean(faster or [False])) > 0.5,
         asymmetry=any(several) and all(len(index) for index in readings.two_sided),
         exponent=readings.are_samples or levels >= FEWEST_PRESSURES_FOR_EXPONENT,
     )
