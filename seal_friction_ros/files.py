@@ -8,8 +8,9 @@ from typing import Any
 
 import yaml
 
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import MOUNTING, Configuration, SealSelection, mounted
-from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import (
     FRICTION_ESTIMATOR_PARAMETERS,
@@ -124,7 +125,10 @@ def config_path(kind: str, name: str) -> Path:
 
 
 def load_configuration(
-    selection: SealSelection, settings: EstimatorSettings, feedforward: FeedForwardSettings = DEFAULT_FEEDFORWARD
+    selection: SealSelection,
+    settings: EstimatorSettings,
+    feedforward: FeedForwardSettings = DEFAULT_FEEDFORWARD,
+    adaptation: AdaptationSettings = DEFAULT_ADAPTATION,
 ) -> Configuration:
     """Configuration with the seal files that ``selection`` names.
 
@@ -134,7 +138,7 @@ def load_configuration(
     paths = [config_path('seals', name) for name in selection.seals]
     documents = [read_yaml(path) for path in paths]
     try:
-        configuration = Configuration(*mounted(selection, documents), settings, feedforward)
+        configuration = Configuration(*mounted(selection, documents), settings, feedforward, adaptation)
         configuration.parameters()
     except ValueError as error:
         raise ValueError(f'{", ".join(sorted({str(p) for p in paths}))}: {error}') from None
@@ -165,8 +169,8 @@ def default_configuration() -> Configuration:
     return load_configuration(SealSelection(), EstimatorSettings())
 
 
-def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, FeedForwardSettings]:
-    """Seals, estimator and feed-forward from a ROS parameter file of ``friction_estimator``.
+def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, FeedForwardSettings, AdaptationSettings]:
+    """Seals, estimator, feed-forward and adaptation from a ROS parameter file of ``friction_estimator``.
 
     The sections ``friction_estimator``, ``*`` and ``**`` of any namespace count, and the only section of a file
     whatever its name. Later sections override earlier ones. All parameters of the node are checked.
@@ -191,7 +195,7 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, F
     for group in groups:
         given = {field: values[name] for name, field in group.names().items() if name in values}
         made[group.record_type] = from_mapping(group.record_type, given, str(path))
-    return made[SealSelection], made[EstimatorSettings], made[FeedForwardSettings]
+    return made[SealSelection], made[EstimatorSettings], made[FeedForwardSettings], made[AdaptationSettings]
 
 
 def unknown_parameters(node: str, names: Iterable[str]) -> str:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
@@ -261,7 +262,12 @@ def test_a_parameter_file_gives_selection_and_settings_of_any_node_name(written)
     path = written(
         '/ns/some_node:\n  ros__parameters:\n    seals: [x]\n    seal_chambers: [b]\n    stick_velocity: 0\n'
     )
-    expected = (SealSelection(('x',), ('b',)), EstimatorSettings(stick_velocity=0.0), FeedForwardSettings())
+    expected = (
+        SealSelection(('x',), ('b',)),
+        EstimatorSettings(stick_velocity=0.0),
+        FeedForwardSettings(),
+        AdaptationSettings(),
+    )
     assert load_parameter_file(path) == expected
 
 
@@ -272,7 +278,7 @@ def test_settings_of_the_feed_forward_may_be_nested_or_dotted_as_in_ros(written,
 
 
 def test_the_shipped_parameter_file_holds_the_defaults():
-    expected = (SealSelection(), EstimatorSettings(), FeedForwardSettings())
+    expected = (SealSelection(), EstimatorSettings(), FeedForwardSettings(), AdaptationSettings())
     assert load_parameter_file(ROOT / 'config' / 'friction_estimator.yaml') == expected
 
 
@@ -289,7 +295,7 @@ def test_the_shipped_parameter_file_holds_the_defaults():
 )
 def test_parameters_of_the_node_that_a_replay_does_not_need_are_accepted(written, others):
     path = written(f'/**:\n  ros__parameters: {{{others}, use_stiction: false}}\n')
-    expected = (SealSelection(), EstimatorSettings(use_stiction=False), FeedForwardSettings())
+    expected = (SealSelection(), EstimatorSettings(use_stiction=False), FeedForwardSettings(), AdaptationSettings())
     assert load_parameter_file(path) == expected
 
 

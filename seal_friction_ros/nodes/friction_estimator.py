@@ -12,6 +12,7 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import (
     PLACEHOLDER_WARNING,
     Configuration,
@@ -77,12 +78,13 @@ class FrictionEstimator(ManagedNode):
         self._recording = Recording(self.get_fully_qualified_name())
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
+        self.create_service(Trigger, '~/reset_adaptation', self._on_reset_adaptation)
 
     # --- lifecycle ---
 
     def make(self) -> None:
         """Read the seal files; create publishers and subscriptions."""
-        settings = self.settings(EstimatorSettings), self.settings(FeedForwardSettings)
+        settings = map(self.settings, (EstimatorSettings, FeedForwardSettings, AdaptationSettings))
         configuration = load_configuration(self.settings(SealSelection), *settings)
         if configuration.has_placeholder:
             self.get_logger().warning(PLACEHOLDER_WARNING)
@@ -275,8 +277,12 @@ class FrictionEstimator(ManagedNode):
     def on_change(self) -> None:
         """Apply changed settings, between two samples."""
         self._refuse_inputs(self._watch.duplicate_publishers())
-        settings, feedforward = self.settings(EstimatorSettings), self.settings(FeedForwardSettings)
-        changed = replace(self._configuration, settings=settings, feedforward=feedforward)
+        changed = replace(
+            self._configuration,
+            settings=self.settings(EstimatorSettings),
+            feedforward=self.settings(FeedForwardSettings),
+            adaptation=self.settings(AdaptationSettings),
+        )
         if changed == self._configuration:
             return
         self._configuration = changed
@@ -315,6 +321,17 @@ class FrictionEstimator(ManagedNode):
         outcome = self._recording.stop()
         response.success = bool(outcome) and not self._recording.failure
         response.message = outcome or 'not recording'
+        return response
+
+    def _on_reset_adaptation(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Forget what the adaptation has learnt."""
+        del request
+        response.success = self.active
+        response.message = 'scale 1, offset 0 N' if self.active else 'not active: nothing is learnt'
+        if self.active:
+            known = self._state.estimator._replace(adaptation=NOT_ADAPTED)
+            self._state = self._state._replace(estimator=known)
+            self._publish_configuration()  # a replay forgets at the same message
         return response
 
     # --- diagnostics ---

@@ -17,6 +17,7 @@ from rcl_interfaces.srv import DescribeParameters, SetParametersAtomically
 from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
@@ -232,7 +233,12 @@ def test_every_parameter_of_the_node_is_accepted_in_a_parameter_file(nested: boo
         branch[leaf] = value
     path = tmp_path / 'parameters.yaml'
     path.write_text(yaml.safe_dump({'/friction_estimator': {'ros__parameters': tree}}))
-    assert load_parameter_file(path) == (SealSelection(), EstimatorSettings(), FeedForwardSettings())
+    assert load_parameter_file(path) == (
+        SealSelection(),
+        EstimatorSettings(),
+        FeedForwardSettings(),
+        AdaptationSettings(),
+    )
 
 
 def test_names_are_relative_so_namespaces_and_remapping_work():

@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, get_type_hints
 
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
+from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorParameters, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
 from seal_friction_ros.core.estimation.records import Force, Pressure
@@ -115,6 +116,7 @@ class Configuration:
     seal_documents: tuple[Mapping[str, Any], ...]
     settings: EstimatorSettings
     feedforward: FeedForwardSettings
+    adaptation: AdaptationSettings = DEFAULT_ADAPTATION
 
     def __post_init__(self) -> None:
         if self.selection.seal_chambers == MOUNTING:
@@ -132,7 +134,7 @@ class Configuration:
             ValueError: A seal document is not valid.
         """
         seals = mount_seals(self.seal_documents, self.selection.seal_chambers)
-        return PipelineParameters(EstimatorParameters(self.settings, seals), self.feedforward)
+        return PipelineParameters(EstimatorParameters(self.settings, seals, self.adaptation), self.feedforward)
 
 
 ALGORITHM_VERSION = 2
@@ -174,6 +176,7 @@ def snapshot_text(snapshot: Snapshot) -> str:
         'seal_documents': configuration.seal_documents,
         'settings': dataclasses.asdict(configuration.settings),
         'feedforward': dataclasses.asdict(configuration.feedforward),
+        'adaptation': dataclasses.asdict(configuration.adaptation),
         'state': _encoded_record(state),
     }
     if recorded is not None:
@@ -201,6 +204,7 @@ def parse_snapshot(text: str) -> Snapshot:
             tuple(document['seal_documents']),
             _settings(EstimatorSettings, document['settings'], version, 'configuration: settings'),
             _settings(FeedForwardSettings, document['feedforward'], version, 'configuration: feedforward'),
+            from_mapping(AdaptationSettings, document.get('adaptation', {}), 'configuration: adaptation'),
         )
         state = _state(configuration, document['state'], version)
         return Snapshot(configuration, state, version, _recorded(document.get('recorded'), version))
@@ -245,7 +249,8 @@ def _state(configuration: Configuration, document: Any, version: int) -> Pipelin
         return init(configuration.parameters())._replace(
             pressure=pressure, force=force, refused=bool(document['refused'])
         )
-    state: PipelineState = _parsed(PipelineState, document)
+    estimator = {'adaptation': _encoded_record(NOT_ADAPTED)} | document['estimator']  # older bags are without it
+    state: PipelineState = _parsed(PipelineState, document | {'estimator': estimator})
     if not all(map(_is_finite, (state.estimator, state.feedforward, state.friction, state.reference))):
         raise ValueError('configuration: a number in the state is not finite')
     return state

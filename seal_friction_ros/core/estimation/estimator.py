@@ -9,6 +9,15 @@ import math
 from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple
 
+from seal_friction_ros.core.estimation.adaptation import (
+    NOT_ADAPTED,
+    AdaptationSettings,
+    AdaptationState,
+    Slide,
+    adapt,
+    disagrees,
+    with_scale,
+)
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
     SETTLING,
@@ -16,6 +25,7 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     condition_velocity,
 )
 from seal_friction_ros.core.estimation.records import (
+    EXTRAPOLATED,
     NEVER,
     NO_FORCE,
     NO_PRESSURE,
@@ -41,7 +51,7 @@ from seal_friction_ros.core.friction.force_sum_correction import (
     one_correction,
 )
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, MotionLimits, motion_limits
-from seal_friction_ros.core.friction.states import UNKNOWN, StateFriction, is_at_rest, state_friction
+from seal_friction_ros.core.friction.states import SLIDING, UNKNOWN, StateFriction, is_at_rest, state_friction
 
 
 @dataclass(frozen=True)
@@ -125,6 +135,9 @@ class EstimatorSettings:
             )
 
 
+DEFAULT_ADAPTATION = AdaptationSettings()
+
+
 @dataclass(frozen=True)
 class EstimatorParameters:
     """Settings of the estimator and the seals of the actuator.
@@ -141,10 +154,18 @@ class EstimatorParameters:
         'force_sum_correction',
         'limits_motion',
         'motion_limits',
+        'adaptation',
+        'adapts',
+        'uses_scale',
     )
 
     settings: EstimatorSettings
     seals: tuple[MountedSeal, ...]
+    adaptation: AdaptationSettings = DEFAULT_ADAPTATION
+    adapts: bool = field(init=False, repr=False, compare=False)
+    """whether scale and offset are learnt"""
+    uses_scale: bool = field(init=False, repr=False, compare=False)
+    """whether the friction has the scale"""
     seal_numbers: tuple[SealNumbers, ...] = field(init=False, repr=False, compare=False)
     depends_on_velocity: bool = field(init=False, repr=False, compare=False)
     """whether the sliding friction of a seal does"""
@@ -168,6 +189,8 @@ class EstimatorParameters:
             'force_sum_correction': correction or NO_CORRECTION,
             'limits_motion': any(motion != ANY_MOTION for motion in motions),
             'motion_limits': motion_limits(motions),
+            'adapts': self.adaptation.mode != 'off',
+            'uses_scale': self.adaptation.mode == 'on',
         }
         for name, value in derived.items():
             object.__setattr__(self, name, value)
@@ -195,6 +218,7 @@ class EstimatorState(NamedTuple):
     leapt_force: Force  # likewise
     leapt_velocity: Speed  # likewise
     motion: ConditionedVelocity  # of the usable velocities
+    adaptation: AdaptationState = NOT_ADAPTED
 
 
 class Observation(NamedTuple):
@@ -237,6 +261,8 @@ _MOTION_UNCERTAIN = int(Status.MOTION_UNCERTAIN)
 _FASTER_THAN_IDENTIFIED = int(Status.FASTER_THAN_IDENTIFIED)
 _SLOWER_THAN_IDENTIFIED = int(Status.SLOWER_THAN_IDENTIFIED)
 _DIRECTION_NOT_IDENTIFIED = int(Status.DIRECTION_NOT_IDENTIFIED)
+_MODEL_DISAGREES = int(Status.MODEL_DISAGREES)
+_EXTRAPOLATED = int(EXTRAPOLATED)
 
 NO_VELOCITY = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
 """Status bits of a velocity that is not used."""
@@ -280,7 +306,63 @@ def step(
     if not seen.status & _PRESSURE_MISSING:
         pressure = state.pressure
         friction = friction_of_seals(parameters.seal_numbers, pressure.chamber_a, pressure.chamber_b, seen.velocity)
-    return state, estimate_of(parameters, seen, friction)
+    if not parameters.adapts:
+        return state, estimate_of(parameters, seen, friction)
+    return _adapted_step(parameters, state, seen, friction)
+
+
+@compilable
+def _adapted_step(
+    parameters: EstimatorParameters, state: EstimatorState, seen: Observation, friction: ActuatorFriction
+) -> tuple[EstimatorState, FrictionEstimate]:
+    """Second half of a step with adaptation: estimate by what was learnt before, then learn from this sample."""
+    settings, known = parameters.adaptation, state.adaptation
+    learnt = known.learnt
+    estimate = estimate_of(parameters, seen, with_scale(friction, learnt, parameters.uses_scale))
+    stamp, coulomb, std, breakaway, acting, kind, direction, status, input_age, _, _, _, _ = estimate
+    is_usable, is_identified = not status & ~_EXTRAPOLATED, status == 0
+    if disagrees(settings, learnt, friction, parameters.uses_scale, seen.velocity == 0.0):
+        status |= _MODEL_DISAGREES
+    law = friction.coulomb_friction + friction.velocity_friction
+    pressure = state.pressure
+    slide = Slide(
+        stamp,
+        seen.velocity,
+        seen.force_sum,
+        law,
+        friction.coulomb_friction_std,
+        pressure.chamber_a,
+        pressure.chamber_b,
+        is_usable,
+        is_identified,
+    )
+    known, residual = adapt(settings, known, slide)
+    if kind != SLIDING or status & _NO_FORCE_SUM:
+        residual = 0.0
+    elif not parameters.uses_scale:
+        residual += (learnt.scale - 1.0) * law * direction
+    scale_std = learnt.scale_std
+    if scale_std < 0.0:
+        scale_std = std / law if law > 0.0 else 0.0
+    last, at_rest, _, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, _ = state
+    state = EstimatorState(
+        last, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known
+    )
+    return state, FrictionEstimate(
+        stamp,
+        coulomb,
+        std,
+        breakaway,
+        acting,
+        kind,
+        direction,
+        status,
+        input_age,
+        learnt.scale,
+        scale_std,
+        learnt.offset,
+        residual,
+    )
 
 
 @compilable
@@ -294,7 +376,7 @@ def assess_inputs(
     """
     # One unpacking takes a quarter of the time of an attribute each.
     stamp, given, newest_pressure, newest_force, refused, stamp_age = sample
-    last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion = state
+    last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known = state
     settings = parameters.settings
     status = _INPUT_REFUSED if refused else 0
     if last_stamp != NEVER and stamp <= last_stamp:
@@ -334,7 +416,7 @@ def assess_inputs(
         if not at_rest or (uncertain and motion.velocity * force_sum < 0.0):
             sliding_velocity = motion.velocity
     state = EstimatorState(
-        stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion
+        stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known
     )
     return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
 
@@ -389,6 +471,10 @@ def estimate_of(parameters: EstimatorParameters, seen: Observation, friction: Ac
         acting.direction,
         status,
         input_age,
+        1.0,  # compiled code takes no defaults
+        0.0,
+        0.0,
+        0.0,
     )
 
 

@@ -61,6 +61,7 @@ class Layout(NamedTuple):
     record: type  # named tuple: the stamp [ns], the numbers in the order of the message, and for some the frame name
     codes: str  # type of each number as of `struct`: d float64, I uint32, B uint8, b int8
     check: Callable[[Any], object] = bool  # raises ValueError for a record that is not valid
+    older_numbers: int = 0  # how many numbers the message had before it grew; 0: it never grew
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -82,11 +83,10 @@ class Layout(NamedTuple):
         """Size of all numbers [bytes]."""
         return self.offsets[-1] + struct.calcsize(self.codes[-1])
 
-    @property
-    def body(self) -> str:
-        """Format of the numbers for `struct`, with the padding between them."""
+    def body(self, count: int | None = None) -> str:
+        """Format of the numbers for `struct`, of the first ``count`` or of all, with the padding between them."""
         text, end = '', 0
-        for code, offset in zip(self.codes, self.offsets, strict=True):
+        for code, offset in list(zip(self.codes, self.offsets, strict=True))[:count]:
             text += f'{offset - end}x{code}' if offset > end else code
             end = offset + struct.calcsize(code)
         return text
@@ -99,9 +99,15 @@ LAYOUTS = (
     Layout(POSITION_TYPE, Position, 'd'),
     Layout(REFERENCE_TYPE, ServoReference, 'ddd'),
     Layout(TICK_TYPE, WatchdogTick, 'd'),
-    Layout(ESTIMATE_TYPE, FrictionEstimate, 'ddddBbId', lambda estimate: FrictionState(estimate.state)),
+    Layout(ESTIMATE_TYPE, FrictionEstimate, 'ddddBbIddddd', lambda estimate: FrictionState(estimate.state), 8),
     Layout(FEEDFORWARD_TYPE, FeedForward, 'ddI'),
 )
+
+GROWN = {
+    layout.message_type: layout.size - struct.calcsize('<' + layout.body(layout.older_numbers or None))
+    for layout in LAYOUTS
+}
+"""By how many bytes each message is longer than it was; what it had before is its beginning."""
 
 LONGEST_FRAME = 1024  # [bytes] our choice; a longer frame name is not valid
 SECOND = 1_000_000_000  # [ns]
@@ -135,6 +141,8 @@ def _decode(layout: Layout, body: str, keeps_frame: bool, data: bytes) -> Any:
     if not 0 <= length <= LONGEST_FRAME or not 0 <= nanoseconds < SECOND:
         raise ValueError(f'header with {nanoseconds} ns and a frame name of {length} bytes is not valid')
     known = _struct(length, body)
+    if len(data) < known.size and layout.older_numbers:
+        known = _struct(length, layout.body(layout.older_numbers))
     if not known.size <= len(data) <= known.size + 3:  # some writers pad the whole to a multiple of 4
         raise ValueError(f'{len(data)} bytes where the message has {known.size}')
     fields = known.unpack_from(data)
@@ -150,7 +158,7 @@ def _keeps_frame(layout: Layout) -> bool:
     return 'frame_id' in layout.record.__annotations__
 
 
-_BODIES = {layout.record: (layout.body, _keeps_frame(layout)) for layout in LAYOUTS}
+_BODIES = {layout.record: (layout.body(), _keeps_frame(layout)) for layout in LAYOUTS}
 _TYPES = {layout.record: layout.message_type for layout in LAYOUTS}
 
 
@@ -188,7 +196,7 @@ def decode_text(data: bytes) -> str:
 
 
 DECODERS: dict[str, Callable[[bytes], Any]] = {
-    **{layout.message_type: partial(_decode, layout, layout.body, _keeps_frame(layout)) for layout in LAYOUTS},
+    **{layout.message_type: partial(_decode, layout, layout.body(), _keeps_frame(layout)) for layout in LAYOUTS},
     CONFIGURATION_TYPE: decode_text,
 }
 """Message type -> its decoder: bytes to record. Raises ValueError for bytes that are not such a message."""

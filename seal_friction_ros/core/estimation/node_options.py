@@ -6,6 +6,7 @@ the tables in docs/interfaces.md (``tools/make_docs.py``) follow from the table.
 
 from dataclasses import dataclass
 
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
@@ -102,11 +103,15 @@ class RecordingOptions:
 FEEDFORWARD_PREFIX = 'feedforward.'
 """Start of the names of the feed-forward parameters."""
 
+ADAPTATION_PREFIX = 'adaptation.'
+"""Start of the names of the parameters of the adaptation."""
+
 FRICTION_ESTIMATOR_PARAMETERS = (
     ParameterGroup(StartOptions),
     ParameterGroup(SealSelection),
     ParameterGroup(EstimatorSettings),
     ParameterGroup(FeedForwardSettings, FEEDFORWARD_PREFIX),
+    ParameterGroup(AdaptationSettings, ADAPTATION_PREFIX),
     ParameterGroup(InputOptions),
     ParameterGroup(RecordingOptions),
 )

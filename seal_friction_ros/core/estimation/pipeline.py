@@ -271,7 +271,10 @@ def _feed_forward(
         ground = -1.0
     if ground >= 0.0 and parameters.estimator.depends_on_velocity and not math.isnan(velocity):
         seals, used = parameters.estimator.seal_numbers, known.pressure
-        ground += friction_of_seals(seals, used.chamber_a, used.chamber_b, velocity).velocity_friction
+        added = friction_of_seals(seals, used.chamber_a, used.chamber_b, velocity).velocity_friction
+        if parameters.estimator.uses_scale:
+            added *= known.adaptation.learnt.scale
+        ground += added
         ground = max(ground, 0.0)
     guided, compensation = feedforward_step(settings, guided, stamp, received, ground, velocity)
     send(emit, compensation, frame_id)

@@ -37,6 +37,7 @@ class Status(IntFlag):
     FASTER_THAN_IDENTIFIED = 262144
     SLOWER_THAN_IDENTIFIED = 524288
     DIRECTION_NOT_IDENTIFIED = 1048576
+    MODEL_DISAGREES = 4194304
 
 
 EXTRAPOLATED = (
@@ -123,6 +124,10 @@ class FrictionEstimate(NamedTuple):
     direction: int  # -1, 0 or 1
     status: int  # bits of `Status`
     input_age: float  # [s] age of the older of pressure and force in use; -1.0 while one is missing
+    adaptation_scale: float = 1.0  # [-] friction of the machine over that of the seal file; 1.0 until it is learnt
+    adaptation_scale_std: float = 0.0  # [-] its standard deviation; 0.0 without adaptation
+    adaptation_offset: float = 0.0  # [N] part of the force sum that does not change sign with the direction
+    residual: float = 0.0  # [N] force sum less inertia, ``friction_force`` and offset; 0.0 at rest
 
 
 NO_ESTIMATE = FrictionEstimate(NEVER, 0.0, 0.0, 0.0, 0.0, UNKNOWN, 0, 0, -1.0)

@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
-from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE
+from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE, GROWN
 
 LONGEST_QUEUE = 100_000  # replayed answers that may wait for a recorded one; bounds memory if recording has stopped
 
@@ -65,21 +65,28 @@ class AnswerStream:
         self.recorded = self.differing = 0
         self.first = ''
         self._discarded = 0
+        self._size: int | None = None  # of the recorded messages, if their type has grown since
 
     def add_replayed(self, data: bytes) -> None:
         """Queue a replayed answer; the oldest one is discarded when the queue is longer than `LONGEST_QUEUE`."""
-        self.pending.append(data)
+        self.pending.append(data[: self._size])
         if len(self.pending) > LONGEST_QUEUE:
             self.pending.popleft()
             self._discarded += 1
 
     def compare_recorded(self, data: bytes) -> None:
-        """Compare a recorded answer with the replayed ones that wait."""
+        """Compare a recorded answer with the replayed ones that wait.
+
+        A message that was recorded before its type grew has fewer bytes: what it has must be the same.
+        """
         self.recorded += 1
         pending, name = self.pending, f'{_kind(self.type_name)} {self.recorded}'
         if self._discarded:
             self._count_difference(lambda: f'{name}: the ones before it were not recorded', self._discarded)
             self._discarded = 0
+        if self._size is None and pending and len(data) == len(pending[0]) - GROWN[self.type_name]:
+            self._size = len(data)
+            pending = self.pending = deque(answer[: self._size] for answer in pending)
         while data in islice(pending, 1, None) and data != pending[0]:  # some were not recorded
             pending.popleft()
             self._count_difference(lambda: f'{name}: the ones before it were not recorded')

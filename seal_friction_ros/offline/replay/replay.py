@@ -15,7 +15,7 @@ from seal_friction_ros.core.estimation.configuration import (
     snapshot_text,
     snapshot_version,
 )
-from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
@@ -48,15 +48,15 @@ def chosen_configuration(params: Path | None, seal: Path | None) -> Configuratio
     """
     if params is None and seal is None:
         return None
-    selection, feedforward = SealSelection(), FeedForwardSettings()
+    selection, feedforward, adaptation = SealSelection(), FeedForwardSettings(), DEFAULT_ADAPTATION
     settings = EstimatorSettings(
         stamp_age_max=0.0
     )  # [s] off: stamps of a bag that was played are older than its receipt
     if params:
-        selection, settings, feedforward = load_parameter_file(params)
+        selection, settings, feedforward, adaptation = load_parameter_file(params)
     if seal:
         selection = with_seal(selection, str(seal))
-    return load_configuration(selection, settings, feedforward)
+    return load_configuration(selection, settings, feedforward, adaptation)
 
 
 class Step(NamedTuple):

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import struct
+from typing import get_type_hints
 
 import pytest
 from harness.answers import receive_one
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationState
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, ConditionedVelocity
 from seal_friction_ros.core.estimation.configuration import (
     Configuration,
@@ -81,6 +83,14 @@ conditioned = st.just(NOT_CONDITIONED) | st.builds(
     usable,
     st.integers(0, 10),
 )
+
+
+def records(kind: type) -> st.SearchStrategy:
+    """A record of numbers and of such records, every number of it usable."""
+    of_type = {float: usable, int: st.integers(-(2**62), 2**62)}
+    return st.builds(kind, *(of_type.get(hint) or records(hint) for hint in get_type_hints(kind).values()))
+
+
 states = st.builds(
     PipelineState,
     st.builds(
@@ -89,6 +99,7 @@ states = st.builds(
         st.booleans(),
         *[usable_pressures, usable_forces, usable_speeds] * 2,
         conditioned,
+        st.just(NOT_ADAPTED) | records(AdaptationState),
     ),
     st.builds(FeedForwardState, stamps_or_never, usable, usable, usable, usable),
     usable,
@@ -128,6 +139,14 @@ def test_a_snapshot_comes_back_to_the_bit_nan_included(state):
     assert back.configuration.parameters() == CONFIGURATION.parameters()
     assert back.configuration.selection == CONFIGURATION.selection
     assert bits(back.state) == bits(state)
+
+
+def test_a_snapshot_from_before_there_was_adaptation_has_learnt_nothing():
+    document = json.loads(snapshot_text(SNAPSHOT))
+    del document['adaptation'], document['state']['estimator']['adaptation']
+    back = parse_snapshot(json.dumps(document))
+    assert back.configuration == CONFIGURATION
+    assert back.state.estimator.adaptation == NOT_ADAPTED
 
 
 @given(states)

@@ -268,7 +268,10 @@ IDENTIFIED = tuple(replace(m, seal=replace(m.seal, identified_motion=IdentifiedM
 
 
 def test_every_status_bit_is_provoked_here():
-    below = {'DIRECTION_NOT_IDENTIFIED'}  # a new direction sets MOTION_UNCERTAIN, too
+    below = {
+        'DIRECTION_NOT_IDENTIFIED',
+        'MODEL_DISAGREES',
+    }  # a new direction sets MOTION_UNCERTAIN, too; test_adaptation
     assert {*PROVOKED} == {bit.name for bit in Status} - below
 
 

@@ -130,7 +130,7 @@ def test_two_runs_write_the_same_bytes(simulated: Path):
 
 def test_file_is_a_parameter_file_of_the_node(simulated: Path):
     path = simulated / 'one' / 'feedforward.yaml'
-    selection, settings, feedforward = load_parameter_file(path)
+    selection, settings, feedforward, _ = load_parameter_file(path)
     known = default_configuration()
     assert load_configuration(selection, settings).selection == known.selection
     assert settings == known.settings

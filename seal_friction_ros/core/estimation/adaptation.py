@@ -1,0 +1,395 @@
+r"""How far the friction law is off on this machine today: a scale on the friction, an offset of the force sum.
+
+While the rod slides evenly, the force sum less inertia is a reading y of the friction:
+
+.. math:: y = \Sigma F - m a = s\,f\,d + b + e
+
+with f the friction of the law at the pressure and speed in use, d = +-1 the direction, s the scale of the friction and
+b the offset of the force sum: load, area or sensor zero that nobody took off. Within one direction s and b cannot be
+told apart. Over a reversal they can: friction changes its sign, the offset does not. So each has a time scale of its
+own:
+
+- **Offset**, at every usable sample: the mean of y - s f d over the last half second (`WINDOW`). It starts anew at a
+  reversal and after a load step, so it holds nothing older than that.
+- **Scale**, once a reversal, from the means of the two strokes before it. They cover nearly the same way, and the slope
+  c of y over the travel x, common to both, takes off the rest, so that a load over position cancels:
+
+.. math:: z = d_2 \frac{\bar y_2 - \bar y_1 - c (\bar x_2 - \bar x_1)}{\bar f_1 + \bar f_2}
+
+  s follows the median of the last six z. A load step within a stroke spoils two z, an offset that drifts makes them
+  alternate; the median of an even number of values passes on neither. The standard deviation of s is that of the median
+  of independent z, from their mean absolute deviation, and the distance that s still has to go.
+- **Noise**, the standard deviation of the residual: it grows with each residual outside its 95 % band and shrinks with
+  each one inside, so that the band holds 95 % in the long run, whatever the distribution.
+
+Nothing is learnt at rest, with a bad input, or while the rod accelerates; the scale never outside the identified range
+or from one direction alone. s changes by at most `LARGEST_CHANGE` a reversal, and not at all while the median is out of
+its bounds: what the force sum shows then is not this friction.
+
+Source: estimates with forgetting, [Ljung1999]_ chapter 11; friction as the half difference of the two directions, as
+the thesis evaluates Tables A-1 to A-3; width of a band from its misses, [Gibbs2021]_. The two time scales, the median
+and all numbers are our choice.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from seal_friction_ros.core.estimation.records import NEVER
+from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.foundation.limits import between
+from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.friction.actuator import ActuatorFriction
+
+MODES = ('off', 'observe', 'on')
+
+WINDOW = 0.5  # [s] time constant of the offset
+LONGEST_MEMORY = 10.0  # [s] time constant of the means of one direction that two directions are compared by
+LEAST_SHARE = 0.2  # [-] duration of the shorter of two directions that are compared over that of the longer
+FEWEST_SAMPLES = 5  # in each of them
+LONGEST_PAUSE = 60.0  # [s] between two directions that are compared
+WIDTH_TIME = 1.0  # [s] of even sliding outside the band that make it e times as wide
+OUTSIDE = 0.05  # [-] share of the residuals that the band leaves outside
+BAND_95 = 1.959964  # [-] half the width of the band over its standard deviation
+ONE_SIDED_95 = 1.644854  # [-] 95 % of a normal distribution are below it
+OUTLIER = 4.0  # [-] residual over its standard deviation above which a sample is a spike, or a load step
+STEP_SAMPLES = 2  # outliers in a row that are a load step
+ACCELERATION_TIME = 0.005  # [s] time constant of each of the two lags that the acceleration is taken with
+LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
+LEARNING_INTERVAL = 0.004  # [s] least time between two samples that are learnt from
+FEWEST_REVERSALS = 3  # before which no scale is believed
+LARGEST_CHANGE = 0.1  # [-] of the scale in one reversal
+GAIN = 0.5  # [-] share of the way to the median that the scale goes in one reversal
+STD_OF_MEAN_DEVIATION = 1.2533  # [-] standard deviation over mean absolute deviation of a normal distribution
+
+
+@dataclass(frozen=True)
+class AdaptationSettings:
+    """Settings of the adaptation, one field per ROS parameter.
+
+    Raises:
+        ValueError: A setting is out of bounds, or the mode is unknown.
+    """
+
+    COMPILED: ClassVar = ('moving_mass', 'acceleration_max', 'scale_min', 'scale_max')
+
+    mode: str = parameter(
+        'off',
+        unit='',
+        description='off: the seal file as it is. observe: scale and offset are learnt and published, nothing else '
+        'changes but the standard deviation and the status. on: estimate and feed-forward use the scale.',
+    )
+    moving_mass: float = parameter(
+        0.0, unit='kg', lower=0.0, upper=1e6, description='m; 0: unknown, then learnt at even speed only.'
+    )
+    acceleration_max: float = parameter(
+        0.05,
+        unit='m/s^2',
+        lower=1e-6,
+        upper=1e3,
+        description='Largest acceleration that counts as even speed; with a moving mass its inertia counts instead.',
+    )
+    scale_min: float = parameter(0.3, unit='1', lower=0.01, upper=1.0, description='Lowest scale.')
+    scale_max: float = parameter(3.0, unit='1', lower=1.0, upper=100.0, description='Highest scale.')
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.mode not in MODES:
+            raise ValueError(f'AdaptationSettings.mode = {self.mode!r} is not one of {", ".join(MODES)}')
+
+
+class Level(NamedTuple):
+    """Means over the last half second of even sliding in one direction."""
+
+    direction: int  # -1 or 1; 0: none
+    stamp: int  # [ns] of the newest sample in it
+    reading: float  # [N] y
+    friction: float  # [N] f of the law, >= 0
+    pressure_a: float  # [Pa, gauge]
+    pressure_b: float  # [Pa, gauge]
+    travel: float  # [m] place of the rod, from any zero
+    travel_variance: float  # [m^2]
+    covariance: float  # [N m] of reading and travel
+    duration: float  # [s] of even sliding
+    samples: int
+
+
+class Ratios(NamedTuple):
+    """z of the last six reversals, the newest first."""
+
+    first: float
+    second: float
+    third: float
+    fourth: float
+    fifth: float
+    sixth: float
+
+
+class Learnt(NamedTuple):
+    """What is learnt."""
+
+    direction: int  # -1 or 1, of the last sample that was learnt from; 0: none
+    offset: float  # [N] b
+    samples: int  # in the mean of the offset
+    outliers: int  # in a row
+    noise: float  # [N] standard deviation of the residual; negative: not known yet
+    level: Level  # of the present direction
+    before: Level  # of the direction before
+    scale: float  # [-] s
+    scale_std: float  # [-] negative: nothing is learnt yet
+    median: float  # [-] of the last z; it has no bounds
+    ratios: Ratios
+    reversals: int  # number of z so far
+
+
+class AdaptationState(NamedTuple):
+    """What one sample leaves for the next."""
+
+    stamp: int  # [ns] of the last sample; `NEVER` before the first
+    velocity: float  # [m/s] after one lag
+    lagging_velocity: float  # [m/s] after two
+    travel: float  # [m] integrated velocity
+    learnt: Learnt
+    learnt_stamp: int  # [ns] of the last sample that was learnt from
+
+
+NO_LEVEL = Level(0, NEVER, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+NOTHING_LEARNT = Learnt(0, 0.0, 0, 0, -1.0, NO_LEVEL, NO_LEVEL, 1.0, -1.0, 1.0, Ratios(1.0, 1.0, 1.0, 1.0, 1.0, 1.0), 0)
+NOT_ADAPTED = AdaptationState(NEVER, 0.0, 0.0, 0.0, NOTHING_LEARNT, NEVER)
+"""State before the first sample."""
+
+
+class Slide(NamedTuple):
+    """One sample of the rod."""
+
+    stamp: int  # [ns]
+    velocity: float  # [m/s] at which the seals slide, conditioned; 0.0 at rest
+    force_sum: float  # [N]
+    friction: float  # [N] of the law at this pressure and speed, >= 0, before any scale
+    friction_std: float  # [N] of a new reading, by the seal file
+    pressure_a: float  # [Pa, gauge]
+    pressure_b: float  # [Pa, gauge]
+    is_usable: bool  # whether every input is good
+    is_identified: bool  # whether the law was identified at this pressure and speed
+
+
+@compilable
+def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) -> tuple[AdaptationState, float]:
+    """Learn from one sample.
+
+    Args:
+        settings: Settings; the mode does not matter here.
+        state: `NOT_ADAPTED` or the state before.
+        slide: The sample.
+
+    Returns:
+        The next state, and the residual [N] of this sample before it is learnt from: y - s f d - b; 0.0 at rest.
+    """
+    stamp, velocity, force_sum, friction, _, _, _, learns, _ = slide
+    last, first_lag, second_lag, travel, learnt, learnt_stamp = state
+    elapsed = (stamp - last) * 1e-9 if last != NEVER else 0.0
+    acceleration = 0.0
+    if 0.0 < elapsed <= LONGEST_STEP:
+        lag = elapsed + ACCELERATION_TIME
+        first_lag += elapsed / lag * (velocity - first_lag)
+        acceleration = (first_lag - second_lag) / lag
+        second_lag += elapsed / lag * (first_lag - second_lag)
+        travel += velocity * elapsed
+    else:
+        first_lag, second_lag, learns = velocity, velocity, False
+    residual = 0.0
+    if velocity != 0.0:
+        direction = 1 if velocity > 0.0 else -1
+        reading = force_sum - settings.moving_mass * acceleration
+        residual = reading - learnt.scale * friction * direction - learnt.offset
+        since = (stamp - learnt_stamp) * 1e-9 if learnt_stamp != NEVER else LONGEST_STEP
+        is_due = since >= LEARNING_INTERVAL or direction != learnt.direction
+        if learns and is_due and friction > 0.0 and _is_even(settings, acceleration, learnt.scale * friction):
+            since = between(0.0, since, LONGEST_STEP)
+            learnt = _learn(settings, learnt, slide, since, direction, travel, reading, residual)
+            learnt_stamp = stamp
+    return AdaptationState(stamp, first_lag, second_lag, travel, learnt, learnt_stamp), residual
+
+
+@compilable
+def _learn(
+    settings: AdaptationSettings,
+    learnt: Learnt,
+    slide: Slide,
+    elapsed: float,
+    direction: int,
+    travel: float,
+    reading: float,
+    residual: float,
+) -> Learnt:
+    """What is learnt after one more reading y [N], ``elapsed`` [s] after the one before."""
+    last_direction, offset, samples, outliers, noise, level, before, scale, std, median, ratios, reversals = learnt
+    if noise < 0.0:
+        noise = slide.friction_std
+    if direction != last_direction:
+        if _can_be_compared(before, level):
+            ratio = _ratio(before, level)
+            old_scale = scale
+            scale, std, median, ratios = _learnt_scale(settings, scale, std, ratios, reversals, ratio)
+            offset += (old_scale - scale) * slide.friction * direction
+            reversals += 1
+        before, level, samples, outliers = level, NO_LEVEL, 0, 0
+    elif abs(residual) > OUTLIER * noise:
+        outliers += 1
+        if outliers < STEP_SAMPLES:  # a spike counts as the largest residual that is none
+            reading += between(-OUTLIER * noise, residual, OUTLIER * noise) - residual
+        else:
+            samples, outliers = 0, 0
+    else:
+        outliers = 0
+    samples += 1
+    outside = 1.0 if abs(residual) > BAND_95 * noise else 0.0
+    noise *= 1.0 + elapsed / WIDTH_TIME * (outside - OUTSIDE)
+    if slide.is_identified:
+        level = _averaged(level, slide, elapsed, direction, travel, reading)
+    offset += _share(elapsed, WINDOW, samples) * (reading - scale * slide.friction * direction - offset)
+    return Learnt(direction, offset, samples, outliers, noise, level, before, scale, std, median, ratios, reversals)
+
+
+@compilable
+def with_scale(friction: ActuatorFriction, learnt: Learnt, uses_scale: bool) -> ActuatorFriction:
+    r"""Friction by what is learnt, with the standard deviation of the next reading.
+
+    With ``uses_scale`` it is :math:`\sigma = \max(\sigma_e, \sigma_s f)` with :math:`\sigma_e` the noise. Without, the
+    friction misses :math:`m = |s - 1| f`, and the band that holds 95 % of a normal distribution about m is
+    :math:`(m + 1.64 \sigma) / 1.96` where that is wider. While nothing is learnt, the deviation is that of the seal
+    file.
+    """
+    coulomb, _, stiction, in_identified_range, velocity_friction = friction
+    if learnt.scale_std < 0.0:
+        return friction
+    sliding = coulomb + velocity_friction
+    std = learnt.scale_std * sliding
+    std = max(std, learnt.noise)
+    if not uses_scale:
+        missed = (abs(learnt.scale - 1.0) * sliding + ONE_SIDED_95 * std) / BAND_95
+        return ActuatorFriction(coulomb, max(std, missed), stiction, in_identified_range, velocity_friction)
+    scale = learnt.scale
+    return ActuatorFriction(scale * coulomb, std, scale * stiction, in_identified_range, scale * velocity_friction)
+
+
+@compilable
+def disagrees(
+    settings: AdaptationSettings, learnt: Learnt, friction: ActuatorFriction, uses_scale: bool, is_at_rest: bool
+) -> bool:
+    """Whether what is learnt contradicts the law beyond twice the deviation that its seal file states.
+
+    The same if the ratio is out of bounds, and at rest if the force sum has an offset of more than half the breakaway
+    force, since the state at rest stands on the force sum (our choice).
+
+    Args:
+        settings: With the bounds.
+        learnt: Before this sample.
+        friction: By the seal file.
+        uses_scale: Whether the estimate has the scale.
+        is_at_rest: Whether the rod rests.
+    """
+    if learnt.scale_std < 0.0:
+        return False
+    if not settings.scale_min <= learnt.median <= settings.scale_max:
+        return True
+    used = learnt.scale if uses_scale else 1.0
+    if is_at_rest and abs(learnt.offset) > 0.5 * used * (friction.coulomb_friction + friction.stiction):
+        return True
+    return abs(learnt.median - used) * friction.coulomb_friction > 2.0 * friction.coulomb_friction_std
+
+
+@compilable
+def _is_even(settings: AdaptationSettings, acceleration: float, friction: float) -> bool:
+    """Whether inertia is small, or known and no larger than the friction [N]."""
+    if settings.moving_mass > 0.0:
+        return settings.moving_mass * abs(acceleration) <= friction
+    return abs(acceleration) <= settings.acceleration_max
+
+
+@compilable
+def _averaged(level: Level, slide: Slide, elapsed: float, direction: int, travel: float, reading: float) -> Level:
+    """Level after one more sample."""
+    _, _, mean_reading, friction, pressure_a, pressure_b, place, variance, covariance, duration, samples = level
+    samples += 1
+    share = _share(elapsed, LONGEST_MEMORY, samples)
+    further, higher = travel - place, reading - mean_reading
+    return Level(
+        direction,
+        slide.stamp,
+        mean_reading + share * higher,
+        friction + share * (slide.friction - friction),
+        pressure_a + share * (slide.pressure_a - pressure_a),
+        pressure_b + share * (slide.pressure_b - pressure_b),
+        place + share * further,
+        (1.0 - share) * (variance + share * further * further),
+        (1.0 - share) * (covariance + share * further * higher),
+        duration + elapsed,
+        samples,
+    )
+
+
+@compilable
+def _can_be_compared(before: Level, after: Level) -> bool:
+    """Whether two levels are of opposite directions, close in time and long enough."""
+    if before.direction * after.direction >= 0:
+        return False
+    if (after.stamp - before.stamp) * 1e-9 - after.duration > LONGEST_PAUSE:
+        return False
+    if before.samples < FEWEST_SAMPLES or after.samples < FEWEST_SAMPLES:
+        return False
+    return between(LEAST_SHARE, before.duration / after.duration, 1.0 / LEAST_SHARE) == before.duration / after.duration
+
+
+@compilable
+def _ratio(before: Level, level: Level) -> float:
+    """Ratio z of the equation at the top."""
+    variance = before.travel_variance + level.travel_variance
+    slope = (before.covariance + level.covariance) / variance if variance > 0.0 else 0.0
+    change = level.reading - before.reading - slope * (level.travel - before.travel)
+    return level.direction * change / (level.friction + before.friction)
+
+
+@compilable
+def _share(elapsed: float, memory: float, samples: int) -> float:
+    """Weight of a new sample in a mean: a plain one at first, later forgetting with time constant ``memory`` [s]."""
+    share = elapsed / (elapsed + memory)
+    return share if share * samples >= 1.0 else 1.0 / samples
+
+
+@compilable
+def _learnt_scale(
+    settings: AdaptationSettings, scale: float, std: float, ratios: Ratios, reversals: int, ratio: float
+) -> tuple[float, float, float, Ratios]:
+    """Scale, its standard deviation, median and ratios after one more ratio, with ``reversals`` before it."""
+    ratios = Ratios(ratio, ratios.first, ratios.second, ratios.third, ratios.fourth, ratios.fifth)
+    known = reversals + 1 if reversals + 1 < len(ratios) else len(ratios)
+    median = _median(ratios, known)
+    if known < FEWEST_REVERSALS:
+        return scale, std, median, ratios
+    deviation = 0.0
+    for i in range(known):
+        deviation += abs(ratios[i] - median)
+    deviation *= STD_OF_MEAN_DEVIATION / known
+    if settings.scale_min <= median <= settings.scale_max:
+        most = LARGEST_CHANGE * scale
+        scale += between(-most, GAIN * (median - scale), most)
+    # The variance of a median is pi / 2 times that of a mean.
+    std = math.sqrt(0.5 * math.pi * deviation * deviation / known + (median - scale) * (median - scale))
+    return scale, std, median, ratios
+
+
+@compilable
+def _median(ratios: Ratios, known: int) -> float:
+    """Median of the first ``known`` ratios, by rank: no value needs to move."""
+    low, high = ratios[0], ratios[0]
+    for i in range(known):
+        below = 0
+        for k in range(known):
+            if ratios[k] < ratios[i] or (ratios[k] == ratios[i] and k < i):
+                below += 1
+        if below == (known - 1) // 2:
+            low = ratios[i]
+        if below == known // 2:
+            high = ratios[i]
+    return 0.5 * (low + high)
