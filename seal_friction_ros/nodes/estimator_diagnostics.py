@@ -5,9 +5,12 @@ from collections import Counter, deque
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationState
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.messages import INPUTS
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.estimation.seal_health import SealHealth, findings, followed, health_values
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 _SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one
@@ -85,6 +88,8 @@ class EstimatorDiagnostics:
         self._feedforward_force = self._feedforward_sign = 0.0
         self._input_age = -1.0
         self._latencies: list[int] = []
+        self._health = SealHealth()
+        self._adaptation = NOT_ADAPTED
         self.start_interval()
 
     def start_interval(self) -> None:
@@ -113,6 +118,21 @@ class EstimatorDiagnostics:
         self._latencies.append(latency)
         self._input_age = estimate.input_age
 
+    def on_adaptation(self, state: AdaptationState) -> None:
+        """Follow what is learnt; ``state`` after the newest sample."""
+        self._adaptation = state
+        self._health = followed(self._health, state)
+
+    def health(self, parameters: EstimatorParameters) -> DiagnosticStatus:
+        """Indicators of the seals, WARN with what a person should know."""
+        said = findings(parameters, self._health, _count(self._by_status, Status.MODEL_DISAGREES) > 0)
+        values = health_values(parameters, self._adaptation, self._health)
+        return DiagnosticStatus(
+            level=DiagnosticStatus.WARN if said else DiagnosticStatus.OK,
+            message='; '.join(said) or 'no finding',
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        )
+
     def on_feedforward(self, feedforward: FeedForward) -> None:
         """Count one feed-forward."""
         self._feedforwards_by_limit[feedforward.limited] += 1
@@ -129,21 +149,26 @@ class EstimatorDiagnostics:
         """Inputs without a message in this interval."""
         return [name for name in INPUTS if self._received[name] == self._received_before[name]]
 
-    def report(self, active: bool, refused: bool, graph: GraphFindings) -> DiagnosticStatus:
+    def report(
+        self, active: bool, refused: bool, graph: GraphFindings, parameters: EstimatorParameters | None = None
+    ) -> DiagnosticStatus:
         """Status of the estimate in this interval.
 
         Args:
+            parameters: Of the estimator, if it adapts.
             active: Whether the node estimates.
             refused: Whether the node rejects its inputs because of duplicate publishers.
             graph: State of the graph.
         """
         seconds = max(time.monotonic() - self._started, 1e-3)
-        level, message = self._level(seconds) if active else (DiagnosticStatus.OK, 'inactive')
+        level, message = self._level(seconds, parameters) if active else (DiagnosticStatus.OK, 'inactive')
         if refused:
             level = DiagnosticStatus.ERROR
         elif (graph.duplicates or graph.unheard) and level == DiagnosticStatus.OK:
             level = DiagnosticStatus.WARN
         values = self._input_values(seconds, graph) | self._output_values(seconds)
+        if active and parameters is not None:
+            values |= health_values(parameters, self._adaptation, self._health)
         values |= {f'{name} best effort only, from': node for name, node in graph.best_effort.items()}
         return DiagnosticStatus(
             level=level,
@@ -151,7 +176,7 @@ class EstimatorDiagnostics:
             values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
 
-    def _level(self, seconds: float) -> tuple[bytes, str]:
+    def _level(self, seconds: float, parameters: EstimatorParameters | None) -> tuple[bytes, str]:
         """Level and message of an active estimator ``seconds`` [s] after the start of the interval."""
         if not self._latencies and (seconds > _SHORTEST_SILENCE or not self._estimated_before):
             return DiagnosticStatus.STALE, 'no rod_velocity received'
@@ -160,30 +185,33 @@ class EstimatorDiagnostics:
         for bits in estimates:
             status |= bits
         status &= ~sum(_NEAR_REST_MESSAGES)
+        said: list[str] = []
+        if parameters is not None:
+            said = findings(parameters, self._health, bool(status & Status.MODEL_DISAGREES))
         if status:
-            return DiagnosticStatus.WARN, str(Status(status).name)
+            return DiagnosticStatus.WARN, '; '.join([str(Status(status).name), *said])
         if self._malformed != self._malformed_before:
             names = ', '.join(sorted((self._malformed - self._malformed_before).keys()))
             return DiagnosticStatus.WARN, f'malformed messages on {names}'
-        findings = self._feedforward_findings(seconds)
-        findings += [
+        said += self._feedforward_findings(seconds)
+        said += [
             f'{_share(estimates, bit):.0%} {message}'
             for bit, message in _NEAR_REST_MESSAGES.items()
             if _share(estimates, bit) > _LARGEST_NEAR_REST
         ]
-        return (DiagnosticStatus.WARN, '; '.join(findings)) if findings else (DiagnosticStatus.OK, 'estimating')
+        return (DiagnosticStatus.WARN, '; '.join(said)) if said else (DiagnosticStatus.OK, 'estimating')
 
     def _feedforward_findings(self, seconds: float) -> list[str]:
         """What limits the feed-forward more than a motion does by itself."""
         recent = self._feedforwards_by_limit - self._limits_before
-        findings = [
+        said = [
             f'feed-forward {_share(recent, bit):.0%} {_LIMIT_MESSAGES[bit]}'
             for bit, largest in _LARGEST_SHARE.items()
             if _share(recent, bit) > largest
         ]
         if self._reversals > _MOST_REVERSALS * seconds:
-            findings.append(f'feed-forward reverses {self._reversals / seconds:.0f} times a second')
-        return findings
+            said.append(f'feed-forward reverses {self._reversals / seconds:.0f} times a second')
+        return said
 
     def _input_values(self, seconds: float, graph: GraphFindings) -> dict[str, str]:
         values: dict[str, str] = {}

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
@@ -50,6 +50,7 @@ from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 
 _WATCH_PERIOD = 0.05  # [s]
+_HEALTH_PERIOD = 60.0  # [s]
 _WATCHDOG_PERIOD = 0.01  # [s] more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
 _STOP_PERIOD = 0.005  # [s] between two forces while the node stops
@@ -103,6 +104,7 @@ class FrictionEstimator(ManagedNode):
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
         )
+        self._health = self.create_publisher(DiagnosticArray, '~/health', 10)
         self._topics = {type_name: publisher.topic_name for type_name, publisher in self._outputs.items()}
         for name in INPUTS:
             self._subscribe(name, qos.STREAM)
@@ -110,6 +112,7 @@ class FrictionEstimator(ManagedNode):
         self._timers = [
             self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
             self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog),
+            self.create_steady_timer(_HEALTH_PERIOD, self._on_health_timer),
         ]
         self._configuration = configuration
 
@@ -121,6 +124,7 @@ class FrictionEstimator(ManagedNode):
             self.destroy_publisher(publisher)
         self._inputs.clear()
         self._outputs.clear()
+        self.destroy_publisher(self._health)
         for timer in self._timers:
             self.destroy_timer(timer)
         self._timers.clear()
@@ -227,6 +231,8 @@ class FrictionEstimator(ManagedNode):
         self._statistics.on_input(name, message.stamp)
         self._record_answers(done - taken)
         if name == 'rod_velocity':
+            if self._known.estimator.adapts:
+                self._statistics.on_adaptation(self._state.estimator.adaptation)
             self._recording.flush_if_idle()
 
     def _record_answers(self, latency: int = 0) -> None:
@@ -340,12 +346,26 @@ class FrictionEstimator(ManagedNode):
         """Status of the estimate, of its inputs and outputs, and of the recorder."""
         graph = self._watch.findings(self._statistics.silent_inputs, retry=self.active)
         self._refuse_inputs(graph.duplicates)
-        estimate = self._statistics.report(self.active, self.active and self._state.refused, graph)
+        adapting = self._known.estimator if self._adapts else None
+        estimate = self._statistics.report(self.active, self.active and self._state.refused, graph, adapting)
         recorder = self._recording.report()
         self._log_error_once('publishers', '; '.join(graph.duplicates))
         self._log_error_once('unheard', '; '.join(graph.unheard))
         self._log_error_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
         return {'estimate': estimate, 'recorder': recorder}
+
+    @property
+    def _adapts(self) -> bool:
+        return self.active and self._known.estimator.adapts
+
+    def _on_health_timer(self) -> None:
+        """Publish the health of the seals while the adaptation learns."""
+        if self._adapts:
+            status = self._statistics.health(self._known.estimator)
+            status.name = f'{self.get_fully_qualified_name()}: seals'
+            message = DiagnosticArray(status=[status])
+            message.header.stamp = self.get_clock().now().to_msg()
+            self._health.publish(message)
 
     def end_interval(self) -> None:
         """Start a new interval of rates and latencies."""

@@ -53,6 +53,13 @@ class Seal(CheckedParameters):
     stiction_ratio: float = parameter(
         0.0, unit='1', lower=0.0, upper=10.0, description='The same, as a share of the Coulomb friction.'
     )
+    friction_scale: float = parameter(
+        1.0,
+        unit='1',
+        lower=0.01,
+        upper=100.0,
+        description='Factor on all friction, as `seal_friction adapt` writes it.',
+    )
     velocity_terms: VelocityTerms | None = None
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
@@ -143,7 +150,7 @@ class MountedSeal:
         margin = 0.01 * (seal.pressure_max - seal.pressure_min)
         numbers = numbers_of_law(seal.coulomb_law, seal.velocity_terms)._replace(
             chamber=CHAMBERS.index(self.chamber),
-            scale=self.friction_scale,
+            scale=self.friction_scale * seal.friction_scale,
             stiction=seal.stiction,
             stiction_ratio=seal.stiction_ratio,
             relative_std=seal.uncertainty.relative_std,

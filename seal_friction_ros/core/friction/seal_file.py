@@ -12,9 +12,9 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     uncertainty: {relative_std: 0.08, absolute_std: 0.3}
     identified_pressure: [0.0, 6.9e+6]
 
-Optional are ``velocity_terms``, ``stiction_ratio``, ``identified_speed``, ``identified_directions``, ``mounting``,
-``force_sum_correction``, and ``identification``: what ``seal_friction identify`` reports about its data. This module
-ignores the latter.
+Optional are ``velocity_terms``, ``stiction_ratio``, ``friction_scale``, ``identified_speed``,
+``identified_directions``, ``mounting``, ``force_sum_correction``, and ``identification``: what ``seal_friction
+identify`` reports about its data. This module ignores the latter.
 """
 
 import dataclasses
@@ -43,7 +43,7 @@ from seal_friction_ros.core.friction.mounting import Mounting
 _COMMON = {
     'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
     'identified_pressure', 'identified_speed', 'identified_directions', 'identification', 'mounting',
-    'force_sum_correction',
+    'force_sum_correction', 'friction_scale',
 }  # fmt: skip
 _PARTS: dict[type, str] = {
     SealGeometry: 'geometry',
@@ -87,7 +87,7 @@ def parse_seal(document: Any) -> Seal:
     pressures = _ends(document, 'identified_pressure', 'pressures [Pa]', where)
     mounting_of(document)
     numbers = {'pressure_min': pressures[0], 'pressure_max': pressures[1]}
-    numbers |= {key: document[key] for key in ('stiction', 'stiction_ratio') if key in document}
+    numbers |= {key: document[key] for key in ('stiction', 'stiction_ratio', 'friction_scale') if key in document}
     motion: dict[str, Any] = {}
     if 'identified_speed' in document:
         motion['slowest'], motion['fastest'] = _ends(document, 'identified_speed', 'speeds [m/s]', where)

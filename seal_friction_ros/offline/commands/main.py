@@ -11,9 +11,11 @@ import sys
 import textwrap
 
 from seal_friction_ros.offline.commands import (
+    adapt,
     charts,
     compare,
     ehl,
+    health,
     identify,
     import_data,
     info,
@@ -31,6 +33,7 @@ from seal_friction_ros.offline.commands import command_line as cli
 GROUPS = {
     'replay': (info, replay, compare, recover, report, import_data),
     'identify': (identify, sheet, spool, charts),
+    'watch': (health, adapt),
     'tune': (tune, servo),
     'compute': (oring, ehl),
 }

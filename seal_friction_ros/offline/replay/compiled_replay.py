@@ -70,7 +70,7 @@ def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: 
     velocities, is_cut = 0, False
     versions: set[int] = set()
     streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in topics.answers.items() if topic}
-    for messages, answers in _answered(read_in_bulk(bag, _kind_of(topics)), override):
+    for messages, answers in _answered(read_in_bulk(bag, kinds_of_topics(topics)), override):
         kinds = messages.kinds
         velocities += int(np.count_nonzero(kinds == Kind.VELOCITY))
         for type_name, stream in streams.items():
@@ -93,7 +93,7 @@ def compile_now() -> None:
     block_reader.compile_now()
 
 
-def _kind_of(topics: Topics) -> KindOf:
+def kinds_of_topics(topics: Topics) -> KindOf:
     """Function that gives the kind of message on a topic.
 
     It raises `UnsuitedError` for a topic with messages of two types.

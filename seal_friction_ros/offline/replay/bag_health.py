@@ -1,0 +1,185 @@
+"""What the adaptation learns from a bag: one row a reversal, and what the residuals and starts say between them.
+
+The bag runs through the compiled estimator with ``adaptation.mode`` observe, in blocks, so that memory does not grow
+with its length.
+"""
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.estimation.adaptation import AdaptationState
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, UnsuitedError, receive_all
+from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, LAYOUTS
+from seal_friction_ros.core.estimation.pipeline import init
+from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.friction.states import SLIDING
+from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.block_reader import read_in_bulk
+from seal_friction_ros.offline.bags.mcap_reader import ERRORS
+from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.replay.compiled_replay import kinds_of_topics
+
+REST = 0.5  # [s] our choice: after a rest of this length a start counts as a breakaway
+START = 0.1  # [s] our choice: the friction of a start is the largest within this time
+
+
+class BagHealth(NamedTuple):
+    """What a bag shows; arrays of shape (n,), one value a reversal."""
+
+    time: FloatArray  # [s] stamps
+    scale: FloatArray  # [-]
+    scale_std: FloatArray  # [-]
+    offset: FloatArray  # [N] at the end of a stroke
+    friction: FloatArray  # [N] Coulomb friction by the seal file
+    noise: float  # [N] standard deviation of the residual of good samples; NaN without any
+    starts: FloatArray  # [-] largest friction of each start after a rest, over the Coulomb friction then
+    learnt: AdaptationState | None  # at the end; None if the bag has no estimate
+
+
+def bag_health(
+    bag: Path,
+    namespace: str = '',
+    override: Configuration | None = None,
+    learnt: AdaptationState | None = None,
+) -> BagHealth:
+    """Health from one bag.
+
+    Args:
+        bag: The bag.
+        namespace: Use only topics below it.
+        override: Configuration instead of the recorded one; its mode counts as observe.
+        learnt: What was learnt from the bags before; None: nothing.
+
+    Raises:
+        BagError: The bag cannot be read, or not in blocks.
+    """
+    rows: list[FloatArray] = []
+    starts: list[float] = []
+    squares, good = 0.0, 0
+    end, follower = learnt, _Starts()
+    try:
+        for estimates, known in _observed(bag, namespace, override, learnt):
+            end = known
+            changed = np.flatnonzero(np.diff(estimates['adaptation_scale'], prepend=np.nan))
+            changed = changed[estimates['adaptation_scale_std'][changed] > 0.0]
+            first = not rows
+            rows.append(
+                np.array(
+                    [
+                        estimates['stamp'][changed] * 1e-9,
+                        *(estimates[name][changed] for name in ('adaptation_scale', 'adaptation_scale_std')),
+                        estimates['adaptation_offset'][changed],
+                        estimates['coulomb_friction'][changed],
+                    ]
+                )[:, int(first and changed.size > 0 and changed[0] == 0) :]
+            )
+            slides = (estimates['state'] == SLIDING) & (estimates['status'] == 0)
+            squares += float((estimates['residual'][slides] ** 2).sum())
+            good += int(slides.sum())
+            starts += follower.taken(estimates)
+    except (UnsuitedError, OSError, *ERRORS) as error:
+        raise BagError(f'{bag}: {error}: `seal_friction replay` tells more') from None
+    table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
+    table = table[:, np.append(True, np.diff(table[1]) != 0.0)] if table.shape[1] else table  # ends of blocks
+    noise = float(np.sqrt(squares / good)) if good else float('nan')
+    time, scale, scale_std, offset, friction = table
+    return BagHealth(time, scale, scale_std, offset, friction, noise, np.array(starts), end)
+
+
+class _Starts:
+    """Friction of the starts after a rest, across blocks of estimates."""
+
+    def __init__(self) -> None:
+        self._rested_since: float | None = None
+        self._started: float | None = None
+        self._largest = 0.0
+
+    def taken(self, estimates: Any) -> list[float]:
+        """Ratios of the starts that end in this block."""
+        found = []
+        time, slides = estimates['stamp'] * 1e-9, estimates['state'] == SLIDING
+        seen = np.abs(estimates['friction_force'] + estimates['residual']) / np.maximum(
+            estimates['coulomb_friction'], 1e-9
+        )
+        turns = np.flatnonzero(np.diff(slides.astype(np.int8), prepend=np.int8(slides[0] if len(slides) else 0)))
+        for i in turns.tolist():
+            if not slides[i]:
+                self._rested_since = float(time[i])
+            elif self._rested_since is not None and time[i] - self._rested_since >= REST:
+                inside = slice(max(i - 1, 0), int(np.searchsorted(time, time[i] + START)))
+                found.append(float(seen[inside].max()))
+        return found
+
+
+def _observed(
+    bag: Path, namespace: str, override: Configuration | None, learnt: AdaptationState | None
+) -> Iterator[tuple[Any, AdaptationState]]:
+    """Estimates of each block, as a structured array, and the state of the adaptation after it."""
+    configuration = _observing(override or default_configuration())
+    parameters = configuration.parameters()
+    state = init(parameters)
+    if learnt is not None:
+        state = state._replace(estimator=state.estimator._replace(adaptation=learnt))
+    for block in read_in_bulk(bag, kinds_of_topics(find_topics(bag, namespace))):
+        changes = np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist()
+        for first, end in zip([0, *changes], [*changes, len(block.kinds)], strict=True):
+            if first == end:
+                continue
+            messages = block.taken(first, end)
+            if messages.kinds[0] == Kind.CONFIGURATION:
+                snapshot = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))
+                kept = state.estimator.adaptation
+                state = snapshot.state._replace(estimator=snapshot.state.estimator._replace(adaptation=kept))
+                if override is None:
+                    parameters = _observing(snapshot.configuration).parameters()
+            state, answers = receive_all(parameters, state, messages)
+            estimates = _estimates(answers)
+            if len(estimates):
+                yield estimates, state.estimator.adaptation
+
+
+def _observing(configuration: Configuration) -> Configuration:
+    return dataclasses.replace(configuration, adaptation=dataclasses.replace(configuration.adaptation, mode='observe'))
+
+
+def _estimates(answers: Answers) -> Any:
+    """The estimates of a block as a structured array with the fields of `FrictionEstimate`."""
+    sizes = answers.estimate_sizes
+    decode = DECODERS[ESTIMATE_TYPE]
+    kinds = [(name, '<i8' if isinstance(value, int) else '<f8') for name, value in NO_ESTIMATE._asdict().items()]
+    places = np.flatnonzero(sizes)
+    if not len(places):
+        return np.zeros(0, kinds)
+    offsets = answers.estimate_offsets[places]
+    data, size = answers.data, int(sizes[places[0]])
+    if (sizes[places] != size).any():  # frame names of several lengths
+        return np.array(
+            [tuple(decode(data[o : o + s].tobytes())) for o, s in zip(offsets, sizes[places], strict=True)], kinds
+        )
+    raw = data[offsets[:, None] + np.arange(size)]
+    first: FrictionEstimate = decode(raw[0].tobytes())
+    return _columns(raw, first, kinds)
+
+
+def _columns(raw: Any, first: FrictionEstimate, kinds: Any) -> Any:
+    """Fields of equally long messages; ``first`` is the first of them, to be sure of the layout."""
+    layout = next(one for one in LAYOUTS if one.message_type == ESTIMATE_TYPE)
+    made = np.zeros(len(raw), kinds)
+    seconds = np.ascontiguousarray(raw[:, 4:8]).view('<i4')[:, 0].astype(np.int64)
+    nanoseconds = np.ascontiguousarray(raw[:, 8:12]).view('<u4')[:, 0]
+    made['stamp'] = seconds * 1_000_000_000 + nanoseconds
+    begin = raw.shape[1] - layout.size
+    types = {'d': '<f8', 'I': '<u4', 'B': 'u1', 'b': 'i1'}
+    for name, code, offset in zip(layout.fields, layout.codes, layout.offsets, strict=True):
+        width = np.dtype(types[code]).itemsize
+        made[name] = np.ascontiguousarray(raw[:, begin + offset : begin + offset + width]).view(types[code])[:, 0]
+    if tuple(made[0].tolist()) != tuple(first):
+        raise UnsuitedError('an estimate of another layout')
+    return made
