@@ -7,12 +7,16 @@ noisy, and load, offset and friction may change over time.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.estimation.messages import INPUTS, encode, type_of
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Velocity
+from seal_friction_ros.offline.bags.bag import BagWriter
 
 SECOND = 1_000_000_000  # [ns]
+TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}
 
 
 def unchanged(time: float) -> float:
@@ -77,3 +81,14 @@ def samples(day: Day, seconds: float, seed: int, start: int = 1_700_000_000 * SE
         stamp = start + round(time * SECOND)
         yield RodSample(stamp, (measured - counted) / day.period, Pressure(stamp, *day.pressure), Force(stamp, force))
         before, counted = velocity, measured
+
+
+def write_day(path: Path, day: Day, seconds: float, seed: int = 0, start: int = 1_700_000_000 * SECOND) -> Path:
+    """A bag with the inputs of a day."""
+    with BagWriter(path) as writer:
+        for sample in samples(day, seconds, seed, start):
+            velocity = Velocity(sample.stamp, sample.velocity, b'rod')
+            for number, record in enumerate((sample.pressure, sample.force, velocity)):
+                type_name = type_of(record)
+                writer.write(TOPICS[type_name], type_name, sample.stamp + 1000 * number, encode(record, b'rod'))
+    return path
