@@ -1,4 +1,4 @@
-"""How much one seal differs from run to run, and how it changes within a run.
+"""How much one seal differs from run to run.
 
 A run is one mounting, one day: a ring on the Delft rig differs by 10 to 65 % between two of them. A law that was fitted
 to one run says nothing about that, so a prior stands in until runs are repeated.
@@ -17,8 +17,6 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 PRIOR_STD = 0.15  # [-] of the friction between runs of one seal, expected before any is seen (our choice)
 PRIOR_FREEDOM = 8.0  # degrees of freedom that this is worth (our choice)
 ANOTHER_SEAL = 2.0  # ratio of the friction of two sources above which they are two seals (our choice)
-LARGEST_ERROR = 0.03  # relative standard error below which an asymptote is determined (our choice)
-FEWEST_STROKES = 6  # for a drift term (our choice)
 
 
 class BetweenRuns(NamedTuple):
@@ -63,66 +61,3 @@ def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: Floa
     measured_std = math.sqrt(squares / freedom) if freedom else math.nan
     std = math.sqrt((PRIOR_FREEDOM * PRIOR_STD**2 + squares) / (PRIOR_FREEDOM + freedom))
     return BetweenRuns(std, measured_std, freedom)
-
-
-class Drift(NamedTuple):
-    """Friction of one source at one pressure over the travel of the rod: f = asymptote (1 + share exp(-s / length))."""
-
-    source: int
-    level: int
-    change: float  # [-] from the first stroke to the last, relative to the mean
-    asymptote: float  # [N] friction of the settled seal; NaN if the strokes do not determine it
-    length: float  # [m] travel over which the difference falls to 37 %; likewise
-    settled_share: float  # [-] asymptote over the mean of the run; 1 if unknown
-
-
-def drifts(readings: FrictionReadings, offsets: FloatArray) -> list[Drift]:
-    """Drift of each source at each pressure with `FEWEST_STROKES` strokes at least.
-
-    The change is the slope of a line over the strokes, mean of the two directions. The run-in term is fitted by least
-    squares over a row of lengths. It counts if its asymptote has a standard error below `LARGEST_ERROR` and the rod
-    travelled twice the length at least; an exponential approach is our choice.
-    """
-    measured, found = readings.magnitudes(offsets), []
-    for level, inside in readings.levels.items():
-        for source in np.unique(readings.source[inside]):
-            index = np.flatnonzero(inside & (readings.source == source))
-            if len(index) < FEWEST_STROKES:
-                continue
-            mean = float(measured[index].mean())
-            sides = [index[readings.at.direction[index] == side] for side in (-1.0, 1.0)]
-            slopes = [
-                float(np.polyfit(np.arange(len(side)), measured[side], 1)[0]) * (len(side) - 1)
-                for side in sides
-                if len(side) >= 2
-            ]
-            change = float(np.mean(slopes)) / mean
-            asymptote, length = math.nan, math.nan
-            if len(readings.travel):
-                asymptote, length = _run_in(readings.travel[index], measured[index], readings.at.direction[index])
-            share = asymptote / mean if math.isfinite(asymptote) else 1.0
-            found.append(Drift(int(source), level, change, asymptote, length, share))
-    return found
-
-
-def _run_in(travel: FloatArray, friction: FloatArray, direction: FloatArray) -> tuple[float, float]:
-    """Asymptote [N] and length [m] of an exponential approach; NaN if they are not determined."""
-    unknown = math.nan, math.nan
-    spanned = float(np.ptp(travel))
-    if spanned <= 0.0 or len(friction) < FEWEST_STROKES:
-        return unknown
-    best = (math.inf, *unknown, math.inf)
-    side = direction - direction.mean()  # what is left of an offset
-    for length in np.geomspace(spanned / 20.0, spanned / 2.0, 15):
-        design = np.column_stack((np.ones_like(travel), np.exp(-(travel - travel.min()) / length), side))
-        values, *_ = np.linalg.lstsq(design, friction, rcond=None)
-        residual = float(np.sum((friction - design @ values) ** 2))
-        if residual < best[0]:
-            variance = residual / max(len(friction) - 4, 1)
-            error = math.sqrt(variance * float(np.linalg.pinv(design.T @ design)[0, 0]))
-            best = (residual, float(values[0]), float(length), error)
-    straight = np.column_stack((np.ones_like(travel), travel, side))
-    line, *_ = np.linalg.lstsq(straight, friction, rcond=None)
-    bends = best[0] < 0.7 * float(np.sum((friction - straight @ line) ** 2))  # clearly better than a straight line
-    certain = best[3] < LARGEST_ERROR * abs(best[1])
-    return (best[1], best[2]) if bends and certain else unknown

@@ -20,7 +20,7 @@ from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
 from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
 from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
-from seal_friction_ros.core.identification import diagnostics, fitting, runs, validation
+from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.calibration import calibration
 from seal_friction_ros.core.identification.candidate_laws import (
@@ -83,12 +83,15 @@ def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Iden
     data = gather(paths, options)
     selection = select_law(data, options.law)
     quality = assess(data, selection, options.run_to_run)
-    document = seal_document(data, selection, quality, options.name or name)
-    levels = _levels(data, selection, quality, document)
+    as_measured = seal_document(data, selection, quality, options.name or name)
+    levels = _levels(data, selection, quality, as_measured)
+    document = as_measured
+    if quality.settled is not None:
+        document = seal_document(data, selection, quality, options.name or name, quality.settled)
     warnings = tuple(warnings_of(data, selection, quality, levels))
     remarks = (*data.sources.remarks, *remarks_on(data, selection))
     document['identification'] = identification_section(data, selection, quality, levels, warnings)
-    return Identification(data, selection, quality, levels, document, warnings, remarks)
+    return Identification(data, selection, quality, levels, document, as_measured, warnings, remarks)
 
 
 def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationData:
@@ -260,7 +263,8 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
         coverage=coverage,
         calibration=calibration(selection.law, used, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
-        drifts=[] if used.are_samples else runs.drifts(everything, offsets),
+        drifts=[] if used.are_samples else run_in.drifts(everything, offsets),
+        settled=run_in.settled_law(found, used),
         breakaway=_breakaway(data, found),
         standard_errors=dict(zip(names, validation.jackknife_errors(left_out.parameters).tolist(), strict=True)),
     )
@@ -304,7 +308,7 @@ def _breakaway(data: IdentificationData, found: fitting.LawFit) -> BreakawayFit 
 def _levels(
     data: IdentificationData, selection: LawSelection, quality: LawQuality, document: Mapping[str, Any]
 ) -> tuple[PressureLevel, ...]:
-    """Measured and fitted friction at each pressure level, by the law as the seal file has it."""
+    """Measured and fitted friction at each pressure level, by the law of a seal file with this ``document``."""
     readings = data.prepared.readings
     seal = parse_seal(document)
     mounted = tuple(MountedSeal(seal, chamber) for chamber in data.sources.chambers)

@@ -18,7 +18,8 @@ from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
 from seal_friction_ros.core.identification.diagnostics import Outlier, changed_levels
 from seal_friction_ros.core.identification.force_correction import NOTICED, ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
-from seal_friction_ros.core.identification.runs import BetweenRuns, Drift
+from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
+from seal_friction_ros.core.identification.runs import BetweenRuns
 from seal_friction_ros.core.identification.selection import LawScore, is_beaten
 from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
 from seal_friction_ros.offline.identification.load_numbers import load_numbers
@@ -82,6 +83,7 @@ class LawQuality:
     calibration: Calibration  # share inside the band at each nominal share, within and between runs
     repeatability: float  # [-] scatter of repeated readings
     drifts: list[Drift]  # of the friction over each run
+    settled: SettledLaw | None  # law of the settled seal, which the seal file holds; None if no drift is evident
     breakaway: BreakawayFit | None  # None if no stroke starts from rest
     standard_errors: dict[str, float]  # of the parameters, by name
 
@@ -92,8 +94,8 @@ class PressureLevel(NamedTuple):
     pressure: float  # [Pa, gauge] mean over seals and readings
     speed: float  # [m/s] mean; NaN if not measured
     measured: float  # [N] all seals
-    fitted: float  # [N] all seals, by the law of the seal file
-    std: float  # [N] of a new reading, by the law of the seal file
+    fitted: float  # [N] all seals, by the law fitted to the readings as measured
+    std: float  # [N] of a new reading, by that law
     left_out: float  # [N] prediction by the law fitted without these readings
     offset: float  # [N] of the force sum
     readings: int
@@ -109,7 +111,8 @@ class Identification:
     selection: LawSelection
     quality: LawQuality
     levels: tuple[PressureLevel, ...]
-    document: dict[str, Any]  # seal file
+    document: dict[str, Any]  # seal file: the law of the settled seal, if a drift is evident
+    as_measured: dict[str, Any]  # seal file with the law of the readings as measured; the same without a drift
     warnings: tuple[str, ...]  # limits of the law that its user has to know
     remarks: tuple[str, ...]  # assumptions, and how an option changes them
 
@@ -119,19 +122,27 @@ def rounded_value(value: float) -> float:
     return rounded(value, DIGITS)
 
 
-def seal_document(data: IdentificationData, selection: LawSelection, quality: LawQuality, name: str) -> dict[str, Any]:
-    """Seal file of the selected law, checked as the node checks it.
+def seal_document(
+    data: IdentificationData,
+    selection: LawSelection,
+    quality: LawQuality,
+    name: str,
+    settled: SettledLaw | None = None,
+) -> dict[str, Any]:
+    """Seal file of the selected law, or of that law for the ``settled`` seal, checked as the node checks it.
 
     Raises:
         ValueError: The law makes no valid seal.
     """
     seals, law, pressure = len(data.sources.chambers), selection.law, data.used.at.pressure
-    values = _json_value(selection.fit.values)
+    values = _json_value((selection.fit if settled is None else settled.fit).values)
+    of_settled = '' if settled is None else ', of the settled seal'
+    relative = math.hypot(quality.uncertainty.relative, 0.0 if settled is None else settled.relative_std)
     files = ', '.join(file.name for file in data.sources.files)
     document: dict[str, Any] = {
         'name': name,
-        'source': f'Made by seal_friction identify from {files}: law {law.name} ({law.formula}), parameters by least '
-        f'squares over {data.used.count} readings, uncertainty from readings left out.',
+        'source': f'Made by seal_friction identify from {files}: law {law.name} ({law.formula}){of_settled}, '
+        f'parameters by least squares over {data.used.count} readings, uncertainty from readings left out.',
     }
     document['mounting'] = {'chambers': list(data.sources.chambers)}
     if data.ring is not None:
@@ -143,7 +154,7 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
     stiction, ratio = (
         (terms.get('stribeck_friction', 0.0), 0.0) if quality.breakaway is None else quality.breakaway[1:3]
     )
-    uncertainty = {'relative_std': quality.uncertainty.relative, 'absolute_std': quality.uncertainty.absolute / seals}
+    uncertainty = {'relative_std': relative, 'absolute_std': quality.uncertainty.absolute / seals}
     identified = [float(pressure.min()), float(pressure.max())]
     numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
     document |= _json_value({**numbers, 'identified_pressure': identified})
@@ -197,7 +208,7 @@ def identification_section(
         {
             'law': selection.law.name,
             'recommended_law': selection.best.law.name,
-            'parameters': selection.fit.values,
+            'parameters': (quality.settled or selection).fit.values,
             'standard_errors': quality.standard_errors,
             'seal_chambers': data.sources.chambers,
             'pressure_Pa': [level.pressure for level in levels],
@@ -230,7 +241,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'cross_validation_mean_deviation_N': selection.validation.mean_deviation,
             'ladder': [_ladder_row(score, selection) for score in selection.scores],
             'plain_mean_deviation_N': reference and reference.mean_deviation,
-            'relative_std': quality.uncertainty.relative,
+            'relative_std': found.document['uncertainty']['relative_std'],
             'absolute_std_N': quality.uncertainty.absolute,
             'condition_number': selection.fit.condition_number,
             'correlation': selection.fit.correlation.tolist(),
@@ -243,6 +254,8 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'told_apart_std': quality.told_apart,
             'calibration': {name: getattr(quality.calibration, name).tolist() for name in Calibration._fields[:3]},
             'drift': [level.drift for level in levels],
+            'as_measured': {'parameters': selection.fit.values, 'relative_std': quality.uncertainty.relative},
+            'settled': quality.settled and _settled_numbers(quality.settled, quality),
             'run_in': [
                 {
                     'source': data.sources.files[drift.source].name,
@@ -250,6 +263,9 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
                     'change': drift.change,
                     'asymptote_N': drift.asymptote,
                     'length_m': drift.length,
+                    'is_evident': drift.is_evident,
+                    'settled_share': drift.settled_share,
+                    'settled_std': drift.settled_std,
                 }
                 for drift in quality.drifts
             ],
@@ -264,6 +280,22 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,
         'remarks': list(found.remarks),
+    }
+
+
+def _settled_numbers(settled: SettledLaw, quality: LawQuality) -> dict[str, Any]:
+    """The settled seal: friction at each pressure in use, from its readings and by its law."""
+    readings, friction = settled.readings, settled.fit.friction(settled.readings.at)
+    levels = list(readings.levels.values())
+    fitted = [float(friction[inside].mean()) for inside in levels]
+    relative = math.hypot(quality.uncertainty.relative, settled.relative_std)
+    return {
+        'parameters': settled.fit.values,
+        'relative_std_of_settling': settled.relative_std,
+        'pressure_Pa': readings.level_pressures.tolist(),
+        'measured_N': [readings.half_range(inside).friction for inside in levels],
+        'fitted_N': fitted,
+        'std_N': [math.hypot(relative * value, quality.uncertainty.absolute) for value in fitted],
     }
 
 

@@ -9,6 +9,7 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, has_pressures
+from seal_friction_ros.core.identification.run_in import SettledLaw
 from seal_friction_ros.offline.identification.results import (
     Identification,
     IdentificationData,
@@ -145,6 +146,8 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
             f'laws that fit these data nearly as well differ by {100.0 * quality.told_apart:.0f} % where speed and '
             'pressure do not go together as here: that is in the standard deviation'
         )
+    if quality.settled is not None:
+        yield _settled_text(quality.settled, selection)
     drifted = [level for level in levels if level.is_used and abs(level.drift) > diagnostics.SETTLED]
     if drifted:
         at = ', '.join(f'{100.0 * level.drift:+.0f} % at {level.pressure / BAR:.3g} bar' for level in drifted)
@@ -156,6 +159,17 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
             f'the law is off by {100.0 * error:.0f} % (RMS) on left-out readings, while readings repeat within '
             f'{100.0 * floor:.0f} %: the friction depends on something that is not in the law'
         )
+
+
+def _settled_text(settled: SettledLaw, selection: LawSelection) -> str:
+    at = settled.readings.at
+    change = float(settled.fit.friction(at).mean() / selection.fit.friction(at).mean()) - 1.0
+    values = ', '.join(f'{p.name} = {selection.fit.values[p.name]:.4g} {p.unit}' for p in selection.law.parameters)
+    return (
+        f'run-in: the friction drifts over the runs beyond the scatter of the strokes; the seal file holds the law of '
+        f'the settled seal, {100.0 * change:+.0f} % against the readings, with a standard deviation of '
+        f'{100.0 * settled.relative_std:.2g} % since it is extrapolated; as measured: {values}'
+    )
 
 
 def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[str]:
@@ -187,7 +201,10 @@ def summary(found: Identification) -> str:
     lines = [f'law: {selection.law.name} ({selection.law.formula})']
     for p in selection.law.parameters:
         value, error = selection.fit.values[p.name], quality.standard_errors[p.name]
-        lines.append(f'  {p.name} = {value:.4g} {p.unit}, standard error {error:.2g}')
+        settled = (
+            '' if quality.settled is None else f'; settled seal: {quality.settled.fit.values[p.name]:.4g} {p.unit}'
+        )
+        lines.append(f'  {p.name} = {value:.4g} {p.unit}, standard error {error:.2g}{settled}')
     lines += ['  pressure [bar]  measured [N]  fitted [N]  std [N]']
     for level in found.levels:
         numbers = f'{level.pressure / BAR:14.4g}  {level.measured:12.4g}  {level.fitted:10.4g}  {level.std:7.4g}'
