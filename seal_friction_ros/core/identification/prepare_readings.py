@@ -118,8 +118,8 @@ def _breakaway(
     level = _nearest_level(at.pressure.mean(axis=1), dynamic)
     several = len(np.unique(source)) > 1
     group = level if dynamic.left_out_by == 'pressure' else source if several else _parts_of_strokes(source, level)
-    empty = np.empty(0)
-    return replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=(), travel=empty)
+    found = replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=())
+    return replace(found, travel=np.empty(0), dwell=np.array([peak.dwell for _, peak in rows]))
 
 
 def _groups(level: IntArray, part: IntArray, kind: str) -> tuple[IntArray, str]:
@@ -201,7 +201,7 @@ def prepare_manual_readings(
 
 
 def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
-    names, *columns = zip(*sources, strict=True)
+    names, *columns, dwells = zip(*sources, strict=True)
     test, pressure, direction, friction, velocity = (np.concatenate(column) for column in columns)
     of_seals = np.repeat(np.maximum(pressure, 0.0)[:, np.newaxis], seals, axis=1)
     source = np.repeat(np.arange(len(sources)), [len(manual.friction) for manual in sources])
@@ -210,6 +210,8 @@ def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
     group, by = _groups(level, tests, 'test')
     at = OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64))
     readings = FrictionReadings(at, direction * friction, source, group, level, names, by, are_samples=False)
+    if all(dwell is not None for dwell in dwells):
+        readings = replace(readings, dwell=np.concatenate(dwells))
     if by == 'pressure' and not has_pressures(readings):
         return replace(readings, group=_parts_of_strokes(source, level), left_out_by='block')
     return readings

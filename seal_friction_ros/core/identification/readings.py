@@ -55,6 +55,7 @@ class ManualReadings(NamedTuple):
     direction: IntArray  # -1 or 1
     friction: FloatArray  # [N] magnitude, of all seals
     velocity: FloatArray  # [m/s] magnitude; NaN if not measured
+    dwell: FloatArray | None = None  # [s] time at rest before; None if not noted
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,8 @@ class FrictionReadings:
     samples: tuple[FloatArray, ...] = ()  # [N] force sums behind each reading; empty if there is only the reading
     travel: FloatArray = field(default_factory=lambda: np.empty(0))
     """[m] way of the rod since the start of its source, shape (n,); empty if unknown"""
+    dwell: FloatArray = field(default_factory=lambda: np.empty(0))
+    """[s] time at rest before each breakaway, shape (n,); empty if unknown"""
 
     @property
     def count(self) -> int:
@@ -110,6 +113,7 @@ class FrictionReadings:
             level=self.level[where],
             samples=tuple(self.samples[i] for i in where) if self.samples else (),
             travel=self.travel[where] if len(self.travel) else self.travel,
+            dwell=self.dwell[where] if len(self.dwell) else self.dwell,
         )
 
     def magnitudes(self, offsets: FloatArray) -> FloatArray:

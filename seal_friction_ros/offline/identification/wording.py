@@ -7,6 +7,7 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification import diagnostics
+from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, has_pressures
 from seal_friction_ros.core.identification.run_in import SettledLaw
@@ -49,6 +50,8 @@ def warnings_of(
         yield f'no gain is claimed for pressure: {gain[0]}: the difference is within the noise'
     yield from _parameter_texts(selection)
     yield from _scatter_texts(selection, quality, levels)
+    if quality.breakaway is not None and quality.breakaway.dwell is not None:
+        yield _dwell_text(quality.breakaway)
     if quality.breakaway is None:
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
 
@@ -159,6 +162,16 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
             f'the law is off by {100.0 * error:.0f} % (RMS) on left-out readings, while readings repeat within '
             f'{100.0 * floor:.0f} %: the friction depends on something that is not in the law'
         )
+
+
+def _dwell_text(law: BreakawayFit) -> str:
+    parts = ((law.stiction_per_decade, ' N'), (100.0 * law.ratio_per_decade, ' % of the Coulomb friction'))
+    growth = ' and '.join(f'{value:.2g}{unit}' for value, unit in parts if value)
+    shortest, longest = law.dwells or (math.nan, math.nan)
+    return (
+        f'breakaway grows with the time at rest, by {growth} of one seal for a rest ten times as long (rests of '
+        f'{shortest:.2g} to {longest:.3g} s); the seal file holds that after {law.dwell:.3g} s'
+    )
 
 
 def _settled_text(settled: SettledLaw, selection: LawSelection) -> str:
