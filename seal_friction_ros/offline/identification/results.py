@@ -210,6 +210,7 @@ def identification_section(
             'recommended_law': selection.best.law.name,
             'parameters': (quality.settled or selection).fit.values,
             'standard_errors': quality.standard_errors,
+            'as_measured': {'parameters': selection.fit.values, 'relative_std': quality.uncertainty.relative},
             'seal_chambers': data.sources.chambers,
             'pressure_Pa': [level.pressure for level in levels],
             'measured_N': measured,
@@ -254,7 +255,6 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'told_apart_std': quality.told_apart,
             'calibration': {name: getattr(quality.calibration, name).tolist() for name in Calibration._fields[:3]},
             'drift': [level.drift for level in levels],
-            'as_measured': {'parameters': selection.fit.values, 'relative_std': quality.uncertainty.relative},
             'settled': quality.settled and _settled_numbers(quality.settled, quality),
             'run_in': [
                 {
