@@ -159,7 +159,10 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
 
 
 def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> ForceSumCorrection | None:
-    """Area and offset of the logs, if they matter: at rest they would count as force on the rod; None otherwise."""
+    """Area and offset of the logs, if they matter: at rest they would count as force on the rod; None otherwise.
+
+    The load that was taken out of a log remains in the force sum of the node.
+    """
     readings = data.used
     sources = [source for source, index in enumerate(readings.two_sided) if len(index)]
     if data.sources.each[0].log is None or not sources:
@@ -168,9 +171,10 @@ def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> 
     friction = float(fit.friction(readings.at).mean())
     made = data.correction if data.correction is not None and data.correction.is_significant else None
     areas = {} if made is None else {f'area_{made.chamber}': rounded_value(made.area)}
-    if not areas and abs(offset) < NOTICED * friction:
+    matters, contains_load = bool(areas) or abs(offset) >= NOTICED * friction, data.sources.has_fitted_load
+    if not matters and not contains_load:
         return None
-    return ForceSumCorrection(**areas, offset=rounded_value(offset))
+    return ForceSumCorrection(**areas, offset=rounded_value(offset) if matters else 0.0, contains_load=contains_load)
 
 
 def _json_value(value: Any) -> Any:
@@ -215,7 +219,8 @@ def identification_section(
             'warnings': warnings,
         }
     )
-    return section
+    load = load_numbers([(source.file.name, source.load) for source in data.sources.each])
+    return section if load is None else section | {'load': load}
 
 
 def identification_numbers(found: Identification) -> dict[str, Any]:
@@ -259,7 +264,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         'breakaway': quality.breakaway and _breakaway_numbers(found),
         'stiction': quality.breakaway and quality.breakaway._asdict(),
         'changes': [change._asdict() for change in changed_levels(data.prepared.readings)],
-        'load': load_numbers([(source.file.name, source.load) for source in data.sources.each]),
+        'load': found.document['identification'].get('load'),
         'samples_used': data.prepared.used,
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,
