@@ -202,7 +202,7 @@ class Observation(NamedTuple):
 
     stamp: int  # [ns]
     velocity: float  # [m/s] at which the seals slide, conditioned; 0.0 at rest and where it is not known
-    force_sum: float  # [N] corrected
+    force_sum: float  # [N] corrected; 0.0 if it contains a load, which hides it
     status: int  # bits of `Status`
     input_age: float  # [s] as in `FrictionEstimate`
 
@@ -237,11 +237,12 @@ _MOTION_UNCERTAIN = int(Status.MOTION_UNCERTAIN)
 _FASTER_THAN_IDENTIFIED = int(Status.FASTER_THAN_IDENTIFIED)
 _SLOWER_THAN_IDENTIFIED = int(Status.SLOWER_THAN_IDENTIFIED)
 _DIRECTION_NOT_IDENTIFIED = int(Status.DIRECTION_NOT_IDENTIFIED)
+_FORCE_CONTAINS_LOAD = int(Status.FORCE_CONTAINS_LOAD)
 
 NO_VELOCITY = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
 """Status bits of a velocity that is not used."""
 _NO_STATE = NO_VELOCITY | _INPUT_REFUSED | _PRESSURE_MISSING
-_NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE
+_NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE | _FORCE_CONTAINS_LOAD
 _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
@@ -258,8 +259,8 @@ def step(
 
     A pressure or force sum that is not finite, out of range, or jumps is never used: the last usable one stays in use
     until it is stale, and the status says so. The state is UNKNOWN and the friction force 0 N with such a velocity,
-    with refused inputs, without any usable pressure so far, and at rest with a missing or stale force sum. A stale
-    pressure leaves state and friction as they are, with the status bit set.
+    with refused inputs, without any usable pressure so far, and at rest with a force sum that is missing, stale or
+    contains a load. A stale pressure leaves state and friction as they are, with the status bit set.
 
     A sample jumps if it is further from the last usable one than the largest rate allows over the time between them,
     at least `SHORTEST_INTERVAL`. The next sample is usable if it agrees with either of the two: a spike and a real step
@@ -315,11 +316,7 @@ def assess_inputs(
     input_age = pressure_age if pressure_age >= force_age else force_age
     if status & (_PRESSURE_MISSING | _FORCE_MISSING):
         input_age = -1.0
-    force_sum = force.force
-    if parameters.corrects_force_sum and force.stamp != NEVER:
-        force_sum = corrected_force_sum(
-            parameters.force_sum_correction, force_sum, pressure.chamber_a, pressure.chamber_b
-        )
+    force_sum = _force_sum_on_rod(parameters, force, pressure)
 
     velocity, leapt_velocity, fault = _usable_velocity(settings, Speed(stamp, given), velocity, leapt_velocity)
     status |= fault
@@ -337,6 +334,19 @@ def assess_inputs(
         stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion
     )
     return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
+
+
+@compilable
+def _force_sum_on_rod(parameters: EstimatorParameters, force: Force, pressure: Pressure) -> float:
+    """Measured force sum, corrected [N]; 0.0 if it contains a load, which hides it."""
+    if parameters.force_sum_correction.contains_load:
+        return 0.0
+    if not parameters.corrects_force_sum or force.stamp == NEVER:
+        return force.force
+    found: float = corrected_force_sum(
+        parameters.force_sum_correction, force.force, pressure.chamber_a, pressure.chamber_b
+    )
+    return found
 
 
 @compilable
@@ -376,6 +386,8 @@ def estimate_of(parameters: EstimatorParameters, seen: Observation, friction: Ac
     if parameters.limits_motion:
         status |= _unidentified_motion(parameters.motion_limits, velocity)
     acting, slides = _UNKNOWN, velocity != 0.0
+    if not slides and parameters.force_sum_correction.contains_load:
+        status |= _FORCE_CONTAINS_LOAD
     if not status & _NO_STATE and (slides or not status & _NO_FORCE_SUM):
         sliding = coulomb + velocity_friction
         acting = state_friction(velocity, force_sum, not slides, sliding, breakaway)

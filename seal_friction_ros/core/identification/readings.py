@@ -116,6 +116,12 @@ class FrictionReadings:
             dwell=self.dwell[where] if len(self.dwell) else self.dwell,
         )
 
+    def without(self, out: BoolArray) -> 'FrictionReadings':
+        """The readings that are not ``out``; levels, and groups that are levels, are numbered without a gap."""
+        left = self.taken(~out)
+        level = np.unique(left.level, return_inverse=True)[1]
+        return replace(left, level=level, group=level if left.left_out_by == 'pressure' else left.group)
+
     def magnitudes(self, offsets: FloatArray) -> FloatArray:
         """Measured friction [N], shape (n,): force sum without the offset of its source [N], along the direction."""
         return np.asarray(self.at.direction * (self.force - offsets[self.source]))
@@ -292,9 +298,13 @@ def _check_bounds(name: str, pressure: FloatArray, speed: FloatArray, force: Flo
 
 def has_pressures(readings: FrictionReadings) -> bool:
     """Whether the readings show how friction depends on pressure: enough pressures, far enough apart."""
-    pressures = readings.seal_pressure
-    wide = float(np.ptp(pressures)) >= max(NARROWEST_PRESSURES, 0.1 * float(pressures.max()))
-    return wide and (readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES)
+    enough = readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES
+    return enough and are_far_apart(readings.seal_pressure)
+
+
+def are_far_apart(pressures: FloatArray) -> bool:
+    """Whether pressures [Pa], shape (n,), differ by more than a regulator and its sensor do (our choice)."""
+    return float(np.ptp(pressures)) >= max(NARROWEST_PRESSURES, 0.1 * float(np.max(pressures)))
 
 
 def _check_pressures(where: str, readings: FrictionReadings) -> None:

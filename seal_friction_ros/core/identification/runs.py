@@ -35,9 +35,9 @@ class BetweenRuns(NamedTuple):
 def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: FloatArray) -> BetweenRuns:
     """Standard deviation between runs, from sources that repeat a pressure, or from swept logs.
 
-    std^2 = (nu_0 s_0^2 + nu s^2) / (nu_0 + nu): the mean of a scaled inverse chi-squared posterior with the prior s_0 =
-    `PRIOR_STD` of weight nu_0 = `PRIOR_FREEDOM`, where s is measured with nu degrees of freedom. The conjugate prior of
-    a variance is in [Gelman2013]_, section 2.6; its numbers are our choice.
+    std^2 = (nu_0 s_0^2 + nu s^2) / (nu_0 + nu): the scale of a scaled inverse chi-squared posterior with the prior
+    s_0 = `PRIOR_STD` of weight nu_0 = `PRIOR_FREEDOM`, where s is measured with nu degrees of freedom. The conjugate
+    prior of a variance is in [Gelman2013]_, section 2.6; its numbers are our choice.
 
     Args:
         readings: Readings of one or several runs.
@@ -46,12 +46,7 @@ def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: Floa
     """
     squares, freedom = 0.0, 0
     if readings.are_samples:
-        measured = readings.magnitudes(offsets)
-        ratios = [
-            float(np.sum(measured[index] * friction[index]) / np.sum(friction[index] ** 2))
-            for index in (readings.source == source for source in np.unique(readings.source))
-        ]
-        parts = [np.array(ratios)]
+        parts = [np.array(list(shares_of_law(readings, friction, offsets).values()))]
     else:
         of_sources = (readings.frictions_of_sources(inside) for inside in readings.levels.values())
         parts = [np.array(list(found.values())) for found in of_sources]
@@ -61,3 +56,21 @@ def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: Floa
     measured_std = math.sqrt(squares / freedom) if freedom else math.nan
     std = math.sqrt((PRIOR_FREEDOM * PRIOR_STD**2 + squares) / (PRIOR_FREEDOM + freedom))
     return BetweenRuns(std, measured_std, freedom)
+
+
+def shares_of_law(readings: FrictionReadings, friction: FloatArray, offsets: FloatArray) -> dict[int, float]:
+    r"""Source -> its friction as a share of a law that was fitted to all sources [-], by least squares.
+
+    .. math:: \min_s \sum_i (F_i - s f_i)^2
+
+    Args:
+        readings: Of several runs.
+        friction: By the law [N], shape (n,).
+        offsets: Of the force sum of each source [N], shape (sources,).
+    """
+    measured = readings.magnitudes(offsets)
+    each = {int(source): readings.source == source for source in np.unique(readings.source)}
+    return {
+        source: float(np.sum(measured[inside] * friction[inside]) / np.sum(friction[inside] ** 2))
+        for source, inside in each.items()
+    }

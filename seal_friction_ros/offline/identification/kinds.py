@@ -164,7 +164,7 @@ def _seal_document(
     if np.isfinite(speed).all():
         document['identified_speed'] = [_value(speed.min()), _value(speed.max())]
     document['identified_directions'] = [int(side) for side in np.unique(readings.at.direction)]
-    correction = _correction(fit)
+    correction = _correction(fit, contains_load=sources.has_fitted_load)
     if correction is not None:
         document['force_sum_correction'] = asdict(correction)
     document['identification'] = {
@@ -177,15 +177,17 @@ def _seal_document(
     return document
 
 
-def _correction(fit: KindsFit) -> ForceSumCorrection | None:
+def _correction(fit: KindsFit, *, contains_load: bool) -> ForceSumCorrection | None:
     """Areas and offset that the force sum lacks, if they matter; the same in the file of each kind."""
     readings = fit.data.readings
     two_sided = [source for source, index in enumerate(readings.two_sided) if len(index)]
     offset = -float(np.mean(fit.offsets[two_sided])) if two_sided else 0.0
-    if not fit.rung.areas and abs(offset) < NOTICED * float(fit.frictions(readings.at).sum(axis=1).mean()):
+    matters = fit.rung.areas or abs(offset) >= NOTICED * float(fit.frictions(readings.at).sum(axis=1).mean())
+    if not matters and not contains_load:
         return None
     area_a, area_b = (_value(-area) for area in fit.areas)
-    return ForceSumCorrection(area_a=area_a, area_b=area_b, offset=_value(offset))
+    zero = _value(offset) if matters else 0.0
+    return ForceSumCorrection(area_a=area_a, area_b=area_b, offset=zero, contains_load=contains_load)
 
 
 def shares(found: KindsIdentification) -> tuple[FloatArray, FloatArray]:

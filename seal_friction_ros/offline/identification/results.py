@@ -15,19 +15,18 @@ from seal_friction_ros.core.identification import fitting
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
-from seal_friction_ros.core.identification.diagnostics import Outlier, changed_levels
+from seal_friction_ros.core.identification.diagnostics import Outlier, RunChange
 from seal_friction_ros.core.identification.force_correction import NOTICED, ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
-from seal_friction_ros.core.identification.selection import LawScore, is_beaten
+from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, is_beaten
 from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
 from seal_friction_ros.offline.identification.load_numbers import load_numbers
 from seal_friction_ros.offline.identification.sources import Sources
 from seal_friction_ros.offline.work.seal_writer import rounded
 
 DIGITS = 6  # of a number in a seal file
-FEWEST_PRESSURES_FOR_EXPONENT = 6  # with fewer, leaving each out in turn does not determine an exponent (our choice)
 
 
 class Ring(NamedTuple):
@@ -63,6 +62,8 @@ class LawSelection:
     validation: CrossValidation
     reference: CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
+    chosen_anew: ChosenAnew | None
+    """prediction by laws chosen without each group; None for swept logs and for a law that the user names"""
 
     @property
     def law(self) -> CandidateLaw:
@@ -78,6 +79,7 @@ class LawQuality:
     between_runs: BetweenRuns
     """relative standard deviation between runs that is added to what readings left out deviate by"""
     is_stated: bool  # whether the user gave it
+    changes: list[RunChange]  # of the friction from run to run, under the same conditions
     told_apart: float  # [-] relative spread of laws that the data cannot tell apart, added likewise
     coverage: float  # share of the left-out readings inside a 95 % band that was made without them
     calibration: Calibration  # share inside the band at each nominal share, within and between runs
@@ -96,7 +98,8 @@ class PressureLevel(NamedTuple):
     measured: float  # [N] all seals
     fitted: float  # [N] all seals, by the law fitted to the readings as measured
     std: float  # [N] of a new reading, by that law
-    left_out: float  # [N] prediction by the law fitted without these readings
+    left_out: float  # [N] prediction by the law fitted without these readings; they had a say in its choice
+    left_out_nested: float  # [N] prediction by a law chosen and fitted without these readings; NaN if not done
     offset: float  # [N] of the force sum
     readings: int
     drift: float  # [-] relative change of the friction over the run; NaN if unknown
@@ -134,7 +137,7 @@ def seal_document(
     Raises:
         ValueError: The law makes no valid seal.
     """
-    seals, law, pressure = len(data.sources.chambers), selection.law, data.used.at.pressure
+    seals, law = len(data.sources.chambers), selection.law
     values = _json_value((selection.fit if settled is None else settled.fit).values)
     of_settled = '' if settled is None else ', of the settled seal'
     relative = math.hypot(quality.uncertainty.relative, 0.0 if settled is None else settled.relative_std)
@@ -155,9 +158,8 @@ def seal_document(
         (terms.get('stribeck_friction', 0.0), 0.0) if quality.breakaway is None else quality.breakaway[1:3]
     )
     uncertainty = {'relative_std': relative, 'absolute_std': quality.uncertainty.absolute / seals}
-    identified = [float(pressure.min()), float(pressure.max())]
     numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
-    document |= _json_value({**numbers, 'identified_pressure': identified})
+    document |= _json_value({**numbers, 'identified_pressure': _identified_pressure(data)})
     speed = np.abs(data.used.at.velocity)
     if np.isfinite(speed).all():
         document['identified_speed'] = _json_value([float(speed.min()), float(speed.max())])
@@ -169,8 +171,26 @@ def seal_document(
     return document
 
 
+def _identified_pressure(data: IdentificationData) -> list[float]:
+    """Lowest and highest pressure [Pa] at which the law holds: of the longer run of levels on one side of an outlier.
+
+    Of two equally long runs the lower one counts (our choice).
+    """
+    everything, used = data.prepared.readings, data.used.at.pressure
+    if data.outlier is not None:
+        below, above = (
+            everything.taken(side)
+            for side in (everything.level < data.outlier.level, everything.level > data.outlier.level)
+        )
+        used = (above if len(above.levels) > len(below.levels) else below).at.pressure
+    return [float(used.min()), float(used.max())]
+
+
 def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> ForceSumCorrection | None:
-    """Area and offset of the logs, if they matter: at rest they would count as force on the rod; None otherwise."""
+    """Area and offset of the logs, if they matter: at rest they would count as force on the rod; None otherwise.
+
+    The load that was taken out of a log remains in the force sum of the node.
+    """
     readings = data.used
     sources = [source for source, index in enumerate(readings.two_sided) if len(index)]
     if data.sources.each[0].log is None or not sources:
@@ -179,9 +199,10 @@ def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> 
     friction = float(fit.friction(readings.at).mean())
     made = data.correction if data.correction is not None and data.correction.is_significant else None
     areas = {} if made is None else {f'area_{made.chamber}': rounded_value(made.area)}
-    if not areas and abs(offset) < NOTICED * friction:
+    matters, contains_load = bool(areas) or abs(offset) >= NOTICED * friction, data.sources.has_fitted_load
+    if not matters and not contains_load:
         return None
-    return ForceSumCorrection(**areas, offset=rounded_value(offset))
+    return ForceSumCorrection(**areas, offset=rounded_value(offset) if matters else 0.0, contains_load=contains_load)
 
 
 def _json_value(value: Any) -> Any:
@@ -227,7 +248,8 @@ def identification_section(
             'warnings': warnings,
         }
     )
-    return section
+    load = load_numbers([(source.file.name, source.load) for source in data.sources.each])
+    return section if load is None else section | {'load': load}
 
 
 def identification_numbers(found: Identification) -> dict[str, Any]:
@@ -239,6 +261,8 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'std_N': [level.std for level in levels],
             'left_out_N': [level.left_out for level in levels],
             'worst_left_out_error': worst_left_out(levels),
+            'left_out_nested_N': [level.left_out_nested for level in levels],
+            'left_out_nested_laws': selection.chosen_anew and selection.chosen_anew.laws,
             'cross_validation_mean_deviation_N': selection.validation.mean_deviation,
             'ladder': [_ladder_row(score, selection) for score in selection.scores],
             'plain_mean_deviation_N': reference and reference.mean_deviation,
@@ -274,8 +298,8 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
     return numbers | {
         'breakaway': quality.breakaway and _breakaway_numbers(found),
         'stiction': quality.breakaway and quality.breakaway._asdict(),
-        'changes': [change._asdict() for change in changed_levels(data.prepared.readings)],
-        'load': load_numbers([(source.file.name, source.load) for source in data.sources.each]),
+        'changes': [change._asdict() for change in quality.changes if change.is_changed],
+        'load': found.document['identification'].get('load'),
         'samples_used': data.prepared.used,
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,

@@ -9,7 +9,7 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
-from seal_friction_ros.core.identification.readings import FrictionReadings, has_pressures
+from seal_friction_ros.core.identification.readings import has_pressures
 from seal_friction_ros.core.identification.run_in import SettledLaw
 from seal_friction_ros.offline.identification.results import (
     Identification,
@@ -27,7 +27,7 @@ def warnings_of(
 ) -> Iterator[str]:
     """Limits of the law that its user has to know, one line each."""
     readings = data.prepared.readings
-    yield from _change_texts(readings)
+    yield from _change_texts(quality)
     one_way = [name for name, index in zip(readings.names, readings.two_sided, strict=True) if not len(index)]
     if one_way:
         yield (
@@ -56,11 +56,14 @@ def warnings_of(
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
 
 
-def _change_texts(readings: FrictionReadings) -> Iterator[str]:
-    for change in diagnostics.changed_levels(readings):
+def _change_texts(quality: LawQuality) -> Iterator[str]:
+    for change in quality.changes:
+        if not change.is_changed:
+            continue
         percent = 100.0 * (change.other_friction / change.friction - 1.0)
+        where = 'of the same law' if change.pressure is None else f'at {change.pressure / BAR:.3g} bar'
         yield (
-            f'friction differs between runs: at {change.pressure / BAR:.3g} bar {change.friction:.3g} N in '
+            f'friction differs between runs: {where} {change.friction:.3g} N in '
             f'{change.name} and {change.other_friction:.3g} N in {change.other_name} ({percent:+.0f} %); they are '
             'fitted together, and the band holds both: if they are two seals, identify each separately'
         )

@@ -15,16 +15,17 @@ from seal_friction_ros.core.identification.candidate_laws import (
     with_velocity_terms,
 )
 from seal_friction_ros.core.identification.diagnostics import (
-    changed_levels,
     collinear_regressors,
     outlying_level,
     repeatability,
+    shared_levels,
     traded_off,
 )
 from seal_friction_ros.core.identification.fitting import fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.runs import PRIOR_STD, between_runs
 from seal_friction_ros.core.identification.selection import (
+    choose_anew,
     is_beaten,
     recommended,
     rise_over_pressures,
@@ -397,10 +398,28 @@ def test_sources_that_disagree_at_a_pressure_are_named():
     both = FrictionReadings(
         **{**vars(noted(pressures=3, count=2)), 'force': force, 'source': part, 'names': ('a', 'b')}
     )
-    (change,) = changed_levels(both)
+    changes = shared_levels(both)
+    assert [round(1e-5 * change.pressure) for change in changes] == [round(1e-5 * p) for p in both.level_pressures]
+    (change,) = (change for change in changes if change.is_changed)
     assert (change.name, change.other_name) == ('a', 'b')
-    assert change.other_friction / change.friction == pytest.approx(1.5)
-    assert not changed_levels(one)
+    assert change.ratio == change.other_friction / change.friction == pytest.approx(1.5)
+    assert not shared_levels(one)
+
+
+def test_a_law_chosen_anew_for_a_group_has_not_seen_it():
+    readings = noted(scatter=0.02, pressures=5)
+    laws = [LAWS['constant_coulomb'], ELASTIC]
+
+    def choose(left):
+        return recommended(score_laws(laws, left))
+
+    found = choose_anew(readings, choose)
+    assert found.laws == ('pressure_power_law_2_3',) * 3
+    first = readings.group == 0
+    wild = FrictionReadings(**{**vars(noted(scatter=0.02, pressures=5)), 'force': readings.force * (1.0 + 9.0 * first)})
+    again = choose_anew(wild, choose)
+    assert again.predicted[first] == pytest.approx(found.predicted[first], rel=1e-12)
+    assert again.predicted[~first].mean() > 2.0 * found.predicted[~first].mean()
 
 
 # --- breakaway ---

@@ -185,6 +185,54 @@ def test_delft_a_left_out_pressure_is_predicted_within_15_percent(seal, tmp_path
     assert np.abs(off[used]).max() <= 0.15
     assert run.figures['fitted_N'] == sorted(run.figures['fitted_N'])
     assert run.figures['fitted_N'][-1] > 1.3 * run.figures['fitted_N'][0]
+    nested = np.array(run.figures['left_out_nested_N']) / np.array(run.figures['measured_N']) - 1.0
+    worst = 0.22 if seal == 'X-ring257' else 0.15  # two pressures are left of three: the prior exponent stands in
+    assert np.abs(nested[used]).max() <= worst
+    same = np.array(run.figures['left_out_nested_laws']) == run.figures['law']
+    assert nested[used][same] == pytest.approx(off[used][same], abs=1e-6)
+
+
+def test_without_its_lowest_pressure_another_law_is_chosen_and_the_nested_error_says_so(tmp_path):
+    run = Run(tmp_path, *delft('O-ring257_run2'))
+    assert run.figures['law'].startswith('pressure_power_law')
+    assert run.figures['left_out_nested_laws'][0] == 'constant_coulomb'
+    off, nested = (
+        run.figures[key][0] / run.figures['measured_N'][0] - 1.0 for key in ('left_out_N', 'left_out_nested_N')
+    )
+    assert nested > off + 0.05
+    named = Run(tmp_path, *delft('O-ring257_run2'), '--law', run.figures['law'], name='named')
+    assert named.figures['left_out_nested_N'] == [None] * 4  # nothing was chosen
+
+
+@pytest.mark.parametrize(('higher', 'code'), [((1,), 0), ((1, 3, 5), 2)])
+def test_two_seals_are_refused_if_they_differ_at_most_of_the_pressures(higher, code, tmp_path):
+    random, tables = np.random.default_rng(4), []
+    for run in range(2):
+        rows = ['pressure_bar,friction_N,direction']
+        for bar in (1, 3, 5, 7, 9):
+            friction = (2.0 + 0.5 * bar) * (2.2 if run and bar in higher else 1.0)
+            rows += [f'{bar},{friction * random.normal(1.0, 0.01)},{way}' for way in ('extend', 'retract') * 4]
+        tables.append(tmp_path / f'run{run}.csv')
+        tables[-1].write_text('\n'.join(rows))
+    run = Run(tmp_path, *map(str, tables))
+    assert run.code == code, run.errors
+    assert ('two seals or two states of one' in run.errors) == (code == 2)
+
+
+@pytest.mark.parametrize(('wrong', 'claimed'), [(7, (1.0, 5.0)), (3, (5.0, 11.0)), (11, (1.0, 9.0)), (1, (3.0, 11.0))])
+def test_nothing_is_claimed_beyond_a_pressure_that_disagrees_with_the_others(wrong, claimed, tmp_path):
+    random = np.random.default_rng(3)
+    rows = ['pressure_bar,friction_N,direction']
+    for bar in (1, 3, 5, 7, 9, 11):
+        friction = (2.0 + 0.5 * bar) * (2.0 if bar == wrong else 1.0)
+        rows += [f'{bar},{friction * random.normal(1.0, 0.01)},{way}' for way in ('extend', 'retract') * 4]
+    (tmp_path / 'table.csv').write_text('\n'.join(rows))
+    run = Run(tmp_path, str(tmp_path / 'table.csv'))
+    assert run.figures['is_outlier'] == [bar == wrong for bar in (1, 3, 5, 7, 9, 11)]
+    assert run.document['identified_pressure'] == [pytest.approx(1e5 * bar) for bar in claimed]
+    for bar in (1, 3, 5, 7, 9, 11):
+        status = estimates_of(run, 1e5 * bar, 0.01).status
+        assert bool(status) == (not claimed[0] <= bar <= claimed[1])
 
 
 def test_the_same_bytes_given_twice_are_refused(tmp_path):
@@ -291,6 +339,15 @@ def test_mbari_two_logs_are_fitted_together_and_their_difference_is_in_the_band(
     assert both.figures['between_runs_measured'] > 0.15
     assert both.figures['between_run_std'] > friction_id.figures['between_run_std']
     assert len(both.document['identification']['data']) == 2
+    (change,) = both.figures['changes']
+    assert change['pressure'] is None  # one pressure holds several speeds
+    assert (change['name'], change['other_name']) == (FRICTION_ID, OTHER)
+    assert 0.5 < change['other_friction'] / change['friction'] < 0.85  # the first log has more friction
+    assert both.has_warning('friction differs between runs: of the same law')
+    logs = [str(data(f'mbari/{name}')) for name in (FRICTION_ID, OTHER)]
+    refused = Run(tmp_path, *logs, '--refuse-changed', name='refused')
+    assert refused.code == 2
+    assert 'over their speeds and pressures' in refused.errors
 
 
 def test_viscous_friction_acts_in_the_node_and_is_not_in_the_coulomb_friction(friction_id):
