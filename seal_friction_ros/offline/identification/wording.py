@@ -73,14 +73,15 @@ def _correction_text(correction: ForceCorrection, area: float | None) -> str:
     change = f'{1e6 * correction.area:+.3g} mm2 (standard error {1e6 * correction.standard_error:.2g} mm2)'
     text = (
         f'the area of chamber {correction.chamber} in the force sum is off: its offset follows the pressure, by '
-        f'{change}; the law is fitted with the corrected area'
+        f'{change}; the law is fitted with the corrected area, and the seal file carries the correction for the node'
     )
+    twice = 'identify anew, or it is corrected twice'
     if area is None:
-        return f'{text}: correct it where the force sum is made'
+        return f'{text}; if you correct the area where the force sum is made, {twice}'
     old, new = (1e3 * math.sqrt(4.0 * max(value, 0.0) / math.pi) for value in (area, area + correction.area))
     return (
         f'{text}: {1e6 * (area + correction.area):.4g} mm2 in place of {1e6 * area:.4g} mm2, the bore is nearer to '
-        f'{new:.3g} than {old:.3g} mm: correct the rig file; the seal file carries the correction for the node'
+        f'{new:.3g} than {old:.3g} mm; if you correct the rig file, {twice}'
     )
 
 

@@ -133,9 +133,21 @@ def test_delft_a_wrong_bore_is_found_told_and_corrected(tmp_path):
     """The cylinder has 490.9 mm2, the rig file 518.7 mm2; README of the data."""
     run = Run(tmp_path, *delft('NAPN'))
     assert run.figures['area_correction_m2'] * 1e6 == pytest.approx(-24.0, abs=4.0)
-    assert run.has_warning('the bore is nearer to 25.1 than 25.7 mm')
+    assert run.has_warning(
+        'the bore is nearer to 25.1 than 25.7 mm', 'the seal file carries', 'or it is corrected twice'
+    )
     offsets = np.array(run.figures['offset_N'])
     assert np.ptp(offsets) < 0.1 * max(run.figures['measured_N'])
+
+
+def test_delft_an_area_that_was_put_right_in_the_rig_file_is_not_corrected_again(tmp_path):
+    rig = config_path('rigs', 'delft').read_text()
+    assert rig.count('518.748') == 1
+    right = tmp_path / 'right.yaml'
+    right.write_text(rig.replace('518.748', '495.9'))
+    run = Run(tmp_path, *delft('NAPN'), '--rig', str(right))
+    assert not run.has_warning('area of chamber')
+    assert run.document.get('force_sum_correction', {}).get('area_a', 0.0) == 0.0
 
 
 def test_delft_both_directions_of_a_held_file_are_one_level(tmp_path):
