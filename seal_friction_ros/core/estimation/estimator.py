@@ -365,14 +365,14 @@ def _unidentified_motion(limits: MotionLimits, velocity: float) -> int:
 @compilable
 def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_rest: bool) -> bool:
     """Whether the velocity does not tell if the rod is at rest."""
-    speed = abs(motion.velocity)
+    _, velocity, half_width, _, _, is_waiting, last_velocity, last_change, _, _, _, _, samples = motion
     if at_rest:
-        return speed > CREEP * settings.stick_velocity
-    if motion.samples < SETTLING:
+        return abs(velocity) > CREEP * settings.stick_velocity
+    if samples < SETTLING:
         return True
-    if motion.half_width == 0.0:  # the first step of a motion may be a ripple that is not learnt yet
-        return motion.velocity * (motion.last_velocity - motion.last_change) <= 0.0
-    return motion.is_waiting or speed <= settings.slip_velocity + motion.half_width / SETTLING_TIME
+    if half_width == 0.0:  # the first step of a motion may be a ripple that is not learnt yet
+        return velocity * (last_velocity - last_change) <= 0.0
+    return is_waiting or abs(velocity) <= settings.slip_velocity + half_width / SETTLING_TIME
 
 
 @compilable
@@ -412,15 +412,11 @@ def _largest_change(elapsed: int, largest_rate: float) -> float:
 
 
 @compilable
-def _leaps(change: float, elapsed: int, largest_rate: float) -> bool:
-    """Whether a change is faster than ``largest_rate`` [unit of the change / s] over ``elapsed`` [ns]."""
-    return abs(change) > _largest_change(elapsed, largest_rate)
-
-
-@compilable
 def _pressure_leaps(settings: EstimatorSettings, newer: Pressure, older: Pressure) -> bool:
-    most = _largest_change(newer.stamp - older.stamp, settings.pressure_rate_max)
-    return abs(newer.chamber_a - older.chamber_a) > most or abs(newer.chamber_b - older.chamber_b) > most
+    stamp, a, b = newer
+    older_stamp, older_a, older_b = older
+    most = _largest_change(stamp - older_stamp, settings.pressure_rate_max)
+    return abs(a - older_a) > most or abs(b - older_b) > most
 
 
 @compilable
@@ -428,17 +424,17 @@ def _usable_pressure(
     settings: EstimatorSettings, newest: Pressure, used: Pressure, leapt: Pressure
 ) -> tuple[Pressure, Pressure, int]:
     """Pressure to use, the pressure that jumped, and status bits."""
+    stamp, a, b = newest
     missing = _PRESSURE_MISSING if used.stamp == NEVER else 0
-    if newest.stamp == NEVER:
+    if stamp == NEVER:
         return used, leapt, missing
-    a, b = newest.chamber_a, newest.chamber_b
     lowest, highest = settings.pressure_min, settings.pressure_max
     if not (lowest <= a <= highest and lowest <= b <= highest):
         finite = math.isfinite(a) and math.isfinite(b)
         return used, leapt, missing | (_PRESSURE_OUT_OF_RANGE if finite else _PRESSURE_NOT_FINITE)
     if missing or not _pressure_leaps(settings, newest, used):
         return newest, NO_PRESSURE, 0
-    confirms = leapt.stamp not in (NEVER, newest.stamp)
+    confirms = leapt.stamp not in (NEVER, stamp)
     if confirms and not _pressure_leaps(settings, newest, leapt):
         return newest, NO_PRESSURE, 0
     return used, newest, _PRESSURE_LEAP
@@ -447,16 +443,18 @@ def _usable_pressure(
 @compilable
 def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt: Force) -> tuple[Force, Force, int]:
     """Force sum to use, the force sum that jumped, and status bits."""
-    missing = _FORCE_MISSING if used.stamp == NEVER else 0
-    if newest.stamp == NEVER:
+    stamp, force = newest
+    used_stamp, used_force = used
+    missing = _FORCE_MISSING if used_stamp == NEVER else 0
+    if stamp == NEVER:
         return used, leapt, missing
-    if not abs(newest.force) <= settings.force_max:
-        return used, leapt, missing | (_FORCE_OUT_OF_RANGE if math.isfinite(newest.force) else _FORCE_NOT_FINITE)
+    if not abs(force) <= settings.force_max:
+        return used, leapt, missing | (_FORCE_OUT_OF_RANGE if math.isfinite(force) else _FORCE_NOT_FINITE)
     fastest = settings.force_rate_max
-    if missing or not _leaps(newest.force - used.force, newest.stamp - used.stamp, fastest):
+    if missing or abs(force - used_force) <= _largest_change(stamp - used_stamp, fastest):
         return newest, NO_FORCE, 0
-    confirms = leapt.stamp not in (NEVER, newest.stamp)
-    if confirms and not _leaps(newest.force - leapt.force, newest.stamp - leapt.stamp, fastest):
+    confirms = leapt.stamp not in (NEVER, stamp)
+    if confirms and abs(force - leapt.force) <= _largest_change(stamp - leapt.stamp, fastest):
         return newest, NO_FORCE, 0
     return used, newest, _FORCE_LEAP
 
@@ -464,12 +462,14 @@ def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt
 @compilable
 def _usable_velocity(settings: EstimatorSettings, newest: Speed, used: Speed, leapt: Speed) -> tuple[Speed, Speed, int]:
     """Velocity to use, the velocity that jumped, and status bits."""
-    if not abs(newest.velocity) <= settings.velocity_max:
-        return used, leapt, _VELOCITY_OUT_OF_RANGE if math.isfinite(newest.velocity) else _VELOCITY_NOT_FINITE
+    stamp, velocity = newest
+    used_stamp, used_velocity = used
+    if not abs(velocity) <= settings.velocity_max:
+        return used, leapt, _VELOCITY_OUT_OF_RANGE if math.isfinite(velocity) else _VELOCITY_NOT_FINITE
     fastest = settings.acceleration_max
-    if used.stamp == NEVER or not _leaps(newest.velocity - used.velocity, newest.stamp - used.stamp, fastest):
+    if used_stamp == NEVER or abs(velocity - used_velocity) <= _largest_change(stamp - used_stamp, fastest):
         return newest, NO_SPEED, 0
-    confirms = leapt.stamp not in (NEVER, newest.stamp)
-    if confirms and not _leaps(newest.velocity - leapt.velocity, newest.stamp - leapt.stamp, fastest):
+    confirms = leapt.stamp not in (NEVER, stamp)
+    if confirms and abs(velocity - leapt.velocity) <= _largest_change(stamp - leapt.stamp, fastest):
         return newest, NO_SPEED, 0
     return used, newest, _VELOCITY_LEAP

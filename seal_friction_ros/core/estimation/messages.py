@@ -54,13 +54,17 @@ Output = FrictionEstimate | FeedForward
 """A message that the estimator makes."""
 
 
+Check = Callable[[Any], object]
+"""Raises ValueError for a record that is not valid."""
+
+
 class Layout(NamedTuple):
     """A message with a header: stamp and frame name, then numbers."""
 
     message_type: str
     record: type  # named tuple: the stamp [ns], the numbers in the order of the message, and for some the frame name
     codes: str  # type of each number as of `struct`: d float64, I uint32, B uint8, b int8
-    check: Callable[[Any], object] = bool  # raises ValueError for a record that is not valid
+    check: Check | None = None
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -126,7 +130,7 @@ def _encode(body: str, stamp: int, frame_id: bytes, numbers: tuple[Any, ...]) ->
     return _struct(length, body).pack(_ENCAPSULATION, seconds, nanoseconds, length, frame_id, *numbers)
 
 
-def _decode(layout: Layout, body: str, keeps_frame: bool, data: bytes) -> Any:
+def _decode(record: type, body: str, keeps_frame: bool, check: Check | None, data: bytes) -> Any:
     if len(data) < _FIRST_HEADER_PART.size:
         raise ValueError(f'{len(data)} bytes are too few for a stamped message')
     encapsulation, seconds, nanoseconds, length = _FIRST_HEADER_PART.unpack_from(data)
@@ -140,10 +144,11 @@ def _decode(layout: Layout, body: str, keeps_frame: bool, data: bytes) -> Any:
     fields = known.unpack_from(data)
     stamp = seconds * SECOND + nanoseconds
     if keeps_frame:
-        return layout.record(stamp, *fields[5:], fields[4][:-1])
-    record = layout.record(stamp, *fields[5:])
-    layout.check(record)
-    return record
+        return record(stamp, *fields[5:], fields[4][:-1])
+    decoded = record(stamp, *fields[5:])
+    if check is not None:
+        check(decoded)
+    return decoded
 
 
 def _keeps_frame(layout: Layout) -> bool:
@@ -188,7 +193,10 @@ def decode_text(data: bytes) -> str:
 
 
 DECODERS: dict[str, Callable[[bytes], Any]] = {
-    **{layout.message_type: partial(_decode, layout, layout.body, _keeps_frame(layout)) for layout in LAYOUTS},
+    **{
+        layout.message_type: partial(_decode, layout.record, layout.body, _keeps_frame(layout), layout.check)
+        for layout in LAYOUTS
+    },
     CONFIGURATION_TYPE: decode_text,
 }
 """Message type -> its decoder: bytes to record. Raises ValueError for bytes that are not such a message."""
