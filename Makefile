@@ -8,6 +8,7 @@
 .DEFAULT_GOAL := demo
 
 python := .venv/bin/python
+unexport PYTHONDONTWRITEBYTECODE  # tests start hundreds of processes, and each would compile every module anew
 ifdef ROS_DISTRO
 export LD_LIBRARY_PATH := $(CURDIR)/.venv/lib:$(LD_LIBRARY_PATH)
 endif
@@ -23,8 +24,8 @@ test:
 	$(python) -m ruff check .
 	$(python) -m ruff format --check .
 	$(python) -m mypy
-	$(python) -m pytest --numprocesses auto --dist loadfile test/core test/offline
-	$(python) -m pytest --numprocesses auto --dist loadfile --ignore test/core --ignore test/offline
+	$(python) -m pytest --numprocesses auto --dist worksteal test/core test/offline
+	$(python) -m pytest --numprocesses auto --dist worksteal --ignore test/core --ignore test/offline
 
 bench: setup
 	@$(python) bench/step.py

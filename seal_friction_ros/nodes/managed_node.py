@@ -199,8 +199,16 @@ class ManagedNode(LifecycleNode):
         self.release()
 
     def create_steady_timer(self, period: float, callback: Callable[[], None]) -> Any:
-        """Timer with ``period`` [s] of steady time, which continues while simulated time stands still."""
-        return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        """Timer with ``period`` [s] of steady time, which continues while simulated time stands still.
+
+        An executor may call a timer that was due just before its destruction: unconfigured, the node ignores the call.
+        """
+
+        def call() -> None:
+            if self.configured:
+                callback()
+
+        return self.create_timer(period, call, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_timer(self) -> None:
         self.publish_diagnostics()

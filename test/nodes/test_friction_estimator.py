@@ -152,6 +152,16 @@ def test_lifecycle_services_start_and_stop_it():
         assert g.estimate(3 * SECOND, -0.1).direction == -1
 
 
+def test_a_timer_that_was_due_before_a_cleanup_does_nothing_after_it():
+    with graph() as g:
+        due = [timer.callback for timer in g.estimator.timers]
+        assert len(due) == 3  # diagnostics, graph, watchdog
+        g.estimator.trigger_deactivate()
+        g.estimator.trigger_cleanup()
+        for callback in due:
+            callback()
+
+
 def test_settings_change_while_running_and_the_new_configuration_is_published():
     with graph() as g:
         g.connect()

@@ -6,10 +6,11 @@ rise exceeds four standard errors.
 """
 
 import argparse
+import itertools
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,14 @@ from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.candidate_laws import candidate_laws
 from seal_friction_ros.core.identification.prepare_readings import prepare_manual_readings
 from seal_friction_ros.core.identification.readings import FrictionReadings, ManualReadings
-from seal_friction_ros.core.identification.selection import Rise, recommended, rise_over_pressures, score_ladder
-from seal_friction_ros.offline.identification.pipeline import variation_of
+from seal_friction_ros.core.identification.selection import (
+    Rise,
+    recommended,
+    rise_over_pressures,
+    score_ladder,
+    variation_of,
+)
+from seal_friction_ros.offline.work.executor import available_cores, run_all
 
 SEALS: dict[str, Callable[[float], float]] = {
     '1.9 + 0.65 P': lambda p: 1.9 + 0.65 * p,
@@ -60,9 +67,7 @@ def law_of(readings: FrictionReadings) -> tuple[str, Rise | None, bool]:
     laws = candidate_laws(variation_of(readings))
     outlier = diagnostics.outlying_level([law for law in laws if law.fixed], readings)
     if outlier is not None:
-        readings = readings.taken(readings.level != outlier.level)
-        level = np.unique(readings.level, return_inverse=True)[1]
-        readings = replace(readings, level=level, group=level)
+        readings = readings.without(readings.level == outlier.level)
     rise, variation = rise_over_pressures(readings), variation_of(readings)
     return (
         recommended(score_ladder(candidate_laws(variation), readings, variation), rise).law.name,
@@ -71,26 +76,29 @@ def law_of(readings: FrictionReadings) -> tuple[str, Rise | None, bool]:
     )
 
 
-def campaign(draws: int) -> Iterator[tuple[list[str], int]]:
-    """One row a case: its texts, and how often a flat law was recommended against four standard errors."""
-    for of_pressure in (False, True):
-        for seal in SEALS:
-            for count, pressures in PRESSURES.items():
-                for noise in NOISES:
-                    found = [law_of(readings_of(seal, pressures, noise, of_pressure, seed)) for seed in range(draws)]
-                    flat = [name == 'constant_coulomb' for name, _, _ in found]
-                    wrong = sum(
-                        is_flat and rise is not None and rise.rise > 4.0 * rise.standard_error
-                        for is_flat, (_, rise, _) in zip(flat, found, strict=True)
-                    )
-                    right = np.mean(flat) if seal == '3' else 1.0 - np.mean(flat)
-                    names = Counter(name.removeprefix('pressure_power_law_') for name, _, _ in found)
-                    texts = [
-                        'pressure' if of_pressure else 'reading', seal, str(count), f'{100.0 * noise:g}',
-                        f'{100.0 * right:.1f}', f'{100.0 * np.mean([out for _, _, out in found]):.1f}', str(wrong),
-                        ', '.join(f'{name} {n}' for name, n in names.most_common()),
-                    ]  # fmt: skip
-                    yield texts, wrong
+def case(draws: int, seal: str, count: int, noise: float, of_pressure: bool) -> tuple[list[str], int]:
+    """Texts of a row, and how often a flat law was recommended against four standard errors."""
+    found = [law_of(readings_of(seal, PRESSURES[count], noise, of_pressure, seed)) for seed in range(draws)]
+    flat = [name == 'constant_coulomb' for name, _, _ in found]
+    wrong = sum(
+        is_flat and rise is not None and rise.rise > 4.0 * rise.standard_error
+        for is_flat, (_, rise, _) in zip(flat, found, strict=True)
+    )
+    right = np.mean(flat) if seal == '3' else 1.0 - np.mean(flat)
+    names = Counter(name.removeprefix('pressure_power_law_') for name, _, _ in found)
+    texts = [
+        'pressure' if of_pressure else 'reading', seal, str(count), f'{100.0 * noise:g}',
+        f'{100.0 * right:.1f}', f'{100.0 * np.mean([out for _, _, out in found]):.1f}', str(wrong),
+        ', '.join(f'{name} {n}' for name, n in names.most_common()),
+    ]  # fmt: skip
+    return texts, wrong
+
+
+def campaign(draws: int, workers: int) -> list[tuple[list[str], int]]:
+    """One row a case."""
+    cases = list(itertools.product(SEALS, PRESSURES, NOISES))
+    calls = [partial(case, draws, *each, of_pressure) for of_pressure in (False, True) for each in cases]
+    return run_all('known seals', calls, workers)
 
 
 def main() -> int:
@@ -99,7 +107,9 @@ def main() -> int:
     parser.add_argument('--draws', type=int, default=200)
     heads = ('noise of each', 'friction [N]', 'pressures', 'noise [%]', 'right kind [%]', 'outlier [%]', 'flat', 'laws')
     table, wrong = Table(*heads), 0
-    for texts, bad in campaign(parser.parse_args().draws):
+    parser.add_argument('--workers', type=int, default=available_cores(), help='cases at a time')
+    options = parser.parse_args()
+    for texts, bad in campaign(options.draws, options.workers):
         table.add_row(*texts)
         wrong += bad
     Console(width=150).print(table)

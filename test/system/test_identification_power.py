@@ -4,6 +4,6 @@ from system.identification_power import campaign
 
 
 def test_no_flat_law_where_friction_rises_by_four_standard_errors():
-    rows = list(campaign(2))
+    rows = campaign(2, workers=2)
     assert len(rows) == 54
     assert not any(wrong for _, wrong in rows)

@@ -226,7 +226,7 @@ class Observation(NamedTuple):
 
     stamp: int  # [ns]
     velocity: float  # [m/s] at which the seals slide, conditioned; 0.0 at rest and where it is not known
-    force_sum: float  # [N] corrected
+    force_sum: float  # [N] corrected; 0.0 if it contains a load, which hides it
     status: int  # bits of `Status`
     input_age: float  # [s] as in `FrictionEstimate`
 
@@ -261,13 +261,14 @@ _MOTION_UNCERTAIN = int(Status.MOTION_UNCERTAIN)
 _FASTER_THAN_IDENTIFIED = int(Status.FASTER_THAN_IDENTIFIED)
 _SLOWER_THAN_IDENTIFIED = int(Status.SLOWER_THAN_IDENTIFIED)
 _DIRECTION_NOT_IDENTIFIED = int(Status.DIRECTION_NOT_IDENTIFIED)
+_FORCE_CONTAINS_LOAD = int(Status.FORCE_CONTAINS_LOAD)
 _MODEL_DISAGREES = int(Status.MODEL_DISAGREES)
 _EXTRAPOLATED = int(EXTRAPOLATED)
 
 NO_VELOCITY = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
 """Status bits of a velocity that is not used."""
 _NO_STATE = NO_VELOCITY | _INPUT_REFUSED | _PRESSURE_MISSING
-_NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE
+_NO_FORCE_SUM = _FORCE_MISSING | _FORCE_STALE | _FORCE_CONTAINS_LOAD
 _NO_FRICTION = ActuatorFriction(0.0, 0.0, 0.0, True, 0.0)
 _UNKNOWN = StateFriction(UNKNOWN, 0, 0.0)
 
@@ -284,8 +285,8 @@ def step(
 
     A pressure or force sum that is not finite, out of range, or jumps is never used: the last usable one stays in use
     until it is stale, and the status says so. The state is UNKNOWN and the friction force 0 N with such a velocity,
-    with refused inputs, without any usable pressure so far, and at rest with a missing or stale force sum. A stale
-    pressure leaves state and friction as they are, with the status bit set.
+    with refused inputs, without any usable pressure so far, and at rest with a force sum that is missing, stale or
+    contains a load. A stale pressure leaves state and friction as they are, with the status bit set.
 
     A sample jumps if it is further from the last usable one than the largest rate allows over the time between them,
     at least `SHORTEST_INTERVAL`. The next sample is usable if it agrees with either of the two: a spike and a real step
@@ -397,11 +398,7 @@ def assess_inputs(
     input_age = pressure_age if pressure_age >= force_age else force_age
     if status & (_PRESSURE_MISSING | _FORCE_MISSING):
         input_age = -1.0
-    force_sum = force.force
-    if parameters.corrects_force_sum and force.stamp != NEVER:
-        force_sum = corrected_force_sum(
-            parameters.force_sum_correction, force_sum, pressure.chamber_a, pressure.chamber_b
-        )
+    force_sum = _force_sum_on_rod(parameters, force, pressure)
 
     velocity, leapt_velocity, fault = _usable_velocity(settings, Speed(stamp, given), velocity, leapt_velocity)
     status |= fault
@@ -412,13 +409,25 @@ def assess_inputs(
         uncertain = _is_uncertain(settings, motion, at_rest)
         if uncertain:
             status |= _MOTION_UNCERTAIN
-        # Friction never drives: a rod in the band of rest that moves against the force sum slides.
-        if not at_rest or (uncertain and motion.velocity * force_sum < 0.0):
+        # Friction never drives: a rod in the band of rest that moves against the force sum slides. A load hides that sum.
+        drives = motion.velocity * force_sum < 0.0 and not parameters.force_sum_correction.contains_load
+        if not at_rest or (uncertain and drives):
             sliding_velocity = motion.velocity
     state = EstimatorState(
         stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known
     )
     return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
+
+
+@compilable
+def _force_sum_on_rod(parameters: EstimatorParameters, force: Force, pressure: Pressure) -> float:
+    """Measured force sum, corrected [N]."""
+    if not parameters.corrects_force_sum or force.stamp == NEVER:
+        return force.force
+    found: float = corrected_force_sum(
+        parameters.force_sum_correction, force.force, pressure.chamber_a, pressure.chamber_b
+    )
+    return found
 
 
 @compilable
@@ -437,14 +446,14 @@ def _unidentified_motion(limits: MotionLimits, velocity: float) -> int:
 @compilable
 def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_rest: bool) -> bool:
     """Whether the velocity does not tell if the rod is at rest."""
-    speed = abs(motion.velocity)
+    _, velocity, half_width, _, _, is_waiting, last_velocity, last_change, _, _, _, _, samples = motion
     if at_rest:
-        return speed > CREEP * settings.stick_velocity
-    if motion.samples < SETTLING:
+        return abs(velocity) > CREEP * settings.stick_velocity
+    if samples < SETTLING:
         return True
-    if motion.half_width == 0.0:  # the first step of a motion may be a ripple that is not learnt yet
-        return motion.velocity * (motion.last_velocity - motion.last_change) <= 0.0
-    return motion.is_waiting or speed <= settings.slip_velocity + motion.half_width / SETTLING_TIME
+    if half_width == 0.0:  # the first step of a motion may be a ripple that is not learnt yet
+        return velocity * (last_velocity - last_change) <= 0.0
+    return is_waiting or abs(velocity) <= settings.slip_velocity + half_width / SETTLING_TIME
 
 
 @compilable
@@ -458,6 +467,8 @@ def estimate_of(parameters: EstimatorParameters, seen: Observation, friction: Ac
     if parameters.limits_motion:
         status |= _unidentified_motion(parameters.motion_limits, velocity)
     acting, slides = _UNKNOWN, velocity != 0.0
+    if not slides and parameters.force_sum_correction.contains_load:
+        status |= _FORCE_CONTAINS_LOAD
     if not status & _NO_STATE and (slides or not status & _NO_FORCE_SUM):
         sliding = coulomb + velocity_friction
         acting = state_friction(velocity, force_sum, not slides, sliding, breakaway)
@@ -486,15 +497,11 @@ def _largest_change(elapsed: int, largest_rate: float) -> float:
 
 
 @compilable
-def _leaps(change: float, elapsed: int, largest_rate: float) -> bool:
-    """Whether a change is faster than ``largest_rate`` [unit of the change / s] over ``elapsed`` [ns]."""
-    return abs(change) > _largest_change(elapsed, largest_rate)
-
-
-@compilable
 def _pressure_leaps(settings: EstimatorSettings, newer: Pressure, older: Pressure) -> bool:
-    most = _largest_change(newer.stamp - older.stamp, settings.pressure_rate_max)
-    return abs(newer.chamber_a - older.chamber_a) > most or abs(newer.chamber_b - older.chamber_b) > most
+    stamp, a, b = newer
+    older_stamp, older_a, older_b = older
+    most = _largest_change(stamp - older_stamp, settings.pressure_rate_max)
+    return abs(a - older_a) > most or abs(b - older_b) > most
 
 
 @compilable
@@ -502,17 +509,17 @@ def _usable_pressure(
     settings: EstimatorSettings, newest: Pressure, used: Pressure, leapt: Pressure
 ) -> tuple[Pressure, Pressure, int]:
     """Pressure to use, the pressure that jumped, and status bits."""
+    stamp, a, b = newest
     missing = _PRESSURE_MISSING if used.stamp == NEVER else 0
-    if newest.stamp == NEVER:
+    if stamp == NEVER:
         return used, leapt, missing
-    a, b = newest.chamber_a, newest.chamber_b
     lowest, highest = settings.pressure_min, settings.pressure_max
     if not (lowest <= a <= highest and lowest <= b <= highest):
         finite = math.isfinite(a) and math.isfinite(b)
         return used, leapt, missing | (_PRESSURE_OUT_OF_RANGE if finite else _PRESSURE_NOT_FINITE)
     if missing or not _pressure_leaps(settings, newest, used):
         return newest, NO_PRESSURE, 0
-    confirms = leapt.stamp not in (NEVER, newest.stamp)
+    confirms = leapt.stamp not in (NEVER, stamp)
     if confirms and not _pressure_leaps(settings, newest, leapt):
         return newest, NO_PRESSURE, 0
     return used, newest, _PRESSURE_LEAP
@@ -521,16 +528,18 @@ def _usable_pressure(
 @compilable
 def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt: Force) -> tuple[Force, Force, int]:
     """Force sum to use, the force sum that jumped, and status bits."""
-    missing = _FORCE_MISSING if used.stamp == NEVER else 0
-    if newest.stamp == NEVER:
+    stamp, force = newest
+    used_stamp, used_force = used
+    missing = _FORCE_MISSING if used_stamp == NEVER else 0
+    if stamp == NEVER:
         return used, leapt, missing
-    if not abs(newest.force) <= settings.force_max:
-        return used, leapt, missing | (_FORCE_OUT_OF_RANGE if math.isfinite(newest.force) else _FORCE_NOT_FINITE)
+    if not abs(force) <= settings.force_max:
+        return used, leapt, missing | (_FORCE_OUT_OF_RANGE if math.isfinite(force) else _FORCE_NOT_FINITE)
     fastest = settings.force_rate_max
-    if missing or not _leaps(newest.force - used.force, newest.stamp - used.stamp, fastest):
+    if missing or abs(force - used_force) <= _largest_change(stamp - used_stamp, fastest):
         return newest, NO_FORCE, 0
-    confirms = leapt.stamp not in (NEVER, newest.stamp)
-    if confirms and not _leaps(newest.force - leapt.force, newest.stamp - leapt.stamp, fastest):
+    confirms = leapt.stamp not in (NEVER, stamp)
+    if confirms and abs(force - leapt.force) <= _largest_change(stamp - leapt.stamp, fastest):
         return newest, NO_FORCE, 0
     return used, newest, _FORCE_LEAP
 
@@ -538,12 +547,14 @@ def _usable_force(settings: EstimatorSettings, newest: Force, used: Force, leapt
 @compilable
 def _usable_velocity(settings: EstimatorSettings, newest: Speed, used: Speed, leapt: Speed) -> tuple[Speed, Speed, int]:
     """Velocity to use, the velocity that jumped, and status bits."""
-    if not abs(newest.velocity) <= settings.velocity_max:
-        return used, leapt, _VELOCITY_OUT_OF_RANGE if math.isfinite(newest.velocity) else _VELOCITY_NOT_FINITE
+    stamp, velocity = newest
+    used_stamp, used_velocity = used
+    if not abs(velocity) <= settings.velocity_max:
+        return used, leapt, _VELOCITY_OUT_OF_RANGE if math.isfinite(velocity) else _VELOCITY_NOT_FINITE
     fastest = settings.acceleration_max
-    if used.stamp == NEVER or not _leaps(newest.velocity - used.velocity, newest.stamp - used.stamp, fastest):
+    if used_stamp == NEVER or abs(velocity - used_velocity) <= _largest_change(stamp - used_stamp, fastest):
         return newest, NO_SPEED, 0
-    confirms = leapt.stamp not in (NEVER, newest.stamp)
-    if confirms and not _leaps(newest.velocity - leapt.velocity, newest.stamp - leapt.stamp, fastest):
+    confirms = leapt.stamp not in (NEVER, stamp)
+    if confirms and abs(velocity - leapt.velocity) <= _largest_change(stamp - leapt.stamp, fastest):
         return newest, NO_SPEED, 0
     return used, newest, _VELOCITY_LEAP

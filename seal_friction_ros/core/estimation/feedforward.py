@@ -182,15 +182,16 @@ def step(
         friction: f at ``velocity`` [N]; negative: none is usable.
         velocity: From `wanted_velocity`; NaN: not usable.
     """
-    elapsed = 0.0 if state.received == NEVER or received < state.received else (received - state.received) * 1e-9
+    last_received, last_force, last_fade, last_friction, last_velocity = state
+    elapsed = 0.0 if last_received == NEVER or received < last_received else (received - last_received) * 1e-9
     valid = friction >= 0.0 and not math.isnan(velocity)
     if not friction >= 0.0:
-        friction = state.friction
+        friction = last_friction
     if math.isnan(velocity):
-        velocity = state.velocity
+        velocity = last_velocity
     short = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
     change = short / settings.fade_time if valid else -elapsed / settings.fade_time
-    fade = between(0.0, state.fade + change, 1.0)
+    fade = between(0.0, last_fade + change, 1.0)
 
     limited = _FADE if fade < 1.0 or not valid else 0
     wanted = compensation(settings, friction, velocity)
@@ -198,7 +199,7 @@ def step(
     if clamped != wanted:
         limited |= _CLAMP
     most = settings.slew_limit * short
-    force = between(state.force - most, clamped, state.force + most)
+    force = between(last_force - most, clamped, last_force + most)
     if force != clamped:
         limited |= _SLEW
     if settings.scale == 0.0:

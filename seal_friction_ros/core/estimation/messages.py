@@ -54,14 +54,18 @@ Output = FrictionEstimate | FeedForward
 """A message that the estimator makes."""
 
 
+Check = Callable[[Any], object]
+"""Raises ValueError for a record that is not valid."""
+
+
 class Layout(NamedTuple):
     """A message with a header: stamp and frame name, then numbers."""
 
     message_type: str
     record: type  # named tuple: the stamp [ns], the numbers in the order of the message, and for some the frame name
     codes: str  # type of each number as of `struct`: d float64, I uint32, B uint8, b int8
-    check: Callable[[Any], object] = bool  # raises ValueError for a record that is not valid
-    older_numbers: int = 0  # how many numbers the message had before it grew; 0: it never grew
+    check: Check | None = None
+    older_numbers: int | None = None  # how many numbers the message had before it grew; None: it never grew
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -104,8 +108,7 @@ LAYOUTS = (
 )
 
 GROWN = {
-    layout.message_type: layout.size - struct.calcsize('<' + layout.body(layout.older_numbers or None))
-    for layout in LAYOUTS
+    layout.message_type: layout.size - struct.calcsize('<' + layout.body(layout.older_numbers)) for layout in LAYOUTS
 }
 """By how many bytes each message is longer than it was; what it had before is its beginning."""
 
@@ -132,7 +135,7 @@ def _encode(body: str, stamp: int, frame_id: bytes, numbers: tuple[Any, ...]) ->
     return _struct(length, body).pack(_ENCAPSULATION, seconds, nanoseconds, length, frame_id, *numbers)
 
 
-def _decode(layout: Layout, body: str, keeps_frame: bool, data: bytes) -> Any:
+def _decode(record: type, body: str, older: str, keeps_frame: bool, check: Check | None, data: bytes) -> Any:
     if len(data) < _FIRST_HEADER_PART.size:
         raise ValueError(f'{len(data)} bytes are too few for a stamped message')
     encapsulation, seconds, nanoseconds, length = _FIRST_HEADER_PART.unpack_from(data)
@@ -141,17 +144,18 @@ def _decode(layout: Layout, body: str, keeps_frame: bool, data: bytes) -> Any:
     if not 0 <= length <= LONGEST_FRAME or not 0 <= nanoseconds < SECOND:
         raise ValueError(f'header with {nanoseconds} ns and a frame name of {length} bytes is not valid')
     known = _struct(length, body)
-    if len(data) < known.size and layout.older_numbers:
-        known = _struct(length, layout.body(layout.older_numbers))
+    if len(data) < known.size and older != body:
+        known = _struct(length, older)
     if not known.size <= len(data) <= known.size + 3:  # some writers pad the whole to a multiple of 4
         raise ValueError(f'{len(data)} bytes where the message has {known.size}')
     fields = known.unpack_from(data)
     stamp = seconds * SECOND + nanoseconds
     if keeps_frame:
-        return layout.record(stamp, *fields[5:], fields[4][:-1])
-    record = layout.record(stamp, *fields[5:])
-    layout.check(record)
-    return record
+        return record(stamp, *fields[5:], fields[4][:-1])
+    decoded = record(stamp, *fields[5:])
+    if check is not None:
+        check(decoded)
+    return decoded
 
 
 def _keeps_frame(layout: Layout) -> bool:
@@ -196,7 +200,12 @@ def decode_text(data: bytes) -> str:
 
 
 DECODERS: dict[str, Callable[[bytes], Any]] = {
-    **{layout.message_type: partial(_decode, layout, layout.body(), _keeps_frame(layout)) for layout in LAYOUTS},
+    **{
+        layout.message_type: partial(
+            _decode, layout.record, layout.body(), layout.body(layout.older_numbers), _keeps_frame(layout), layout.check
+        )
+        for layout in LAYOUTS
+    },
     CONFIGURATION_TYPE: decode_text,
 }
 """Message type -> its decoder: bytes to record. Raises ValueError for bytes that are not such a message."""

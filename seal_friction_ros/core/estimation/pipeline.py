@@ -157,18 +157,18 @@ def send(emit: Any, record: Any, frame_id: Any) -> None:
 def receive_velocity(parameters: Any, state: PipelineState, velocity: Any, received: int, emit: Any) -> PipelineState:
     """An estimate, and with a reference a feed-forward."""
     known, guided, _, pressure, force, reference, receipt, refused, offset = state
-    is_new = known.stamp != velocity.stamp
-    age = (received + offset - velocity.stamp) * 1e-9
-    sample = RodSample(velocity.stamp, velocity.velocity, pressure, force, refused, age)
+    stamp, given, frame_id = velocity
+    is_new = known.stamp != stamp
+    sample = RodSample(stamp, given, pressure, force, refused, (received + offset - stamp) * 1e-9)
     known, estimate = estimator_step(parameters.estimator, known, sample)
-    send(emit, estimate, velocity.frame_id)
+    send(emit, estimate, frame_id)
     if is_new and not estimate.status & NO_VELOCITY:
         receipt = ReceiptTimes(received, receipt.pressure, receipt.force, receipt.reference)
     friction = estimate.coulomb_friction if usable(parameters.feedforward, estimate) else -1.0
     state = PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
     if receipt.reference == NEVER and not parameters.feedforward.use_measured_velocity:
         return state
-    return _feed_forward(parameters, state, velocity.stamp, received, velocity.frame_id, emit)
+    return _feed_forward(parameters, state, stamp, received, frame_id, emit)
 
 
 @compilable
@@ -242,19 +242,19 @@ def condition_reference(reference: Reference, wanted: Any) -> Reference:
     Two accelerations in a row of the same sign count with the smaller magnitude, others as 0: the difference of a
     rounded velocity alternates, that of a clean one does not.
     """
-    stamp = reference.velocity.stamp
-    velocity = condition_velocity(reference.velocity, wanted.stamp, between(-FASTEST, wanted.velocity, FASTEST), 0.0)
-    given, last = 0.0, reference.last_acceleration
+    last_velocity, smoothed, last = reference
+    velocity = condition_velocity(last_velocity, wanted.stamp, between(-FASTEST, wanted.velocity, FASTEST), 0.0)
+    given = 0.0
     if math.isfinite(wanted.acceleration):
         given = between(-LARGEST_ACCELERATION, wanted.acceleration, LARGEST_ACCELERATION)
     agreed = 0.0
     if given * last > 0.0:
         agreed = given if abs(given) < abs(last) else last
     acceleration = agreed
-    if velocity.half_width > 0.0 and velocity.smoothing > 0.0 and stamp != NEVER:
-        step = abs(wanted.stamp - stamp) * 1e-9
+    if velocity.half_width > 0.0 and velocity.smoothing > 0.0 and last_velocity.stamp != NEVER:
+        step = abs(wanted.stamp - last_velocity.stamp) * 1e-9
         share = step / (step + ACCELERATION_SMOOTHING * velocity.smoothing)
-        acceleration = reference.acceleration + share * (agreed - reference.acceleration)
+        acceleration = smoothed + share * (agreed - smoothed)
     return Reference(velocity, acceleration, given)
 
 
@@ -300,9 +300,10 @@ def _wanted_velocity(
 @compilable
 def _is_fresh(receipt: ReceiptTimes, received: int, timeout: float) -> bool:
     """Whether every input of the estimator that ever came has come within ``timeout`` [s]."""
-    if receipt.force != NEVER and not _is_younger(receipt.force, received, timeout):
+    velocity, pressure, force, _ = receipt
+    if force != NEVER and not _is_younger(force, received, timeout):
         return False
-    return _is_younger(receipt.velocity, received, timeout) and _is_younger(receipt.pressure, received, timeout)
+    return _is_younger(velocity, received, timeout) and _is_younger(pressure, received, timeout)
 
 
 @compilable

@@ -1,4 +1,4 @@
-"""Correction of a measured force sum whose areas or zero are wrong."""
+"""Correction of a measured force sum whose areas or zero are wrong, or that holds a load."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -25,6 +25,11 @@ class ForceSumCorrection(CheckedParameters):
     offset: float = parameter(
         0.0, unit='N', lower=-1e6, upper=1e6, description='Force that it lacks at any pressure: zero of a load cell.'
     )
+    contains_load: bool = parameter(
+        False,
+        unit='',
+        description='Whether the measured force sum also holds a load that no signal tells, as without a load cell.',
+    )
 
 
 NO_CORRECTION = ForceSumCorrection()
@@ -43,7 +48,7 @@ def corrected_force_sum(correction: ForceSumCorrection, force_sum: Any, pressure
         pressure_b: Pressure of chamber b [Pa, gauge].
 
     Source: the force sum is linear in the pressures, so an area or a zero that is wrong gives this. One correction that
-    does not change with time is our choice.
+    does not change with time is our choice. A load that the force sum contains stays in it.
     """
     return force_sum + correction.area_a * pressure_a + correction.area_b * pressure_b + correction.offset
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.identification import runs
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
 from seal_friction_ros.core.identification.fitting import LawFit, fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
@@ -149,21 +150,44 @@ def _relative_slopes(found: LawFit, readings: FrictionReadings, means: FloatArra
     return result
 
 
-class LevelChange(NamedTuple):
-    """Two sources that disagree at one pressure."""
+class RunChange(NamedTuple):
+    """Friction of two sources under the same conditions."""
 
-    pressure: float  # [Pa]
+    pressure: float | None  # [Pa] held by both; None: that of a swept log, by its share of the fitted law
     name: str
     friction: float  # [N]
     other_name: str
     other_friction: float  # [N]
 
+    @property
+    def ratio(self) -> float:
+        """The larger friction over the smaller one [-]; infinite if one is not positive."""
+        low, high = sorted((self.friction, self.other_friction))
+        return high / low if low > 0.0 else math.inf
 
-def changed_levels(readings: FrictionReadings) -> list[LevelChange]:
-    """Pressures at which a source differs by more than `CHANGED` from the first source there."""
-    found, names = [], readings.names
+    @property
+    def is_changed(self) -> bool:
+        """Whether they differ by more than `CHANGED`."""
+        return self.ratio > 1.0 + CHANGED
+
+
+def shared_levels(readings: FrictionReadings) -> list[RunChange]:
+    """Each source against the first one at each held pressure that they share; none for samples of swept logs."""
+    found: list[RunChange] = []
+    if readings.are_samples:  # one level holds several speeds there
+        return found
     for inside, pressure in zip(readings.levels.values(), readings.level_pressures.tolist(), strict=True):
         (first, friction), *others = readings.frictions_of_sources(inside).items()
-        pairs = [LevelChange(pressure, names[first], friction, names[i], of_source) for i, of_source in others]
-        found += [pair for pair in pairs if abs(pair.other_friction / friction - 1.0) > CHANGED]
+        names = readings.names
+        found += [RunChange(pressure, names[first], friction, names[i], of_source) for i, of_source in others]
     return found
+
+
+def swept_logs_compared(readings: FrictionReadings, found: LawFit) -> list[RunChange]:
+    """Each swept log against the first one, by its share of the law that was fitted to all; none for held pressures."""
+    if not readings.are_samples:
+        return []
+    friction = found.friction(readings.at)
+    (first, share), *others = runs.shares_of_law(readings, friction, found.offsets).items()
+    mean, names = float(friction.mean()), readings.names
+    return [RunChange(None, names[first], share * mean, names[i], other * mean) for i, other in others]

@@ -27,7 +27,7 @@ from seal_friction_ros.core.identification.candidate_laws import (
 )
 from seal_friction_ros.core.identification.diagnostics import CorrelatedPair
 from seal_friction_ros.core.identification.fitting import LawFit
-from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings
+from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart
 from seal_friction_ros.core.identification.runs import PRIOR_FREEDOM, BetweenRuns
 from seal_friction_ros.core.identification.selection import LawScore, is_beaten
 from seal_friction_ros.core.identification.validation import jackknife_errors
@@ -214,7 +214,7 @@ def design_experiment(
     model = _model(chosen, readings, at)
     scatter = _scatter(chosen, readings)
     identified = (float(readings.seal_pressure.min()), float(readings.seal_pressure.max()))
-    low = identified[0] if np.ptp(identified) >= max(NARROWEST_PRESSURES, 0.1 * identified[1]) else 0.0
+    low = identified[0] if are_far_apart(np.array(identified)) else 0.0
     speeds = _grid_speeds(used_speeds)
     prior = _prior(model, low, identified[1], speeds)
     slopes = model.slopes(at)

@@ -27,7 +27,7 @@ from seal_friction_ros.core.identification.readings import (
 BLOCKS = 10  # contiguous parts of a swept log, each predicted from the others
 HELD_LOG = 0.8  # of the even samples in strokes at held speed and pressure: each stroke is a reading (our choice)
 PARTS = 4  # contiguous parts of the strokes at one pressure, each predicted from the others (our choice)
-MOST_SWEPT = 40_000  # samples of swept logs, evenly taken: more tell no more and fill the memory (our choice)
+MOST_SWEPT = 4000  # samples of all swept logs, evenly taken: neighbours at tens of hertz tell the same (our choice)
 FEWEST_SWEPT = 200  # samples of even sliding, so that a block has 20 (our choice)
 
 _Rows = Sequence[tuple[int, signal_preparation.SignalReading]]
@@ -87,9 +87,7 @@ def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> 
     ways = [_travel(log.signals) for log in logs]
     travel = np.array([ways[number][r.samples].mean() for number, r in rows])
     readings = FrictionReadings(at, force, source, group, level, names, by, False, samples, travel)
-    if by == 'pressure' and not has_pressures(readings):  # a pressure that is left out leaves nothing to predict it by
-        readings = replace(readings, group=_parts_of_strokes(source, level), left_out_by='block')
-    return readings, pressures
+    return with_predictable_groups(readings), pressures
 
 
 def _travel(signals: signal_preparation.Signals) -> FloatArray:
@@ -97,6 +95,15 @@ def _travel(signals: signal_preparation.Signals) -> FloatArray:
     steps = np.diff(signals.time, prepend=signals.time[:1])
     steps = np.minimum(steps, signal_preparation.LONGEST_GAP)
     return np.asarray(np.cumsum(np.nan_to_num(np.abs(signals.velocity)) * steps))
+
+
+def with_predictable_groups(readings: FrictionReadings) -> FrictionReadings:
+    """The readings with pressures as groups where one group is left, or parts of strokes where these are too few."""
+    if len(readings.groups) < 2:
+        readings = replace(readings, group=readings.level, left_out_by='pressure')
+    if readings.left_out_by != 'pressure' or has_pressures(readings):
+        return readings
+    return replace(readings, group=_parts_of_strokes(readings.source, readings.level), left_out_by='block')
 
 
 def _parts_of_strokes(source: IntArray, level: IntArray) -> IntArray:
@@ -118,8 +125,8 @@ def _breakaway(
     level = _nearest_level(at.pressure.mean(axis=1), dynamic)
     several = len(np.unique(source)) > 1
     group = level if dynamic.left_out_by == 'pressure' else source if several else _parts_of_strokes(source, level)
-    empty = np.empty(0)
-    return replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=(), travel=empty)
+    found = replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=())
+    return replace(found, travel=np.empty(0), dwell=np.array([peak.dwell for _, peak in rows]))
 
 
 def _groups(level: IntArray, part: IntArray, kind: str) -> tuple[IntArray, str]:
@@ -146,7 +153,10 @@ def _swept(
             'drive longer strokes at even speed, in both directions'
         )
     every = -(-sum(counts) // MOST_SWEPT)
-    parts = [log.signals.taken(np.flatnonzero(index)[::every]) for log, index in zip(logs, even, strict=True)]
+    parts = [
+        log.signals.taken(np.flatnonzero(index)[:: min(every, count // FEWEST_SWEPT)])
+        for log, index, count in zip(logs, even, counts, strict=True)
+    ]
     counts = [len(part.time) for part in parts]
     joined = signal_preparation.Signals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     both = np.column_stack((joined.pressure_a, joined.pressure_b))
@@ -201,7 +211,7 @@ def prepare_manual_readings(
 
 
 def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
-    names, *columns = zip(*sources, strict=True)
+    names, *columns, dwells = zip(*sources, strict=True)
     test, pressure, direction, friction, velocity = (np.concatenate(column) for column in columns)
     of_seals = np.repeat(np.maximum(pressure, 0.0)[:, np.newaxis], seals, axis=1)
     source = np.repeat(np.arange(len(sources)), [len(manual.friction) for manual in sources])
@@ -210,6 +220,6 @@ def _joined(sources: Sequence[ManualReadings], seals: int) -> FrictionReadings:
     group, by = _groups(level, tests, 'test')
     at = OperatingConditions(of_seals, None, direction * velocity, direction.astype(np.float64))
     readings = FrictionReadings(at, direction * friction, source, group, level, names, by, are_samples=False)
-    if by == 'pressure' and not has_pressures(readings):
-        return replace(readings, group=_parts_of_strokes(source, level), left_out_by='block')
-    return readings
+    if all(dwell is not None for dwell in dwells):
+        readings = replace(readings, dwell=np.concatenate(dwells))
+    return with_predictable_groups(readings)

@@ -55,6 +55,7 @@ class ManualReadings(NamedTuple):
     direction: IntArray  # -1 or 1
     friction: FloatArray  # [N] magnitude, of all seals
     velocity: FloatArray  # [m/s] magnitude; NaN if not measured
+    dwell: FloatArray | None = None  # [s] time at rest before; None if not noted
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,8 @@ class FrictionReadings:
     samples: tuple[FloatArray, ...] = ()  # [N] force sums behind each reading; empty if there is only the reading
     travel: FloatArray = field(default_factory=lambda: np.empty(0))
     """[m] way of the rod since the start of its source, shape (n,); empty if unknown"""
+    dwell: FloatArray = field(default_factory=lambda: np.empty(0))
+    """[s] time at rest before each breakaway, shape (n,); empty if unknown"""
 
     @property
     def count(self) -> int:
@@ -110,7 +113,14 @@ class FrictionReadings:
             level=self.level[where],
             samples=tuple(self.samples[i] for i in where) if self.samples else (),
             travel=self.travel[where] if len(self.travel) else self.travel,
+            dwell=self.dwell[where] if len(self.dwell) else self.dwell,
         )
+
+    def without(self, out: BoolArray) -> 'FrictionReadings':
+        """The readings that are not ``out``; levels, and groups that are levels, are numbered without a gap."""
+        left = self.taken(~out)
+        level = np.unique(left.level, return_inverse=True)[1]
+        return replace(left, level=level, group=level if left.left_out_by == 'pressure' else left.group)
 
     def magnitudes(self, offsets: FloatArray) -> FloatArray:
         """Measured friction [N], shape (n,): force sum without the offset of its source [N], along the direction."""
@@ -288,9 +298,13 @@ def _check_bounds(name: str, pressure: FloatArray, speed: FloatArray, force: Flo
 
 def has_pressures(readings: FrictionReadings) -> bool:
     """Whether the readings show how friction depends on pressure: enough pressures, far enough apart."""
-    pressures = readings.seal_pressure
-    wide = float(np.ptp(pressures)) >= max(NARROWEST_PRESSURES, 0.1 * float(pressures.max()))
-    return wide and (readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES)
+    enough = readings.are_samples or len(readings.levels) >= FEWEST_PRESSURES
+    return enough and are_far_apart(readings.seal_pressure)
+
+
+def are_far_apart(pressures: FloatArray) -> bool:
+    """Whether pressures [Pa], shape (n,), differ by more than a regulator and its sensor do (our choice)."""
+    return float(np.ptp(pressures)) >= max(NARROWEST_PRESSURES, 0.1 * float(np.max(pressures)))
 
 
 def _check_pressures(where: str, readings: FrictionReadings) -> None:

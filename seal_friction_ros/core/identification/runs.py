@@ -1,4 +1,4 @@
-"""How much one seal differs from run to run, and how it changes within a run.
+"""How much one seal differs from run to run.
 
 A run is one mounting, one day: a ring on the Delft rig differs by 10 to 65 % between two of them. A law that was fitted
 to one run says nothing about that, so a prior stands in until runs are repeated.
@@ -17,8 +17,6 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 PRIOR_STD = 0.15  # [-] of the friction between runs of one seal, expected before any is seen (our choice)
 PRIOR_FREEDOM = 8.0  # degrees of freedom that this is worth (our choice)
 ANOTHER_SEAL = 2.0  # ratio of the friction of two sources above which they are two seals (our choice)
-LARGEST_ERROR = 0.03  # relative standard error below which an asymptote is determined (our choice)
-FEWEST_STROKES = 6  # for a drift term (our choice)
 
 
 class BetweenRuns(NamedTuple):
@@ -37,9 +35,9 @@ class BetweenRuns(NamedTuple):
 def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: FloatArray) -> BetweenRuns:
     """Standard deviation between runs, from sources that repeat a pressure, or from swept logs.
 
-    std^2 = (nu_0 s_0^2 + nu s^2) / (nu_0 + nu): the mean of a scaled inverse chi-squared posterior with the prior s_0 =
-    `PRIOR_STD` of weight nu_0 = `PRIOR_FREEDOM`, where s is measured with nu degrees of freedom. The conjugate prior of
-    a variance is in [Gelman2013]_, section 2.6; its numbers are our choice.
+    std^2 = (nu_0 s_0^2 + nu s^2) / (nu_0 + nu): the scale of a scaled inverse chi-squared posterior with the prior
+    s_0 = `PRIOR_STD` of weight nu_0 = `PRIOR_FREEDOM`, where s is measured with nu degrees of freedom. The conjugate
+    prior of a variance is in [Gelman2013]_, section 2.6; its numbers are our choice.
 
     Args:
         readings: Readings of one or several runs.
@@ -48,12 +46,7 @@ def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: Floa
     """
     squares, freedom = 0.0, 0
     if readings.are_samples:
-        measured = readings.magnitudes(offsets)
-        ratios = [
-            float(np.sum(measured[index] * friction[index]) / np.sum(friction[index] ** 2))
-            for index in (readings.source == source for source in np.unique(readings.source))
-        ]
-        parts = [np.array(ratios)]
+        parts = [np.array(list(shares_of_law(readings, friction, offsets).values()))]
     else:
         of_sources = (readings.frictions_of_sources(inside) for inside in readings.levels.values())
         parts = [np.array(list(found.values())) for found in of_sources]
@@ -65,64 +58,19 @@ def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: Floa
     return BetweenRuns(std, measured_std, freedom)
 
 
-class Drift(NamedTuple):
-    """Friction of one source at one pressure over the travel of the rod: f = asymptote (1 + share exp(-s / length))."""
+def shares_of_law(readings: FrictionReadings, friction: FloatArray, offsets: FloatArray) -> dict[int, float]:
+    r"""Source -> its friction as a share of a law that was fitted to all sources [-], by least squares.
 
-    source: int
-    level: int
-    change: float  # [-] from the first stroke to the last, relative to the mean
-    asymptote: float  # [N] friction of the settled seal; NaN if the strokes do not determine it
-    length: float  # [m] travel over which the difference falls to 37 %; likewise
-    settled_share: float  # [-] asymptote over the mean of the run; 1 if unknown
+    .. math:: \min_s \sum_i (F_i - s f_i)^2
 
-
-def drifts(readings: FrictionReadings, offsets: FloatArray) -> list[Drift]:
-    """Drift of each source at each pressure with `FEWEST_STROKES` strokes at least.
-
-    The change is the slope of a line over the strokes, mean of the two directions. The run-in term is fitted by least
-    squares over a row of lengths. It counts if its asymptote has a standard error below `LARGEST_ERROR` and the rod
-    travelled twice the length at least; an exponential approach is our choice.
+    Args:
+        readings: Of several runs.
+        friction: By the law [N], shape (n,).
+        offsets: Of the force sum of each source [N], shape (sources,).
     """
-    measured, found = readings.magnitudes(offsets), []
-    for level, inside in readings.levels.items():
-        for source in np.unique(readings.source[inside]):
-            index = np.flatnonzero(inside & (readings.source == source))
-            if len(index) < FEWEST_STROKES:
-                continue
-            mean = float(measured[index].mean())
-            sides = [index[readings.at.direction[index] == side] for side in (-1.0, 1.0)]
-            slopes = [
-                float(np.polyfit(np.arange(len(side)), measured[side], 1)[0]) * (len(side) - 1)
-                for side in sides
-                if len(side) >= 2
-            ]
-            change = float(np.mean(slopes)) / mean
-            asymptote, length = math.nan, math.nan
-            if len(readings.travel):
-                asymptote, length = _run_in(readings.travel[index], measured[index], readings.at.direction[index])
-            share = asymptote / mean if math.isfinite(asymptote) else 1.0
-            found.append(Drift(int(source), level, change, asymptote, length, share))
-    return found
-
-
-def _run_in(travel: FloatArray, friction: FloatArray, direction: FloatArray) -> tuple[float, float]:
-    """Asymptote [N] and length [m] of an exponential approach; NaN if they are not determined."""
-    unknown = math.nan, math.nan
-    spanned = float(np.ptp(travel))
-    if spanned <= 0.0 or len(friction) < FEWEST_STROKES:
-        return unknown
-    best = (math.inf, *unknown, math.inf)
-    side = direction - direction.mean()  # what is left of an offset
-    for length in np.geomspace(spanned / 20.0, spanned / 2.0, 15):
-        design = np.column_stack((np.ones_like(travel), np.exp(-(travel - travel.min()) / length), side))
-        values, *_ = np.linalg.lstsq(design, friction, rcond=None)
-        residual = float(np.sum((friction - design @ values) ** 2))
-        if residual < best[0]:
-            variance = residual / max(len(friction) - 4, 1)
-            error = math.sqrt(variance * float(np.linalg.pinv(design.T @ design)[0, 0]))
-            best = (residual, float(values[0]), float(length), error)
-    straight = np.column_stack((np.ones_like(travel), travel, side))
-    line, *_ = np.linalg.lstsq(straight, friction, rcond=None)
-    bends = best[0] < 0.7 * float(np.sum((friction - straight @ line) ** 2))  # clearly better than a straight line
-    certain = best[3] < LARGEST_ERROR * abs(best[1])
-    return (best[1], best[2]) if bends and certain else unknown
+    measured = readings.magnitudes(offsets)
+    each = {int(source): readings.source == source for source in np.unique(readings.source)}
+    return {
+        source: float(np.sum(measured[inside] * friction[inside]) / np.sum(friction[inside] ** 2))
+        for source, inside in each.items()
+    }

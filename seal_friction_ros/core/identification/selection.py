@@ -6,7 +6,7 @@ not recommended while a sound one is near.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -22,8 +22,8 @@ from seal_friction_ros.core.identification.candidate_laws import (
     with_velocity_terms,
 )
 from seal_friction_ros.core.identification.fitting import LawFit, fit
-from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.validation import CrossValidation, Ticks, cross_validate
+from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart, has_pressures
+from seal_friction_ros.core.identification.validation import CrossValidation, Ticks, cross_validate, predict
 
 BEATEN_CONFIDENCE = 0.95  # of the test whether a law is beaten (our choice)
 WORTHWHILE = 0.1  # share of its loss by which a law must be beaten (our choice)
@@ -33,7 +33,32 @@ RISES = 2.0  # standard errors of the rise over the pressures from which frictio
 OVERDISPERSED = 0.01  # probability of the residuals of a law below which pressures scatter by themselves (our choice)
 PRIOR_SCATTER = 0.05  # [-] of the friction between held pressures, expected with the weight of `PRIOR_FREEDOM`
 PRIOR_FREEDOM = 4.0  # degrees of freedom
+SPEEDS_DIFFER = 1.5  # fastest over slowest reading at one pressure, above which velocity terms are tried (our choice)
+FEWEST_PRESSURES_FOR_EXPONENT = 6  # with fewer, leaving each out in turn does not determine an exponent (our choice)
 STRATA = 3  # quantiles of speed and of pressure, whose cells of a swept log are left out in turn (our choice)
+
+
+def variation_of(readings: FrictionReadings) -> Variation:
+    """What the readings vary.
+
+    Speeds count where they differ at one pressure in one direction: speeds that follow pressure or direction tell
+    nothing apart. One direction has no asymmetry, and if each source holds one pressure, asymmetry is its offset.
+    """
+    speed = np.abs(readings.at.velocity)
+    faster = []
+    for inside in readings.levels.values():
+        for side in (-1.0, 1.0):
+            of_side = speed[inside & (readings.at.direction == side)]
+            if len(of_side) > 1:
+                faster.append(bool(of_side.max() > SPEEDS_DIFFER * of_side.min()))
+    several = [len(np.unique(readings.level[readings.source == source])) > 1 for source in np.unique(readings.source)]
+    levels = len(readings.levels)
+    return Variation(
+        pressures=3 if has_pressures(readings) else min(levels, 2) if are_far_apart(readings.seal_pressure) else 1,
+        speeds=bool(np.isfinite(speed).all()) and float(np.mean(faster or [False])) > 0.5,
+        asymmetry=any(several) and all(len(index) for index in readings.two_sided),
+        exponent=readings.are_samples or levels >= FEWEST_PRESSURES_FOR_EXPONENT,
+    )
 
 
 class Rise(NamedTuple):
@@ -241,3 +266,58 @@ def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = Fals
     if many_times and float(losses.mean()) > MANY_TIMES * float(others.mean()) > 0.0:
         return True
     return worse > max(noise, WORTHWHILE * float(losses.mean()))
+
+
+class ChosenAnew(NamedTuple):
+    """Prediction of each group by a law that was chosen and fitted without it."""
+
+    predicted: FloatArray  # [N] shape (n,); NaN where no law could be chosen
+    laws: tuple[str, ...]  # name of the law without each group; '' where none could be chosen
+
+
+def choose_anew(
+    readings: FrictionReadings, choose: Callable[[FrictionReadings], LawScore], tick: Ticks = lambda _: None
+) -> ChosenAnew:
+    """Predict each group by the law that ``choose`` recommends for the other groups.
+
+    Unlike `cross_validate`, which fits a given law anew, the choice of the law has not seen the group either. ``tick``
+    is called with 1 after each group.
+
+    Source: nested cross-validation, [VarmaSimon2006]_.
+    """
+    predicted, laws = np.full(readings.count, np.nan), []
+    for out in readings.groups:
+        try:
+            chosen = choose(readings.without(out))
+        except ValueError:
+            laws.append('')
+        else:
+            near = chosen.fit.values if chosen.fit else {}
+            _, predicted[out], _ = predict(chosen.law, readings.without(out), readings.taken(out), near)
+            laws.append(chosen.law.name)
+        tick(1)
+    return ChosenAnew(predicted, tuple(laws))
+
+
+def collinear_spread(scores: Sequence[LawScore], selected: LawFit, readings: FrictionReadings) -> float:
+    """Relative spread of laws that fit nearly as well, where speed and pressure part [-]: the data cannot tell them.
+
+    Laws within `NEAR` of the best are compared at every pair of a speed and a pressure (quartiles of each), also those
+    pairs that never occurred: where speed and pressure always changed together, laws agree on the readings and differ
+    there. The spread is the root mean square deviation from the ``selected`` law. 0 for held readings.
+    """
+    if not readings.are_samples:
+        return 0.0
+    scored = [score for score in scores if score.fit is not None and score.losses is not None]
+    least = min(float(score.losses.mean()) for score in scored if score.losses is not None)
+    near = [s.fit for s in scored if s.fit is not None and s.losses is not None and s.losses.mean() <= NEAR * least]
+    shares = (0.125, 0.375, 0.625, 0.875)
+    speeds = np.quantile(np.abs(readings.at.velocity), shares)
+    order = np.argsort(readings.seal_pressure)
+    rows = order[(np.array(shares) * (len(order) - 1)).astype(int)]
+    at = readings.taken(np.tile(rows, 2 * len(speeds))).at
+    direction = np.repeat([1.0, -1.0], len(rows) * len(speeds))
+    at = at._replace(velocity=direction * np.tile(np.repeat(speeds, len(rows)), 2), direction=direction)
+    chosen = selected.friction(at)
+    deviations = [(fit.friction(at) - chosen) / chosen.mean() for fit in near]
+    return float(np.sqrt(np.mean(np.square(deviations)))) if deviations else 0.0

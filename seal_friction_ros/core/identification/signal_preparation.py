@@ -76,6 +76,7 @@ class SignalReading(NamedTuple):
     pressure_a: float  # [Pa, gauge]
     pressure_b: float  # [Pa, gauge]
     force_sum: float  # [N]
+    dwell: float = 0.0  # [s] time at rest before a breakaway; 0 for a stroke
 
 
 class HalfRange(NamedTuple):
@@ -210,7 +211,7 @@ def breakaways(signals: Signals, sliding: Sliding) -> list[SignalReading]:
             peak = candidates[[np.argmax(direction * signals.force_sum[candidates])]]
             _, _, *values = (float(column[0]) for column in signals.taken(peak))
             if np.isfinite(values).all():
-                found.append(SignalReading(direction, peak, 0.0, *values))
+                found.append(SignalReading(direction, peak, 0.0, *values)._replace(dwell=float(rested)))
     return found
 
 

@@ -57,13 +57,13 @@ def cross_validate(
     predicted, deviation = np.empty(readings.count), np.empty(readings.count)
     parameters = []
     for out in readings.groups:
-        values, predicted[out], deviation[out] = _predict(law, readings.taken(~out), readings.taken(out), near)
+        values, predicted[out], deviation[out] = predict(law, readings.taken(~out), readings.taken(out), near)
         parameters.append([values[p.name] for p in law.parameters])
         tick(1)
     return CrossValidation(predicted, deviation, group_losses(readings, deviation), np.array(parameters))
 
 
-def _predict(
+def predict(
     law: CandidateLaw, trained: FrictionReadings, tested: FrictionReadings, near: ParameterValues
 ) -> tuple[ParameterValues, FloatArray, FloatArray]:
     """Law fitted to ``trained``: parameters, friction of ``tested``, and measured less predicted friction [N].
@@ -168,7 +168,7 @@ def deviations_in_std(
     """
     inner = cross_validate(law, trained, near, tick)
     band = prediction_uncertainty(inner.predicted, inner.deviation, len(trained.groups), in_addition)
-    _, friction, deviation = _predict(law, trained, tested, near)
+    _, friction, deviation = predict(law, trained, tested, near)
     return np.asarray(np.abs(deviation) / np.maximum(band.std(friction), 1e-12))
 
 
@@ -176,7 +176,6 @@ def deviations_of_left_out(
     law: CandidateLaw,
     readings: FrictionReadings,
     near: ParameterValues,
-    in_addition: float = 0.0,
     tick: Ticks = lambda _: None,
 ) -> FloatArray:
     """Deviations of each group over the standard deviation of a band that was made without it [-], shape (n,).
@@ -187,7 +186,7 @@ def deviations_of_left_out(
     ratios = np.empty(readings.count)
     for out in readings.groups:
         trained = readings.taken(~out) if len(readings.groups) >= 3 else readings
-        ratios[out] = deviations_in_std(law, trained, readings.taken(out), near, in_addition, tick)
+        ratios[out] = deviations_in_std(law, trained, readings.taken(out), near, tick=tick)
     return ratios
 
 
@@ -195,8 +194,7 @@ def band_coverage(
     law: CandidateLaw,
     readings: FrictionReadings,
     near: ParameterValues,
-    in_addition: float = 0.0,
     tick: Ticks = lambda _: None,
 ) -> float:
     """Share of the readings inside a 95 % band that was made without them [-], as of `deviations_of_left_out`."""
-    return float(np.mean(deviations_of_left_out(law, readings, near, in_addition, tick) <= BAND_95))
+    return float(np.mean(deviations_of_left_out(law, readings, near, tick) <= BAND_95))

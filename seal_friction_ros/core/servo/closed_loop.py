@@ -91,7 +91,7 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
     period = plant.control_period
     whole, part = divmod(delay / period + 1e-9, 1.0)
     back = int(whole)
-    errors = [(0.0, 0.0, 0.0, 0.0)] if noise is None else noise.tolist()
+    errors = [(0.0, 0.0, 0.0, 0.0)] if noise is None else noise[:samples].tolist()
     forces = [0.0] * (back + 1)
     estimation = pipeline.init_running(parameters)
     state = servo.init(plant, wave.at(0.0).position)

@@ -15,6 +15,7 @@ def add_parser(commands: Any) -> None:
         'identify bags/pull_test --out my_seal.yaml --report my_seal.html',
         'identify O-ring257_*bar.csv --rig delft --out o_ring.yaml',
         'identify bags/pull_test --out my_seal.yaml --next next.csv',
+        'identify bags/cylinder --seal-kind rod=a --seal-kind piston=difference --out cylinder.yaml',
     )  # fmt: skip
     parser.add_argument('sources', type=Path, nargs='+', metavar='SOURCE', help='bag, log, table or data sheet')
     cli.add_target(parser, '--out', SEAL_FILE, required=True, metavar='SEAL.yaml', help='seal file to write')
@@ -34,6 +35,14 @@ def add_parser(commands: Any) -> None:
         type=_chambers,
         metavar='a,b',
         help='what each seal sees: a, b, difference or ambient',
+    )
+    parser.add_argument(
+        '--seal-kind',
+        dest='kinds',
+        type=_kind,
+        action='append',
+        metavar='NAME=a,b',
+        help='one of several kinds of seals in the cylinder and what each of its seals sees; one file a kind',
     )
     parser.add_argument('--law', help='law to save instead of the recommended one')
     parser.add_argument(
@@ -64,8 +73,50 @@ def _chambers(text: str) -> tuple[str, ...]:
     return chambers
 
 
+def _kind(text: str) -> tuple[str, tuple[str, ...]]:
+    name, _, chambers = text.partition('=')
+    if not name or not name.replace('_', '').replace('-', '').isalnum():
+        raise argparse.ArgumentTypeError(f'{text} is not a name and chambers like rod=a,b')
+    return name, _chambers(chambers)
+
+
+NOT_FOR_KINDS = ('report', 'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed')
+"""options that several kinds of seals do not take"""
+
+
+def _run_kinds(arguments: argparse.Namespace) -> int:
+    """Identify several kinds of seals together, and write a seal file for each."""
+    from seal_friction_ros.core.identification.several_kinds import SealKind
+    from seal_friction_ros.offline.identification import kinds
+    from seal_friction_ros.offline.identification.sources import SourceOptions
+    from seal_friction_ros.offline.work.seal_writer import write_seal
+    from seal_friction_ros.offline.work.targets import checked_targets
+
+    given = [option for option in NOT_FOR_KINDS if getattr(arguments, option)]
+    if given:
+        option = {'chambers': 'seal_chambers'}.get(given[0], given[0]).replace('_', '-')
+        raise ValueError(f'--{option} is for one kind of seals: leave it out, or leave out --seal-kind')
+    names = [name for name, _ in arguments.kinds]
+    if len(names) < 2 or len({*names}) < len(names):
+        raise ValueError(f'--seal-kind {", ".join(names)}: give two kinds at least, with different names')
+    files = kinds.seal_files(arguments.out, names)
+    targets = [(path, SEAL_FILE) for path in files.values()]
+    with checked_targets('identify', targets, arguments.sources, force=arguments.force):
+        options = SourceOptions(**cli.options_from(arguments, SourceOptions))
+        each = [SealKind(*kind) for kind in arguments.kinds]
+        name = arguments.name or arguments.out.stem
+        result = kinds.identify_kinds(arguments.sources, options, each, name, arguments.run_to_run)
+        for kind, path in files.items():
+            write_seal(result.documents[kind], path, f'Seal file, {mark("identify")}.')
+    numbers = kinds.kinds_numbers(result) | {'seal_files': {kind: str(path) for kind, path in files.items()}}
+    written = ', '.join(str(path) for path in files.values())
+    return cli.print_result(arguments, numbers, f'{kinds.kinds_summary(result)}\n{written}: written')
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Identify, and write seal file, page and data sheet."""
+    if arguments.kinds:
+        return _run_kinds(arguments)
     from seal_friction_ros.offline.identification import next_readings
     from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
     from seal_friction_ros.offline.identification.results import identification_numbers

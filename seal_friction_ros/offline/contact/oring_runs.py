@@ -22,7 +22,7 @@ class Profile:
 
     position_m: tuple[float, ...]
     """along rod and gland from the middle of the free ring, positive downstream; for the wall the radius"""
-    stress_Pa: tuple[float, ...]  # noqa: N815  (unit symbols keep their case)
+    stress_Pa: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -31,17 +31,17 @@ class OringSummary:
 
     case: str
     sliding_wall: str
-    pressure_Pa: tuple[float, ...]  # noqa: N815
-    normal_force_N: tuple[float, ...]  # noqa: N815
+    pressure_Pa: tuple[float, ...]
+    normal_force_N: tuple[float, ...]
     """integral of the contact stress over the sliding wall"""
-    axial_force_N: tuple[float, ...]  # noqa: N815
+    axial_force_N: tuple[float, ...]
     """axial force of the gland on the ring"""
-    peak_contact_stress_Pa: tuple[float, ...]  # noqa: N815
+    peak_contact_stress_Pa: tuple[float, ...]
     contact_width_m: tuple[float, ...]
     area_deformation_gain: float | None  # slope of normal over axial force by least squares; None with one pressure
-    radial_force_N: float | None  # noqa: N815
+    radial_force_N: float | None
     """value of that line at zero axial force; None with one pressure"""
-    friction_N: tuple[float, ...] | None  # noqa: N815
+    friction_N: tuple[float, ...] | None
     """sliding friction of one seal, if the case has a friction coefficient"""
     rod_profile: tuple[Profile, ...]
     gland_profile: tuple[Profile, ...]

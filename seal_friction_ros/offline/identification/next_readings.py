@@ -88,6 +88,11 @@ def _rounded(value: float) -> float | None:
     return rounded_value(value) if math.isfinite(value) else None
 
 
+def _percent(share: float) -> str:
+    """A share with two digits, without an exponent: 0.79 %, 780 %."""
+    return f'{float(f"{100.0 * share:.2g}"):g} %'
+
+
 def texts_of(found: Identification, design: ExperimentDesign) -> Iterator[str]:
     """What limits the band, and what the proposed readings change, one line each."""
     limit = 100.0 * design.parts[design.limit]
@@ -104,8 +109,8 @@ def texts_of(found: Identification, design: ExperimentDesign) -> Iterator[str]:
     slow, fast = (speed / MM for speed in design.speeds)
     yield (
         f'the standard error of {design.law.name} over {low:.3g} to {high:.3g} bar and {slow:.3g} to {fast:.3g} mm/s '
-        f'is {100.0 * design.error_before:.2g} % of the friction; with the proposed readings '
-        f'{100.0 * design.error_after:.2g} %'
+        f'is {_percent(design.error_before)} of the friction; with the proposed readings '
+        f'{_percent(design.error_after)}'
     )
     before, after = design.correlation_before, design.correlation_after
     if before is not None and after is not None and abs(before.correlation) > abs(after.correlation):

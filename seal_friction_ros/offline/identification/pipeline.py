@@ -20,22 +20,29 @@ from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
 from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
 from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
-from seal_friction_ros.core.identification import diagnostics, fitting, runs, validation
+from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, validation
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.calibration import calibration
 from seal_friction_ros.core.identification.candidate_laws import (
     CandidateLaw,
-    Variation,
     candidate_laws,
     normal_forces,
 )
 from seal_friction_ros.core.identification.force_correction import force_correction
-from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, FrictionReadings, has_pressures
-from seal_friction_ros.core.identification.selection import NEAR, recommended, rise_over_pressures, score_ladder
+from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
+from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.selection import (
+    LawScore,
+    choose_anew,
+    collinear_spread,
+    recommended,
+    rise_over_pressures,
+    score_ladder,
+    variation_of,
+)
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.data_sheet import geometry_of_seal_file
 from seal_friction_ros.offline.identification.results import (
-    FEWEST_PRESSURES_FOR_EXPONENT,
     Identification,
     IdentificationData,
     LawQuality,
@@ -50,8 +57,6 @@ from seal_friction_ros.offline.identification.sources import SourceOptions, Sour
 from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
 from seal_friction_ros.offline.work.progress import progress
 
-SPEEDS_DIFFER = 1.5  # fastest over slowest reading at one pressure, above which velocity terms are tried (our choice)
-MOST_SAMPLES = 4000  # of swept logs, evenly taken: neighbours at tens of hertz tell the same (our choice)
 MOST_EXTENSIONS = 3  # of a law by velocity terms
 LARGEST_ERROR = 0.5  # out-of-sample error above which a law is not saved (our choice)
 REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is used if no other is known
@@ -82,13 +87,17 @@ def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Iden
     """
     data = gather(paths, options)
     selection = select_law(data, options.law)
+    _check_one_seal(diagnostics.swept_logs_compared(data.used, selection.fit), options.refuse_changed)
     quality = assess(data, selection, options.run_to_run)
-    document = seal_document(data, selection, quality, options.name or name)
-    levels = _levels(data, selection, quality, document)
+    as_measured = seal_document(data, selection, quality, options.name or name)
+    levels = _levels(data, selection, quality, as_measured)
+    document = as_measured
+    if quality.settled is not None:
+        document = seal_document(data, selection, quality, options.name or name, quality.settled)
     warnings = tuple(warnings_of(data, selection, quality, levels))
     remarks = (*data.sources.remarks, *remarks_on(data, selection))
     document['identification'] = identification_section(data, selection, quality, levels, warnings)
-    return Identification(data, selection, quality, levels, document, warnings, remarks)
+    return Identification(data, selection, quality, levels, document, as_measured, warnings, remarks)
 
 
 def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationData:
@@ -100,7 +109,7 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
     sources = read_sources(paths, options.sources)
     ring = _ring(sources, options)
     prepared = sources.prepare()
-    _check_one_seal(prepared.readings, options.refuse_changed)
+    _check_one_seal(diagnostics.shared_levels(prepared.readings), options.refuse_changed)
     correction = force_correction(prepared)
     if correction is not None and correction.is_significant:
         sources = sources.corrected(correction)
@@ -113,13 +122,8 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
         floor = diagnostics.repeatability(readings, offsets)
         outlier = diagnostics.outlying_level(laws, readings, floor if math.isfinite(floor) else 0.0)
     used = readings
-    if outlier is not None:  # number the levels, and the groups that are levels, without a gap
-        used = readings.taken(readings.level != outlier.level)
-        level = np.unique(used.level, return_inverse=True)[1]
-        group = level if used.left_out_by == 'pressure' else used.group
-        used = replace(used, level=level, group=group)
-    if used.are_samples:
-        used = used.taken(np.arange(used.count) % -(-used.count // MOST_SAMPLES) == 0)
+    if outlier is not None:
+        used = readings.without(readings.level == outlier.level)
     return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction)
 
 
@@ -153,22 +157,23 @@ def _with_normal_force(readings: FrictionReadings, ring: Ring | None) -> Frictio
     return replace(readings, at=readings.at._replace(normal_force=forces))
 
 
-def _check_one_seal(readings: FrictionReadings, refuse_changed: bool) -> None:
-    """Check that sources that share a pressure may be runs of one seal.
+def _check_one_seal(changes: Sequence[diagnostics.RunChange], refuse_changed: bool) -> None:
+    """Check that sources may be runs of one seal.
 
     Raises:
-        ValueError: Their friction differs by more than `runs.ANOTHER_SEAL`, or with ``refuse_changed`` by more than
-            `diagnostics.CHANGED`.
+        ValueError: Their friction differs by more than `runs.ANOTHER_SEAL` at most of the pressures that they share, or
+            with ``refuse_changed`` by more than `diagnostics.CHANGED` at one of them.
     """
+    if not changes:
+        return
+    middle = float(np.median([change.ratio for change in changes]))
+    worst = max(changes, key=lambda change: change.ratio)
     most = 1.0 + diagnostics.CHANGED if refuse_changed else runs.ANOTHER_SEAL
-    changes = [(max(c.other_friction / c.friction, c.friction / c.other_friction), c)
-               for c in diagnostics.changed_levels(readings)]  # fmt: skip
-    middle = float(np.median([ratio for ratio, _ in changes])) if changes else 1.0
-    ratio, worst = max(changes, key=lambda pair: pair[0], default=(1.0, None))
-    if worst is not None and (middle if not refuse_changed else ratio) > most:
+    if (worst.ratio if refuse_changed else middle) > most:
+        where = 'over their speeds and pressures' if worst.pressure is None else f'at {worst.pressure / BAR:.3g} bar'
         raise ValueError(
             f'{worst.name} and {worst.other_name} are two seals or two states of one: friction {worst.friction:.4g} N '
-            f'and {worst.other_friction:.4g} N at {worst.pressure / BAR:.3g} bar, {100.0 * (ratio - 1.0):.0f} % more, '
+            f'and {worst.other_friction:.4g} N {where}, {100.0 * (worst.ratio - 1.0):.0f} % more, '
             f'where {100.0 * (most - 1.0):.0f} % is the most for runs of one seal: identify each separately'
         )
 
@@ -177,46 +182,14 @@ def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[C
     return candidate_laws(variation_of(readings), *(ring or ()))
 
 
-def variation_of(readings: FrictionReadings) -> Variation:
-    """What the readings vary.
-
-    Speeds count where they differ at one pressure in one direction: speeds that follow pressure or direction tell
-    nothing apart. One direction has no asymmetry, and if each source holds one pressure, asymmetry is its offset.
-    """
-    speed = np.abs(readings.at.velocity)
-    faster = []
-    for inside in readings.levels.values():
-        for side in (-1.0, 1.0):
-            of_side = speed[inside & (readings.at.direction == side)]
-            if len(of_side) > 1:
-                faster.append(bool(of_side.max() > SPEEDS_DIFFER * of_side.min()))
-    several = [len(np.unique(readings.level[readings.source == source])) > 1 for source in np.unique(readings.source)]
-    levels = len(readings.levels)
-    return Variation(
-        pressures=3 if has_pressures(readings) else min(levels, 2) if _is_wide(readings) else 1,
-        speeds=bool(np.isfinite(speed).all()) and float(np.mean(faster or [False])) > 0.5,
-        asymmetry=any(several) and all(len(index) for index in readings.two_sided),
-        exponent=readings.are_samples or levels >= FEWEST_PRESSURES_FOR_EXPONENT,
-    )
-
-
-def _is_wide(readings: FrictionReadings) -> bool:
-    pressures = readings.seal_pressure
-    return float(np.ptp(pressures)) >= max(NARROWEST_PRESSURES, 0.1 * float(pressures.max()))
-
-
 def select_law(data: IdentificationData, name: str | None) -> LawSelection:
     """Fit and score every candidate law; select the recommended one, or the one called ``name``.
 
     Raises:
         ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
-    variation = variation_of(data.used)
-    if data.sources.has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
-        variation = variation._replace(asymmetry=False)
-    laws = candidate_laws(variation, *(data.ring or ()))
-    with progress('fit and leave out', len(laws) + MOST_EXTENSIONS) as advance:
-        scores = score_ladder(laws, data.used, variation, advance)
+    with progress('fit and leave out', len(_candidates(data.used, data.ring)) + MOST_EXTENSIONS) as advance:
+        scores = _scored(data, data.used, advance)
     best = recommended(scores, rise_over_pressures(data.used))
     by_name = {None: best} | {score.law.name: score for score in scores}
     if name not in by_name:
@@ -230,7 +203,25 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
             f'{100.0 * selected.validation.error:.0f} % on left-out readings: measure more strokes at each pressure, '
             'in both directions, with a settled seal'
         )
-    return LawSelection(scores, best, selected.fit, selected.validation, validation.plain_mean(data.used))
+    anew = None
+    if name is None and not data.used.are_samples:  # a swept log would take minutes
+        with progress('choose without', len(data.used.groups)) as advance:
+            anew = choose_anew(data.used, lambda left: _recommended(data, with_predictable_groups(left)), advance)
+    return LawSelection(scores, best, selected.fit, selected.validation, validation.plain_mean(data.used), anew)
+
+
+def _recommended(data: IdentificationData, readings: FrictionReadings) -> LawScore:
+    return recommended(_scored(data, readings), rise_over_pressures(readings))
+
+
+def _scored(
+    data: IdentificationData, readings: FrictionReadings, tick: validation.Ticks = lambda _: None
+) -> tuple[LawScore, ...]:
+    """Scores of the ladder on some of the readings."""
+    variation = variation_of(readings)
+    if data.sources.has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
+        variation = variation._replace(asymmetry=False)
+    return score_ladder(candidate_laws(variation, *(data.ring or ())), readings, variation, tick)
 
 
 def assess(data: IdentificationData, selection: LawSelection, run_to_run: float | None) -> LawQuality:
@@ -247,47 +238,25 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
         between, of_band = between._replace(std=0.0), 0.0
     else:
         of_band = between.of_band
-    told_apart = collinear_spread(selection, used)
+    told_apart = collinear_spread(selection.scores, found, used)
     in_addition = math.hypot(of_band, told_apart)
     with progress('test the band', groups * (groups - 1)) as advance:
-        coverage = validation.band_coverage(selection.law, used, found.values, 0.0, advance)
+        coverage = validation.band_coverage(selection.law, used, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]
     return LawQuality(
         uncertainty=validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, in_addition),
         between_runs=between,
         is_stated=run_to_run is not None,
+        changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),
         told_apart=told_apart,
         coverage=coverage,
         calibration=calibration(selection.law, used, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
-        drifts=[] if used.are_samples else runs.drifts(everything, offsets),
+        drifts=[] if used.are_samples else run_in.drifts(everything, offsets),
+        settled=run_in.settled_law(found, used),
         breakaway=_breakaway(data, found),
         standard_errors=dict(zip(names, validation.jackknife_errors(left_out.parameters).tolist(), strict=True)),
     )
-
-
-def collinear_spread(selection: LawSelection, used: FrictionReadings) -> float:
-    """Relative spread of laws that fit nearly as well, where speed and pressure part [-]: the data cannot tell them.
-
-    Laws within `NEAR` of the best are compared at every pair of a speed and a pressure (quartiles of each), also those
-    pairs that never occurred: where speed and pressure always changed together, laws agree on the readings and differ
-    there. The spread is the root mean square deviation from the selected law. 0 for held readings.
-    """
-    if not used.are_samples:
-        return 0.0
-    scored = [score for score in selection.scores if score.fit is not None and score.losses is not None]
-    least = min(float(score.losses.mean()) for score in scored if score.losses is not None)
-    near = [s.fit for s in scored if s.fit is not None and s.losses is not None and s.losses.mean() <= NEAR * least]
-    shares = (0.125, 0.375, 0.625, 0.875)
-    speeds = np.quantile(np.abs(used.at.velocity), shares)
-    order = np.argsort(used.seal_pressure)
-    rows = order[(np.array(shares) * (len(order) - 1)).astype(int)]
-    at = used.taken(np.tile(rows, 2 * len(speeds))).at
-    direction = np.repeat([1.0, -1.0], len(rows) * len(speeds))
-    at = at._replace(velocity=direction * np.tile(np.repeat(speeds, len(rows)), 2), direction=direction)
-    chosen = selection.fit.friction(at)
-    deviations = [(fit.friction(at) - chosen) / chosen.mean() for fit in near]
-    return float(np.sqrt(np.mean(np.square(deviations)))) if deviations else 0.0
 
 
 def _breakaway(data: IdentificationData, found: fitting.LawFit) -> BreakawayFit | None:
@@ -304,15 +273,19 @@ def _breakaway(data: IdentificationData, found: fitting.LawFit) -> BreakawayFit 
 def _levels(
     data: IdentificationData, selection: LawSelection, quality: LawQuality, document: Mapping[str, Any]
 ) -> tuple[PressureLevel, ...]:
-    """Measured and fitted friction at each pressure level, by the law as the seal file has it."""
+    """Measured and fitted friction at each pressure level, by the law of a seal file with this ``document``."""
     readings = data.prepared.readings
     seal = parse_seal(document)
     mounted = tuple(MountedSeal(seal, chamber) for chamber in data.sources.chambers)
     fitted, std = fitted_readings(mounted, data.prepared.chamber_pressures, readings.at.velocity)
     measured = readings.magnitudes(fitting.offsets_of(readings, fitted))
-    predicted = [float(selection.validation.predicted[inside].mean()) for inside in data.used.levels.values()]
+    unseen = np.full((data.used.count, 2), np.nan)
+    unseen[:, 0] = selection.validation.predicted
+    if selection.chosen_anew is not None:
+        unseen[:, 1] = selection.chosen_anew.predicted
+    predicted = [unseen[inside].mean(axis=0).tolist() for inside in data.used.levels.values()]
     if data.outlier is not None:
-        predicted.insert(list(readings.levels).index(data.outlier.level), data.outlier.expected)
+        predicted.insert(list(readings.levels).index(data.outlier.level), [data.outlier.expected] * 2)
     return tuple(
         PressureLevel(
             pressure=float(readings.seal_pressure[inside].mean()),
@@ -321,12 +294,13 @@ def _levels(
             fitted=float(fitted[inside].mean()),
             std=float(std[inside].mean()),
             left_out=left_out,
+            left_out_nested=nested,
             offset=math.nan if readings.are_samples else readings.half_range(inside).offset,
             readings=int(inside.sum()),
             drift=float(np.mean([d.change for d in quality.drifts if d.level == level] or [math.nan])),
             is_used=not data.is_outlier(level),
         )
-        for (level, inside), left_out in zip(readings.levels.items(), predicted, strict=True)
+        for (level, inside), (left_out, nested) in zip(readings.levels.items(), predicted, strict=True)
     )
 
 

@@ -15,18 +15,18 @@ from seal_friction_ros.core.identification import fitting
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import CandidateLaw
-from seal_friction_ros.core.identification.diagnostics import Outlier, changed_levels
+from seal_friction_ros.core.identification.diagnostics import Outlier, RunChange
 from seal_friction_ros.core.identification.force_correction import NOTICED, ForceCorrection
 from seal_friction_ros.core.identification.readings import FrictionReadings, PreparedReadings
-from seal_friction_ros.core.identification.runs import BetweenRuns, Drift
-from seal_friction_ros.core.identification.selection import LawScore, is_beaten
+from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
+from seal_friction_ros.core.identification.runs import BetweenRuns
+from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, is_beaten
 from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
 from seal_friction_ros.offline.identification.load_numbers import load_numbers
 from seal_friction_ros.offline.identification.sources import Sources
 from seal_friction_ros.offline.work.seal_writer import rounded
 
 DIGITS = 6  # of a number in a seal file
-FEWEST_PRESSURES_FOR_EXPONENT = 6  # with fewer, leaving each out in turn does not determine an exponent (our choice)
 
 
 class Ring(NamedTuple):
@@ -62,6 +62,8 @@ class LawSelection:
     validation: CrossValidation
     reference: CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
+    chosen_anew: ChosenAnew | None
+    """prediction by laws chosen without each group; None for swept logs and for a law that the user names"""
 
     @property
     def law(self) -> CandidateLaw:
@@ -77,11 +79,13 @@ class LawQuality:
     between_runs: BetweenRuns
     """relative standard deviation between runs that is added to what readings left out deviate by"""
     is_stated: bool  # whether the user gave it
+    changes: list[RunChange]  # of the friction from run to run, under the same conditions
     told_apart: float  # [-] relative spread of laws that the data cannot tell apart, added likewise
     coverage: float  # share of the left-out readings inside a 95 % band that was made without them
     calibration: Calibration  # share inside the band at each nominal share, within and between runs
     repeatability: float  # [-] scatter of repeated readings
     drifts: list[Drift]  # of the friction over each run
+    settled: SettledLaw | None  # law of the settled seal, which the seal file holds; None if no drift is evident
     breakaway: BreakawayFit | None  # None if no stroke starts from rest
     standard_errors: dict[str, float]  # of the parameters, by name
 
@@ -92,9 +96,10 @@ class PressureLevel(NamedTuple):
     pressure: float  # [Pa, gauge] mean over seals and readings
     speed: float  # [m/s] mean; NaN if not measured
     measured: float  # [N] all seals
-    fitted: float  # [N] all seals, by the law of the seal file
-    std: float  # [N] of a new reading, by the law of the seal file
-    left_out: float  # [N] prediction by the law fitted without these readings
+    fitted: float  # [N] all seals, by the law fitted to the readings as measured
+    std: float  # [N] of a new reading, by that law
+    left_out: float  # [N] prediction by the law fitted without these readings; they had a say in its choice
+    left_out_nested: float  # [N] prediction by a law chosen and fitted without these readings; NaN if not done
     offset: float  # [N] of the force sum
     readings: int
     drift: float  # [-] relative change of the friction over the run; NaN if unknown
@@ -109,7 +114,8 @@ class Identification:
     selection: LawSelection
     quality: LawQuality
     levels: tuple[PressureLevel, ...]
-    document: dict[str, Any]  # seal file
+    document: dict[str, Any]  # seal file: the law of the settled seal, if a drift is evident
+    as_measured: dict[str, Any]  # seal file with the law of the readings as measured; the same without a drift
     warnings: tuple[str, ...]  # limits of the law that its user has to know
     remarks: tuple[str, ...]  # assumptions, and how an option changes them
 
@@ -119,19 +125,27 @@ def rounded_value(value: float) -> float:
     return rounded(value, DIGITS)
 
 
-def seal_document(data: IdentificationData, selection: LawSelection, quality: LawQuality, name: str) -> dict[str, Any]:
-    """Seal file of the selected law, checked as the node checks it.
+def seal_document(
+    data: IdentificationData,
+    selection: LawSelection,
+    quality: LawQuality,
+    name: str,
+    settled: SettledLaw | None = None,
+) -> dict[str, Any]:
+    """Seal file of the selected law, or of that law for the ``settled`` seal, checked as the node checks it.
 
     Raises:
         ValueError: The law makes no valid seal.
     """
-    seals, law, pressure = len(data.sources.chambers), selection.law, data.used.at.pressure
-    values = _json_value(selection.fit.values)
+    seals, law = len(data.sources.chambers), selection.law
+    values = _json_value((selection.fit if settled is None else settled.fit).values)
+    of_settled = '' if settled is None else ', of the settled seal'
+    relative = math.hypot(quality.uncertainty.relative, 0.0 if settled is None else settled.relative_std)
     files = ', '.join(file.name for file in data.sources.files)
     document: dict[str, Any] = {
         'name': name,
-        'source': f'Made by seal_friction identify from {files}: law {law.name} ({law.formula}), parameters by least '
-        f'squares over {data.used.count} readings, uncertainty from readings left out.',
+        'source': f'Made by seal_friction identify from {files}: law {law.name} ({law.formula}){of_settled}, '
+        f'parameters by least squares over {data.used.count} readings, uncertainty from readings left out.',
     }
     document['mounting'] = {'chambers': list(data.sources.chambers)}
     if data.ring is not None:
@@ -143,10 +157,9 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
     stiction, ratio = (
         (terms.get('stribeck_friction', 0.0), 0.0) if quality.breakaway is None else quality.breakaway[1:3]
     )
-    uncertainty = {'relative_std': quality.uncertainty.relative, 'absolute_std': quality.uncertainty.absolute / seals}
-    identified = [float(pressure.min()), float(pressure.max())]
+    uncertainty = {'relative_std': relative, 'absolute_std': quality.uncertainty.absolute / seals}
     numbers = {'stiction': stiction, 'stiction_ratio': ratio, 'uncertainty': uncertainty}
-    document |= _json_value({**numbers, 'identified_pressure': identified})
+    document |= _json_value({**numbers, 'identified_pressure': _identified_pressure(data)})
     speed = np.abs(data.used.at.velocity)
     if np.isfinite(speed).all():
         document['identified_speed'] = _json_value([float(speed.min()), float(speed.max())])
@@ -158,8 +171,26 @@ def seal_document(data: IdentificationData, selection: LawSelection, quality: La
     return document
 
 
+def _identified_pressure(data: IdentificationData) -> list[float]:
+    """Lowest and highest pressure [Pa] at which the law holds: of the longer run of levels on one side of an outlier.
+
+    Of two equally long runs the lower one counts (our choice).
+    """
+    everything, used = data.prepared.readings, data.used.at.pressure
+    if data.outlier is not None:
+        below, above = (
+            everything.taken(side)
+            for side in (everything.level < data.outlier.level, everything.level > data.outlier.level)
+        )
+        used = (above if len(above.levels) > len(below.levels) else below).at.pressure
+    return [float(used.min()), float(used.max())]
+
+
 def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> ForceSumCorrection | None:
-    """Area and offset of the logs, if they matter: at rest they would count as force on the rod; None otherwise."""
+    """Area and offset of the logs, if they matter: at rest they would count as force on the rod; None otherwise.
+
+    The load that was taken out of a log remains in the force sum of the node.
+    """
     readings = data.used
     sources = [source for source, index in enumerate(readings.two_sided) if len(index)]
     if data.sources.each[0].log is None or not sources:
@@ -168,9 +199,10 @@ def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> 
     friction = float(fit.friction(readings.at).mean())
     made = data.correction if data.correction is not None and data.correction.is_significant else None
     areas = {} if made is None else {f'area_{made.chamber}': rounded_value(made.area)}
-    if not areas and abs(offset) < NOTICED * friction:
+    matters, contains_load = bool(areas) or abs(offset) >= NOTICED * friction, data.sources.has_fitted_load
+    if not matters and not contains_load:
         return None
-    return ForceSumCorrection(**areas, offset=rounded_value(offset))
+    return ForceSumCorrection(**areas, offset=rounded_value(offset) if matters else 0.0, contains_load=contains_load)
 
 
 def _json_value(value: Any) -> Any:
@@ -197,8 +229,9 @@ def identification_section(
         {
             'law': selection.law.name,
             'recommended_law': selection.best.law.name,
-            'parameters': selection.fit.values,
+            'parameters': (quality.settled or selection).fit.values,
             'standard_errors': quality.standard_errors,
+            'as_measured': {'parameters': selection.fit.values, 'relative_std': quality.uncertainty.relative},
             'seal_chambers': data.sources.chambers,
             'pressure_Pa': [level.pressure for level in levels],
             'measured_N': measured,
@@ -215,7 +248,8 @@ def identification_section(
             'warnings': warnings,
         }
     )
-    return section
+    load = load_numbers([(source.file.name, source.load) for source in data.sources.each])
+    return section if load is None else section | {'load': load}
 
 
 def identification_numbers(found: Identification) -> dict[str, Any]:
@@ -227,10 +261,12 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'std_N': [level.std for level in levels],
             'left_out_N': [level.left_out for level in levels],
             'worst_left_out_error': worst_left_out(levels),
+            'left_out_nested_N': [level.left_out_nested for level in levels],
+            'left_out_nested_laws': selection.chosen_anew and selection.chosen_anew.laws,
             'cross_validation_mean_deviation_N': selection.validation.mean_deviation,
             'ladder': [_ladder_row(score, selection) for score in selection.scores],
             'plain_mean_deviation_N': reference and reference.mean_deviation,
-            'relative_std': quality.uncertainty.relative,
+            'relative_std': found.document['uncertainty']['relative_std'],
             'absolute_std_N': quality.uncertainty.absolute,
             'condition_number': selection.fit.condition_number,
             'correlation': selection.fit.correlation.tolist(),
@@ -243,6 +279,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'told_apart_std': quality.told_apart,
             'calibration': {name: getattr(quality.calibration, name).tolist() for name in Calibration._fields[:3]},
             'drift': [level.drift for level in levels],
+            'settled': quality.settled and _settled_numbers(quality.settled, quality),
             'run_in': [
                 {
                     'source': data.sources.files[drift.source].name,
@@ -250,6 +287,9 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
                     'change': drift.change,
                     'asymptote_N': drift.asymptote,
                     'length_m': drift.length,
+                    'is_evident': drift.is_evident,
+                    'settled_share': drift.settled_share,
+                    'settled_std': drift.settled_std,
                 }
                 for drift in quality.drifts
             ],
@@ -258,12 +298,28 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
     return numbers | {
         'breakaway': quality.breakaway and _breakaway_numbers(found),
         'stiction': quality.breakaway and quality.breakaway._asdict(),
-        'changes': [change._asdict() for change in changed_levels(data.prepared.readings)],
-        'load': load_numbers([(source.file.name, source.load) for source in data.sources.each]),
+        'changes': [change._asdict() for change in quality.changes if change.is_changed],
+        'load': found.document['identification'].get('load'),
         'samples_used': data.prepared.used,
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,
         'remarks': list(found.remarks),
+    }
+
+
+def _settled_numbers(settled: SettledLaw, quality: LawQuality) -> dict[str, Any]:
+    """The settled seal: friction at each pressure in use, from its readings and by its law."""
+    readings, friction = settled.readings, settled.fit.friction(settled.readings.at)
+    levels = list(readings.levels.values())
+    fitted = [float(friction[inside].mean()) for inside in levels]
+    relative = math.hypot(quality.uncertainty.relative, settled.relative_std)
+    return {
+        'parameters': settled.fit.values,
+        'relative_std_of_settling': settled.relative_std,
+        'pressure_Pa': readings.level_pressures.tolist(),
+        'measured_N': [readings.half_range(inside).friction for inside in levels],
+        'fitted_N': fitted,
+        'std_N': [math.hypot(relative * value, quality.uncertainty.absolute) for value in fitted],
     }
 
 

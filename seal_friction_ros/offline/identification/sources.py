@@ -333,8 +333,8 @@ def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
     """Running and breakaway friction from a table of one reading per row.
 
     Columns, by the names in its first row: ``pressure_<unit>`` (psig, psi, bar, kPa, MPa, Pa) and ``friction_<unit>``
-    (lbf, N, kN), of all seals; optional ``direction`` (extend or retract), ``kind`` (dynamic or static), ``test``
-    and ``velocity_<unit>`` (m_per_s, mm_per_s, in_per_s).
+    (lbf, N, kN), of all seals; optional ``direction`` (extend or retract), ``kind`` (dynamic or static), ``test``,
+    ``velocity_<unit>`` (m_per_s, mm_per_s, in_per_s) and ``dwell_s``, the time at rest before a static reading.
 
     Raises:
         ValueError: The table cannot be read or a cell is invalid; one line that names file, row and column.
@@ -350,7 +350,9 @@ def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:
     direction = _codes(path, rows, 'direction', DIRECTIONS, 1)
     kinds = _codes(path, rows, 'kind', KINDS, 0)
     test = np.unique([row.get('test', '') for row in rows], return_inverse=True)[1]
-    columns = (test, pressure, direction, friction, speed)
+    columns = [test, pressure, direction, friction, speed]
+    if any(name.startswith('dwell') for name in rows[0]):
+        columns.append(column_in_si(path, rows, 'dwell', {'s': 's'}))
     dynamic, static = (ManualReadings(path.name, *(column[kinds == kind] for column in columns)) for kind in (0, 1))
     return dynamic, static
 

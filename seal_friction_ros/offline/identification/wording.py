@@ -7,8 +7,10 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification import diagnostics
+from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
-from seal_friction_ros.core.identification.readings import FrictionReadings, has_pressures
+from seal_friction_ros.core.identification.readings import has_pressures
+from seal_friction_ros.core.identification.run_in import SettledLaw
 from seal_friction_ros.offline.identification.results import (
     Identification,
     IdentificationData,
@@ -25,7 +27,7 @@ def warnings_of(
 ) -> Iterator[str]:
     """Limits of the law that its user has to know, one line each."""
     readings = data.prepared.readings
-    yield from _change_texts(readings)
+    yield from _change_texts(quality)
     one_way = [name for name, index in zip(readings.names, readings.two_sided, strict=True) if not len(index)]
     if one_way:
         yield (
@@ -48,15 +50,20 @@ def warnings_of(
         yield f'no gain is claimed for pressure: {gain[0]}: the difference is within the noise'
     yield from _parameter_texts(selection)
     yield from _scatter_texts(selection, quality, levels)
+    if quality.breakaway is not None and quality.breakaway.dwell is not None:
+        yield _dwell_text(quality.breakaway)
     if quality.breakaway is None:
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
 
 
-def _change_texts(readings: FrictionReadings) -> Iterator[str]:
-    for change in diagnostics.changed_levels(readings):
+def _change_texts(quality: LawQuality) -> Iterator[str]:
+    for change in quality.changes:
+        if not change.is_changed:
+            continue
         percent = 100.0 * (change.other_friction / change.friction - 1.0)
+        where = 'of the same law' if change.pressure is None else f'at {change.pressure / BAR:.3g} bar'
         yield (
-            f'friction differs between runs: at {change.pressure / BAR:.3g} bar {change.friction:.3g} N in '
+            f'friction differs between runs: {where} {change.friction:.3g} N in '
             f'{change.name} and {change.other_friction:.3g} N in {change.other_name} ({percent:+.0f} %); they are '
             'fitted together, and the band holds both: if they are two seals, identify each separately'
         )
@@ -66,14 +73,15 @@ def _correction_text(correction: ForceCorrection, area: float | None) -> str:
     change = f'{1e6 * correction.area:+.3g} mm2 (standard error {1e6 * correction.standard_error:.2g} mm2)'
     text = (
         f'the area of chamber {correction.chamber} in the force sum is off: its offset follows the pressure, by '
-        f'{change}; the law is fitted with the corrected area'
+        f'{change}; the law is fitted with the corrected area, and the seal file carries the correction for the node'
     )
+    twice = 'identify anew, or it is corrected twice'
     if area is None:
-        return f'{text}: correct it where the force sum is made'
+        return f'{text}; if you correct the area where the force sum is made, {twice}'
     old, new = (1e3 * math.sqrt(4.0 * max(value, 0.0) / math.pi) for value in (area, area + correction.area))
     return (
         f'{text}: {1e6 * (area + correction.area):.4g} mm2 in place of {1e6 * area:.4g} mm2, the bore is nearer to '
-        f'{new:.3g} than {old:.3g} mm: correct the rig file; the seal file carries the correction for the node'
+        f'{new:.3g} than {old:.3g} mm; if you correct the rig file, {twice}'
     )
 
 
@@ -145,6 +153,8 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
             f'laws that fit these data nearly as well differ by {100.0 * quality.told_apart:.0f} % where speed and '
             'pressure do not go together as here: that is in the standard deviation'
         )
+    if quality.settled is not None:
+        yield _settled_text(quality.settled, selection)
     drifted = [level for level in levels if level.is_used and abs(level.drift) > diagnostics.SETTLED]
     if drifted:
         at = ', '.join(f'{100.0 * level.drift:+.0f} % at {level.pressure / BAR:.3g} bar' for level in drifted)
@@ -156,6 +166,27 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
             f'the law is off by {100.0 * error:.0f} % (RMS) on left-out readings, while readings repeat within '
             f'{100.0 * floor:.0f} %: the friction depends on something that is not in the law'
         )
+
+
+def _dwell_text(law: BreakawayFit) -> str:
+    parts = ((law.stiction_per_decade, ' N'), (100.0 * law.ratio_per_decade, ' % of the Coulomb friction'))
+    growth = ' and '.join(f'{value:.2g}{unit}' for value, unit in parts if value)
+    shortest, longest = law.dwells or (math.nan, math.nan)
+    return (
+        f'breakaway grows with the time at rest, by {growth} of one seal for a rest ten times as long (rests of '
+        f'{shortest:.2g} to {longest:.3g} s); the seal file holds that after {law.dwell:.3g} s'
+    )
+
+
+def _settled_text(settled: SettledLaw, selection: LawSelection) -> str:
+    at = settled.readings.at
+    change = float(settled.fit.friction(at).mean() / selection.fit.friction(at).mean()) - 1.0
+    values = ', '.join(f'{p.name} = {selection.fit.values[p.name]:.4g} {p.unit}' for p in selection.law.parameters)
+    return (
+        f'run-in: the friction drifts over the runs beyond the scatter of the strokes; the seal file holds the law of '
+        f'the settled seal, {100.0 * change:+.0f} % against the readings, with a standard deviation of '
+        f'{100.0 * settled.relative_std:.2g} % since it is extrapolated; as measured: {values}'
+    )
 
 
 def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[str]:
@@ -187,7 +218,10 @@ def summary(found: Identification) -> str:
     lines = [f'law: {selection.law.name} ({selection.law.formula})']
     for p in selection.law.parameters:
         value, error = selection.fit.values[p.name], quality.standard_errors[p.name]
-        lines.append(f'  {p.name} = {value:.4g} {p.unit}, standard error {error:.2g}')
+        settled = (
+            '' if quality.settled is None else f'; settled seal: {quality.settled.fit.values[p.name]:.4g} {p.unit}'
+        )
+        lines.append(f'  {p.name} = {value:.4g} {p.unit}, standard error {error:.2g}{settled}')
     lines += ['  pressure [bar]  measured [N]  fitted [N]  std [N]']
     for level in found.levels:
         numbers = f'{level.pressure / BAR:14.4g}  {level.measured:12.4g}  {level.fitted:10.4g}  {level.std:7.4g}'

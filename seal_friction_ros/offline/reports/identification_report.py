@@ -108,6 +108,12 @@ def _parameter_table(found: Identification) -> Table:
         for p in selection.law.parameters
     ]
     rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in selection.law.fixed.items()]
+    settled = found.quality.settled
+    if settled is not None:
+        rows += [
+            (f'{p.name}, settled seal', p.symbol, f'{settled.fit.values[p.name]:.5g}', DASH, p.unit)
+            for p in selection.law.parameters
+        ]
     if breakaway is not None:
         values = zip(('constant', 'share'), breakaway[1:3], breakaway.standard_errors, ('N', '1'), strict=True)
         rows += [
@@ -137,13 +143,13 @@ def _data_table(found: Identification) -> Table:
 
 
 class _FittedReadings:
-    """Readings of an identification beside the fitted law, sum over all seals."""
+    """Readings of an identification beside the law fitted to them as measured, sum over all seals."""
 
     def __init__(self, found: Identification) -> None:
         self.found = found
         self.readings = found.data.prepared.readings
         self.pressure = self.readings.seal_pressure / BAR
-        self.seal = parse_seal(found.document)
+        self.seal = parse_seal(found.as_measured)
         self.mounted = tuple(MountedSeal(self.seal, chamber) for chamber in found.data.sources.chambers)
         self.fitted, _ = fitted_readings(self.mounted, found.data.prepared.chamber_pressures, self.readings.at.velocity)
         self.measured = self.readings.magnitudes(offsets_of(self.readings, self.fitted))
@@ -208,6 +214,10 @@ def fitted_law_figure(shown: _FittedReadings) -> Plot:
         fitted, std = shown.curve(pressure, shown.mounted)
         style.fill_band(ax, pressure / BAR, fitted / size, BAND_95 * std / size, label='95 % band')
         ax.plot(pressure / BAR, fitted / size, color=style.BLACK, lw=1.8, label='law')
+        if shown.found.quality.settled is not None:
+            settled = tuple(MountedSeal(parse_seal(shown.found.document), one.chamber) for one in shown.mounted)
+            look = {'color': style.BLACK, 'lw': 1.2, 'ls': '--', 'label': 'law of the settled seal'}
+            ax.plot(pressure / BAR, shown.curve(pressure, settled)[0] / size, **look)
     _draw_readings(ax, shown, shown.pressure, shown.measured / size)
     if not are_samples:
         ax.plot(x, measured / size, 'D', ms=6.0, color=style.BLACK, mec='white', label='measured')

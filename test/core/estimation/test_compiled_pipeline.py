@@ -84,6 +84,7 @@ SEALS |= {
             frictions=(9.0, 7.0, 6.0, 22.0, 18.0, 15.0),
             reference_speed=0.02,
         ),
+        force_sum_correction=ForceSumCorrection(offset=4.0, contains_load=True),
     ),
     'stribeck': dataclasses.replace(SEALS['ms28775_114_table'], velocity_terms=VelocityTerms(30.0, 4.0, 0.003, 0.1)),
 }

@@ -99,7 +99,7 @@ all_settings = st.builds(
 )
 all_parameters = st.builds(EstimatorParameters, all_settings, st.lists(mounted, min_size=1, max_size=3).map(tuple))
 
-corrections = st.none() | st.just(ForceSumCorrection(1.0, -1.0, 1e6))
+corrections = st.sampled_from([None, ForceSumCorrection(1.0, -1.0, 1e6, contains_load=True)])
 motions = st.sampled_from([ANY_MOTION, IdentifiedMotion(1e-3, 0.005, (1,)), IdentifiedMotion(directions=(-1,))])
 told_seals = st.builds(
     lambda name, correction, motion: replace(SEALS[name], force_sum_correction=correction, identified_motion=motion),
@@ -268,10 +268,8 @@ IDENTIFIED = tuple(replace(m, seal=replace(m.seal, identified_motion=IdentifiedM
 
 
 def test_every_status_bit_is_provoked_here():
-    below = {
-        'DIRECTION_NOT_IDENTIFIED',
-        'MODEL_DISAGREES',
-    }  # a new direction sets MOTION_UNCERTAIN, too; test_adaptation
+    # a new direction sets MOTION_UNCERTAIN, too; a load is in the force sum of a machine or it is not; test_adaptation
+    below = {'DIRECTION_NOT_IDENTIFIED', 'FORCE_CONTAINS_LOAD', 'MODEL_DISAGREES'}
     assert {*PROVOKED} == {bit.name for bit in Status} - below
 
 
@@ -576,6 +574,38 @@ def test_a_force_sum_that_never_came_is_not_made_of_the_correction():
 
 def test_without_a_correction_a_force_sum_keeps_every_bit():
     assert math.copysign(1.0, only(sample(velocity=0.0, force=-0.0)).friction_force) == -1.0
+
+
+# --- a force sum that contains a load ---
+
+LOADED = with_seals({'force_sum_correction': ForceSumCorrection(contains_load=True)}, {})
+UNLOADED = with_seals({}, {})
+
+
+@given(st.floats(-1e5, 1e5))
+def test_at_rest_a_force_sum_with_a_load_in_it_tells_no_state(force):
+    estimate = only(sample(velocity=0.0, force=force), LOADED)
+    assert (estimate.state, estimate.friction_force) == (FrictionState.UNKNOWN, 0.0)
+    assert Status(estimate.status) == Status.FORCE_CONTAINS_LOAD
+    without = only(sample(velocity=0.0, force=force), UNLOADED)
+    assert estimate[1:4] == without[1:4]  # friction of the seals follows from the pressures
+
+
+@given(st.floats(-1e5, 1e5))
+def test_sliding_friction_needs_no_force_sum(force):
+    slides = sample(velocity=-0.05, force=force)
+    assert only(slides, LOADED) == only(slides, UNLOADED)
+    assert only(slides, LOADED).status == 0
+
+
+def test_a_slow_rod_that_moves_against_its_load_is_not_taken_to_slide():
+    creeping = [sample(START + i * MS, velocity, force=-30e3) for i, velocity in enumerate([0.0, 9e-4, 9e-4])]
+    assert (
+        run(creeping, UNLOADED)[-1].state == FrictionState.SLIDING
+    )  # friction never drives, if that is the force on the rod
+    last = run(creeping, LOADED)[-1]
+    assert last.state == FrictionState.UNKNOWN
+    assert Status(last.status) == Status.FORCE_CONTAINS_LOAD | Status.MOTION_UNCERTAIN
 
 
 # --- motions that were not identified ---

@@ -299,7 +299,11 @@ def test_correction_and_identified_motion_come_from_the_seal_file():
 @pytest.mark.parametrize(
     ('key', 'value', 'expected'),
     [
-        ('force_sum_correction', {'area': 1.0}, 'force_sum_correction has no area: it has area_a, area_b, offset'),
+        (
+            'force_sum_correction',
+            {'area': 1.0},
+            'force_sum_correction has no area: it has area_a, area_b, offset, contains_load',
+        ),
         ('force_sum_correction', {'area_a': 1.5}, 'ForceSumCorrection.area_a = 1.5 m2 is above its upper bound 1.0 m2'),
         ('force_sum_correction', 5.0, 'force_sum_correction is not a mapping of names to values but 5.0'),
         ('identified_speed', 0.1, 'identified_speed = 0.1 is not a list of two speeds [m/s]'),

@@ -15,16 +15,17 @@ from seal_friction_ros.core.identification.candidate_laws import (
     with_velocity_terms,
 )
 from seal_friction_ros.core.identification.diagnostics import (
-    changed_levels,
     collinear_regressors,
     outlying_level,
     repeatability,
+    shared_levels,
     traded_off,
 )
 from seal_friction_ros.core.identification.fitting import fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.runs import PRIOR_STD, between_runs, drifts
+from seal_friction_ros.core.identification.runs import PRIOR_STD, between_runs
 from seal_friction_ros.core.identification.selection import (
+    choose_anew,
     is_beaten,
     recommended,
     rise_over_pressures,
@@ -290,37 +291,6 @@ def test_repeatability_of_a_swept_log_is_the_scatter_within_a_cell():
     assert repeatability(readings, np.array([200.0])) == pytest.approx(20.0 / 800.0, rel=0.1)
 
 
-def ran_in(share, length=0.5, count=20, scatter=0.005, seed=0):
-    """Strokes at one pressure whose friction approaches 10 N over the travel; ``share``: start over end, less 1."""
-    readings = noted(pressures=1, count=count, law=LAWS['constant_coulomb'], values={CONSTANT: 5.0})
-    travel = 0.1 * np.arange(readings.count)
-    noise = 1.0 + scatter * np.random.default_rng(seed).normal(size=readings.count)
-    force = readings.force * (1.0 + share * np.exp(-travel / length)) * noise
-    return replace(readings, force=force, travel=travel)
-
-
-def test_the_friction_of_the_settled_seal_is_the_asymptote_of_its_run_in():
-    for share in (-0.3, 0.3):
-        (drift,) = drifts(ran_in(share), np.zeros(1))
-        assert drift.asymptote == pytest.approx(10.0, rel=0.02)
-        assert drift.length == pytest.approx(0.5, rel=0.3)
-        assert np.sign(drift.change) == -np.sign(share)
-
-
-def test_a_drift_that_goes_on_has_no_asymptote():
-    (drift,) = drifts(ran_in(0.3, length=40.0), np.zeros(1))
-    assert np.isnan(drift.asymptote)
-    assert drift.settled_share == 1.0
-
-
-def test_drift_is_the_change_over_the_run():
-    readings = noted(pressures=3, count=10, offset=1.0)
-    rising = readings.force + 0.02 * readings.group * (readings.force - 1.0)
-    found = drifts(replace(noted(pressures=3, count=10), force=rising), np.array([1.0]))
-    assert [drift.level for drift in found] == [0, 1, 2]
-    assert [drift.change for drift in found] == pytest.approx([0.18 / 1.09] * 3, rel=1e-6)
-
-
 def test_runs_that_were_never_repeated_differ_by_the_prior_and_many_by_what_they_show():
     one = noted(scatter=0.01)
     alone = between_runs(one, LAW.friction(one.at, POWER), np.zeros(1))
@@ -428,10 +398,28 @@ def test_sources_that_disagree_at_a_pressure_are_named():
     both = FrictionReadings(
         **{**vars(noted(pressures=3, count=2)), 'force': force, 'source': part, 'names': ('a', 'b')}
     )
-    (change,) = changed_levels(both)
+    changes = shared_levels(both)
+    assert [round(1e-5 * change.pressure) for change in changes] == [round(1e-5 * p) for p in both.level_pressures]
+    (change,) = (change for change in changes if change.is_changed)
     assert (change.name, change.other_name) == ('a', 'b')
-    assert change.other_friction / change.friction == pytest.approx(1.5)
-    assert not changed_levels(one)
+    assert change.ratio == change.other_friction / change.friction == pytest.approx(1.5)
+    assert not shared_levels(one)
+
+
+def test_a_law_chosen_anew_for_a_group_has_not_seen_it():
+    readings = noted(scatter=0.02, pressures=5)
+    laws = [LAWS['constant_coulomb'], ELASTIC]
+
+    def choose(left):
+        return recommended(score_laws(laws, left))
+
+    found = choose_anew(readings, choose)
+    assert found.laws == ('pressure_power_law_2_3',) * 3
+    first = readings.group == 0
+    wild = FrictionReadings(**{**vars(noted(scatter=0.02, pressures=5)), 'force': readings.force * (1.0 + 9.0 * first)})
+    again = choose_anew(wild, choose)
+    assert again.predicted[first] == pytest.approx(found.predicted[first], rel=1e-12)
+    assert again.predicted[~first].mean() > 2.0 * found.predicted[~first].mean()
 
 
 # --- breakaway ---

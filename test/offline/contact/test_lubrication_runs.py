@@ -69,7 +69,7 @@ def test_run_gives_its_findings_with_their_errors(small, capsys):
 def test_study_has_the_keys_of_the_paper_as_one_json_object_and_two_processes_find_what_one_does(tmp_path, capsys):
     """The processes do not compile, which would take them longer than the work."""
     tiny = tmp_path / 'tiny.yaml'
-    tiny.write_text(SMALL.replace('cells: 48, time_step: 2.0e-3', 'cells: 32, time_step: 4.0e-3'))
+    tiny.write_text(SMALL.replace('cells: 48, time_step: 2.0e-3', 'cells: 32, time_step: 8.0e-3'))
     words = ['ehl', 'study', str(tiny), '--json', '--jobs', '2']
     command = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main', *words]
     environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}

@@ -23,8 +23,8 @@ from seal_friction_ros.offline.replay.replay import replay
 @pytest.mark.parametrize(
     'law', ['constant_coulomb', 'pressure_power_law_2_3', 'physics_based', 'physics_based_asymmetric']
 )
-def test_the_node_says_what_was_fitted(law, tmp_path):
-    run = Run(tmp_path, str(THESIS), *THESIS_RIG, '--law', law)
+def test_the_node_says_what_was_fitted(law, run_of):
+    run = run_of(str(THESIS), *THESIS_RIG, '--law', law)
     for pressure, fitted, std in zip(*(run.figures[k] for k in ('pressure_Pa', 'fitted_N', 'std_N')), strict=True):
         estimate = estimates_of(run, pressure, 0.01)
         assert estimate.coulomb_friction == pytest.approx(fitted, rel=1e-5)
@@ -37,8 +37,8 @@ def test_the_node_says_what_was_fitted(law, tmp_path):
     assert both[0] / both[1] == pytest.approx((1.0 + asymmetry) / (1.0 - asymmetry))
 
 
-def test_beyond_the_pressures_that_were_measured_the_node_says_so(tmp_path):
-    run = Run(tmp_path, str(THESIS), *THESIS_RIG)
+def test_beyond_the_pressures_that_were_measured_the_node_says_so(run_of):
+    run = run_of(str(THESIS), *THESIS_RIG)
     assert estimates_of(run, 8e6, 0.01).status == Status.OUTSIDE_IDENTIFIED_RANGE
 
 
@@ -72,22 +72,22 @@ def test_no_geometry_is_taken_from_the_placeholder_seals_of_a_bag(tmp_path, vers
     assert '--seal' in run.errors
 
 
-def test_a_log_and_the_bag_imported_from_it_give_the_same_law(tmp_path):
+def test_a_log_and_the_bag_imported_from_it_give_the_same_law(tmp_path, run_of):
     bags = []
     for bar in BARS:
         log = data(f'delft/O-ring257_{bar}bar.csv')
         bags.append(str(tmp_path / f'O{bar}'))
         assert main(['import', 'log', str(log), '--rig', 'delft', '--out', bags[-1]]) == 0
     of_bags = Run(tmp_path, *bags, name='bags')
-    of_logs = Run(tmp_path, *delft('O-ring257'), name='logs')
+    of_logs = run_of(*delft('O-ring257'))
     assert of_bags.figures['parameters'] == of_logs.figures['parameters']
 
 
 # --- the file itself ---
 
 
-def test_json_has_the_promised_keys_and_the_file_says_where_it_is_from(tmp_path):
-    run = Run(tmp_path, str(THESIS), *THESIS_RIG)
+def test_json_has_the_promised_keys_and_the_file_says_where_it_is_from(run_of):
+    run = run_of(str(THESIS), *THESIS_RIG)
     assert set(KEYS) <= set(run.figures)
     part = run.document['identification']
     assert {'law', 'parameters', 'standard_errors', 'residual_N', 'data', 'left_out_by', 'warnings'} <= set(part)
@@ -107,21 +107,21 @@ def test_the_same_sources_give_the_same_bytes(tmp_path):
     assert here.out.read_bytes() == there.out.read_bytes()
 
 
-def test_the_uncertainty_of_the_seals_adds_up_to_that_of_the_rig(tmp_path):
-    run = Run(tmp_path, str(THESIS), *THESIS_RIG)
+def test_the_uncertainty_of_the_seals_adds_up_to_that_of_the_rig(run_of):
+    run = run_of(str(THESIS), *THESIS_RIG)
     seal = parse_seal(run.document)
     both = actuator_friction((MountedSeal(seal, 'a'), MountedSeal(seal, 'b')), 2e6, 2e6)
     expected = np.hypot(run.figures['relative_std'] * both.coulomb_friction, run.figures['absolute_std_N'])
     assert both.coulomb_friction_std == pytest.approx(expected, rel=1e-4)
 
 
-def test_a_law_by_name_is_saved_and_the_recommended_one_still_told(tmp_path):
-    run = Run(tmp_path, str(THESIS), '--law', 'constant_coulomb')
+def test_a_law_by_name_is_saved_and_the_recommended_one_still_told(tmp_path, run_of):
+    run = run_of(str(THESIS), '--law', 'constant_coulomb')
     assert (run.figures['law'], run.figures['recommended_law']) == ('constant_coulomb', 'pressure_power_law_2_3')
     assert Run(tmp_path, str(THESIS), '--law', 'magic').code == 2
 
 
-def test_estimator_needs_no_more_than_the_file(tmp_path):
-    run = Run(tmp_path, str(THESIS), *THESIS_RIG)
+def test_estimator_needs_no_more_than_the_file(run_of):
+    run = run_of(str(THESIS), *THESIS_RIG)
     seal = parse_seal(run.document)
     assert EstimatorParameters(EstimatorSettings(), (MountedSeal(seal, 'a'),))

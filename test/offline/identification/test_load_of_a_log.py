@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from harness import boom
 from harness.boom import Boom
-from harness.identify_run import Run
+from harness.identify_run import Run, estimates_of
 
+from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
 
 RIG = f"""
@@ -52,6 +54,11 @@ def test_identify_gives_friction_and_load_without_a_load_cell(tmp_path, rig):
     assert len(load['std_N']) == len(load['position_m'])
     assert not any('asymmetric' in rung['law'] for rung in run.figures['ladder'])
     assert any('were fitted and taken out of the force sum' in remark for remark in run.figures['remarks'])
+    assert run.document['identification']['load'] == load
+    within, force = float(np.mean(run.figures['pressure_Pa'])), float(simulated.load[0])
+    held = estimates_of(run, within, 0.0, force)
+    assert (held.state, held.status) == (FrictionState.UNKNOWN, Status.FORCE_CONTAINS_LOAD)
+    assert estimates_of(run, within, 0.1, force).state == FrictionState.SLIDING
 
 
 def test_a_load_that_cannot_be_told_from_friction_is_refused_with_what_to_drive(tmp_path):

@@ -21,8 +21,8 @@ from seal_friction_ros.offline.identification.sources import SourceOptions, read
 
 
 @pytest.fixture(scope='module', params=['physics_based', 'pressure_power_law'])
-def thesis(request, tmp_path_factory):
-    return Run(tmp_path_factory.mktemp('thesis'), str(THESIS), *THESIS_RIG, '--law', request.param)
+def thesis(request, run_of):
+    return run_of(str(THESIS), *THESIS_RIG, '--law', request.param)
 
 
 def test_thesis_mean_friction_per_pressure_is_that_of_the_tables(thesis):
@@ -67,8 +67,8 @@ def test_thesis_constant_friction_is_beaten_and_the_repeatability_is_the_floor(t
     assert thesis.ladder('physics_based')['error'] < thesis.figures['repeatability']
 
 
-def test_thesis_physics_based_law_is_that_of_the_shipped_seal(tmp_path):
-    run = Run(tmp_path, str(THESIS), *THESIS_RIG, '--law', 'physics_based')
+def test_thesis_physics_based_law_is_that_of_the_shipped_seal(run_of):
+    run = run_of(str(THESIS), *THESIS_RIG, '--law', 'physics_based')
     shipped = read_yaml(config_path('seals', 'ms28775_114'))['friction_coefficient']
     assert run.figures['parameters']['exponent'] == pytest.approx(shipped['exponent'], abs=0.01)
     assert run.figures['parameters']['coefficient'] == pytest.approx(shipped['coefficient'], rel=0.03)
@@ -77,10 +77,10 @@ def test_thesis_physics_based_law_is_that_of_the_shipped_seal(tmp_path):
     assert run.has_warning('coefficient and exponent trade off')
 
 
-def test_thesis_as_a_bag_gives_the_same_law_as_the_table(tmp_path):
+def test_thesis_as_a_bag_gives_the_same_law_as_the_table(tmp_path, run_of):
     import_thesis(tmp_path / 'bag')
     bag = Run(tmp_path, str(tmp_path / 'bag'), *THESIS_RIG, '--law', 'physics_based', name='of_bag')
-    table = Run(tmp_path, str(THESIS), *THESIS_RIG, '--law', 'physics_based', name='of_table')
+    table = run_of(str(THESIS), *THESIS_RIG, '--law', 'physics_based')
     assert bag.figures['measured_N'] == pytest.approx(
         table.figures['measured_N'], rel=0.06
     )  # three readings: their median there, their mean here
@@ -92,15 +92,15 @@ def test_thesis_as_a_bag_gives_the_same_law_as_the_table(tmp_path):
 
 
 @pytest.mark.parametrize('ring', ['O-ring257', 'X-ring257', 'NAPN'])
-def test_delft_half_range_friction_is_recovered(ring, tmp_path):
-    run = Run(tmp_path, *delft(ring))
+def test_delft_half_range_friction_is_recovered(ring, run_of):
+    run = run_of(*delft(ring))
     assert run.figures['measured_N'] == pytest.approx(DELFT[ring], abs=0.3)
     assert np.array(run.figures['pressure_Pa']) / 1e5 == pytest.approx(BARS, abs=0.1)
 
 
 @pytest.mark.parametrize('more', [(), ('--seal', 'delft_o_ring', '--squeeze-force', '--law', 'physics_based')])
-def test_delft_o_ring_law_predicts_a_pressure_it_has_not_seen(more, tmp_path):
-    run = Run(tmp_path, *delft('O-ring257'), *more)
+def test_delft_o_ring_law_predicts_a_pressure_it_has_not_seen(more, run_of):
+    run = run_of(*delft('O-ring257'), *more)
     assert run.figures['left_out_by'] == 'pressure'
     assert run.figures['worst_left_out_error'] <= 0.12
     assert run.figures['cross_validation_error'] <= 0.05
@@ -111,17 +111,17 @@ def test_delft_o_ring_law_predicts_a_pressure_it_has_not_seen(more, tmp_path):
     assert run.has_warning('collinear', 'speed', 'pressure')
 
 
-def test_delft_standard_deviation_covers_runs_that_repeat_within_10_to_15_percent(tmp_path):
-    run = Run(tmp_path, *delft('O-ring257'))
+def test_delft_standard_deviation_covers_runs_that_repeat_within_10_to_15_percent(run_of):
+    run = run_of(*delft('O-ring257'))
     shares = np.array(run.figures['std_N']) / np.array(run.figures['fitted_N'])
     assert 0.10 <= shares.min() <= shares.max() <= 0.20
     assert run.has_warning('one run', 'a prior of 15 %')
-    known = Run(tmp_path, *delft('O-ring257'), '--run-to-run', '0.05', name='known')
+    known = run_of(*delft('O-ring257'), '--run-to-run', '0.05')
     assert known.figures['relative_std'] < run.figures['relative_std']
 
 
-def test_delft_offsets_of_the_force_sum_are_told(tmp_path):
-    run = Run(tmp_path, *delft('O-ring257'))
+def test_delft_offsets_of_the_force_sum_are_told(run_of):
+    run = run_of(*delft('O-ring257'))
     assert run.figures['offset_N'] == pytest.approx([-1.2, -1.9, -2.2, -2.0], abs=0.15)  # config/rigs/delft.yaml
     line = run.figures['offset_line']
     assert line['area_error_m2'] * 1e6 == pytest.approx(-1.1, abs=0.4)  # [mm2] of a bore of 519
@@ -129,22 +129,34 @@ def test_delft_offsets_of_the_force_sum_are_told(tmp_path):
     assert not run.has_warning('area')  # too little to matter
 
 
-def test_delft_a_wrong_bore_is_found_told_and_corrected(tmp_path):
+def test_delft_a_wrong_bore_is_found_told_and_corrected(run_of):
     """The cylinder has 490.9 mm2, the rig file 518.7 mm2; README of the data."""
-    run = Run(tmp_path, *delft('NAPN'))
+    run = run_of(*delft('NAPN'))
     assert run.figures['area_correction_m2'] * 1e6 == pytest.approx(-24.0, abs=4.0)
-    assert run.has_warning('the bore is nearer to 25.1 than 25.7 mm')
+    assert run.has_warning(
+        'the bore is nearer to 25.1 than 25.7 mm', 'the seal file carries', 'or it is corrected twice'
+    )
     offsets = np.array(run.figures['offset_N'])
     assert np.ptp(offsets) < 0.1 * max(run.figures['measured_N'])
 
 
-def test_delft_both_directions_of_a_held_file_are_one_level(tmp_path):
-    run = Run(tmp_path, *(str(data(f'delft/Stadium_lc_{bar}bar.csv')) for bar in range(1, 6)))
+def test_delft_an_area_that_was_put_right_in_the_rig_file_is_not_corrected_again(tmp_path):
+    rig = config_path('rigs', 'delft').read_text()
+    assert rig.count('518.748') == 1
+    right = tmp_path / 'right.yaml'
+    right.write_text(rig.replace('518.748', '495.9'))
+    run = Run(tmp_path, *delft('NAPN'), '--rig', str(right))
+    assert not run.has_warning('area of chamber')
+    assert run.document.get('force_sum_correction', {}).get('area_a', 0.0) == 0.0
+
+
+def test_delft_both_directions_of_a_held_file_are_one_level(run_of):
+    run = run_of(*(str(data(f'delft/Stadium_lc_{bar}bar.csv')) for bar in range(1, 6)))
     assert np.array(run.figures['pressure_Pa']) / 1e5 == pytest.approx([1, 2, 3, 4, 5], abs=0.1)
     assert run.figures['measured_N'] == pytest.approx(DELFT['Stadium_lc'], abs=0.3)
 
 
-def test_delft_two_runs_of_one_ring_are_fitted_together_and_the_band_holds_the_other_run(tmp_path):
+def test_delft_two_runs_of_one_ring_are_fitted_together_and_the_band_holds_the_other_run(tmp_path, run_of):
     runs = [delft('O-ring257'), delft('O-ring257_run2')]
     both = Run(tmp_path, *runs[0], *runs[1])
     assert 0.10 <= both.figures['between_run_std'] <= 0.20
@@ -153,7 +165,7 @@ def test_delft_two_runs_of_one_ring_are_fitted_together_and_the_band_holds_the_o
     assert refused.code == 2
     assert 'two seals or two states of one' in refused.errors
     for first, other in (runs, runs[::-1]):
-        alone = Run(tmp_path, *first, name='alone')
+        alone = run_of(*first)
         half_width = BAND_95 * np.array(alone.figures['std_N']) / np.array(alone.figures['fitted_N'])
         assert half_width.max() <= 0.45
         log = read_sources([Path(path) for path in other], SourceOptions(rig='delft')).prepare()
@@ -163,8 +175,8 @@ def test_delft_two_runs_of_one_ring_are_fitted_together_and_the_band_holds_the_o
         assert np.mean(np.abs(strokes - fitted) <= BAND_95 * std) >= 0.9
 
 
-def test_delft_x_ring_at_7_bar_is_an_outlier_with_a_reason_to_look(tmp_path):
-    run = Run(tmp_path, *delft('X-ring257'))
+def test_delft_x_ring_at_7_bar_is_an_outlier_with_a_reason_to_look(run_of):
+    run = run_of(*delft('X-ring257'))
     assert run.figures['is_outlier'] == [False, False, False, True]
     assert run.has_warning('outlier', '6.92 bar', 'A reason to look', 'had not settled')
     assert not run.has_warning('one direction only')  # the outlier has both
@@ -175,16 +187,64 @@ def test_delft_x_ring_at_7_bar_is_an_outlier_with_a_reason_to_look(tmp_path):
 
 
 @pytest.mark.parametrize('seal', DELFT)
-def test_delft_a_left_out_pressure_is_predicted_within_15_percent(seal, tmp_path):
+def test_delft_a_left_out_pressure_is_predicted_within_15_percent(seal, run_of):
     """Outliers aside, one a seal; runs of that rig repeat no better. The law rises where the friction does."""
     bars = range(1, 6) if seal == 'Stadium_lc' else BARS
-    run = Run(tmp_path, *(str(data(f'delft/{seal}_{bar}bar.csv')) for bar in bars))
+    run = run_of(*(str(data(f'delft/{seal}_{bar}bar.csv')) for bar in bars))
     off = np.array(run.figures['left_out_N']) / np.array(run.figures['measured_N']) - 1.0
     used = ~np.array(run.figures['is_outlier'])
     assert np.count_nonzero(~used) <= 1
     assert np.abs(off[used]).max() <= 0.15
     assert run.figures['fitted_N'] == sorted(run.figures['fitted_N'])
     assert run.figures['fitted_N'][-1] > 1.3 * run.figures['fitted_N'][0]
+    nested = np.array(run.figures['left_out_nested_N']) / np.array(run.figures['measured_N']) - 1.0
+    worst = 0.22 if seal == 'X-ring257' else 0.15  # two pressures are left of three: the prior exponent stands in
+    assert np.abs(nested[used]).max() <= worst
+    same = np.array(run.figures['left_out_nested_laws']) == run.figures['law']
+    assert nested[used][same] == pytest.approx(off[used][same], abs=1e-6)
+
+
+def test_without_its_lowest_pressure_another_law_is_chosen_and_the_nested_error_says_so(run_of):
+    run = run_of(*delft('O-ring257_run2'))
+    assert run.figures['law'].startswith('pressure_power_law')
+    assert run.figures['left_out_nested_laws'][0] == 'constant_coulomb'
+    off, nested = (
+        run.figures[key][0] / run.figures['measured_N'][0] - 1.0 for key in ('left_out_N', 'left_out_nested_N')
+    )
+    assert nested > off + 0.05
+    named = run_of(*delft('O-ring257_run2'), '--law', run.figures['law'])
+    assert named.figures['left_out_nested_N'] == [None] * 4  # nothing was chosen
+
+
+@pytest.mark.parametrize(('higher', 'code'), [((1,), 0), ((1, 3, 5), 2)])
+def test_two_seals_are_refused_if_they_differ_at_most_of_the_pressures(higher, code, tmp_path):
+    random, tables = np.random.default_rng(4), []
+    for run in range(2):
+        rows = ['pressure_bar,friction_N,direction']
+        for bar in (1, 3, 5, 7, 9):
+            friction = (2.0 + 0.5 * bar) * (2.2 if run and bar in higher else 1.0)
+            rows += [f'{bar},{friction * random.normal(1.0, 0.01)},{way}' for way in ('extend', 'retract') * 4]
+        tables.append(tmp_path / f'run{run}.csv')
+        tables[-1].write_text('\n'.join(rows))
+    run = Run(tmp_path, *map(str, tables))
+    assert run.code == code, run.errors
+    assert ('two seals or two states of one' in run.errors) == (code == 2)
+
+
+@pytest.mark.parametrize(('wrong', 'claimed'), [(7, (1.0, 5.0)), (3, (5.0, 11.0)), (11, (1.0, 9.0)), (1, (3.0, 11.0))])
+def test_nothing_is_claimed_beyond_a_pressure_that_disagrees_with_the_others(wrong, claimed, tmp_path):
+    random = np.random.default_rng(3)
+    rows = ['pressure_bar,friction_N,direction']
+    for bar in (1, 3, 5, 7, 9, 11):
+        friction = (2.0 + 0.5 * bar) * (2.0 if bar == wrong else 1.0)
+        rows += [f'{bar},{friction * random.normal(1.0, 0.01)},{way}' for way in ('extend', 'retract') * 4]
+    (tmp_path / 'table.csv').write_text('\n'.join(rows))
+    run = Run(tmp_path, str(tmp_path / 'table.csv'))
+    assert run.figures['is_outlier'] == [bar == wrong for bar in (1, 3, 5, 7, 9, 11)]
+    assert run.document['identified_pressure'] == [pytest.approx(1e5 * bar) for bar in claimed]
+    for bar in (1, 3, 5, 7, 9, 11):
+        status = estimates_of(run, 1e5 * bar, 0.01).status
+        assert bool(status) == (not claimed[0] <= bar <= claimed[1])
 
 
 def test_the_same_bytes_given_twice_are_refused(tmp_path):
@@ -241,13 +301,13 @@ def test_readings_without_scatter_have_no_outlier(tmp_path):
 
 
 @pytest.fixture(scope='module')
-def friction_id(tmp_path_factory):
-    return Run(tmp_path_factory.mktemp('friction_id'), str(data(f'mbari/{FRICTION_ID}')))
+def friction_id(run_of):
+    return run_of(str(data(f'mbari/{FRICTION_ID}')))
 
 
 @pytest.fixture(scope='module')
-def other(tmp_path_factory):
-    return Run(tmp_path_factory.mktemp('mbari'), str(data(f'mbari/{OTHER}')))
+def other(run_of):
+    return run_of(str(data(f'mbari/{OTHER}')))
 
 
 @pytest.mark.parametrize(('name', 'bar', 'table'), [('friction_id', 150.0, 197.0), ('other', 200.0, 504.0)])
@@ -291,6 +351,15 @@ def test_mbari_two_logs_are_fitted_together_and_their_difference_is_in_the_band(
     assert both.figures['between_runs_measured'] > 0.15
     assert both.figures['between_run_std'] > friction_id.figures['between_run_std']
     assert len(both.document['identification']['data']) == 2
+    (change,) = both.figures['changes']
+    assert change['pressure'] is None  # one pressure holds several speeds
+    assert (change['name'], change['other_name']) == (FRICTION_ID, OTHER)
+    assert 0.5 < change['other_friction'] / change['friction'] < 0.85  # the first log has more friction
+    assert both.has_warning('friction differs between runs: of the same law')
+    logs = [str(data(f'mbari/{name}')) for name in (FRICTION_ID, OTHER)]
+    refused = Run(tmp_path, *logs, '--refuse-changed', name='refused')
+    assert refused.code == 2
+    assert 'over their speeds and pressures' in refused.errors
 
 
 def test_viscous_friction_acts_in_the_node_and_is_not_in_the_coulomb_friction(friction_id):

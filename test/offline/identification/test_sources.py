@@ -193,3 +193,27 @@ def test_a_fit_that_means_nothing_is_not_saved(tmp_path):
     assert run.code == 2
     assert 'no law predicts these readings' in run.errors
     assert not run.out.exists()
+
+
+def test_a_table_with_the_dwell_gives_a_breakaway_that_grows_with_it_and_says_so(tmp_path):
+    rng = np.random.default_rng(4)
+    rows = ['pressure_bar,friction_N,direction,kind,test,dwell_s']
+    for test in (1, 2, 3):
+        for bar in (0, 20, 40, 60):
+            for direction in ('extend', 'retract'):
+                friction = 5.0 + 0.2 * bar
+                rows.append(f'{bar},{friction * rng.normal(1.0, 0.02):.3f},{direction},dynamic,{test},0')
+                for dwell in (1, 30, 600):
+                    start = friction * (1.1 + 0.12 * np.log10(1.0 + dwell)) * rng.normal(1.0, 0.02)
+                    rows.append(f'{bar},{start:.3f},{direction},static,{test},{dwell}')
+    table = tmp_path / 'table.csv'
+    table.write_text('\n'.join(rows))
+    run = Run(tmp_path, str(table))
+    assert run.code == 0, run.errors
+    breakaway = run.figures['breakaway']
+    assert breakaway['law'].endswith('_dwell')
+    assert breakaway['ratio_per_decade'] == pytest.approx(0.12, rel=0.15)
+    assert run.has_warning('breakaway grows with the time at rest', 'the seal file holds that after')
+    held = 0.1 + 0.12 * np.log10(1.0 + breakaway['dwell'])
+    both = run.document['stiction_ratio'] + run.document['stiction'] / 11.0  # [-] of the mean friction of the seal
+    assert both == pytest.approx(held, rel=0.15)

@@ -99,11 +99,15 @@ def axis(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope='module')
 def simulated(tmp_path_factory) -> Path:
-    """Files of two runs on the simulated servo, and the JSON output of the second."""
+    """Files of two runs on the simulated servo, and the JSON output of the second.
+
+    The search stops early to save time; ``test_simulated_axis.py`` searches to the end.
+    """
     folder = tmp_path_factory.mktemp('simulated')
     for run, options in (('one', []), ('two', ['--json'])):
         (folder / run).mkdir()
-        with contextlib.redirect_stdout(io.StringIO()) as output:
+        with contextlib.redirect_stdout(io.StringIO()) as output, pytest.MonkeyPatch.context() as patch:
+            patch.setattr(simulated_axis, 'MOST_CANDIDATES', 30)
             assert main(['tune', '--out', str(folder / run / 'feedforward.yaml'), *QUICK, *options]) == 0
     (folder / 'numbers.json').write_text(output.getvalue())
     return folder

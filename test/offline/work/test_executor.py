@@ -97,7 +97,7 @@ import os, sys, time
 from seal_friction_ros.offline.work.executor import run_all
 def sleep():
     os.write(1, b'%d\n' % os.getpid())
-    time.sleep(60.0)
+    time.sleep(600.0)
 try:
     run_all('sleep', [sleep] * 4, 2)
 except KeyboardInterrupt:
@@ -114,25 +114,25 @@ def test_an_interrupt_ends_all_processes_without_a_word(to_all):
     )  # fmt: skip
     workers = [int(process.stdout.readline()) for _ in range(2)]
     (os.killpg if to_all else os.kill)(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=10.0)
+    _, errors = process.communicate(timeout=60.0)
     assert process.returncode == 130
     assert errors == ''
     assert not any(is_running(worker) for worker in workers)
 
 
 def test_workers_end_after_a_parent_that_was_killed():
-    busy = PROGRAM.replace('time.sleep(60.0)', """
+    busy = PROGRAM.replace('time.sleep(600.0)', """
     from seal_friction_ros.offline.work.progress import progress
     with progress('', 1000) as advance:
         for _ in range(1000):
-            time.sleep(0.01)
+            time.sleep(0.1)
             advance(1)""")  # fmt: skip
     process = subprocess.Popen([sys.executable, '-c', busy], cwd=ROOT, stdout=subprocess.PIPE, text=True)
     workers = [int(process.stdout.readline()) for _ in range(2)]
     process.kill()
     process.wait()
     process.stdout.close()
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + 60.0  # the work takes longer
     while any(is_running(worker) for worker in workers):
         assert time.monotonic() < deadline
         time.sleep(0.05)

@@ -1,0 +1,190 @@
+r"""Run-in: how the friction of a seal drifts over one run, and what it is once the seal has settled.
+
+.. math:: f(s) = f_\infty\,(1 + d\,e^{-s / L})
+
+over the travel s of the rod. Lubricant is pushed out, or a dry seal is wetted: the friction of the Delft rings changes
+by up to 24 % over 0.75 m. The law of a seal file is that of the settled seal. An exponential approach is our choice.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.identification.fitting import LawFit, fit, offsets_of, root_mean_square
+from seal_friction_ros.core.identification.readings import FrictionReadings
+
+FEWEST_STROKES = 6  # for a drift term (our choice)
+LARGEST_ERROR = 0.03  # relative standard error below which an asymptote is determined (our choice)
+EVIDENT = 4.0  # standard errors of the approach from which it is evident (our choice)
+WORTHWHILE = 0.02  # [-] smallest difference of the settled seal from the run that is corrected (our choice)
+LENGTHS = 15  # lengths of travel that are tried, of `SHORTEST` to all of the travel (our choice)
+SHORTEST = 0.05
+OTHER_FORM = 0.15  # of the height: standard deviation since the approach may be no exponential (our choice)
+UNSEEN = 0.5  # standard deviation of what is extrapolated, as a share of it (our choice)
+
+
+class Drift(NamedTuple):
+    """Friction of one source at one pressure over the travel of the rod."""
+
+    source: int
+    level: int
+    change: float  # [-] from the first stroke to the last, relative to the mean
+    is_evident: bool  # beyond the scatter of the strokes
+    asymptote: float  # [N] friction of the settled seal; NaN if the strokes alone do not determine it
+    length: float  # [m] travel over which the difference falls to 37 %; likewise
+    settled_share: float  # [-] friction of the settled seal over the mean of the run; 1 if no drift is evident
+    settled_std: float  # [-] standard deviation of it
+
+
+def drifts(readings: FrictionReadings, offsets: FloatArray) -> list[Drift]:
+    """Drift of each source at each pressure with `FEWEST_STROKES` strokes at least.
+
+    The change is the slope of a line over the strokes, mean of the two directions. The drift is evident if the height
+    of the approach that fits best is above `EVIDENT` of its standard errors from the scatter about it (a lag-one
+    autocorrelation of the scatter counts), and the settled friction differs from the mean by more than `WORTHWHILE`.
+    Readings without travel have no evident drift.
+    """
+    measured, found = readings.magnitudes(offsets), []
+    for level, inside in readings.levels.items():
+        for source in np.unique(readings.source[inside]):
+            index = np.flatnonzero(inside & (readings.source == source))
+            if len(index) >= FEWEST_STROKES:
+                travel = readings.travel[index] if len(readings.travel) else np.empty(0)
+                drift = _drift(travel, measured[index], readings.at.direction[index])
+                found.append(drift._replace(source=int(source), level=level))
+    return found
+
+
+def _drift(travel: FloatArray, friction: FloatArray, direction: FloatArray) -> Drift:
+    mean = float(friction.mean())
+    sides = [friction[direction == side] for side in (-1.0, 1.0)]
+    slopes = [np.polyfit(np.arange(len(side)), side, 1)[0] * (len(side) - 1) for side in sides if len(side) >= 2]
+    change = float(np.mean(slopes)) / mean if slopes else math.nan
+    nothing = Drift(0, 0, change, False, math.nan, math.nan, 1.0, 0.0)
+    if not len(travel) or float(np.ptp(travel)) <= 0.0 or not mean > 0.0:
+        return nothing
+    asymptote, length = _determined(travel, friction, direction)
+    found = nothing._replace(asymptote=asymptote, length=length)
+    approaches = _approaches(travel, friction, direction, SHORTEST, 1.0)
+    best = min(approaches, key=lambda one: one.square)
+    settled, std = _settled(approaches, len(friction))
+    if abs(best.height) < EVIDENT * best.height_error or abs(settled / mean - 1.0) < WORTHWHILE:
+        return found
+    return found._replace(is_evident=True, settled_share=settled / mean, settled_std=std / mean)
+
+
+class _Approach(NamedTuple):
+    """Exponential approach with one length, fitted by least squares."""
+
+    length: float  # [m]
+    asymptote: float  # [N]
+    error: float  # [N] standard error of it
+    last: float  # [N] at the end of the run
+    height: float  # [N] start of the run less asymptote
+    height_error: float  # [N] standard error of it, autocorrelation of the residuals included
+    square: float  # [N^2] sum of the squared residuals
+
+
+def _approaches(
+    travel: FloatArray, friction: FloatArray, direction: FloatArray, shortest: float, longest: float
+) -> list[_Approach]:
+    """Approaches of lengths between shares of the travel; an offset that is left is fitted with each."""
+    spanned, found = float(np.ptp(travel)), []
+    side = direction - direction.mean()
+    for length in spanned * np.geomspace(shortest, longest, LENGTHS):
+        left = np.exp(-(travel - travel.min()) / length)
+        design = np.column_stack((np.ones_like(travel), left, side))
+        values, *_ = np.linalg.lstsq(design, friction, rcond=None)
+        residual = friction - design @ values
+        square = float(residual @ residual)
+        covariance = np.linalg.pinv(design.T @ design) * square / max(len(friction) - 4, 1)
+        error, height_error = np.sqrt(np.diag(covariance)[:2]).tolist()
+        correlation = min(max(float(residual[1:] @ residual[:-1]) / max(square, 1e-300), 0.0), 0.9)
+        height_error *= math.sqrt((1.0 + correlation) / (1.0 - correlation))
+        last = float(values[0] + values[1] * math.exp(-spanned / length))
+        found.append(_Approach(float(length), float(values[0]), error, last, float(values[1]), height_error, square))
+    return found
+
+
+def _determined(travel: FloatArray, friction: FloatArray, direction: FloatArray) -> tuple[float, float]:
+    """Asymptote [N] and length [m] that the strokes alone determine; NaN if they do not.
+
+    They do if the standard error is below `LARGEST_ERROR`, the rod travelled twice the length, and the approach fits
+    clearly better than a line.
+    """
+    best = min(_approaches(travel, friction, direction, SHORTEST, 0.5), key=lambda found: found.square)
+    straight = np.column_stack((np.ones_like(travel), travel, direction - direction.mean()))
+    line, *_ = np.linalg.lstsq(straight, friction, rcond=None)
+    bends = best.square < 0.7 * float(np.sum((friction - straight @ line) ** 2))
+    certain = best.error < LARGEST_ERROR * abs(best.asymptote)
+    return (best.asymptote, best.length) if bends and certain else (math.nan, math.nan)
+
+
+def _settled(found: Sequence[_Approach], strokes: int) -> tuple[float, float]:
+    r"""Friction of the settled seal [N] and its standard deviation [N].
+
+    Mean over lengths up to the whole travel, so that 63 % of the approach was seen at least: the extrapolation is
+    bounded by 0.58 of the change that was seen. The weight of a length is its likelihood :math:`S^{-n/4}` with the sum
+    of squares S of n strokes, each of which counts half, since neighbours go together. The standard deviation holds the
+    spread over the lengths, the standard errors, `UNSEEN` of what lies beyond the last stroke, and `OTHER_FORM` of the
+    height: a hyperbola of the same course ends that much elsewhere. All our choice.
+    """
+    squares = np.array([each.square for each in found])
+    weights = (np.maximum(squares, 1e-300) / max(float(squares.min()), 1e-300)) ** (-strokes / 4.0)
+    weights = weights / weights.sum()
+    asymptotes, errors, lasts, heights = (
+        np.array([getattr(each, name) for each in found]) for name in ('asymptote', 'error', 'last', 'height')
+    )
+    settled = float(weights @ asymptotes)
+    beyond = settled - float(weights @ lasts)
+    variance = float(weights @ (errors**2 + (asymptotes - settled) ** 2)) + (UNSEEN * beyond) ** 2
+    variance += (OTHER_FORM * float(weights @ heights)) ** 2
+    return settled, math.sqrt(variance)
+
+
+@dataclass(frozen=True, eq=False)
+class SettledLaw:
+    """Law of the settled seal."""
+
+    fit: LawFit  # the law, fitted to the settled readings
+    relative_std: float  # [-] of its friction, because the friction of the settled seal is extrapolated
+    readings: FrictionReadings  # as the settled seal would have given them
+
+
+def settled_readings(readings: FrictionReadings, offsets: FloatArray, found: Sequence[Drift]) -> FrictionReadings:
+    """Readings of the settled seal: the friction of each run with an evident drift, times its settled share.
+
+    Args:
+        readings: As measured.
+        offsets: Of the force sum of each source [N], shape (sources,).
+        found: Drifts of these readings; others are ignored.
+    """
+    share = np.ones(readings.count)
+    for drift in found:
+        share[(readings.source == drift.source) & (readings.level == drift.level)] = drift.settled_share
+    offset = offsets[readings.source]
+    force = offset + share * (readings.force - offset)
+    rows = zip(readings.samples, offset.tolist(), share.tolist(), strict=True) if readings.samples else ()
+    return replace(readings, force=force, samples=tuple(zero + one * (part - zero) for part, zero, one in rows))
+
+
+def settled_law(found: LawFit, readings: FrictionReadings) -> SettledLaw | None:
+    """The law ``found``, fitted again to the readings of the settled seal; None if no drift is evident.
+
+    The standard deviation of the settled shares counts as common to all pressures: they are extrapolated by one model
+    (our choice).
+
+    Raises:
+        ValueError: The fit fails.
+    """
+    offsets = offsets_of(readings, found.friction(readings.at))
+    of_runs = drifts(readings, offsets)
+    if readings.are_samples or not any(drift.is_evident for drift in of_runs):
+        return None
+    settled = settled_readings(readings, offsets, of_runs)
+    again = fit(found.law, settled, found.values, is_close=True)
+    return SettledLaw(again, root_mean_square(np.array([drift.settled_std for drift in of_runs])), settled)

@@ -1,0 +1,326 @@
+"""Identification of several kinds of seals in one cylinder: sources -> readings -> one seal file for each kind."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.identification import runs
+from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
+from seal_friction_ros.core.identification.force_correction import NOTICED
+from seal_friction_ros.core.identification.several_kinds import (
+    KindsFit,
+    KindsIdentification,
+    SealKind,
+    fit_kinds,
+    kinds_readings,
+    proposed_conditions,
+)
+from seal_friction_ros.core.identification.validation import PredictionUncertainty, prediction_uncertainty
+from seal_friction_ros.offline.identification.results import rounded_value
+from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
+
+LARGEST_ERROR = 0.5  # out-of-sample error above which laws are not saved (our choice)
+
+
+@dataclass(frozen=True, eq=False)
+class SeveralKinds:
+    """Result of an identification of several kinds of seals."""
+
+    sources: Sources
+    found: KindsIdentification
+    uncertainty: PredictionUncertainty  # of a new reading of all seals, in a new run
+    between_runs: runs.BetweenRuns
+    is_stated: bool  # whether the spread between runs was given
+    breakaway: BreakawayFit | None
+    documents: dict[str, dict[str, Any]]  # kind -> seal file
+    warnings: tuple[str, ...]
+
+    @property
+    def error(self) -> float:
+        """Sum of the deviations of left-out readings over the sum of the friction [-]."""
+        return _error(self.found)
+
+
+def _error(found: KindsIdentification) -> float:
+    return float(np.abs(found.deviation).sum() / np.abs(found.predicted + found.deviation).sum())
+
+
+def identify_kinds(
+    paths: Sequence[Path], options: SourceOptions, kinds: Sequence[SealKind], name: str, run_to_run: float | None = None
+) -> SeveralKinds:
+    """Read bags or logs, fit all kinds together, and make a seal file for each.
+
+    Args:
+        paths: Bags and logs of one cylinder.
+        options: On the sources; their chambers are those of the kinds.
+        kinds: At least two, with different names.
+        name: Of the seals; that of the kind is added.
+        run_to_run: Relative standard deviation between runs, if it is known [-].
+
+    Raises:
+        ValueError: The data are unfit, or they do not tell the kinds apart; one line with what to measure.
+    """
+    chambers = tuple(chamber for kind in kinds for chamber in kind.chambers)
+    sources = read_sources(paths, replace(options, chambers=chambers))
+    if any(source.log is None for source in sources.each):
+        raise ValueError(
+            f'{paths[0]}: a table of readings has one pressure, several kinds of seals need those of both chambers: '
+            'give bags or logs'
+        )
+    prepared = sources.prepare()
+    data = kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
+    found = fit_kinds(data)
+    if not _error(found) <= LARGEST_ERROR:
+        raise ValueError(
+            f'{", ".join(data.readings.names)}: no laws predict these readings: they are off by '
+            f'{100.0 * _error(found):.0f} % on left-out readings: measure more strokes at each pressure'
+        )
+    readings = found.fit.corrected_readings()
+    friction = found.fit.frictions(readings.at).sum(axis=1)
+    between = runs.between_runs(readings, friction, found.fit.offsets)
+    if run_to_run is not None:
+        between = between._replace(std=run_to_run)
+    of_band = run_to_run if run_to_run is not None else between.of_band
+    band = prediction_uncertainty(found.predicted, found.deviation, len(readings.groups), of_band)
+    breakaway = None
+    if prepared.breakaway is not None and len(prepared.breakaway.groups) >= 2:
+        coulomb = found.fit.coulomb_friction(prepared.breakaway.at)
+        breakaway = fit_breakaway(prepared.breakaway, coulomb, found.fit.offsets)
+    documents = {
+        kind.name: _seal_document(sources, found, k, band, breakaway, f'{name}_{kind.name}')
+        for k, kind in enumerate(kinds)
+    }
+    result = SeveralKinds(sources, found, band, between, run_to_run is not None, breakaway, documents, ())
+    return replace(result, warnings=tuple(_warnings_of(result)))
+
+
+def _value(value: float) -> float:
+    return rounded_value(float(value))
+
+
+def law_texts(fit: KindsFit) -> list[str]:
+    """Law of each kind, in words."""
+    return [f'{kind.name}: f_0 + k P^{m:.3g}' + (' + viscous' if fit.rung.viscous else '')
+            for kind, m in zip(fit.data.kinds, fit.rung.exponents, strict=True)]  # fmt: skip
+
+
+def _seal_document(
+    sources: Sources,
+    found: KindsIdentification,
+    number: int,
+    band: PredictionUncertainty,
+    breakaway: BreakawayFit | None,
+    name: str,
+) -> dict[str, Any]:
+    """Seal file of one kind, checked as the node checks it.
+
+    Its standard deviation holds that of all seals, and what the data and this cylinder do not tell apart.
+
+    Raises:
+        ValueError: The law makes no valid seal.
+    """
+    fit, kind = found.fit, found.fit.data.kinds[number]
+    seals, readings = len(kind.chambers), fit.data.readings
+    of_kind = float(fit.frictions(readings.at)[:, number].mean())
+    share = float(fit.division[number]) / seals
+    everyone = readings.at.pressure.shape[1]
+    apart = float(np.hypot(found.errors[number], found.spread[number])) / max(of_kind, 1e-12)
+    has_share = of_kind > 0.0
+    relative = float(np.hypot(band.relative, apart)) if has_share else band.relative
+    alone = float(found.division_std[number]) if has_share else float(found.apart_std[number])
+    pressure = readings.at.pressure[:, fit.data.columns_of(number)]
+    files = ', '.join(file.name for file in sources.files)
+    document: dict[str, Any] = {
+        'name': name,
+        'source': f'Made by seal_friction identify from {files}: {kind.name} fitted together with the other kinds of '
+        'seals of the cylinder, by least squares, uncertainty from readings left out.',
+        'mounting': {'chambers': list(kind.chambers)},
+        'coulomb_law': 'pressure_power_law',
+        'pressure_power_law': {
+            'friction_at_no_pressure': _value(share * fit.constant),
+            'friction_at_one_bar': _value(fit.rises[number]),
+            'pressure_exponent': _value(fit.rung.exponents[number]),
+        },
+    }
+    if fit.rung.viscous:
+        document['velocity_terms'] = {'viscous_friction': _value(share * fit.viscous)}
+    document |= {
+        'stiction': _value(breakaway.stiction) if breakaway else 0.0,
+        'stiction_ratio': _value(breakaway.ratio) if breakaway else 0.0,
+        'uncertainty': {
+            'relative_std': _value(relative),
+            'absolute_std': _value(np.hypot(band.absolute / everyone, alone / seals)),
+        },
+        'identified_pressure': [_value(pressure.min()), _value(pressure.max())],
+    }
+    speed = np.abs(readings.at.velocity)
+    if np.isfinite(speed).all():
+        document['identified_speed'] = [_value(speed.min()), _value(speed.max())]
+    document['identified_directions'] = [int(side) for side in np.unique(readings.at.direction)]
+    correction = _correction(fit, contains_load=sources.has_fitted_load)
+    if correction is not None:
+        document['force_sum_correction'] = asdict(correction)
+    document['identification'] = {
+        'kind': kind.name,
+        'fitted_together_with': [other.name for other in fit.data.kinds if other is not kind],
+        'readings': readings.count,
+        'data': [file._asdict() for file in sources.files],
+    }
+    parse_seal(document)
+    return document
+
+
+def _correction(fit: KindsFit, *, contains_load: bool) -> ForceSumCorrection | None:
+    """Areas and offset that the force sum lacks, if they matter; the same in the file of each kind."""
+    readings = fit.data.readings
+    two_sided = [source for source, index in enumerate(readings.two_sided) if len(index)]
+    offset = -float(np.mean(fit.offsets[two_sided])) if two_sided else 0.0
+    matters = fit.rung.areas or abs(offset) >= NOTICED * float(fit.frictions(readings.at).sum(axis=1).mean())
+    if not matters and not contains_load:
+        return None
+    area_a, area_b = (_value(-area) for area in fit.areas)
+    zero = _value(offset) if matters else 0.0
+    return ForceSumCorrection(area_a=area_a, area_b=area_b, offset=zero, contains_load=contains_load)
+
+
+def shares(found: KindsIdentification) -> tuple[FloatArray, FloatArray]:
+    """Share of each kind in the mean friction, and its standard deviation [-], shape (kinds,) each."""
+    frictions = found.fit.frictions(found.fit.data.readings.at).mean(axis=0)
+    return np.asarray(frictions / frictions.sum()), np.asarray(found.apart_std / frictions.sum())
+
+
+def _warnings_of(result: SeveralKinds) -> Iterator[str]:
+    fit, found = result.found.fit, result.found
+    names = ' and '.join(kind.name for kind in fit.data.kinds)
+    mean = float(fit.frictions(fit.data.readings.at).sum(axis=1).mean())
+    viscous = ' and the viscous friction' if fit.rung.viscous else ''
+    if fit.constant > 0.0 or fit.viscous > 0.0:
+        yield (
+            f'the friction at no pressure, {fit.constant:.3g} N of all seals ({100.0 * fit.constant / mean:.0f} % of '
+            f'the friction),{viscous} cannot be divided between {names} by any pressure of this cylinder: it is '
+            'divided as the rest is, and the standard deviation of each kind holds that: use the seal files together'
+        )
+    for kind, part in zip(fit.data.kinds, fit.rises.tolist(), strict=True):
+        if part == 0.0:
+            yield f'{kind.name}: these data show no friction that rises with its pressure'
+    if fit.rung.areas:
+        change = ' and '.join(
+            f'{-1e6 * area:+.3g} mm2 for chamber {c}' for c, area in zip('ab', fit.areas, strict=True)
+        )
+        yield f'the areas in the force sum are off: {change}; the laws are fitted with the corrected areas'
+    between = result.between_runs
+    if between.std > 0.0 and not between.freedom and not result.is_stated:
+        yield (
+            'this is one run, so the data do not show how runs differ (mounted anew, another day): a prior of '
+            f'{100.0 * between.std:.0f} % is in the standard deviation; repeat runs, or give a known value with '
+            '--run-to-run'
+        )
+    one_way = [
+        n for n, index in zip(fit.data.readings.names, fit.data.readings.two_sided, strict=True) if not len(index)
+    ]
+    if one_way:
+        yield f'{", ".join(one_way)}: readings in one direction only, so an offset of the force counts as friction'
+    if float(found.together.max()) > 0.9:
+        yield (
+            f'the pressures of the kinds moved nearly together (correlation {float(found.together.max()):.2f}), so the '
+            'kinds are told apart by little'
+        )
+
+
+def kinds_numbers(result: SeveralKinds) -> dict[str, Any]:
+    """Numbers for JSON."""
+    found, fit = result.found, result.found.fit
+    readings = fit.corrected_readings()
+    each = fit.frictions(readings.at)
+    total = each.sum(axis=1)
+    measured = readings.magnitudes(fit.offsets)
+    masks = list(readings.levels.values())
+    share, share_std = shares(found)
+    conditions, correlation = proposed_conditions(fit.data, found.rivals)
+
+    def means(values: FloatArray) -> list[float]:
+        return [_value(values[inside].mean()) for inside in masks]
+
+    kinds = []
+    for k, kind in enumerate(fit.data.kinds):
+        pressure = readings.at.pressure[:, fit.data.columns_of(k)].mean(axis=1)
+        kinds.append(
+            {
+                'name': kind.name,
+                'seal_chambers': list(kind.chambers),
+                'law': law_texts(fit)[k],
+                'pressure_exponent': fit.rung.exponents[k],
+                'friction_at_one_bar': _value(fit.rises[k]),
+                'friction_N': _value(each[:, k].mean()),
+                'rising_N': _value(fit.parts[k]),
+                'rising_standard_error_N': _value(found.errors[k]),
+                'law_spread_N': _value(found.spread[k]),
+                'division_std_N': _value(found.division_std[k]),
+                'share': _value(share[k]),
+                'share_std': _value(share_std[k]),
+                'pressure_correlation': _value(found.together[k]),
+                'pressure_Pa': means(pressure),
+                'fitted_N': means(each[:, k]),
+            }
+        )
+    return {
+        'law': '; '.join(law_texts(fit)),
+        'kinds': kinds,
+        'seal_chambers': list(result.sources.chambers),
+        'friction_at_no_pressure_N': _value(fit.constant),
+        'viscous_friction': _value(fit.viscous),
+        'correlation': [[_value(value) for value in row] for row in found.correlation],
+        'pressure_a_Pa': means(fit.data.chamber_pressures[:, 0]),
+        'pressure_b_Pa': means(fit.data.chamber_pressures[:, 1]),
+        'measured_N': means(measured),
+        'fitted_N': means(total),
+        'std_N': means(result.uncertainty.std(total)),
+        'left_out_N': means(found.predicted),
+        'left_out_by': readings.left_out_by,
+        'cross_validation_error': _value(result.error),
+        'area_correction_m2': [_value(-area) for area in fit.areas],
+        'offset_N': [_value(offset) for offset in fit.offsets],
+        'between_run_std': _value(result.between_runs.std),
+        'breakaway': result.breakaway and result.breakaway._asdict(),
+        'laws_tried': found.tried,
+        'laws_not_beaten': len(found.rivals),
+        'readings': readings.count,
+        'next': [{'pressure_a_Pa': _value(c.a), 'pressure_b_Pa': _value(c.b)} for c in conditions],
+        'next_correlation': _value(correlation),
+        'data': [file._asdict() for file in result.sources.files],
+        'warnings': list(result.warnings),
+        'remarks': list(result.sources.remarks),
+    }
+
+
+def kinds_summary(result: SeveralKinds) -> str:
+    """The result for a person."""
+    found, fit = result.found, result.found.fit
+    share, share_std = shares(found)
+    frictions = fit.frictions(fit.data.readings.at).mean(axis=0)
+    lines = ['  kind              seals on         friction [N]   share [%]   std of the share [%]']
+    for k, kind in enumerate(fit.data.kinds):
+        numbers = f'{frictions[k]:12.4g}  {100.0 * share[k]:10.3g}  {100.0 * share_std[k]:21.2g}'
+        lines.append(f'  {kind.name:16}  {",".join(kind.chambers):16} {numbers}')
+    lines += [f'law of {text}' for text in law_texts(fit)]
+    lines += [f'left-out readings: off by {100.0 * result.error:.1f} % ({fit.data.readings.left_out_by} left out)']
+    conditions, correlation = proposed_conditions(fit.data, found.rivals)
+    if conditions:
+        pairs = ', '.join(f'{c.a / BAR:.3g} and {c.b / BAR:.3g}' for c in conditions)
+        change = f'correlation of the pressures {float(found.together.max()):.2f} -> {correlation:.2f}'
+        lines += [f'next: chambers a and b at {pairs} bar, both directions: {change}']
+    lines += [f'note: {remark}' for remark in result.sources.remarks]
+    lines += [f'warning: {warning}' for warning in result.warnings]
+    return '\n'.join(lines)
+
+
+def seal_files(out: Path, kinds: Sequence[str]) -> dict[str, Path]:
+    """Kind -> its seal file: the name of the kind is added to that of ``out``."""
+    return {kind: out.with_name(f'{out.stem}_{kind}{out.suffix}') for kind in kinds}

@@ -1,0 +1,123 @@
+"""Run-in of a seal: what is evident over the strokes of one run, and the friction of the settled seal."""
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, Variation, candidate_laws
+from seal_friction_ros.core.identification.fitting import fit
+from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.run_in import drifts, settled_law
+
+STROKE = 0.04  # [m]
+SETTLED = 10.0  # [N]
+
+
+def run(course, count=20, scatter=0.005, seed=0, pressures=1, offset=0.0, travel=True, follows=0.0):
+    """One source per pressure: strokes out and back whose friction times ``course(travel)`` drifts, with noise.
+
+    ``follows``: correlation of the noise of neighbouring strokes.
+    """
+    rng = np.random.default_rng(seed)
+    source = np.repeat(np.arange(pressures), count)
+    way = STROKE * np.tile(np.arange(count), pressures)
+    noise = rng.normal(size=len(way))
+    for i in range(1, len(noise)):
+        noise[i] = follows * noise[i - 1] + np.sqrt(1.0 - follows**2) * noise[i]
+    friction = SETTLED * (1.0 + source) * course(way) * (1.0 + scatter * noise)
+    direction = np.tile([1.0, -1.0], len(way) // 2)
+    at = OperatingConditions(1e5 * (1.0 + source[:, np.newaxis]), None, 0.01 * direction, direction)
+    return FrictionReadings(
+        at=at,
+        force=offset + direction * friction,
+        source=source,
+        group=source,
+        level=source,
+        names=tuple(f'{i}' for i in range(pressures)),
+        left_out_by='pressure',
+        are_samples=False,
+        travel=way if travel else np.empty(0),
+    )
+
+
+def approach(share, length):
+    return lambda s: 1.0 + share * np.exp(-s / length)
+
+
+def test_the_friction_of_the_settled_seal_is_the_asymptote_of_its_run_in():
+    for share in (-0.3, 0.3):
+        (drift,) = drifts(run(approach(share, 0.1), count=30), np.zeros(1))
+        assert drift.asymptote == pytest.approx(SETTLED, rel=0.02)
+        assert drift.length == pytest.approx(0.1, rel=0.3)
+        assert np.sign(drift.change) == -np.sign(share)
+        assert drift.is_evident
+
+
+def test_a_drift_that_goes_on_has_no_asymptote():
+    (drift,) = drifts(run(approach(-0.3, 8.0)), np.zeros(1))
+    assert np.isnan(drift.asymptote)
+
+
+def test_drift_is_the_change_over_the_run():
+    found = drifts(run(lambda s: 1.0 + 0.2 * s / s.max(), pressures=3, scatter=0.0), np.zeros(3))
+    assert [drift.level for drift in found] == [0, 1, 2]
+    assert [drift.change for drift in found] == pytest.approx([0.2 * 18 / 19 / 1.1] * 3, rel=0.02)
+
+
+@pytest.mark.parametrize('follows', [0.0, 0.6])
+def test_scatter_alone_is_no_evident_drift(follows):
+    """Strokes that repeat within 5 %, also where neighbours go together, as on the rig."""
+    alarms = [drifts(run(lambda s: 1.0 + 0.0 * s, scatter=0.05, seed=i, follows=follows), np.zeros(1))[0].is_evident
+              for i in range(400)]  # fmt: skip
+    assert np.mean(alarms) <= 0.03
+
+
+def test_a_drift_is_evident_where_it_is_several_times_the_scatter():
+    found = [drifts(run(approach(-0.12, 0.4), scatter=0.01, seed=i), np.zeros(1))[0].is_evident for i in range(100)]
+    assert np.mean(found) >= 0.95
+
+
+@pytest.mark.parametrize(
+    'course',
+    [
+        *(approach(share, length) for share in (-0.25, 0.25) for length in (0.1, 0.3, 0.8)),
+        lambda s: 1.0 - 0.25 / (1.0 + s / 0.15),
+        lambda s: 1.0 - 0.2 * np.exp(-np.sqrt(s / 0.1)),
+    ],
+)
+def test_the_settled_friction_is_within_two_of_its_standard_deviations(course):
+    """Also where the approach is no exponential: a hyperbola, a stretched exponential."""
+    found = [drifts(run(course, seed=i), np.zeros(1))[0] for i in range(50)]
+    means = [SETTLED * course(STROKE * np.arange(20)).mean()] * len(found)
+    off = [abs(one.settled_share - SETTLED / mean) for one, mean in zip(found, means, strict=True)]
+    inside = [o <= 2.0 * one.settled_std for o, one in zip(off, found, strict=True)]
+    assert all(one.is_evident for one in found)
+    assert np.mean(inside) >= 0.9
+
+
+def test_the_extrapolation_is_bounded_by_the_change_that_was_seen():
+    for i in range(20):
+        straight = run(lambda s: 1.0 + 0.2 * s / s.max(), seed=i)
+        (drift,) = drifts(straight, np.zeros(1))
+        last = 1.2 * SETTLED
+        assert last < drift.settled_share * 1.1 * SETTLED < last + 0.6 * 0.22 * SETTLED
+        assert drift.settled_std > 0.02
+
+
+def test_readings_without_travel_and_swept_samples_stay_as_they_are():
+    noted = run(approach(-0.3, 0.2), pressures=4, travel=False)
+    assert not any(drift.is_evident for drift in drifts(noted, np.zeros(4)))
+    line = next(law for law in candidate_laws(Variation(speeds=False)) if law.name == 'pressure_power_law_1')
+    assert settled_law(fit(line, noted), noted) is None
+
+
+def test_the_law_is_that_of_the_settled_seal_whatever_the_offset_of_the_force():
+    """Friction 10 N a bar, settled; the readings of the run-in show less."""
+    line = next(law for law in candidate_laws(Variation(speeds=False)) if law.name == 'pressure_power_law_1')
+    for offset in (0.0, -7.0):
+        readings = run(approach(-0.25, 0.15), pressures=4, count=30, offset=offset)
+        as_measured = fit(line, readings)
+        settled = settled_law(as_measured, readings)
+        assert as_measured.values['friction_at_one_bar'] < 9.8
+        assert settled.fit.values['friction_at_one_bar'] == pytest.approx(10.0, rel=0.02)
+        assert settled.fit.offsets == pytest.approx([offset] * 4, abs=0.3)
+        assert 0.0 < settled.relative_std < 0.05

@@ -1,0 +1,89 @@
+"""Logs of a seal that runs in: the seal file holds the settled seal, the numbers beside it the readings as measured."""
+
+import numpy as np
+import pytest
+from harness.identify_run import Run, delft, estimates_of
+from harness.two_kinds import BAR, RIG
+
+PRESSURES = (1.0, 2.5, 4.0, 6.0)
+STEP = 0.01  # [s]
+
+
+def settled_friction(bar):
+    return 3.0 + 1.1 * bar
+
+
+def logs(folder, course, noise=0.05):
+    """One log per pressure of a simulated pneumatic rig, ten strokes out and back; own friction, encoder of 10 um.
+
+    ``course`` is the friction over that of the settled seal, by the travel since the seal was mounted [m].
+    """
+    rng = np.random.default_rng(5)
+    paths = []
+    for bar in PRESSURES:
+        sides = [side for _ in range(10) for side in (1.0, -1.0)]
+        velocity = np.concatenate([np.r_[np.full(400, 0.01 * side), np.zeros(40)] for side in sides])
+        travel = np.cumsum(np.abs(velocity)) * STEP
+        force = np.sign(velocity) * settled_friction(bar) * course(travel) - 1.5 + noise * rng.normal(size=len(travel))
+        position = np.round((0.1 + np.cumsum(velocity) * STEP) / 1e-5) * 1e-5 + 1e-7 * rng.normal(size=len(travel))
+        pressure = bar * (1.0 + 0.003 * rng.normal(size=len(travel)))
+        columns = (np.arange(len(travel)) * STEP, 1e3 * position, pressure, 0.0 * pressure, force)
+        paths.append(folder / f'run_{bar:g}.csv')
+        header = 'time_s,position_mm,pa_bar,pb_bar,force_N'
+        np.savetxt(paths[-1], np.column_stack(columns), delimiter=',', header=header, comments='', fmt='%.5f')
+    (folder / 'rig.yaml').write_text(RIG)
+    return [*map(str, paths), '--rig', str(folder / 'rig.yaml'), '--seal-chambers', 'a']
+
+
+@pytest.fixture(
+    scope='module',
+    params=[lambda s: 1.0 - 0.2 * np.exp(-s / 0.25), lambda s: 1.0 + 0.25 / (1.0 + s / 0.1)],
+    ids=['rising', 'falling hyperbola'],
+)
+def ran_in(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp('run_in')
+    return Run(folder, *logs(folder, request.param))
+
+
+def test_the_seal_file_holds_the_friction_of_the_settled_seal(ran_in):
+    for bar in PRESSURES:
+        estimate = estimates_of(ran_in, bar * BAR, 0.01)
+        assert estimate.coulomb_friction == pytest.approx(settled_friction(bar), rel=0.06)
+    settled = ran_in.figures['settled']
+    truth = np.array([settled_friction(bar) for bar in PRESSURES])
+    share = settled['relative_std_of_settling']
+    assert np.abs(np.array(settled['fitted_N']) / truth - 1.0).max() < 2.0 * share + 0.01
+    assert ran_in.document['uncertainty']['relative_std'] > ran_in.figures['as_measured']['relative_std']
+
+
+def test_the_numbers_beside_it_are_of_the_readings_as_measured(ran_in):
+    measured, fitted = (np.array(ran_in.figures[name]) for name in ('measured_N', 'fitted_N'))
+    truth = np.array([settled_friction(bar) for bar in PRESSURES])
+    assert np.abs(measured / truth - 1.0).min() > 0.03
+    assert fitted == pytest.approx(measured, rel=0.03)
+    assert ran_in.figures['left_out_N'] == pytest.approx(measured.tolist(), rel=0.05)
+    assert ran_in.figures['parameters'] == ran_in.figures['settled']['parameters']
+    assert ran_in.figures['parameters'] != ran_in.figures['as_measured']['parameters']
+    assert ran_in.has_warning('run-in', 'the law of the settled seal', 'as measured')
+    assert all(row['is_evident'] for row in ran_in.figures['run_in'])
+
+
+def test_without_a_drift_nothing_is_corrected(tmp_path):
+    run = Run(tmp_path, *logs(tmp_path, np.ones_like))
+    assert run.figures['settled'] is None
+    assert run.figures['parameters'] == run.figures['as_measured']['parameters']
+    assert not run.has_warning('run-in')
+    assert not any(row['is_evident'] for row in run.figures['run_in'])
+    for bar, fitted in zip(PRESSURES, run.figures['fitted_N'], strict=True):
+        assert estimates_of(run, bar * BAR, 0.01).coulomb_friction == pytest.approx(fitted, rel=0.01)
+
+
+def test_delft_two_days_of_one_ring_agree_better_once_settled(tmp_path):
+    """Each day ran in by another amount; the settled friction was extrapolated for each day by itself."""
+    days = [Run(tmp_path, *delft(ring)) for ring in ('O-ring257', 'O-ring257_run2')]
+
+    def apart(numbers):
+        one, other = (np.array(each['measured_N']) for each in numbers)
+        return np.sqrt(np.mean(np.log(one / other) ** 2))
+
+    assert apart([day.figures['settled'] for day in days]) < 0.9 * apart([day.figures for day in days])
