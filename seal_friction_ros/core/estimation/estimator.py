@@ -409,7 +409,7 @@ def assess_inputs(
         uncertain = _is_uncertain(settings, motion, at_rest)
         if uncertain:
             status |= _MOTION_UNCERTAIN
-        # Friction never drives: a rod in the band of rest that moves against the force sum slides. A load hides that sum.
+        # Friction never drives: a rod in the band of rest that moves against the force sum slides; a load hides that.
         drives = motion.velocity * force_sum < 0.0 and not parameters.force_sum_correction.contains_load
         if not at_rest or (uncertain and drives):
             sliding_velocity = motion.velocity

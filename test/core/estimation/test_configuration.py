@@ -88,7 +88,9 @@ conditioned = st.just(NOT_CONDITIONED) | st.builds(
 def records(kind: type) -> st.SearchStrategy:
     """A record of numbers and of such records, every number of it usable."""
     of_type = {float: usable, int: st.integers(-(2**62), 2**62)}
-    return st.builds(kind, *(of_type.get(hint) or records(hint) for hint in get_type_hints(kind).values()))
+    return st.builds(
+        kind, *(of_type[hint] if hint in of_type else records(hint) for hint in get_type_hints(kind).values())
+    )
 
 
 states = st.builds(

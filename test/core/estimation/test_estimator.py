@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from paths import ROOT
 
 from seal_friction_ros.core.estimation import estimator
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState, step
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, decode, encode
@@ -650,7 +651,10 @@ def test_motion_with_a_ripple_is_uncertain_up_to_slip_velocity_and_half_width_ov
     assert estimator._is_uncertain(settings, motion, False) is uncertain
 
 
-def test_parameters_are_compared_and_shown_by_settings_and_seals_alone():
+def test_parameters_are_compared_and_shown_by_what_was_given():
     again = EstimatorParameters(EstimatorSettings(), BOTH)
     assert again == PARAMETERS
-    assert repr(again) == f'EstimatorParameters(settings={PARAMETERS.settings!r}, seals={BOTH!r})'
+    assert (
+        repr(again)
+        == f'EstimatorParameters(settings={PARAMETERS.settings!r}, seals={BOTH!r}, adaptation={AdaptationSettings()!r})'
+    )
