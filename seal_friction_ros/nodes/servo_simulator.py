@@ -17,7 +17,7 @@ from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, INPUTS,
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, measured_force_sum, one_correction
 from seal_friction_ros.core.servo.controller import Limited
-from seal_friction_ros.core.servo.motions import PullTest, Setpoint, Wave
+from seal_friction_ros.core.servo.motions import PullTest, RoundedWave, Setpoint, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.core.servo.pull_rig import PullRig, init_pull_rig, pull_rig, step_pull_rig
 from seal_friction_ros.core.servo.sensors import Readings, SensorSettings, read
@@ -55,6 +55,7 @@ class ServoSimulator(ManagedNode):
     def make(self) -> None:
         """Create and compile the servo; create publishers and subscriptions."""
         self._settings = self.settings(SimulatorSettings)
+        self._period = round(_SECOND / self._settings.rate)
         self._make_servo()
         for topic in _OUTPUTS:
             if topic != 'servo_reference' or self._settings.wave in WAVES:
@@ -116,7 +117,6 @@ class ServoSimulator(ManagedNode):
         settings = self._settings
         self._apply_settings()
         self._wave_start = self._index = 0  # [samples]
-        self._period = round(_SECOND / settings.rate)
         self._origin = 0 if settings.publish_clock else self.get_clock().now().nanoseconds
         self._feedforward: FeedForward | None = None
         self._reference: ServoReference | None = None
@@ -174,6 +174,8 @@ class ServoSimulator(ManagedNode):
         self._sensors = self.settings(SensorSettings)
         self._delay = round(self._sensors.delay * self._settings.rate)  # [samples]
         self._wave: Wave | None = self.settings(WAVES[self._settings.wave]) if self._settings.wave in WAVES else None
+        if self._wave is not None and self._settings.reference_resolution:
+            self._wave = RoundedWave(self._wave, self._settings.reference_resolution, self._period * 1e-9)
 
     # --- inputs ---
 

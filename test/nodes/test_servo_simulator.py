@@ -142,6 +142,20 @@ def test_every_topic_comes_at_every_sample_and_the_reference_is_the_wave_asked_f
         assert len(set(pressures)) > 50
 
 
+def test_a_rounded_reference_has_the_velocity_of_its_steps():
+    resolution = 5e-6  # [m]
+    with stage({'reference_resolution': resolution}) as s:
+        heard = s.listener.heard['servo_reference']
+        s.wait(lambda: len(heard) > 200)
+        for before, now in itertools.pairwise(heard[:200]):
+            assert now.position / resolution == pytest.approx(round(now.position / resolution), abs=1e-9)
+            if nanoseconds(now.header.stamp) - nanoseconds(before.header.stamp) == 2_000_000:
+                assert now.velocity == pytest.approx((now.position - before.position) / 2e-3, abs=1e-12)
+                assert now.acceleration == pytest.approx((now.velocity - before.velocity) / 2e-3, abs=1e-9)
+        assert s.set(reference_resolution=0.0).successful
+        s.wait(lambda: heard[-1].velocity % (resolution / 2e-3) > 1e-6)
+
+
 def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_path):
     estimator = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     estimator['refuse_second_publisher'] = False  # the listener publishes, too

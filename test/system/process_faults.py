@@ -9,8 +9,8 @@ import signal
 import subprocess
 import time
 from collections import deque
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -22,7 +22,7 @@ from rclpy.context import Context
 
 from seal_friction_ros.core.estimation import records
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, INPUTS, decode
-from seal_friction_ros.offline.bags.bag import read_messages
+from seal_friction_ros.offline.bags.bag import BagError, read_messages
 from seal_friction_ros.offline.bags.recover import recover
 
 LIVE_SLEW_LIMIT = 100.0  # [N/s] two thirds of the force cannot come back within one step
@@ -275,26 +275,48 @@ def disk_full(chance: random.Random, folder: Path) -> list[str]:
     return on_a_disk(folder, f'size={chance.randrange(150, 400)}k', 'No space left on device')
 
 
+def bags_with_estimates(disk: Path, copies: Path) -> list[Path]:
+    """Recovered copies of the bags on a disk that hold an estimate, also of one that is being written."""
+    shutil.rmtree(copies, ignore_errors=True)
+    shutil.copytree(disk, copies)
+    found = []
+    for bag in sorted(path for path in copies.iterdir() if path.is_dir()):
+        with suppress(BagError):  # no message in it yet
+            found.append(Path(recover(bag).out))
+    return [bag for bag in found if any(message.type_name == ESTIMATE_TYPE for message in read_messages(bag))]
+
+
 def disk_nearly_full(chance: random.Random, folder: Path) -> list[str]:
     """A disk that something else fills, and that has room again later."""
     with on_small_disk(folder, 'size=8m', free_space=2_000_000) as (place, small):
 
-        def says(message: str) -> bool:
-            """Whether the newest report of the recorder contains ``message``; sends samples meanwhile."""
-            place.run(50, 1e5)
-            return message in ''.join(place.recorder_messages[-1:])
+        def recorded() -> list[Path]:
+            return bags_with_estimates(small, folder / 'copies')
+
+        def happens(condition: Callable[[], bool]) -> bool:
+            """Send samples until the condition holds; whether it does in time."""
+
+            def holds() -> bool:
+                place.run(50, 1e5)
+                return condition()
+
+            return place.spin_until(holds)
 
         place.run(chance.randrange(100, 300))
+        wrong = unless(happens(lambda: len(recorded()) == 1), 'nothing recorded')
         (small / 'other').write_bytes(bytes(chance.randrange(6_300_000, 7_000_000)))
-        wrong = unless(place.spin_until(lambda: says('record_free_space')), 'recording goes on')
+        stops = happens(lambda: 'record_free_space' in place.recorder_messages[-1])
+        wrong += unless(stops, f'recording goes on: {place.recorder_messages[-1]}')
         (small / 'other').unlink()
-        wrong += unless(place.spin_until(lambda: says('recording') and not says('stopped')), 'recording does not go on')
+        continues = happens(lambda: place.recorder_messages[-1] == 'recording')
+        wrong += unless(continues, f'recording does not go on: {place.recorder_messages[-1]}')
         place.run(chance.randrange(100, 300))
         wrong += place.unrecovered()
-        shutil.copytree(small, folder / 'copies')
-    for bag in sorted((folder / 'copies').iterdir()):
-        wrong += verified(Path(recover(bag).out))
-    return wrong + unless(len(list((folder / 'copies').glob('*_recovered'))) == 2, 'not two bags')
+        wrong += unless(happens(lambda: len(recorded()) == 2), 'not two bags with estimates')
+        bags = recorded()
+    for bag in bags:
+        wrong += verified(bag)
+    return wrong
 
 
 def read_only(chance: random.Random, folder: Path) -> list[str]:

@@ -152,6 +152,32 @@ class Chirp(CheckedParameters):
         return Setpoint(self.offset + self.amplitude * sine, self.amplitude * rate * cosine, self.amplitude * bend)
 
 
+@dataclass(frozen=True)
+class RoundedWave:
+    r"""A wave with the resolution r of a digital set point; velocity and acceleration are its differences.
+
+    .. math:: x_i = r\,\mathrm{round}(x(t_i) / r), \quad v_i = (x_i - x_{i-1}) / T, \quad a_i = (v_i - v_{i-1}) / T
+
+    Differences without a filter are our choice: no controller publishes a coarser velocity.
+    """
+
+    wave: Wave
+    resolution: float  # [m] r, above 0
+    period: float  # [s] T, time from one set point to the next
+
+    def at(self, time: float) -> Setpoint:
+        """Set point i with t_i = i T nearest to ``time`` [s]."""
+        i = round(time / self.period)
+        newest, last, before = (self._steps((i - back) * self.period) for back in range(3))
+        speed = self.resolution / self.period  # of one step a sample
+        return Setpoint(
+            self.resolution * newest, speed * (newest - last), speed / self.period * (newest - 2 * last + before)
+        )
+
+    def _steps(self, time: float) -> int:
+        return round(self.wave.at(time).position / self.resolution)
+
+
 class PullCommand(NamedTuple):
     """Command of the pull-test rig at one moment."""
 

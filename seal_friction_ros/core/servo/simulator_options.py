@@ -31,6 +31,10 @@ class SimulatorSettings(CheckedParameters):
         unit='',
         description='Reference: sine, step, trapezoid, chirp; topic; or pull_test, a rig without servo.',
     )
+    reference_resolution: float = parameter(
+        0.0, unit='m', lower=0.0, upper=0.1,
+        description='Step of the positions of sine to chirp; their differences are its velocity. 0: continuous.'
+    )  # fmt: skip
     use_feedforward: bool = parameter(True, unit='', description='Add friction_feedforward to the force command.')
     feedforward_timeout: float = parameter(
         0.05, unit='s', lower=1e-3, upper=10.0, description='An older feed-forward counts as 0 N.'

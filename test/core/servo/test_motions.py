@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.foundation.units import PSI
-from seal_friction_ros.core.servo.motions import Chirp, PullTest, Setpoint, Sine, Step, Trapezoid
+from seal_friction_ros.core.servo.motions import Chirp, PullTest, RoundedWave, Setpoint, Sine, Step, Trapezoid
 
 WAVES = [Sine(0.002, 3.0, 0.01), Trapezoid(), Chirp(duration=2.0), Chirp(start_frequency=9.0, end_frequency=2.0)]
 
@@ -27,6 +27,18 @@ def test_velocity_and_acceleration_are_the_derivatives(wave, time):
 @pytest.mark.parametrize('wave', [*WAVES, Step(0.1, 1.0, 0.2)], ids=lambda w: type(w).__name__)
 def test_before_time_0_a_wave_stands_still(wave):
     assert wave.at(-1.0) == Setpoint(wave.offset, 0.0, 0.0)
+
+
+@pytest.mark.parametrize('wave', [*WAVES, Step(0.1, 1.0, 0.2)], ids=lambda w: type(w).__name__)
+@given(sample=st.integers(-5, 4000), resolution=st.sampled_from([1e-6, 5e-6, 1e-3]), rate=st.sampled_from([1e3, 2e3]))
+def test_a_rounded_wave_is_a_digital_set_point_and_its_differences(wave, sample, resolution, rate):
+    rounded = RoundedWave(wave, resolution, 1.0 / rate)
+    before, now = (rounded.at(i / rate) for i in (sample - 1, sample))
+    steps = now.position / resolution
+    assert steps == pytest.approx(round(steps), abs=1e-6)
+    assert abs(now.position - wave.at(sample / rate).position) <= 0.5 * resolution * (1.0 + 1e-6)
+    assert now.velocity == pytest.approx((now.position - before.position) * rate, abs=1e-9)
+    assert now.acceleration == pytest.approx((now.velocity - before.velocity) * rate, abs=1e-6)
 
 
 def test_step_steps_once():

@@ -1,0 +1,57 @@
+"""The loop of ``make demo`` in core: the feed-forward cuts the tracking error, also with a rounded reference."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+from seal_friction_ros.core.servo.closed_loop import Axis, run_closed_loop, without_feedforward
+from seal_friction_ros.core.servo.motions import RoundedWave, Sine
+from seal_friction_ros.core.servo.position_servo import ServoParameters
+from seal_friction_ros.core.servo.sensors import SensorSettings
+from seal_friction_ros.core.servo.tracking import reversals, tracking_rms
+from seal_friction_ros.files import default_configuration, read_yaml
+
+SIMULATOR = read_yaml(ROOT / 'config/servo_simulator.yaml')['/**']['ros__parameters']
+SENSORS = SensorSettings(**SIMULATOR['sensors'])
+PIPELINE = default_configuration().parameters()
+PERIOD = 1e-3  # [s]
+SERVO = ServoParameters(seals=PIPELINE.estimator.seals, control_period=PERIOD, inner_step=1e-4)
+DELAY = 1e-3  # [s] from a velocity sample to its feed-forward in the controller
+SLOW_TIME = 1.0  # [s]
+SETTLING_TIME, EVALUATED_TIME = 0.4, 0.8  # [s] whole periods
+
+
+class SlowAtFirst(NamedTuple):
+    """A wave after a slow one, at which the conditioned velocity learns the ripple of a rounded reference."""
+
+    wave: Sine
+
+    def at(self, time):
+        return Sine(1e-4, 1.0).at(time) if time < SLOW_TIME else self.wave.at(time - SLOW_TIME)
+
+
+WAVE = SlowAtFirst(Sine(**SIMULATOR['sine']))
+
+
+def evaluated(wave, feedforward):
+    """The last periods of the loop, with the noise of the sensors of the demo."""
+    noise = np.array([SENSORS.pressure_noise] * 2 + [SENSORS.force_noise, SENSORS.velocity_noise])
+    axis = Axis(SERVO, PIPELINE._replace(feedforward=feedforward))
+    samples = round((SLOW_TIME + SETTLING_TIME + EVALUATED_TIME) / PERIOD)
+    errors = noise * np.random.default_rng(SENSORS.seed).standard_normal((samples, 4))
+    run = run_closed_loop(axis, wave, samples, DELAY, errors)
+    return type(run)(*(values[-round(EVALUATED_TIME / PERIOD) :] for values in run))
+
+
+@pytest.mark.parametrize('resolution', [0.0, 1e-6, 5e-6])
+def test_feedforward_cuts_the_tracking_error_by_80_percent_with_a_rounded_reference_too(resolution):
+    wave = RoundedWave(WAVE, resolution, PERIOD) if resolution else WAVE
+    settings = PIPELINE.feedforward
+    without, compensated = (evaluated(wave, given) for given in (without_feedforward(settings), settings))
+    exact = np.array([WAVE.at(time).position for time in without.time])
+    error, remaining = (tracking_rms(exact, run.position) for run in (without, compensated))
+    assert error > 300e-6  # the friction is worth compensating
+    assert remaining < 0.2 * error
+    assert reversals(compensated.feedforward) == 2 * round(WAVE.wave.frequency * EVALUATED_TIME)
