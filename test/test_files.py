@@ -193,9 +193,7 @@ def test_two_seals_without_mounting_are_one_at_each_end_and_others_need_their_ch
     plain, other, rod = seal_file('plain'), seal_file('other'), seal_file('rod', 'a')
     assert mounted_on(SealSelection((plain, other))) == [('plain', 'a'), ('other', 'b')]
     for seals in ((plain,), (plain, plain, other), (plain, rod)):
-        assert f'{plain} has no mounting: give every entry its chamber' in refusal(
-            mounted_on, SealSelection(seals)
-        )
+        assert f'{plain} has no mounting: give every entry its chamber' in refusal(mounted_on, SealSelection(seals))
 
 
 def test_a_file_named_more_often_than_it_has_chambers_is_refused(seal_file):

@@ -27,6 +27,7 @@ from seal_friction_ros.offline.commands import (
     tune,
 )
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.packages import as_missing, needed
 
 GROUPS = {
     'replay': (info, replay, compare, recover, report, import_data),
@@ -69,16 +70,21 @@ def _entry(name: str, parser: argparse.ArgumentParser) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; return its exit code."""
     parser = make_parser()
-    if '_ARGCOMPLETE' in os.environ:  # a shell asks for completions
-        from argcomplete import autocomplete
-
-        autocomplete(parser)
-    parsed = parser.parse_args(arguments)
     try:
+        if '_ARGCOMPLETE' in os.environ:  # a shell asks for completions
+            needed('argcomplete').autocomplete(parser)
+        parsed = parser.parse_args(arguments)
         with cli.checked(parsed):
+            cli.check_packages(parsed)
             return int(parsed.run(parsed))
     except BrokenPipeError:
         raise
+    except ModuleNotFoundError as error:
+        missing = as_missing(error)
+        if missing is error:
+            raise
+        cli.print_error(str(missing))
+        return cli.UNUSABLE
     except (ValueError, OSError) as error:
         from seal_friction_ros.offline.work.executor import error_text
 

@@ -14,7 +14,6 @@ import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 
@@ -120,8 +119,8 @@ def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:
     place: dict[str, Any] = {'loc': 'lower right', 'bbox_to_anchor': (1.0, 1.0), 'borderaxespad': 0.2}
     spacing: dict[str, Any] = {'ncols': 6, 'columnspacing': 1.2, 'handlelength': 1.6, 'handletextpad': 0.5}
     legend = ax.legend(handles[chosen], labels[chosen], **place, **spacing)
-    for handle in legend.legend_handles:
-        if isinstance(handle, Line2D) and handle.get_linestyle() == 'None':
+    for handle in legend.get_lines():
+        if handle.get_linestyle() == 'None':
             handle.set_alpha(1.0)
 
 
