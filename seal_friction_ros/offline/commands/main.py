@@ -13,6 +13,7 @@ import textwrap
 from seal_friction_ros.offline.commands import (
     charts,
     compare,
+    doctor,
     ehl,
     identify,
     import_data,
@@ -34,6 +35,7 @@ GROUPS = {
     'identify': (identify, sheet, spool, charts),
     'tune': (tune, servo),
     'compute': (oring, ehl),
+    'machine': (doctor,),
 }
 
 # Before numpy is loaded: the last bits of a sum depend on the number of threads, and the long, narrow matrices of a fit
