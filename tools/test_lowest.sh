@@ -12,8 +12,9 @@ if [ "$(cat "$environment/.done" 2>/dev/null)" != "$sum" ]; then
     "$python" -m venv "$environment"
     "$environment/bin/python" -m pip install --quiet --disable-pip-version-check -r requirements/lowest.txt
     packages=$("$environment/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
-    messages=$(.venv/bin/python -c 'import pathlib, seal_friction_msgs as m; print(pathlib.Path(m.__file__).parent)')
-    ln -s "$messages" "$packages/seal_friction_msgs"
+    for name in seal_friction_msgs std_msgs builtin_interfaces; do
+        ln -s "$(.venv/bin/python -c "import pathlib, $name as m; print(pathlib.Path(m.__file__).parent)")" "$packages/$name"
+    done
     echo "$sum" >"$environment/.done"
 fi
 [ $# -gt 0 ] || set -- test/core test/offline

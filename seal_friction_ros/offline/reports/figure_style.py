@@ -20,6 +20,7 @@ from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntA
 BLACK, GREY, LIGHT_GREY = '#1a1a1a', '#7f7f7f', '#d9d9d9'
 BLUE, SKY, ORANGE, VERMILLION, GREEN, PURPLE = '#0072b2', '#56b4e9', '#e69f00', '#d55e00', '#009e73', '#cc79a7'
 WIDTH = 8.6  # [inch]
+_LEGEND_HEIGHT = 0.3  # [inch]
 COLUMNS = 1200  # of pixels across a figure
 _STYLE = {
     'axes.axisbelow': True,
@@ -111,6 +112,15 @@ def label_panels(axes: Sequence[Axes], xlabel: str, ylabel: str, columns: int = 
         ax.tick_params(labelbottom=True)
     for ax in axes[::columns]:
         ax.set_ylabel(ylabel)
+
+
+def legend_below(figure: Figure, ax: Axes, columns: int) -> None:
+    """Legend of the artists of ``ax`` in one row below all axes of a figure of `new_figure`."""
+    share = _LEGEND_HEIGHT / figure.get_figheight()
+    engine: Any = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(rect=(0.0, share, 1.0, 1.0 - share))
+    figure.legend(*ax.get_legend_handles_labels(), loc='lower right', ncols=columns)
 
 
 def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:
