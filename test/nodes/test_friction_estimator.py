@@ -319,7 +319,7 @@ def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Pat
     assert replay(tmp_path / 'bag').identical
 
 
-def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path):
+def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path, capfd):
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'precious').write_text('data')
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
@@ -327,6 +327,8 @@ def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path):
         assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
         assert g.spin_until(lambda: 'exists already' in g.probe.values('recorder').get('message', ''))
         assert g.probe.values('recorder')['level'] == '2'
+        assert g.spin_until(lambda: len(g.probe.diagnostics) > 2)
+        assert capfd.readouterr().err.count('exists already') == 1  # once in the log, not once a second
     assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['precious']
 
 
