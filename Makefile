@@ -1,10 +1,11 @@
 # make demo    set up, then play real friction readings through the live node, verify, report
 # make test    set up, then lint, types and tests
+# make test-lowest  core and offline with the lowest versions of all packages
 # make setup   only set up .venv
 # make bench   figures of speed
 # make figures the figures in docs/figures
 
-.PHONY: demo test setup bench figures clean
+.PHONY: demo test test-lowest setup bench figures clean
 .DEFAULT_GOAL := demo
 
 python := .venv/bin/python
@@ -26,6 +27,9 @@ test:
 	$(python) -m mypy
 	$(python) -m pytest --numprocesses auto --dist worksteal test/core test/offline
 	$(python) -m pytest --numprocesses auto --dist worksteal --ignore test/core --ignore test/offline
+
+test-lowest: setup
+	@tools/test_lowest.sh
 
 bench: setup
 	@$(python) bench/step.py

@@ -28,6 +28,7 @@ setup(
         shared('config/oring', '*.yaml'),
         shared('config/ehl', '*.yaml'),
         shared('data/thesis', '*.csv'),
+        shared('launch', '*.launch.py'),
     ],
     package_data={NAME: ['py.typed'], f'{NAME}.offline.reports': ['templates/*.html']},
     python_requires='>=3.11',

@@ -2,7 +2,7 @@
 
 A synthetic log of a cylinder (pressure, force sum and velocity at 1 kHz) is imported, replayed, identified from and
 reported on, in sizes a factor of ten apart, each in a process of its own. Beside them the same bag is merely decoded,
-with ``rosbags`` and with ``mcap-ros2-support`` where that is installed. Times are those of the processor, so that
+with ``rosbags`` and with ``mcap-ros2-support`` where they are installed. Times are those of the processor, so that
 others on the machine count less; what is loaded and compiled first has a row of its own. The exponent is the slope of
 log time over log size, here from the two largest sizes. Memory is the most that the one process of a task ever held:
 `replay --workers N` has N such processes. The last row replays eight bags by one process and by two, in time on the
@@ -152,6 +152,8 @@ TASKS: dict[str, Callable[[], Callable[[Path], object]]] = {
     'decoded by mcap-ros2-support': _mcap_ros2,
 }
 """Name -> what makes ready and gives the task."""
+OTHER_READERS = {'decoded by rosbags': 'rosbags', 'decoded by mcap-ros2-support': 'mcap_ros2'}
+"""Task -> module that it needs."""
 
 
 def run_task(name: str, folder: Path) -> dict[str, float]:
@@ -202,7 +204,7 @@ def measure(largest: int, names: list[str], folder: Path) -> dict[str, Any]:
             write_log(place / 'log.csv', samples)
             (place / 'rig.yaml').write_text(RIG)
             for task in names:
-                if task != 'decoded by mcap-ros2-support' or find_spec('mcap_ros2'):
+                if find_spec(OTHER_READERS.get(task, 'sys')):
                     tasks[task][samples] = timed(task, place)
             if samples == min(sizes[-1], 1_000_000) and set(names) == set(TASKS):
                 workers = measure_workers(place / 'bag')
@@ -234,8 +236,8 @@ def show(figures: dict[str, Any]) -> None:
         cells = [f'{value:.3g}' if value is not None else '-' for value in times]
         table.add_row(task, *cells, f'{row["exponent"]:.2f}', f'{row["ready [s]"]:.2f}', f'{row["memory [MB]"]:.0f}')
     Console().print(table)
-    if not find_spec('mcap_ros2'):
-        print('mcap-ros2-support is not installed, so its row is empty: make test installs it')
+    if not all(map(find_spec, OTHER_READERS.values())):
+        print('rosbags or mcap-ros2-support is not installed, so its row is empty: make test installs both')
     if figures['workers [s]']:
         one, two, ratio = figures['workers [s]'].values()
         print(

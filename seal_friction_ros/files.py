@@ -9,7 +9,13 @@ from typing import Any
 import yaml
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
-from seal_friction_ros.core.estimation.configuration import MOUNTING, Configuration, SealSelection, mounted
+from seal_friction_ros.core.estimation.configuration import (
+    MOUNTING,
+    Configuration,
+    SealSelection,
+    mounted,
+    names_chamber,
+)
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import (
@@ -135,6 +141,9 @@ def load_configuration(
     Raises:
         ValueError: A seal file cannot be read or is invalid; one line that names file, field, value and bound.
     """
+    twice = [name for name in selection.seals if names_chamber(name)]  # without seal_chambers they have been split
+    if twice:
+        raise ValueError(f'seals has {twice[0]} and seal_chambers is given: set seal_chambers to [mounting]')
     paths = [config_path('seals', name) for name in selection.seals]
     documents = [read_yaml(path) for path in paths]
     try:

@@ -183,16 +183,23 @@ def test_seals_are_mounted_as_their_files_say_unless_chambers_are_given(seal_fil
     assert mounted_on(SealSelection((rod,), ('ambient',))) == [('rod', 'ambient')]
 
 
+def test_a_chamber_that_is_given_twice_is_refused(seal_file):
+    rod = seal_file('rod', 'a')
+    assert mounted_on(SealSelection((f'{rod}@b', f'{rod}@ambient'))) == [('rod', 'b'), ('rod', 'ambient')]
+    expected = f'seals has {rod}@a and seal_chambers is given: set seal_chambers to [mounting]'
+    assert refusal(mounted_on, SealSelection((f'{rod}@a',), ('b',))) == expected
+
+
 def test_two_seals_without_mounting_are_one_at_each_end_and_others_need_their_chambers(seal_file):
     plain, other, rod = seal_file('plain'), seal_file('other'), seal_file('rod', 'a')
     assert mounted_on(SealSelection((plain, other))) == [('plain', 'a'), ('other', 'b')]
     for seals in ((plain,), (plain, plain, other), (plain, rod)):
-        assert f'{plain} has no mounting: give seal_chambers' in refusal(mounted_on, SealSelection(seals))
+        assert f'{plain} has no mounting: give every entry its chamber' in refusal(mounted_on, SealSelection(seals))
 
 
 def test_a_file_named_more_often_than_it_has_chambers_is_refused(seal_file):
     rod = seal_file('rod', 'a')
-    expected = f'seals has {rod} 2 times but its mounting has 1 chambers: name it once, or give seal_chambers'
+    expected = f'seals has {rod} 2 times but its mounting has 1 chambers: name it once, or give every entry'
     assert expected in refusal(mounted_on, SealSelection((rod, rod)))
 
 
@@ -225,7 +232,8 @@ def test_a_replay_with_a_seal_file_has_as_many_seals_as_the_file_says(seal_file,
     assert replayed(one) == ('a',)
     assert replayed(plain) == ('a', 'b')
     assert replayed(one, 'seals: [x, x, x]') == ('a',)
-    assert replayed(one, 'seals: [x, x], seal_chambers: [b, ambient]') == ('b', 'ambient')
+    for text in ('seals: [x, x], seal_chambers: [b, ambient]', 'seals: [x@b, x@ambient]'):
+        assert replayed(one, text) == ('b', 'ambient')
 
 
 @pytest.mark.parametrize(
@@ -369,6 +377,8 @@ def test_a_file_that_is_not_a_parameter_file_is_rejected(written, content):
         ('{use_stiction: 1}', 'use_stiction = 1 is not true or false'),
         ('{seals: ms28775_114}', "seals = 'ms28775_114' is not a list"),
         ('{seals: [x], seal_chambers: [a, b]}', 'has 2 entries but there are 1 seals'),
+        ('{seals: [x@a, y]}', 'give every seal its chamber (NAME@CHAMBER), or none'),
+        ('{seals: [x@top]}', "'top' is not a, b, difference or ambient"),
         ('{realtime_priority: 100}', 'StartOptions.realtime_priority = 100  is above its upper bound 99'),
         ('{record_split_size: 5}', 'record_split_size = 5 makes too many files'),
         ('{refuse_second_publisher: 1}', 'refuse_second_publisher = 1 is not true or false'),

@@ -60,7 +60,7 @@ def inputs(folder: Path) -> Iterator[tuple[Path, float, dict[str, object]]]:
     """Bags to play, made from measurements, with the rate and the parameters of the estimator for each."""
     import_thesis(folder / 'pull_test')
     yield folder / 'pull_test', PULL_TEST_RATE, {'seals': ['ms28775_114', 'ms28775_114']}
-    rig = {'seals': [str(config_path('seals', 'delft_o_ring'))], 'seal_chambers': ['a']}
+    rig = {'seals': [f'{config_path("seals", "delft_o_ring")}@a']}
     for log in sorted(RIG_LOGS.glob('O-ring*.csv')):
         import_log(log, config_path('rigs', 'delft'), folder / log.stem)
         yield folder / log.stem, RIG_RATE, rig

@@ -4,12 +4,18 @@ Before, the interpreter itself starts for some 50 ms, in which SIGINT ends it wi
 """
 
 import signal
-from importlib import import_module
+import sys
+
+from seal_friction_ros.packages import MissingPackageError, needed
 
 
 def _run(module: str) -> int:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    return int(import_module(f'seal_friction_ros.nodes.{module}').main())
+    try:
+        return int(needed(f'seal_friction_ros.nodes.{module}').main())
+    except MissingPackageError as error:
+        print(f'{module}: {error}', file=sys.stderr)
+        return 2
 
 
 def friction_estimator() -> int:

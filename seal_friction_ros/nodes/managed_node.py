@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX, StartOptions
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.files import unknown_parameters
-from seal_friction_ros.nodes.parameters import declare, read
+from seal_friction_ros.nodes.parameters import declare, numbers, read, with_declared_type
 from seal_friction_ros.nodes.realtime import take_realtime_priority
 
 Record = TypeVar('Record')
@@ -61,6 +61,8 @@ class ManagedNode(LifecycleNode):
             raise ValueError(unknown_parameters(name, unknown))
         if unknown:
             self.get_logger().warning(f'ignored: {unknown_parameters(name, unknown)}')
+        floats = {name for group in groups for name in numbers(group)}
+        self.add_pre_set_parameters_callback(lambda changes: [with_declared_type(p, floats) for p in changes])
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.add_post_set_parameters_callback(self._on_parameters_set)
 

@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from seal_friction_ros.core.foundation.parameters import Meaning, ParameterGroup, meanings
 
@@ -13,7 +14,7 @@ Record = TypeVar('Record')
 
 
 def declare(node: Node, group: ParameterGroup) -> None:
-    """Declare the parameters of a group.
+    """Declare the parameters of a group; a number may be given as a whole number.
 
     Raises:
         rclpy.exceptions.ParameterException: An override has the wrong type or is out of bounds.
@@ -23,7 +24,29 @@ def declare(node: Node, group: ParameterGroup) -> None:
     for name, field in group.names().items():
         default = defaults[field]
         value = list(default) if isinstance(default, tuple) else default
-        node.declare_parameter(name, value, _descriptor(described[field], default, name not in fixed))
+        descriptor = _descriptor(described[field], default, name not in fixed)
+        given = getattr(node, '_parameter_overrides', {}).get(name)
+        taken = given and with_declared_type(given, numbers(group))
+        if taken is given:
+            node.declare_parameter(name, value, descriptor)
+        else:
+            node.declare_parameter(name, taken.value, descriptor, ignore_override=True)
+
+
+def numbers(group: ParameterGroup) -> set[str]:
+    """Parameters of a group that are floating-point numbers."""
+    defaults = {field.name: field.default for field in dataclasses.fields(group.record_type)}
+    return {name for name, field in group.names().items() if isinstance(defaults[field], float)}
+
+
+def with_declared_type(parameter: Parameter, numbers: set[str]) -> Parameter:
+    """The parameter, a whole number as a floating-point number if it is one of ``numbers``.
+
+    ROS refuses ``ros2 param set NODE feedforward.force_limit 0`` otherwise, since 0 is an integer in YAML.
+    """
+    if parameter.name in numbers and parameter.type_ == Parameter.Type.INTEGER:
+        return Parameter(parameter.name, Parameter.Type.DOUBLE, float(parameter.value))
+    return parameter
 
 
 def read(node: Node, record_type: type[Record], prefix: str = '', **changed: Any) -> Record:

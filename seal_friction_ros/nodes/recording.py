@@ -45,8 +45,8 @@ class Recording:
                 owner=self._owner,
             )
         except (ValueError, RuntimeError) as error:
-            self.failure = str(error)
-            raise BagError(f'record_directory = {directory!r}, record_name = {name!r}: {error}') from None
+            self.failure = f'record_directory = {directory!r}, record_name = {name!r}: {error}'
+            raise BagError(self.failure) from None
         self.failure = ''
         if self._recorder.error:
             raise BagError(self._recorder.error)

@@ -15,6 +15,7 @@ from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, INPUTS, REFERENCE_TYPE, decode, encode
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, measured_force_sum, one_correction
 from seal_friction_ros.core.servo.controller import Limited
 from seal_friction_ros.core.servo.motions import PullTest, RoundedWave, Setpoint, Wave
@@ -55,6 +56,8 @@ class ServoSimulator(ManagedNode):
     def make(self) -> None:
         """Create and compile the servo; create publishers and subscriptions."""
         self._settings = self.settings(SimulatorSettings)
+        if not has_compiler():
+            self.get_logger().warning('numba is not installed: the simulation is slow; apt-get install python3-numba')
         self._period = round(_SECOND / self._settings.rate)
         self._make_servo()
         for topic in _OUTPUTS:

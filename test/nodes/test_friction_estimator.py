@@ -13,7 +13,9 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from paths import ROOT
 from rcl_interfaces.msg import Parameter, ParameterValue
-from rcl_interfaces.srv import DescribeParameters, SetParametersAtomically
+from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.parameter import Parameter as RclpyParameter
 from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
@@ -29,7 +31,7 @@ from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.replay.replay import replay
 
 SECOND = 10**9  # [ns]
-DOUBLE, STRING_ARRAY = 3, 9  # rcl_interfaces/ParameterType
+INTEGER, DOUBLE, STRING_ARRAY = 2, 3, 9  # rcl_interfaces/ParameterType
 
 
 def double(name: str, value: float) -> Parameter:
@@ -212,6 +214,9 @@ def test_parameters_carry_unit_bounds_and_description():
     [
         ({'pressure_timeout': -1.0}, ['pressure_timeout', '-1.0', '0.001']),
         ({'pressure_timeout': 'soon'}, ['pressure_timeout', 'soon']),
+        ({'pressure_timeout': 2}, ['pressure_timeout', '2.0', '1.0']),
+        ({'use_stiction': 1}, ['use_stiction', '1']),
+        ({'record_split_size': 1e7}, ['record_split_size', '10000000.0']),
     ],
 )
 def test_an_invalid_parameter_override_prevents_the_start(parameters: dict[str, object], words: list[str]):
@@ -219,6 +224,37 @@ def test_an_invalid_parameter_override_prevents_the_start(parameters: dict[str, 
         pass
     assert [word for word in words if word not in str(error.value)] == []
     assert '\n' not in str(error.value)
+
+
+def test_a_whole_number_is_a_number_at_the_start_and_while_running():
+    """``ros2 param set /friction_estimator feedforward.force_limit 0`` takes the force out."""
+    with graph({'force_max': 500}) as g:
+        assert g.estimator.get_parameter('force_max').value == 500.0
+        whole = ParameterValue(type=INTEGER, integer_value=0)
+        changes = [Parameter(name='feedforward.force_limit', value=whole)]
+        for kind, name in ((SetParameters, 'set_parameters'), (SetParametersAtomically, 'set_parameters_atomically')):
+            assert g.estimator.set_parameters([RclpyParameter('feedforward.force_limit', value=9.0)])[0].successful
+            response = g.call(kind, f'friction_estimator/{name}', kind.Request(parameters=changes))
+            assert 'successful=True' in str(response)
+            found = g.estimator.get_parameter('feedforward.force_limit')
+            assert (found.value, found.type_) == (0.0, RclpyParameter.Type.DOUBLE)
+        assert g.spin_until(lambda: json.loads(g.probe.configurations[-1].json)['feedforward']['force_limit'] == 0.0)
+        refused = g.estimator.set_parameters([RclpyParameter('record_split_size', value=1e7)])[0]
+        assert not refused.successful  # a whole number stays one
+
+
+def test_the_seals_change_by_single_parameters_while_the_node_is_unconfigured():
+    with graph(autostart=False) as g:
+        for seals, mounted in (
+            (['ms28775_114@a'], [('ms28775_114', 'a')]),
+            (['delft_o_ring@b', 'ms28775_114@difference'], [('delft_o_ring', 'b'), ('ms28775_114', 'difference')]),
+            (['ms28775_114', 'ms28775_114'], [('ms28775_114', 'a'), ('ms28775_114', 'b')]),
+        ):
+            assert g.estimator.set_parameters([RclpyParameter('seals', value=seals)])[0].successful
+            assert g.estimator.trigger_configure() == TransitionCallbackReturn.SUCCESS
+            selection = g.estimator._configuration.selection
+            assert list(zip(selection.seals, selection.seal_chambers, strict=True)) == mounted
+            assert g.estimator.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
 
 
 def test_an_unknown_parameter_is_logged_with_a_suggestion(capfd):
@@ -299,7 +335,7 @@ def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Pat
     assert replay(tmp_path / 'bag').identical
 
 
-def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path):
+def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path, capfd):
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'precious').write_text('data')
     with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
@@ -307,6 +343,8 @@ def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path):
         assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
         assert g.spin_until(lambda: 'exists already' in g.probe.values('recorder').get('message', ''))
         assert g.probe.values('recorder')['level'] == '2'
+        assert g.spin_until(lambda: len(g.probe.diagnostics) > 2)
+        assert capfd.readouterr().err.count('exists already') == 1  # once in the log, not once a second
     assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['precious']
 
 

@@ -27,7 +27,7 @@ PLACEHOLDER_WARNING = (
     'the parameter seals'
 )
 MOUNTING = ('mounting',)
-"""Value of `SealSelection.seal_chambers`: the chambers are those of the seal files."""
+"""Value of `SealSelection.seal_chambers`: the chambers are those in ``seals``, or else of the seal files."""
 _USUAL_CHAMBERS = ('a', 'b')  # of two seals whose files do not tell: one at each end of the cylinder (our choice)
 _DEFAULT_OF_VERSION_1 = ('ms28775_114', 'ms28775_114')
 
@@ -36,21 +36,25 @@ _DEFAULT_OF_VERSION_1 = ('ms28775_114', 'ms28775_114')
 class SealSelection:
     """Which seals the actuator has, one ROS parameter per field.
 
+    ``NAME@CHAMBER`` in ``seals`` is split: the record has the names in ``seals`` and the chambers in ``seal_chambers``.
+
     Raises:
-        ValueError: There are not as many chambers as seals, or none, or a chamber is not known.
+        ValueError: There are not as many chambers as seals, or none, or a chamber is not known, or only some of the
+            seals have one.
     """
 
     seals: tuple[str, ...] = parameter(
         (PLACEHOLDER, PLACEHOLDER),
         unit='',
         live=False,
-        description='Seal file of each seal: a path, or the name of one in config/seals.',
+        description='Seal file of each seal: a path, or the name of one in config/seals. NAME@CHAMBER names the '
+        f'chamber that it sees, too: {CHAMBERS_TEXT}. Without: as the seal file says.',
     )
     seal_chambers: tuple[str, ...] = parameter(
         MOUNTING,
         unit='',
         live=False,
-        description=f'Chamber whose pressure each seal sees: {CHAMBERS_TEXT}; [mounting]: as the seal files say.',
+        description='Earlier form of NAME@CHAMBER: the chamber of each seal. [mounting]: not used.',
     )
 
     def __post_init__(self) -> None:
@@ -58,13 +62,29 @@ class SealSelection:
         if not self.seals:
             raise ValueError('SealSelection.seals is empty: name at least one seal')
         if self.seal_chambers == MOUNTING:
-            return
+            if not any(map(names_chamber, self.seals)):
+                return
+            names, _, chambers = zip(*(seal.rpartition('@') for seal in self.seals), strict=True)
+            if not all(map(names_chamber, self.seals)):
+                raise ValueError(
+                    f'SealSelection.seals = {list(self.seals)}: give every seal its chamber (NAME@CHAMBER), or none'
+                )
+            check_chambers('SealSelection.seals', chambers)
+            object.__setattr__(self, 'seals', names)
+            object.__setattr__(self, 'seal_chambers', chambers)
         if len(self.seals) != len(self.seal_chambers):
             raise ValueError(
                 f'SealSelection.seal_chambers = {list(self.seal_chambers)} has {len(self.seal_chambers)} entries '
-                f'but there are {len(self.seals)} seals: give one chamber a seal'
+                f'but there are {len(self.seals)} seals: give one chamber a seal, or set it to [mounting] and write '
+                'the chambers in seals: NAME@CHAMBER'
             )
         check_chambers('SealSelection.seal_chambers', self.seal_chambers)
+
+
+def names_chamber(seal: str) -> bool:
+    """Whether an entry of ``seals`` ends in ``@CHAMBER``, known or not; a path may have an @ in its folders or name."""
+    name, _, chamber = seal.rpartition('@')
+    return bool(name) and chamber.isidentifier()
 
 
 def mounted(
@@ -93,11 +113,11 @@ def mounted(
     seals: list[tuple[str, str]] = []
     for name, mounting in mountings.items():
         if mounting is None:
-            raise ValueError(f'{name} has no mounting: give seal_chambers with one chamber for each entry of seals')
+            raise ValueError(f'{name} has no mounting: give every entry its chamber (NAME@CHAMBER)')
         if named[name] not in (1, len(mounting.chambers)):
             raise ValueError(
                 f'seals has {name} {named[name]} times but its mounting has {len(mounting.chambers)} chambers: name it '
-                'once, or give seal_chambers'
+                'once, or give every entry its chamber (NAME@CHAMBER)'
             )
         seals += [(name, chamber) for chamber in mounting.chambers]
     names, chambers = zip(*seals, strict=True)

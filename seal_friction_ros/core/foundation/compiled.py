@@ -9,7 +9,8 @@ calls it, `unrolled` loops over records of different types, and `for_compiler` c
 
 numba is imported where it is used: it takes half a second, and the live node does without.
 
-With ``NUMBA_DISABLE_JIT=1`` in the environment everything runs as plain Python and gives the same numbers.
+With ``NUMBA_DISABLE_JIT=1`` in the environment, or without numba, everything runs as plain Python and gives the same
+numbers.
 """
 
 import dataclasses
@@ -30,6 +31,16 @@ _compilable: list[Callable[..., Any]] = []
 _waiting: list[Callable[..., Any]] = []  # compilable functions that the compiler does not know yet
 
 
+@cache
+def has_compiler() -> bool:
+    """Whether numba is installed; loads it."""
+    try:
+        import numba  # noqa: F401
+    except ModuleNotFoundError:
+        return False
+    return True
+
+
 def compilable(function: Function) -> Function:
     """Decorator: ``function`` uses numbers and named tuples of numbers only, so it can be compiled as it stands.
 
@@ -47,6 +58,8 @@ def compiled(function: Function) -> Function:
     ``NUMBA_CACHE_DIR`` names a folder for it. Use another folder after every change of the sources, as the tests do:
     numba compares the file of a function, not the files of the functions it calls.
     """
+    if not has_compiler():
+        return function
     import numba
 
     make_known()
@@ -193,6 +206,8 @@ def __getattr__(name: str) -> Any:
 
 @cache
 def _runs_as_python() -> bool:
+    if not has_compiler():
+        return True
     import numba
 
     config: Any = numba.config

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
@@ -148,7 +149,7 @@ def memory_length(case: LubricationCase) -> MemoryLength:
     course = np.array([_friction(model, state, fast)[0] for state in (slow, *states)])
     end = _friction(model, steady, fast)[0]
     over = (course - end) / (course[0] - end)
-    return MemoryLength(float(np.trapezoid(over) * step * fast), first + second + third)
+    return MemoryLength(float(trapezoid(over) * step * fast), first + second + third)
 
 
 def friction_map(case: LubricationCase, rows: list[SteadyFriction], memory: float) -> FrictionMap:

@@ -6,6 +6,8 @@ memory is bounded, and no file outside the bag is opened.
 """
 
 import errno
+import json
+import os
 import re
 import shutil
 import sqlite3
@@ -20,9 +22,6 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 import yaml
-import zstandard
-from mcap.exceptions import McapError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, PACKAGE
 from seal_friction_ros.files import parse_yaml, read_yaml, share_directory
@@ -67,24 +66,53 @@ def timed_name(name: str) -> str:
 
 @cache
 def message_definition(type_name: str) -> tuple[str, str]:
-    """Full text of a message definition (comments included) and its RIHS01 hash."""
-    store = get_typestore(Stores.ROS2_JAZZY)
+    """Full text of the definition of an installed message type, and its RIHS01 hash.
+
+    The text of a message of this project has its comments, with the units.
+
+    Raises:
+        BagError: The type is not installed.
+    """
+    try:
+        description = json.loads(_definition_file(type_name, '.json').read_text())
+        hashes = {entry['type_name']: entry['hash_string'] for entry in description['type_hashes']}
+        described = description['type_description_msg']
+        fields = {part['type_name']: part['fields'] for part in described['referenced_type_descriptions']}
+        used: list[str] = []
+        _collect(described['type_description']['fields'], fields, used)
+        parts = [_definition_text(type_name)]
+        for name in used:
+            package, _, stem = name.split('/')
+            parts.append(f'MSG: {package}/{stem}\n{_definition_text(name)}')
+    except (OSError, ValueError, LookupError) as error:
+        raise BagError(
+            f'{type_name} is not installed: run make setup, or source the colcon workspace: {error}'
+        ) from None
+    return ('=' * 80 + '\n').join(parts), hashes[type_name]
+
+
+def _collect(fields: Any, known: Mapping[str, Any], used: list[str]) -> None:
+    """Append the types of fields, and those of their fields, in order."""
+    for name in (field['type']['nested_type_name'] for field in fields):
+        if name and name not in used:
+            used.append(name)
+            _collect(known[name], known, used)
+
+
+def _definition_text(type_name: str) -> str:
+    text = _definition_file(type_name, '.msg').read_text()
+    if type_name.startswith(PACKAGE):
+        return text
+    lines = (line.partition('#')[0].rstrip() for line in text.splitlines())
+    return ''.join(f'{line}\n' for line in lines if line)
+
+
+def _definition_file(type_name: str, suffix: str) -> Path:
     package, _, name = type_name.split('/')
-    if package != PACKAGE:
-        return store.generate_msgdef(type_name, ros_version=2)[0], store.hash_rihs01(type_name)
-    text = (_message_share() / 'msg' / f'{name}.msg').read_text()
-    store.register(get_types_from_msg(text, type_name))
-    generated, _ = store.generate_msgdef(type_name, ros_version=2)
-    separator = '=' * 80 + '\n'
-    dependencies = generated.split(separator)[1:]
-    return separator.join([text, *dependencies]), store.hash_rihs01(type_name)
-
-
-def _message_share() -> Path:
-    spec = find_spec(PACKAGE)
+    spec = find_spec(package)
     if spec is None or spec.origin is None:
-        raise BagError(f'{PACKAGE} is not installed: run make setup, or source the colcon workspace')
-    return share_directory(PACKAGE, spec.origin)
+        raise ValueError(f'no package {package}')
+    return share_directory(package, spec.origin) / 'msg' / f'{name}{suffix}'
 
 
 @cache
@@ -310,7 +338,7 @@ class BagWriter:
             'compression_mode': '',
             'files': [{'path': name, **_span_information(span)} for name, span in files],
             'custom_data': self._custom_data or None,
-            'ros_distro': 'rosbags',
+            'ros_distro': os.environ.get('ROS_DISTRO', 'unknown'),
         }
 
     def _write_metadata(self) -> None:
@@ -392,13 +420,17 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
                 yield BagMessage(*message)
 
 
+_Messages = Callable[[Path], Iterator[tuple[str, str, int, bytes]]]
+_Topics = Callable[[Path], Iterable[tuple[str, str, int]]]
+
+
 class Storage(NamedTuple):
     """Files of a bag, and the functions that read one of them."""
 
     files: tuple[Path, ...]
-    read: Callable[[Path], Iterator[tuple[str, str, int, bytes]]]
+    read: _Messages
     """topic, message type, log time [ns] and bytes of each message, in order of log time"""
-    list_topics: Callable[[Path], Iterable[tuple[str, str, int]]]
+    list_topics: _Topics
     """name, message type and number of messages of each topic; a name may come several times"""
 
     @property
@@ -446,7 +478,7 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
         yield
     except BagError:
         raise
-    except (McapError, OSError, ValueError, struct.error, sqlite3.Error, zstandard.ZstdError) as error:
+    except (OSError, ValueError, struct.error, sqlite3.Error) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise BagError(f'{path}: not a readable bag: {reason}') from None
 
@@ -461,7 +493,11 @@ def storage(path: Path) -> Storage:
         if not path.is_dir():
             if not path.is_file():
                 raise ValueError('no such file' if not path.exists() else 'neither a file nor a folder')
-            return Storage((path,), *_READERS['sqlite3' if path.suffix == '.db3' else 'mcap'])
+            packed = path.suffix == '.zstd'
+            functions = _READERS[
+                'sqlite3' if path.with_suffix('' if packed else path.suffix).suffix == '.db3' else 'mcap'
+            ]
+            return Storage((path,), *(_of_packed_files(*functions) if packed else functions))
         metadata = path / 'metadata.yaml'
         if not metadata.is_file():
             raise BagError(f'{path}: not a rosbag2 bag: no metadata.yaml in it')
@@ -474,20 +510,38 @@ def storage(path: Path) -> Storage:
             raise ValueError('metadata.yaml: relative_file_paths is not a list of names')
         if kind not in tuple(_READERS):  # it may be anything, also unhashable
             raise ValueError(f'metadata.yaml: storage_identifier = {kind!r} is neither mcap nor sqlite3')
-        mode = str(information.get('compression_mode') or 'none').lower()
-        if mode not in ('none', 'message'):
-            raise ValueError(f'its files are compressed as a whole (compression_mode = {mode!r}): unpack them first')
+        mode, form = (str(information.get(f'compression_{name}') or 'none').lower() for name in ('mode', 'format'))
+        if mode not in ('none', 'message', 'file') or (mode != 'none' and form != 'zstd'):
+            raise ValueError(
+                f'metadata.yaml: compression_mode = {mode!r} by {form!r} is none of message or file by zstd'
+            )
+        messages: _Messages
+        topics: _Topics
         messages, topics = _READERS[kind]
         if mode == 'message':
             messages = partial(_unpacked_messages, messages)
+        if mode == 'file':
+            messages, topics = _of_packed_files(messages, topics)
         return Storage(tuple(_inside(path, name) for name in names), messages, topics)
 
 
-def _unpacked_messages(
-    read: Callable[[Path], Iterator[tuple[str, str, int, bytes]]], file: Path
-) -> Iterator[tuple[str, str, int, bytes]]:
+def _unpacked_messages(read: _Messages, file: Path) -> Iterator[tuple[str, str, int, bytes]]:
     for topic, type_name, log_time, data in read(file):
         yield topic, type_name, log_time, mcap_reader.unpack_zstd(data, mcap_reader.LARGEST_CHUNK)
+
+
+def _of_packed_files(messages: _Messages, topics: _Topics) -> tuple[_Messages, _Topics]:
+    """Readers of files that are compressed as a whole, each unpacked to a temporary file while it is read."""
+
+    def packed_messages(file: Path) -> Iterator[tuple[str, str, int, bytes]]:
+        with mcap_reader.unpacked_file(file) as unpacked:
+            yield from messages(unpacked)
+
+    def packed_topics(file: Path) -> Iterable[tuple[str, str, int]]:
+        with mcap_reader.unpacked_file(file) as unpacked:
+            yield from topics(unpacked)
+
+    return packed_messages, packed_topics
 
 
 def _inside(folder: Path, name: str) -> Path:

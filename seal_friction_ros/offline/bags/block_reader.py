@@ -12,7 +12,6 @@ from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
-from mcap.opcode import Opcode
 
 from seal_friction_ros.core.estimation.compiled_pipeline import (
     MOST_MESSAGES,
@@ -26,6 +25,7 @@ from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.offline.bags import mcap_reader
 from seal_friction_ros.offline.bags.bag import BagMessage, read_messages, storage
 from seal_friction_ros.offline.bags.mcap_reader import Block, Layout
+from seal_friction_ros.offline.bags.mcap_records import Opcode
 
 KindOf = Callable[[str, str], Kind]
 """Topic and message type -> kind of its messages."""

@@ -1,29 +1,29 @@
 """Reader of one untrusted MCAP file: memory is bounded whatever sizes the file claims, and damage is located.
 
 The libraries trust the sizes in a file (a chunk of 1 TB, a kilobyte that unpacks to gigabytes), so this module walks
-over the records itself. The library only parses the records of schemas, channels and statistics.
+over the records itself.
 
 Layout: https://mcap.dev/spec.
 """
 
 import heapq
 import os
+import shutil
 import struct
 import zlib
 from array import array
 from collections.abc import Callable, Iterator, Sequence
-from io import BytesIO
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import BinaryIO, NamedTuple
 
-import lz4.frame
-import zstandard
-from mcap import records
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
+from seal_friction_ros.offline.bags import mcap_records
+from seal_friction_ros.offline.bags.mcap_records import MAGIC, TOO_SHORT, Opcode
+from seal_friction_ros.packages import needed
 
-MAGIC = b'\x89MCAP0\r\n'
+FREE_SPACE = 1 << 30  # [bytes] that stay free on the disk where a file is unpacked (our choice)
+_UNPACKED_AT_ONCE = 1 << 22  # [bytes]
 LARGEST_CHUNK = 1 << 25  # [bytes] packed or unpacked, and of any other record; rosbag2 writes chunks of 0.8 MB
 MOST_AT_ONCE = 2 * LARGEST_CHUNK  # [bytes] of chunks that overlap in time
 _MOST_BLOCKS = 500_000  # 30 GB in chunks of `mcap_writer`
@@ -36,8 +36,7 @@ RECORD = struct.Struct('<BQ')  # opcode, length
 _CHUNK = struct.Struct('<QQQII')  # first and last log time, unpacked size, checksum, length of the compression's name
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log time, publish time
 _SIZE = struct.Struct('<Q')
-_SHORT = 'a record is shorter than what it claims to hold'  # the library gives no reason
-ERRORS = (ValueError, McapError, struct.error, EOFError, RuntimeError, zstandard.ZstdError)  # RuntimeError: of lz4
+ERRORS = (ValueError, struct.error)
 
 
 class Channel(NamedTuple):
@@ -90,7 +89,7 @@ def scan(file: BinaryIO) -> Layout:
     try:
         walk.to_the_end()
     except ERRORS as error:
-        damage = str(error) or _SHORT
+        damage = TOO_SHORT if isinstance(error, struct.error) else str(error)
     walk.finish_bare()
     return Layout(tuple(walk.blocks), walk.names.channels, walk.counts, damage, walk.position)
 
@@ -161,8 +160,7 @@ class _Walk:
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self.names.learn(opcode, self._whole(content, length))
         elif opcode == Opcode.STATISTICS:
-            statistics = records.Statistics.read(_stream(self._whole(content, length)))
-            self.counts = dict(statistics.channel_message_counts)
+            self.counts = mcap_records.parse_message_counts(self._whole(content, length))
         if len(self.blocks) > _MOST_BLOCKS:
             raise ValueError(f'more than {_MOST_BLOCKS} chunks: split the file')
 
@@ -218,15 +216,11 @@ def _too_large(size: int) -> str:
     return f'{size} bytes, at most {LARGEST_CHUNK >> 20} MiB are allowed: write the file again with smaller chunks'
 
 
-def _stream(data: bytes) -> ReadDataStream:
-    return ReadDataStream(BytesIO(data))
-
-
 class Names:
     """Schemas and channels by number."""
 
     def __init__(self, channels: dict[int, Channel] | None = None) -> None:
-        self._schemas: dict[int, records.Schema] = {0: records.Schema(id=0, data=b'', encoding='', name='')}
+        self._schemas = {0: mcap_records.Schema(0, '', '', b'')}
         self._sizes: dict[tuple[int, int], int] = {}
         self._size = 0
         self.channels = dict(channels or {})
@@ -238,20 +232,18 @@ class Names:
             ValueError: It is invalid, or a name in it is too long or not printable.
         """
         if opcode == Opcode.SCHEMA:
-            schema = records.Schema.read(_stream(data))
+            schema = mcap_records.parse_schema(data)
             _check_name('type', schema.name)
-            self._count(opcode, schema.id, len(data))
-            self._schemas[schema.id] = schema
+            self._count(opcode, schema.number, len(data))
+            self._schemas[schema.number] = schema
             return
-        channel = records.Channel.read(_stream(data))
-        _check_name('topic', channel.topic)
-        self._count(opcode, channel.id, len(data))
-        schema = self._schemas.get(channel.schema_id)
-        if schema is None:
-            raise ValueError(f'{channel.topic} has a type without description in the file')
-        self.channels[channel.id] = Channel(
-            channel.topic, schema.name, channel.message_encoding, schema.encoding, schema.data, channel.metadata
-        )
+        number, of_schema, topic, encoding, metadata = mcap_records.parse_channel(data)
+        _check_name('topic', topic)
+        self._count(opcode, number, len(data))
+        known = self._schemas.get(of_schema)
+        if known is None:
+            raise ValueError(f'{topic} has a type without description in the file')
+        self.channels[number] = Channel(topic, known.name, encoding, known.encoding, known.data, dict(metadata))
 
     def _count(self, opcode: int, number: int, size: int) -> None:
         self._size += size - self._sizes.get((opcode, number), 0)
@@ -369,7 +361,7 @@ def _contents(file: BinaryIO, block: Block, names: Names, on_fault: Callable[[Bl
     try:
         return _indexed(unpacked(file, block), block, names)
     except ERRORS as error:
-        reason = str(error) or _SHORT
+        reason = TOO_SHORT if isinstance(error, struct.error) else str(error)
         if on_fault is None:
             raise ValueError(f'chunk at byte {block.offset}: {reason}') from None
         on_fault(block, reason)
@@ -419,18 +411,47 @@ def unpack_zstd(data: bytes, size: int) -> bytes:
     """Unpack at most ``size + 1`` bytes.
 
     Raises:
-        zstandard.ZstdError: The data are no zstd frame, or its window is above `LARGEST_CHUNK`.
+        ValueError: The data are no zstd frame, its window is above `LARGEST_CHUNK`, or the package is not installed.
     """
+    zstandard = needed('zstandard')
     parts, wanted = [], size + 1
-    with zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(data) as reader:
-        while wanted > 0 and (part := reader.read(wanted)):
-            parts.append(part)
-            wanted -= len(part)
+    try:
+        with zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(data) as reader:
+            while wanted > 0 and (part := reader.read(wanted)):
+                parts.append(part)
+                wanted -= len(part)
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from None
     return b''.join(parts)
 
 
+@contextmanager
+def unpacked_file(path: Path) -> Iterator[Path]:
+    """A zstd file unpacked to a temporary file (in the folder TMPDIR), which is removed at the end.
+
+    Raises:
+        ValueError: It is not a zstd file, its window is above `LARGEST_CHUNK`, zstandard is not installed, or unpacking
+            it would leave less than `FREE_SPACE` on the disk.
+    """
+    zstandard = needed('zstandard')
+    with path.open('rb') as packed, NamedTemporaryFile(prefix='seal_friction_', suffix=path.stem) as file:
+        try:
+            reader = zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(packed)
+            while part := reader.read(_UNPACKED_AT_ONCE):
+                if shutil.disk_usage(file.name).free < FREE_SPACE + len(part):
+                    raise ValueError(f'no room to unpack it in {Path(file.name).parent}: set TMPDIR to another folder')
+                file.write(part)
+        except zstandard.ZstdError as error:
+            raise ValueError(str(error)) from None
+        file.flush()
+        yield Path(file.name)
+
+
 def _unpack_lz4(data: bytes, size: int) -> bytes:
-    unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+    try:
+        unpacked: bytes = needed('lz4.frame').LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+    except RuntimeError as error:
+        raise ValueError(str(error)) from None
     return unpacked
 
 

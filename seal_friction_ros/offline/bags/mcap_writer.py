@@ -1,7 +1,7 @@
 """Writer of one MCAP file (profile ``ros2``) that is valid up to its newest chunk at any time, however writing ends.
 
-The file is byte for byte that of the writer of the ``mcap`` library. Messages and their index are packed here, in less
-than half the time, because the estimator waits while Python packs.
+The file is byte for byte that of the writer of the ``mcap`` library, in less than half the time: the estimator waits
+while Python packs.
 """
 
 import errno
@@ -9,26 +9,11 @@ import os
 import struct
 import zlib
 from collections import deque
-from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from mcap.data_stream import RecordBuilder
-from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
-from mcap.writer import MCAP0_MAGIC
+from seal_friction_ros.offline.bags import mcap_records as records
+from seal_friction_ros.offline.bags.mcap_records import MAGIC, Opcode
 
 CHUNK_SIZE = 64 * 1024  # [bytes] small, so that the writing thread blocks briefly; the file does not get larger
 FILE_MODE = 0o640  # of the files of a bag, less what the umask of the process forbids
@@ -88,7 +73,7 @@ class _Chunk:
             self.first_time = log_time
         self.last_time = log_time
 
-    def records(self, start: int) -> tuple[bytes, ChunkIndex]:
+    def packed(self, start: int) -> tuple[bytes, bytes]:
         """Bytes of the chunk written at offset ``start``, and its entry in the summary."""
         size, first, last = len(self.data), self.first_time, self.last_time
         length = _CHUNK.size - _OPCODE_AND_LENGTH + size
@@ -98,7 +83,8 @@ class _Chunk:
             offsets[channel] = start + len(chunk) + len(indices)
             packed = struct.pack(f'<{len(entries)}Q', *entries)
             indices += _MESSAGE_INDEX.pack(Opcode.MESSAGE_INDEX, 6 + len(packed), channel, len(packed)) + packed
-        return chunk + indices, ChunkIndex(len(chunk), start, '', size, last, len(indices), offsets, first, size)
+        entry = records.ChunkIndex(first, last, start, len(chunk), offsets, len(indices), size)
+        return chunk + indices, records.chunk_index(entry)
 
 
 class McapOutput:
@@ -118,15 +104,16 @@ class McapOutput:
         """topic and type -> messages"""
         self._stream = _Stream(path)
         try:
-            self._stream.write(MCAP0_MAGIC + _packed(Header('ros2', 'seal_friction_ros')))
+            self._stream.write(MAGIC + records.header('ros2', 'seal_friction_ros'))
         except OSError:
             self._stream.close()
             path.unlink(missing_ok=True)
             raise
-        self._channels: dict[tuple[str, str], Channel] = {}
-        self._schemas: list[Schema] = []
+        self._numbers: dict[tuple[str, str], int] = {}  # topic and type -> channel
+        self._schemas: list[bytes] = []
+        self._channels: list[bytes] = []
         self._chunk = _Chunk()
-        self._chunks: list[ChunkIndex] = []
+        self._chunks: list[bytes] = []  # their entries in the summary
         self._pending = 0
         self._marks = deque([_Mark(self._stream.tell(), self.span, {})], maxlen=_MARKS)
 
@@ -148,10 +135,10 @@ class McapOutput:
             publish_time: [ns] on any clock; default: ``log_time``.
         """
         key = (topic, description.type_name)
-        if key not in self._channels:
+        if key not in self._numbers:
             self._add_channel(key, description)
         publish_time = log_time if publish_time is None else publish_time
-        self._chunk.add(self._channels[key].id, log_time, publish_time, data)
+        self._chunk.add(self._numbers[key], log_time, publish_time, data)
         self.counts[key] += 1
         first, _, before = self.span
         self.span = Span(first if before else log_time, log_time, before + 1)
@@ -161,18 +148,17 @@ class McapOutput:
 
     def _add_channel(self, key: tuple[str, str], description: Description) -> None:
         type_name, encoding, definition, metadata = description
-        schema = Schema(len(self._schemas) + 1, definition, encoding, type_name)
-        channel = Channel(len(self._channels) + 1, key[0], 'cdr', metadata, schema.id)
-        self._chunk.data += _packed(schema, channel)
-        self._schemas.append(schema)
-        self._channels[key] = channel
+        number = self._numbers[key] = len(self._numbers) + 1
+        self._schemas.append(records.schema(records.Schema(number, type_name, encoding, definition)))
+        self._channels.append(records.channel(records.Channel(number, number, key[0], 'cdr', metadata)))
+        self._chunk.data += self._schemas[-1] + self._channels[-1]
         self.counts[key] = 0
 
     def flush(self) -> None:
         """Pass pending messages to the operating system, so that they outlive this process."""
         if self._pending:
-            records, entry = self._chunk.records(self._stream.tell())
-            self._stream.write(records)
+            chunk, entry = self._chunk.packed(self._stream.tell())
+            self._stream.write(chunk)
             self._stream.check()
             self._chunks.append(entry)
             self._chunk = _Chunk()
@@ -182,34 +168,31 @@ class McapOutput:
     def finish(self, metadata: str) -> None:
         """Write pending messages, ``metadata`` for rosbag2, the index and the end of the file."""
         self.flush()
-        record = _packed(Metadata('rosbag2', {'serialized_metadata': metadata}))
-        entry = MetadataIndex(self._stream.tell(), len(record), 'rosbag2')
-        self._stream.write(record + _packed(DataEnd(0)))
+        record = records.metadata('rosbag2', {'serialized_metadata': metadata})
+        entry = records.metadata_index(self._stream.tell(), len(record), 'rosbag2')
+        self._stream.write(record + records.data_end())
         self._stream.write(self._summary(self._stream.tell(), entry))
 
-    def _summary(self, start: int, metadata: MetadataIndex) -> bytes:
+    def _summary(self, start: int, metadata: bytes) -> bytes:
         """Bytes from ``start`` to the end of the file."""
-        channels = self._channels.values()
-        counts = {self._channels[key].id: count for key, count in self.counts.items()}
-        schemas, chunks, (first, last, messages) = len(self._schemas), len(self._chunks), self.span
-        statistics = Statistics(0, len(channels), counts, chunks, messages, last, first, 1, schemas)
-        groups: tuple[tuple[Opcode, Iterable[McapRecord]], ...] = (
-            (Opcode.SCHEMA, self._schemas),
-            (Opcode.CHANNEL, channels),
-            (Opcode.STATISTICS, [statistics]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.ATTACHMENT_INDEX, []),
-            (Opcode.METADATA_INDEX, [metadata]),
+        counts = {self._numbers[key]: count for key, count in self.counts.items()}
+        first, last, _ = self.span
+        groups = (
+            (Opcode.SCHEMA, b''.join(self._schemas)),
+            (Opcode.CHANNEL, b''.join(self._channels)),
+            (Opcode.STATISTICS, records.statistics(first, last, len(self._schemas), len(self._chunks), 1, counts)),
+            (Opcode.CHUNK_INDEX, b''.join(self._chunks)),
+            (Opcode.ATTACHMENT_INDEX, b''),
+            (Opcode.METADATA_INDEX, metadata),
         )
         summary, offsets = b'', b''
-        for opcode, records in groups:
-            group = _packed(*records)
-            offsets += _packed(SummaryOffset(opcode, start + len(summary), len(group)))
+        for opcode, group in groups:
+            offsets += records.summary_offset(opcode, start + len(summary), len(group))
             summary += group
         offsets_start = start + len(summary)
         summary += offsets
         checksum = zlib.crc32(_FOOTER.pack(Opcode.FOOTER, 20, start, offsets_start), zlib.crc32(summary))
-        return summary + _packed(Footer(start, offsets_start, checksum)) + MCAP0_MAGIC
+        return summary + records.footer(start, offsets_start, checksum) + MAGIC
 
     def finish_early(self) -> None:
         """After a failure, cut off incomplete records and write an end of the file without index.
@@ -220,7 +203,7 @@ class McapOutput:
         self.counts = dict(counts)
         self._pending = 0
         self._stream.cut(size)
-        self._stream.write(_packed(DataEnd(0), Footer(0, 0, 0)) + MCAP0_MAGIC)
+        self._stream.write(records.data_end() + records.footer(0, 0, 0) + MAGIC)
 
     def give_back(self) -> bool:
         """Drop the newest chunk to make room; False if there is none."""
@@ -232,13 +215,6 @@ class McapOutput:
     def close(self) -> None:
         """Close the file as it is."""
         self._stream.close()
-
-
-def _packed(*records: McapRecord) -> bytes:
-    builder = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    return bytes(builder.end())
 
 
 class _Stream:

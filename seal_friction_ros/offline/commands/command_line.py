@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.work.targets import PAGE, Kind, checked_targets
+from seal_friction_ros.packages import needed
 
+_OF_A_PAGE = ('matplotlib', 'jinja2')
 SUCCESS, DIFFERENT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 """Exit codes: no difference; a difference or a failed check; unusable input; interrupted by SIGINT."""
 
@@ -20,7 +22,12 @@ SUCCESS, DIFFERENT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
 
 def add_command(
-    commands: Any, name: str, run: Callable[[argparse.Namespace], int], description: str, *examples: str
+    commands: Any,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    description: str,
+    *examples: str,
+    needs: tuple[str, ...] = (),
 ) -> argparse.ArgumentParser:
     """Add a command with the option ``--json``.
 
@@ -30,6 +37,7 @@ def add_command(
         run: Runs it and returns the exit code.
         description: One line for ``--help``.
         examples: Command lines for ``--help``, without ``seal_friction``.
+        needs: Optional packages that it does not work without, though it could be imported.
     """
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
@@ -41,7 +49,7 @@ def add_command(
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('--json', action='store_true', help='print the numbers as one JSON object on stdout')
-    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={})
+    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={}, needs=needs)
     return parser
 
 
@@ -90,6 +98,18 @@ def checked(arguments: argparse.Namespace) -> AbstractContextManager[None]:
     targets = [(values[name], kind) for name, kind in arguments.targets.items() if values[name] is not None]
     inputs = [path for name, value in values.items() if name not in arguments.targets for path in _paths(value)]
     return checked_targets(arguments.command, targets, inputs, force=bool(values.get('force')))
+
+
+def check_packages(arguments: argparse.Namespace) -> None:
+    """Check before the work that the packages for it and for its page are installed.
+
+    Raises:
+        MissingPackageError: One is not.
+    """
+    values = vars(arguments)
+    has_page = any(kind is PAGE and values[name] is not None for name, kind in arguments.targets.items())
+    for package in (*arguments.needs, *(_OF_A_PAGE if has_page else ())):
+        needed(package)
 
 
 def _paths(value: Any) -> Iterator[Path]:

@@ -17,6 +17,7 @@ def add_parser(commands: Any) -> None:
     run = cli.add_command(
         steps, 'run', run_case, 'compute friction, film and contact over a motion',
         'ehl run inner_seal --out inner_seal.html',
+        needs=('numba',),
     )  # fmt: skip
     help_text = 'run through the recorded position of this bag and compare with its force'
     run.add_argument('--bag', type=Path, help=help_text)
@@ -27,10 +28,12 @@ def add_parser(commands: Any) -> None:
     study = cli.add_command(
         steps, 'study', run_study, 'compute friction with other solid shear stresses',
         'ehl study inner_seal --work build/study --out study.html',
+        needs=('numba',),
     )  # fmt: skip
     chart = cli.add_command(
         steps, 'map', run_map, 'compute a friction map: steady friction over speed and pressure',
         'ehl map inner_seal --seal-file mapped.yaml',
+        needs=('numba',),
     )  # fmt: skip
     cli.add_target(chart, '--seal-file', SEAL_FILE, metavar='FILE.yaml', help='seal file to write')
     for step in (run, study, chart):

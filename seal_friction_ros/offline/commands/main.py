@@ -14,6 +14,7 @@ from seal_friction_ros.offline.commands import (
     adapt,
     charts,
     compare,
+    doctor,
     ehl,
     health,
     identify,
@@ -29,6 +30,7 @@ from seal_friction_ros.offline.commands import (
     tune,
 )
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.packages import as_missing, needed
 
 GROUPS = {
     'replay': (info, replay, compare, recover, report, import_data),
@@ -36,6 +38,7 @@ GROUPS = {
     'watch': (health, adapt),
     'tune': (tune, servo),
     'compute': (oring, ehl),
+    'machine': (doctor,),
 }
 
 # Before numpy is loaded: the last bits of a sum depend on the number of threads, and the long, narrow matrices of a fit
@@ -72,16 +75,21 @@ def _entry(name: str, parser: argparse.ArgumentParser) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; return its exit code."""
     parser = make_parser()
-    if '_ARGCOMPLETE' in os.environ:  # a shell asks for completions
-        from argcomplete import autocomplete
-
-        autocomplete(parser)
-    parsed = parser.parse_args(arguments)
     try:
+        if '_ARGCOMPLETE' in os.environ:  # a shell asks for completions
+            needed('argcomplete').autocomplete(parser)
+        parsed = parser.parse_args(arguments)
         with cli.checked(parsed):
+            cli.check_packages(parsed)
             return int(parsed.run(parsed))
     except BrokenPipeError:
         raise
+    except ModuleNotFoundError as error:
+        missing = as_missing(error)
+        if missing is error:
+            raise
+        cli.print_error(str(missing))
+        return cli.UNUSABLE
     except (ValueError, OSError) as error:
         from seal_friction_ros.offline.work.executor import error_text
 

@@ -9,7 +9,7 @@ from seal_friction_ros.offline.commands import command_line as cli
 def add_parser(commands: Any) -> None:
     """Add the command."""
     description = 'write a page on a simulated servo with and without friction'
-    cli.add_page(cli.add_command(commands, 'servo', run, description, 'servo --out servo.html'))
+    cli.add_page(cli.add_command(commands, 'servo', run, description, 'servo --out servo.html', needs=('numba',)))
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,6 +16,7 @@ def add_parser(commands: Any) -> None:
         commands, 'tune', run, 'tune the friction feed-forward on a simulated servo or on a recorded axis',
         'tune --out feedforward.yaml',
         'tune --bag BAG --out feedforward.yaml',
+        needs=('numba',),
     )  # fmt: skip
     parser.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
     help_text = 'parameter file to write; a report goes beside it'

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.offline.bags.bag import bag_topics
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
@@ -13,7 +14,9 @@ from seal_friction_ros.offline.work.executor import Outcome, try_all
 from seal_friction_ros.offline.work.progress import progress
 
 BULK_FROM = 500_000
-"""Bags of at least so many messages are replayed compiled: compiling takes as long as replaying them one by one."""
+"""Bags of at least so many messages are replayed compiled: compiling takes as long as replaying them one by one.
+
+Without numba all are replayed one by one, with the same result."""
 
 _INPUT_SIZE = 80  # [bytes] of an input in an uncompressed bag
 
@@ -28,7 +31,7 @@ def verify(
     """
     known = bag_topics(bag)
     total = count_messages(known)
-    if total >= bulk_from:
+    if total >= bulk_from and has_compiler():
         from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
 
         with progress(f'replay {bag.name}', total) as advance:
@@ -47,7 +50,7 @@ def replay_many(
     inherit it.
     """
     bulk_from = BULK_FROM
-    if sum(map(_size, bags)) > _INPUT_SIZE * BULK_FROM:
+    if sum(map(_size, bags)) > _INPUT_SIZE * BULK_FROM and has_compiler():
         from seal_friction_ros.offline.replay.compiled_replay import compile_now  # noqa: PLC0415  loads the compiler
 
         compile_now()

@@ -14,13 +14,13 @@ import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 
 BLACK, GREY, LIGHT_GREY = '#1a1a1a', '#7f7f7f', '#d9d9d9'
 BLUE, SKY, ORANGE, VERMILLION, GREEN, PURPLE = '#0072b2', '#56b4e9', '#e69f00', '#d55e00', '#009e73', '#cc79a7'
 WIDTH = 8.6  # [inch]
+_LEGEND_HEIGHT = 0.3  # [inch]
 COLUMNS = 1200  # of pixels across a figure
 _STYLE = {
     'axes.axisbelow': True,
@@ -114,14 +114,23 @@ def label_panels(axes: Sequence[Axes], xlabel: str, ylabel: str, columns: int = 
         ax.set_ylabel(ylabel)
 
 
+def legend_below(figure: Figure, ax: Axes, columns: int) -> None:
+    """Legend of the artists of ``ax`` in one row below all axes of a figure of `new_figure`."""
+    share = _LEGEND_HEIGHT / figure.get_figheight()
+    engine: Any = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(rect=(0.0, share, 1.0, 1.0 - share))
+    figure.legend(*ax.get_legend_handles_labels(), loc='lower right', ncols=columns)
+
+
 def legend_above(ax: Axes, chosen: slice = slice(None)) -> None:
     """Legend in a row above the axes, with opaque dots; only the ``chosen`` of the labelled artists."""
     handles, labels = ax.get_legend_handles_labels()
     place: dict[str, Any] = {'loc': 'lower right', 'bbox_to_anchor': (1.0, 1.0), 'borderaxespad': 0.2}
     spacing: dict[str, Any] = {'ncols': 6, 'columnspacing': 1.2, 'handlelength': 1.6, 'handletextpad': 0.5}
     legend = ax.legend(handles[chosen], labels[chosen], **place, **spacing)
-    for handle in legend.legend_handles:
-        if isinstance(handle, Line2D) and handle.get_linestyle() == 'None':
+    for handle in legend.get_lines():
+        if handle.get_linestyle() == 'None':
             handle.set_alpha(1.0)
 
 

@@ -245,7 +245,7 @@ def profile_figure(computed: Computed) -> Plot:
         ax.set_title(pressure_text(result.pressure))
     axes[0].set(xlim=(0.0, None), ylim=(0.0, None))  # the others share these axes
     style.label_panels(axes, 'from the upstream end [mm]', 'contact stress [MPa]')
-    figure.legend(*axes[-1].get_legend_handles_labels(), loc='outside lower right', ncols=3)
+    style.legend_below(figure, axes[-1], 3)
     return Plot('contact_stress_profiles', figure)
 
 
@@ -269,7 +269,7 @@ def walls_figure(computed: Computed) -> Plot:
     ):
         ax.set(title=name, xlabel=f'{along} [mm]', ylim=(0.0, None))
     axes[0].set_ylabel('contact stress [MPa]')
-    figure.legend(*axes[0].get_legend_handles_labels(), loc='outside lower right', ncols=len(results))
+    style.legend_below(figure, axes[0], len(results))
     return Plot('contact_stress_walls', figure)
 
 

@@ -4,8 +4,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+try:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+except ModuleNotFoundError:
+    HAS_BAR = False
+else:
+    HAS_BAR = True
 
 _SMALLEST_SHARE = 0.01  # of a call: a worker process reports no smaller progress (our choice)
 _REFRESH_PERIOD = 0.1  # [s]
@@ -21,7 +26,7 @@ def report_shares_to(report: Callable[[float], None]) -> None:
 
 @contextmanager
 def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]:
-    """Show a bar on stderr while the block runs, if stderr is a terminal.
+    """Show a bar on stderr while the block runs, if stderr is a terminal and the package rich is installed.
 
     No thread draws the bar, so that a process may fork inside the block.
 
@@ -34,6 +39,9 @@ def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]
     """
     if _report_share is not None:
         yield _shares(total, _report_share)
+        return
+    if not HAS_BAR:
+        yield lambda _: None
         return
     console = Console(stderr=True)
     columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

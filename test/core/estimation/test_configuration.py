@@ -244,6 +244,13 @@ def test_a_damaged_snapshot_is_refused_with_what_is_wrong(path, value, complaint
         parse_snapshot(with_part(path, value))
 
 
+def test_one_parameter_holds_seals_and_chambers_and_the_earlier_two_mean_the_same():
+    for seals, chambers in ((('x',), ('a',)), (('x', '/p@q/y.yaml', 'x'), ('ambient', 'difference', 'b'))):
+        assert SealSelection(tuple(map('@'.join, zip(seals, chambers, strict=True)))) == SealSelection(seals, chambers)
+    for path in ('/p@q/y.yaml', '/p/y@a.yaml', 'x@'):  # an @ in a path names no chamber
+        assert SealSelection((path,)).seals == (path,)
+
+
 @pytest.mark.parametrize(
     ('change', 'complaint'),
     [
@@ -253,6 +260,8 @@ def test_a_damaged_snapshot_is_refused_with_what_is_wrong(path, value, complaint
             'has 2 entries but there are 1 seals: give one chamber a seal',
         ),
         ({'seal_chambers': ('a', 'c')}, "'c' is not a, b, difference or ambient"),
+        ({'seals': ('x@a', 'y')}, 'give every seal its chamber'),
+        ({'seals': ('x@a', 'y@c')}, "'c' is not a, b, difference or ambient"),
     ],
 )
 def test_a_selection_that_makes_no_sense_is_refused(change, complaint):

@@ -1,0 +1,22 @@
+"""``seal_friction doctor``: what this machine lacks for nodes and commands."""
+
+import argparse
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    cli.add_command(commands, 'doctor', run, 'say what this machine lacks for nodes and commands', 'doctor')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Look and print; exit code 1 if a node cannot run or would not be discovered."""
+    from seal_friction_ros.offline.work.machine import Level, findings
+
+    found = findings()
+    numbers = [{'level': one.level.value, 'subject': one.subject, 'text': one.text} for one in found]
+    lines = [f'{one.level.value:<5} {one.subject}: {one.text}' for one in found]
+    code = cli.DIFFERENT if any(one.level is Level.FAULT for one in found) else cli.SUCCESS
+    return cli.print_result(arguments, {'findings': numbers}, '\n'.join(lines), code)

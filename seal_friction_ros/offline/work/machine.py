@@ -1,0 +1,148 @@
+"""What this machine has and lacks for nodes and commands, looked up without a graph: ``seal_friction doctor``."""
+
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from enum import Enum
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+from seal_friction_ros.packages import OPTIONAL
+
+PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+_FIRST_PORT, _PORTS_OF_A_DOMAIN = 7410, 250  # UDP port of participant 0 of domain 0; RTPS 2.5, 9.6.2
+_MOST_PARTICIPANTS = 120  # of a domain on one machine: so many ports it has
+_ANNOUNCED_TO = {'rclpy': 32, 'profile': 100}  # participants that a new one announces itself to
+_SMALLEST_SHARED_MEMORY = 64 << 20  # [bytes] of /dev/shm for a few nodes (our choice)
+_SHARED_MEMORY = Path('/dev/shm')  # noqa: S108
+
+
+class Level(Enum):
+    """Weight of a finding."""
+
+    OK = 'ok'
+    NOTE = 'note'  # something works less well, or some command does not
+    FAULT = 'fault'  # a node cannot run, or nodes do not find each other
+
+
+class Finding(NamedTuple):
+    """One line about this machine."""
+
+    level: Level
+    subject: str
+    text: str
+
+
+def findings(environment: Mapping[str, str] = os.environ, udp: Path = Path('/proc/net/udp')) -> list[Finding]:
+    """Everything that is known, in order.
+
+    Args:
+        environment: Environment variables.
+        udp: Table of the UDP sockets of this machine.
+    """
+    return [
+        *_versions(),
+        *_ros(environment),
+        *_middleware(environment),
+        _participants(environment, udp),
+        _shared_memory(environment),
+        _priority(),
+    ]
+
+
+def _versions() -> Iterator[Finding]:
+    own = _version('seal_friction_ros') or 'not installed: run make setup, or source the colcon workspace'
+    yield Finding(Level.OK, 'versions', f'seal_friction_ros {own}, Python {platform.python_version()}')
+    for module, package in OPTIONAL.items():
+        if find_spec(module):
+            yield Finding(Level.OK, module, _version(module) or 'version unknown')
+        else:
+            yield Finding(Level.NOTE, module, f'not installed: apt-get install {package}, or pip install {module}')
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ''
+
+
+def _ros(environment: Mapping[str, str]) -> Iterator[Finding]:
+    distribution = environment.get('ROS_DISTRO', '')
+    for module, hint in (
+        ('rclpy', 'run make setup, or source a ROS 2 distribution'),
+        ('seal_friction_msgs', 'run make setup, or build msg_defs with colcon and source the workspace'),
+    ):
+        found = find_spec(module) is not None
+        text = f'from {distribution or "wheels"}' if found else f'not installed: no node can run: {hint}'
+        yield Finding(Level.OK if found else Level.FAULT, module, text)
+
+
+def _middleware(environment: Mapping[str, str]) -> Iterator[Finding]:
+    given = [(name, environment[name]) for name in PROFILES if environment.get(name)]
+    for name, path in given:
+        there = Path(path).is_file()
+        text = f'{path} ({name})' + ('' if there else ': no such file, so the defaults of Fast DDS act')
+        yield Finding(Level.OK if there else Level.FAULT, 'profile', text)
+    if not given:
+        own = 'config/fastdds.xml, set by the nodes'
+        without = f'none: nodes may find each other 3 s late; export {PROFILES[0]}=.../config/fastdds.xml'
+        from_wheels = 'ROS_DISTRO' not in environment
+        yield Finding(Level.OK if from_wheels else Level.NOTE, 'profile', own if from_wheels else without)
+    default = 'SUBNET' if 'ROS_DISTRO' in environment else 'LOCALHOST'
+    reach = environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE', default)
+    where = {'LOCALHOST': 'nodes of this machine', 'OFF': 'no other node', 'SUBNET': 'every machine of the network'}
+    text = f'{reach}: {where.get(reach, "not a range: use SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT")}'
+    level = Level.OK if reach in (*where, 'SYSTEM_DEFAULT') else Level.FAULT
+    yield Finding(level, 'discovery range', f'{text}; domain {_domain(environment)}')
+
+
+def _domain(environment: Mapping[str, str]) -> int:
+    text = environment.get('ROS_DOMAIN_ID', '')
+    return int(text) if text.isdecimal() else 0
+
+
+def _participants(environment: Mapping[str, str], udp: Path) -> Finding:
+    """Processes of the domain, by their ports: those beyond the reach of the announcements stay unknown to new ones."""
+    first = _FIRST_PORT + _PORTS_OF_A_DOMAIN * _domain(environment)
+    ports = range(first, first + 2 * _MOST_PARTICIPANTS, 2)
+    try:
+        used = {int(port, 16) for port in re.findall(r'^ *\d+: [0-9A-F]+:([0-9A-F]{4})', udp.read_text(), re.MULTILINE)}
+    except OSError as error:
+        return Finding(Level.NOTE, 'participants', f'not known: {error.strerror}')
+    numbers = [number for number, port in enumerate(ports) if port in used]
+    own_profile = 'ROS_DISTRO' not in environment and not any(map(environment.get, PROFILES))
+    most = _ANNOUNCED_TO['profile' if own_profile else 'rclpy']
+    if max(numbers, default=0) >= most:
+        text = f'{len(numbers)}, the highest has number {max(numbers)}: nodes from number {most} on are not discovered'
+        return Finding(Level.FAULT, 'participants', f'{text}: stop some, or use another ROS_DOMAIN_ID')
+    return Finding(Level.OK, 'participants', f'{len(numbers)} of at most {most}')
+
+
+def _shared_memory(environment: Mapping[str, str]) -> Finding:
+    if 'ROS_DISTRO' not in environment and not any(map(environment.get, PROFILES)):
+        return Finding(Level.OK, 'shared memory', 'not used: config/fastdds.xml has UDP alone')
+    if not os.access(_SHARED_MEMORY, os.W_OK):
+        return Finding(Level.NOTE, 'shared memory', f'{_SHARED_MEMORY} cannot be written: Fast DDS falls back to UDP')
+    free = shutil.disk_usage(_SHARED_MEMORY).free
+    files = len(list(_SHARED_MEMORY.glob('fastrtps_*')))
+    text = f'{free >> 20} MiB free, {files} files of Fast DDS'
+    if free < _SMALLEST_SHARED_MEMORY:
+        return Finding(Level.NOTE, 'shared memory', f'{text}: with no node running, remove {_SHARED_MEMORY}/fastrtps_*')
+    return Finding(Level.OK, 'shared memory', text)
+
+
+def _priority() -> Finding:
+    """Another process tries it: the priority of this one does not change."""
+    attempt = 'import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))'
+    granted = subprocess.run([sys.executable, '-S', '-c', attempt], capture_output=True, check=False).returncode == 0
+    if granted:
+        return Finding(Level.OK, 'real-time priority', 'granted')
+    hint = 'give the user an rtprio limit (/etc/security/limits.conf) or the process CAP_SYS_NICE'
+    return Finding(Level.NOTE, 'real-time priority', f'not granted: {hint}, or leave realtime_priority at 0')

@@ -1,0 +1,44 @@
+"""Packages that only some commands need. Without one of them they end with one line that says how to install it.
+
+Core, bags and the live node need numpy and PyYAML alone; the first command that a machine lacks a package for says so.
+"""
+
+from importlib import import_module
+from typing import Any
+
+OPTIONAL = {
+    'scipy': 'python3-scipy',
+    'numba': 'python3-numba',
+    'matplotlib': 'python3-matplotlib',
+    'jinja2': 'python3-jinja2',
+    'zstandard': 'python3-zstandard',
+    'lz4': 'python3-lz4',
+    'rich': 'python3-rich',
+    'argcomplete': 'python3-argcomplete',
+}
+"""Module, which is also its name on PyPI -> package of Debian and Ubuntu."""
+
+
+class MissingPackageError(ValueError):
+    """A package is not installed; one line that says which, and how to install it."""
+
+
+def needed(module: str) -> Any:
+    """Import a module of an optional package.
+
+    Raises:
+        MissingPackageError: It is not installed.
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        raise as_missing(error) from None
+
+
+def as_missing(error: ModuleNotFoundError) -> Exception:
+    """`MissingPackageError` for an import of an optional package that failed; any other error as it is."""
+    package = (error.name or '').partition('.')[0]
+    if package not in OPTIONAL:
+        return error
+    text = f'{package} is not installed: apt-get install {OPTIONAL[package]}, or pip install {package}'
+    return MissingPackageError(text)
