@@ -25,8 +25,8 @@ test:
 	$(python) -m ruff check .
 	$(python) -m ruff format --check .
 	$(python) -m mypy
-	$(python) -m pytest --numprocesses auto --dist worksteal test/core test/offline
-	$(python) -m pytest --numprocesses auto --dist worksteal --ignore test/core --ignore test/offline
+	$(python) -m pytest --numprocesses auto --dist loadfile test/core test/offline
+	$(python) -m pytest --numprocesses auto --dist loadfile --ignore test/core --ignore test/offline
 
 test-lowest: setup
 	@tools/test_lowest.sh
