@@ -203,7 +203,8 @@ def test_parameters_of_the_configuration_are_those_of_the_docs():
     """Names and defaults; the bounds are checked where the file is loaded."""
     text = (ROOT / 'config' / 'friction_estimator.yaml').read_text()
     values = yaml.safe_load(text)['/**']['ros__parameters']
-    values |= {f'feedforward.{name}': value for name, value in values.pop('feedforward').items()}
+    for prefix in ('feedforward', 'adaptation'):
+        values |= {f'{prefix}.{name}': value for name, value in values.pop(prefix).items()}
     defaults = {
         name: group.record_type.__dataclass_fields__[field].default
         for group in FRICTION_ESTIMATOR_PARAMETERS

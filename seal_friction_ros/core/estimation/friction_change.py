@@ -7,7 +7,7 @@ over the first `REFERENCE_REVERSALS`. A sum above `THRESHOLD` is a change, which
 new reference begins. sigma counts as `LEAST_STD` at least, since a smaller change means nothing, and one reversal
 counts as `LARGEST_TERM` at most, so that no single load step is a change.
 
-Source: [Page1954]_; numbers are our choice: between two false alarms there are some 10^5 reversals.
+Source: [Page1954]_; numbers are our choice.
 """
 
 import math
@@ -17,9 +17,9 @@ from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.core.foundation.limits import between
 
 REFERENCE_REVERSALS = 20
-LEAST_STD = 0.01  # [-]
+LEAST_STD = 0.02  # [-]
 ALLOWANCE = 0.5  # [-] kappa, in standard deviations
-THRESHOLD = 15.0  # [-] likewise
+THRESHOLD = 12.0  # [-] likewise
 LARGEST_TERM = 3.0  # [-] likewise
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from statistics import fmean
 
 import pytest
+from harness.simulated_day import Day, samples
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
@@ -27,7 +28,6 @@ from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSe
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import read_yaml
-from test.harness.simulated_day import Day, samples
 
 SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))
 SEALS = (MountedSeal(SEAL, 'a'), MountedSeal(SEAL, 'b'))

@@ -1,13 +1,15 @@
 """The loop of ``make demo`` in core: the feed-forward cuts the tracking error, also with a rounded reference."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.servo.closed_loop import Axis, run_closed_loop, without_feedforward
-from seal_friction_ros.core.servo.motions import RoundedWave, Sine
+from seal_friction_ros.core.servo.motions import RoundedWave, Sine, Trapezoid
 from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.tracking import reversals, tracking_rms
@@ -55,3 +57,34 @@ def test_feedforward_cuts_the_tracking_error_by_80_percent_with_a_rounded_refere
     assert error > 300e-6  # the friction is worth compensating
     assert remaining < 0.2 * error
     assert reversals(compensated.feedforward) == 2 * round(WAVE.wave.frequency * EVALUATED_TIME)
+
+
+ADAPTATION = AdaptationSettings('on', moving_mass=SERVO.load.mass)
+
+
+def adapted_error(friction, adaptation, scale=None, law=1.0, seconds=12.0):
+    """Tracking error [m] over the last two periods: seals of ``friction``, a seal file of ``law`` times the friction."""
+    seals = tuple(replace(mounted, friction_scale=friction) for mounted in PIPELINE.estimator.seals)
+    servo = ServoParameters(seals=seals, control_period=PERIOD, inner_step=1e-4)
+    feedforward = PIPELINE.feedforward if scale is None else replace(PIPELINE.feedforward, scale=scale)
+    filed = tuple(replace(mounted, friction_scale=law) for mounted in PIPELINE.estimator.seals)
+    estimator = replace(PIPELINE.estimator, seals=filed, adaptation=adaptation)
+    known = PIPELINE._replace(estimator=estimator, feedforward=feedforward)
+    wave = Trapezoid(distance=0.02, speed=0.04, frequency=0.8, acceleration=1.0, cycles=100)
+    noise = np.array([SENSORS.pressure_noise] * 2 + [SENSORS.force_noise, SENSORS.velocity_noise])
+    samples = round(seconds / PERIOD)
+    errors = noise * np.random.default_rng(1).standard_normal((samples, 4))
+    run = run_closed_loop(Axis(servo, known), wave, samples, DELAY, errors)
+    last = run.time > seconds - 2.5
+    return tracking_rms(run.reference[last], run.position[last])
+
+
+def test_with_adaptation_a_seal_of_40_percent_more_friction_tracks_as_with_its_own_file():
+    stronger = 1.4
+    off = AdaptationSettings()
+    right_file = adapted_error(stronger, off, law=stronger)
+    without = adapted_error(stronger, off, scale=0.0)
+    adapted = adapted_error(stronger, ADAPTATION)
+    fixed = adapted_error(stronger, off)
+    assert adapted < fixed < without
+    assert adapted < 1.3 * right_file

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
+from harness.simulated_day import SECOND, Day, write_day
 from paths import ROOT
 
 from seal_friction_ros.core.friction.actuator import actuator_friction
@@ -11,7 +12,6 @@ from seal_friction_ros.core.friction.mounting import CHAMBERS
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.commands.main import main
-from test.harness.simulated_day import SECOND, Day, write_day
 
 SEAL = ROOT / 'config' / 'seals' / 'ms28775_114.yaml'
 SEALS = mount_seals([read_yaml(SEAL)] * 2, CHAMBERS[:2])
