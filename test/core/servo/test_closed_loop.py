@@ -63,7 +63,7 @@ ADAPTATION = AdaptationSettings('on', moving_mass=SERVO.load.mass)
 
 
 def adapted_error(friction, adaptation, scale=None, law=1.0, seconds=12.0):
-    """Tracking error [m] over the last two periods: seals of ``friction``, a seal file of ``law`` times the friction."""
+    """Tracking error [m] over two periods: seals of ``friction``, a seal file of ``law`` times the friction."""
     seals = tuple(replace(mounted, friction_scale=friction) for mounted in PIPELINE.estimator.seals)
     servo = ServoParameters(seals=seals, control_period=PERIOD, inner_step=1e-4)
     feedforward = PIPELINE.feedforward if scale is None else replace(PIPELINE.feedforward, scale=scale)
