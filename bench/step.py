@@ -12,6 +12,7 @@ import time
 import timeit
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from statistics import median
@@ -29,7 +30,9 @@ from seal_friction_msgs.msg import RodVelocity
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.processes import free_domain
 
-from seal_friction_ros.core.estimation.estimator import step
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, step
+from seal_friction_ros.core.estimation.estimator import init as init_estimator
 from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, Output, decode, encode
 from seal_friction_ros.core.estimation.pipeline import init, init_running, receive
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, ServoReference, Velocity
@@ -38,6 +41,22 @@ from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.offline.bags.recorder import Recorder
 
 CALLS = 2000
+ADAPTATION = AdaptationSettings('on')
+
+
+def sliding(parameters: EstimatorParameters) -> Callable[[], object]:
+    """One step of a rod that slides to and fro at 1 kHz, a reversal a second; the next call is the next step."""
+    state, numbers = init_estimator(parameters), count()
+
+    def one() -> None:
+        """The next step."""
+        nonlocal state
+        number = next(numbers)
+        stamp, side = (number + 1) * 1_000_000, 1.0 if number // 1000 % 2 == 0 else -1.0
+        sample = RodSample(stamp, side * 0.01, Pressure(stamp, 3e6, 1e6), Force(stamp, side * 20.0))
+        state, _ = step(parameters, state, sample)
+
+    return one
 
 
 def stages() -> dict[str, Callable[[], object]]:
@@ -62,6 +81,8 @@ def stages() -> dict[str, Callable[[], object]]:
         'decode velocity': lambda: decode(VELOCITY_TYPE, velocity_bytes),
         'receive pressure': lambda: receive(parameters, alone, pressure, 1, drop),
         'estimator step': lambda: step(parameters.estimator, alone.estimator, sample),
+        'estimator step, sliding': sliding(parameters.estimator),
+        'estimator step, sliding, with adaptation': sliding(replace(parameters.estimator, adaptation=ADAPTATION)),
         'receive velocity': lambda: receive(parameters, alone, velocity, 1, drop),
         'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity, 1, drop),
         'encode estimate': lambda: encode(*estimate),

@@ -58,6 +58,10 @@ class RecordedRun:
     direction: IntArray
     status: IntArray
     input_age: FloatArray  # [s]
+    adaptation_scale: FloatArray  # [-]
+    adaptation_scale_std: FloatArray  # [-]
+    adaptation_offset: FloatArray  # [N]
+    residual: FloatArray  # [N]
     feedforward_force: FloatArray  # [N] that acted, published with the estimate; NaN where there is none
     replayed_force: FloatArray | None  # [N] feed-forward of a replay, which did not act; None: the bag is no replay
 

@@ -24,6 +24,7 @@ from seal_friction_ros.core.estimation.messages import (
     DECODERS,
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
+    GROWN,
     decode_text,
 )
 from seal_friction_ros.core.estimation.pipeline import init
@@ -89,7 +90,9 @@ def compile_now() -> None:
     parameters = default_configuration().parameters()
     none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((3, 0), np.int64))
     _, answers = receive_all(parameters, init(parameters), none)
-    _compare(0, 0, False, (answers.data, none.offsets, none.sizes), (none.data, none.offsets, none.sizes), none.sizes)
+    _compare(
+        0, 0, False, (answers.data, none.offsets, none.sizes), (none.data, none.offsets, none.sizes), none.sizes, 0
+    )
     block_reader.compile_now()
 
 
@@ -152,7 +155,9 @@ class _BulkAnswerStream(AnswerStream):
         while taken < len(recorded):
             if not self.pending:
                 before = taken
-                taken, used, differing = _compare(taken, used, bool(self.first), ours, theirs, available)
+                taken, used, differing = _compare(
+                    taken, used, bool(self.first), ours, theirs, available, GROWN[self.type_name]
+                )
                 self.recorded += taken - before
                 self.differing += differing
             if taken < len(recorded):
@@ -178,11 +183,12 @@ def _compare(
     ours: tuple[Bytes, Integers, Integers],
     theirs: tuple[Bytes, Integers, Integers],
     available: Integers,
+    grown: int,
 ) -> tuple[int, int, int]:
     """Compare recorded messages from number ``taken`` on with answers from number ``used`` on, in the simple case.
 
     The case is simple while they agree and, once the first difference has a text (``is_named``), while exactly one
-    answer waits.
+    answer waits. A recorded message may be ``grown`` [bytes] shorter, as it was before its type grew.
 
     Returns:
         Number of the first recorded message that is not simple, of the first answer that waits for it, and the number
@@ -192,8 +198,8 @@ def _compare(
     recorded, recorded_offsets, recorded_sizes = theirs
     differing = 0
     while taken < len(available) and used < available[taken]:
-        size, first, second = sizes[used], offsets[used], recorded_offsets[taken]
-        same = size == recorded_sizes[taken]
+        size, first, second = recorded_sizes[taken], offsets[used], recorded_offsets[taken]
+        same = size in (sizes[used], sizes[used] - grown)
         if same:
             for k in range(size):
                 if data[first + k] != recorded[second + k]:

@@ -158,7 +158,7 @@ def test_help_lists_every_command_in_its_group(capsys):
     groups = re.findall(r'^(\w+):\n((?:  .*\n)+)', capsys.readouterr().out, re.MULTILINE)
     listed = {title: re.findall(r'^  (\w+)', text, re.MULTILINE) for title, text in groups}
     del listed['options']
-    assert list(listed) == ['replay', 'identify', 'tune', 'compute', 'machine']
+    assert list(listed) == ['replay', 'identify', 'watch', 'tune', 'compute', 'machine']
     names = [name for of_group in listed.values() for name in of_group]
     assert sorted(names) == sorted(command[0] for command in parsers(make_parser()) if len(command) == 1)
 

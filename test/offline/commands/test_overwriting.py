@@ -21,6 +21,8 @@ COMMANDS = {
     ('sheet',): ['rod_seal'],
     ('spool',): ['ten_cycles.csv'],
     ('charts',): ['ms28775_114'],
+    ('health',): [PULL_TEST],
+    ('adapt',): [PULL_TEST, '--seal', 'ms28775_114'],
     ('tune',): [],
     ('servo',): [],
     ('oring',): ['ms28775_114'],
