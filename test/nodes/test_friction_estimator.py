@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter as RclpyParameter
 from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
@@ -157,7 +157,7 @@ def test_lifecycle_services_start_and_stop_it():
 def test_a_timer_that_was_due_before_a_cleanup_does_nothing_after_it():
     with graph() as g:
         due = [timer.callback for timer in g.estimator.timers]
-        assert len(due) == 3  # diagnostics, graph, watchdog
+        assert len(due) == 4  # diagnostics, graph, watchdog, health
         g.estimator.trigger_deactivate()
         g.estimator.trigger_cleanup()
         for callback in due:
@@ -380,3 +380,14 @@ def test_the_node_declares_the_parameters_of_its_table_and_no_other():
         declared = {name for name in g.estimator._parameters if name.split('.')[0] not in ROS_PARAMETERS}
         assert declared == {name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.names()}
         assert isinstance(g.estimator, FrictionEstimator)
+
+
+def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it():
+    with graph({'adaptation.mode': 'observe'}) as g:
+        g.connect()
+        g.estimate(SECOND, 0.005)
+        assert g.call(Trigger, 'friction_estimator/reset_adaptation', Trigger.Request()).success
+        assert g.estimator._state.estimator.adaptation == NOT_ADAPTED
+        values = {item.key: item.value for item in g.estimator.diagnostics()['estimate'].values}
+        assert values['adaptation mode'] == 'observe'
+        assert values['adaptation scale std'] == 'not learnt'
