@@ -58,6 +58,7 @@ ACCELERATION_TIME = 0.005  # [s] time constant of each of the two lags that the 
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
 LEARNING_INTERVAL = 0.004  # [s] least time between two samples that are learnt from
 FEWEST_REVERSALS = 3  # before which no scale is believed
+FORGETTING_TIME = 3600.0  # [s] without a reversal in which the scale becomes as uncertain as the seal file
 LARGEST_CHANGE = 0.1  # [-] of the scale in one reversal
 GAIN = 0.5  # [-] share of the way to the median that the scale goes in one reversal
 STD_OF_MEAN_DEVIATION = 1.2533  # [-] standard deviation over mean absolute deviation of a normal distribution
@@ -252,20 +253,29 @@ def _learn(
 
 
 @compilable
-def with_scale(friction: ActuatorFriction, learnt: Learnt, uses_scale: bool) -> ActuatorFriction:
+def with_scale(friction: ActuatorFriction, learnt: Learnt, stamp: int, uses_scale: bool) -> ActuatorFriction:
     r"""Friction by what is learnt, with the standard deviation of the next reading.
 
     With ``uses_scale`` it is :math:`\sigma = \max(\sigma_e, \sigma_s f)` with :math:`\sigma_e` the noise. Without, the
     friction misses :math:`m = |s - 1| f`, and the band that holds 95 % of a normal distribution about m is
     :math:`(m + 1.64 \sigma) / 1.96` where that is wider. While nothing is learnt, the deviation is that of the seal
-    file.
+    file; over an hour without a reversal its variance comes back, since friction in one direction may change unseen.
+
+    Args:
+        friction: By the seal file.
+        learnt: Before this sample.
+        stamp: Of this sample [ns].
+        uses_scale: Whether the estimate has the scale.
     """
-    coulomb, _, stiction, in_identified_range, velocity_friction = friction
+    coulomb, file_std, stiction, in_identified_range, velocity_friction = friction
     if learnt.scale_std < 0.0:
         return friction
     sliding = coulomb + velocity_friction
-    std = learnt.scale_std * sliding
-    std = max(std, learnt.noise)
+    std = max(learnt.scale_std * sliding, learnt.noise)
+    reversal, forgotten = learnt.before.stamp, 1.0
+    if reversal != NEVER:
+        forgotten = between(0.0, (stamp - reversal) * 1e-9 / FORGETTING_TIME, 1.0)
+    std = math.sqrt(std * std + forgotten * file_std * file_std)
     if not uses_scale:
         missed = (abs(learnt.scale - 1.0) * sliding + ONE_SIDED_95 * std) / BAND_95
         return ActuatorFriction(coulomb, max(std, missed), stiction, in_identified_range, velocity_friction)

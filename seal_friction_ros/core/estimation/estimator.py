@@ -319,7 +319,7 @@ def _adapted_step(
     """Second half of a step with adaptation: estimate by what was learnt before, then learn from this sample."""
     settings, known = parameters.adaptation, state.adaptation
     learnt = known.learnt
-    estimate = estimate_of(parameters, seen, with_scale(friction, learnt, parameters.uses_scale))
+    estimate = estimate_of(parameters, seen, with_scale(friction, learnt, seen.stamp, parameters.uses_scale))
     stamp, coulomb, std, breakaway, acting, kind, direction, status, input_age, _, _, _, _ = estimate
     is_usable, is_identified = not status & ~_EXTRAPOLATED, status == 0
     if disagrees(settings, learnt, friction, parameters.uses_scale, seen.velocity == 0.0):

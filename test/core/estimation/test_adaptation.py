@@ -12,6 +12,7 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation import estimator
 from seal_friction_ros.core.estimation.adaptation import (
+    NO_LEVEL,
     NOT_ADAPTED,
     NOTHING_LEARNT,
     AdaptationSettings,
@@ -196,7 +197,18 @@ def test_at_rest_an_offset_that_the_seals_could_not_hold_is_said():
 
 def test_nothing_learnt_leaves_friction_and_deviation_as_the_file_has_them():
     friction = ActuatorFriction(40.0, 4.0, 10.0, True, 1.0)
-    assert with_scale(friction, NOTHING_LEARNT, True) == friction
+    assert with_scale(friction, NOTHING_LEARNT, 0, True) == friction
+
+
+def test_an_hour_without_a_reversal_brings_the_uncertainty_of_the_seal_file_back():
+    friction = ActuatorFriction(40.0, 4.0, 10.0, True, 0.0)
+    known = NOTHING_LEARNT._replace(scale=1.2, scale_std=0.01, noise=0.3, before=NO_LEVEL._replace(stamp=0))
+    stds = [
+        with_scale(friction, known, minutes * 60 * 10**9, True).coulomb_friction_std for minutes in (0, 30, 60, 600)
+    ]
+    assert stds[0] == pytest.approx(0.4)
+    assert stds == sorted(stds)
+    assert stds[2] == stds[3] == pytest.approx(math.hypot(0.4, 4.0))
 
 
 @given(st.lists(st.floats(-5.0, 5.0), min_size=6, max_size=6), st.integers(1, 6))

@@ -12,6 +12,7 @@ from seal_friction_ros.core.friction.mounting import CHAMBERS
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.replay.parallel_replay import verify
 
 SEAL = ROOT / 'config' / 'seals' / 'ms28775_114.yaml'
 SEALS = mount_seals([read_yaml(SEAL)] * 2, CHAMBERS[:2])
@@ -79,3 +80,17 @@ def test_adapt_refuses_a_bag_without_reversals(tmp_path, capsys):
     assert main(['adapt', str(bag), '--seal', str(SEAL), '--out', str(tmp_path / 'seal.yaml')]) == 2
     assert 'too few reversals' in capsys.readouterr().err
     assert not (tmp_path / 'seal.yaml').exists()
+
+
+@pytest.mark.parametrize('mode', ['observe', 'on'])
+def test_what_is_learnt_replays_to_the_same_bytes_one_by_one_and_compiled(mode, tmp_path):
+    load = replace(DAY, scale=lambda _: 1.4, load=lambda time: 3.0 * FRICTION * (time > 11.3))
+    bag, parameters = write_day(tmp_path / 'bag', load, 30.0), tmp_path / 'parameters.yaml'
+    parameters.write_text(f"/**: {{ros__parameters: {{adaptation.mode: '{mode}', stamp_age_max: 0.0}}}}\n")
+    out = tmp_path / 'out'
+    options = ['--seal', str(SEAL), '--params', str(parameters), '--out', str(out)]
+    assert main(['replay', str(bag), *options]) == 0
+    for bulk_from in (10**9, 0):
+        verdict = verify(out, bulk_from=bulk_from)
+        assert verdict.identical
+        assert verdict.recorded_estimates == 3000
