@@ -100,6 +100,14 @@ def _verify() -> Callable[[Path], object]:
     return check
 
 
+def _health() -> Callable[[Path], object]:
+    from seal_friction_ros.offline.replay.bag_health import bag_health
+    from seal_friction_ros.offline.replay.compiled_replay import compile_now
+
+    compile_now()
+    return lambda folder: bag_health(folder / 'bag')
+
+
 def _identify() -> Callable[[Path], object]:
     from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
     from seal_friction_ros.offline.identification.sources import SourceOptions
@@ -146,6 +154,7 @@ TASKS: dict[str, Callable[[], Callable[[Path], object]]] = {
     'replay, message by message': _replay_one_by_one,
     'replay to a new bag': _replay_to_a_bag,
     'replay --verify of it': _verify,
+    'health': _health,
     'identify': _identify,
     'report': _report,
     'decoded by rosbags': _rosbags,

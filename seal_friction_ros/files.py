@@ -20,12 +20,15 @@ from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, Esti
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import (
     FRICTION_ESTIMATOR_PARAMETERS,
+    MACHINE_ESTIMATOR_PARAMETERS,
     REMOVED_PARAMETERS,
     ROS_PARAMETERS,
 )
-from seal_friction_ros.core.foundation.parameters import from_mapping, printable, similar_names
+from seal_friction_ros.core.foundation.parameters import ParameterGroup, from_mapping, meant, printable, similar_names
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.seal_file import mounting_of
+from seal_friction_ros.core.machine.machine_file import MachineFile, parse_machine
+from seal_friction_ros.core.machine.outputs import check_outputs
 
 _CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # PyYAML raises these for '!!int foo'
 DEFAULT_FEEDFORWARD = FeedForwardSettings()
@@ -116,18 +119,34 @@ def share_directory(package: str, module_file: str) -> Path:
     raise FileNotFoundError(f'no share folder of {package} above {module_file}')
 
 
+def package_version() -> str:
+    """Version of this package, from its manifest."""
+    text = (share_directory('seal_friction_ros', __file__) / 'package.xml').read_text(encoding='utf-8')
+    return text.partition('<version>')[2].partition('</version>')[0]
+
+
 def config_path(kind: str, name: str) -> Path:
     """Path of a configuration file: ``name`` itself if it is a path, else ``config/<kind>/<name>.yaml``.
 
     Raises:
-        ValueError: The path starts with an unknown user (``~user``).
+        ValueError: The path starts with an unknown user (``~user``), or there is no file of this name.
     """
     if '/' in name or name.endswith('.yaml'):
         try:
             return Path(name).expanduser()
         except RuntimeError as error:
             raise ValueError(f'{name}: {error}') from None
-    return share_directory('seal_friction_ros', __file__) / 'config' / kind / f'{name}.yaml'
+    path = share_directory('seal_friction_ros', __file__) / 'config' / kind / f'{name}.yaml'
+    if not path.is_file():
+        names = config_names(kind)
+        raise ValueError(f'config/{kind} has no {name}: {meant(name, names)}; name a file by its path, ./{name}.yaml')
+    return path
+
+
+def config_names(kind: str) -> list[str]:
+    """Names of the files in ``config/KIND``."""
+    folder = share_directory('seal_friction_ros', __file__) / 'config' / kind
+    return sorted(path.stem for path in folder.glob('*.yaml'))
 
 
 def load_configuration(
@@ -181,8 +200,23 @@ def default_configuration() -> Configuration:
 def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, FeedForwardSettings, AdaptationSettings]:
     """Seals, estimator, feed-forward and adaptation from a ROS parameter file of ``friction_estimator``.
 
-    The sections ``friction_estimator``, ``*`` and ``**`` of any namespace count, and the only section of a file
-    whatever its name. Later sections override earlier ones. All parameters of the node are checked.
+    Raises:
+        ValueError: As of `read_parameters`.
+    """
+    made = read_parameters(path, 'friction_estimator', FRICTION_ESTIMATOR_PARAMETERS)
+    return made[SealSelection], made[EstimatorSettings], made[FeedForwardSettings], made[AdaptationSettings]
+
+
+def read_parameters(path: Path, node: str, groups: Iterable[ParameterGroup]) -> dict[type, Any]:
+    """A record for each group of parameters of a node, by its type, from a ROS parameter file.
+
+    The sections of the node, ``*`` and ``**`` of any namespace count, and the only section of a file whatever its name.
+    Later sections override earlier ones. All parameters of the node are checked.
+
+    Args:
+        path: The file.
+        node: ``friction_estimator`` or ``servo_simulator``.
+        groups: All parameters of the node.
 
     Raises:
         ValueError: The file is not a parameter file, the node has no such parameter, or a value is invalid.
@@ -190,21 +224,62 @@ def load_parameter_file(path: Path) -> tuple[SealSelection, EstimatorSettings, F
     document = read_yaml(path)
     values: dict[str, Any] = {}
     try:
-        for node, content in document.items():
-            if len(document) == 1 or str(node).rsplit('/', maxsplit=1)[-1] in ('friction_estimator', '*', '**'):
+        for name, content in document.items():
+            if len(document) == 1 or str(name).rsplit('/', maxsplit=1)[-1] in (node, '*', '**'):
                 values.update(_flat(content['ros__parameters']))
     except (AttributeError, KeyError, TypeError):
         raise ValueError(f'{path}: not a ROS parameter file (NODE: ros__parameters: NAME: VALUE)') from None
-    groups = FRICTION_ESTIMATOR_PARAMETERS
+    groups = tuple(groups)
     known = {name for group in groups for name in group.names()}
     unknown = [name for name in values if name not in known and name.split('.')[0] not in ROS_PARAMETERS]
     if unknown:
-        raise ValueError(f'{path}: {unknown_parameters("friction_estimator", unknown)}')
+        raise ValueError(f'{path}: {unknown_parameters(node, unknown)}')
     made: dict[type, Any] = {}
     for group in groups:
         given = {field: values[name] for name, field in group.names().items() if name in values}
         made[group.record_type] = from_mapping(group.record_type, given, str(path))
-    return made[SealSelection], made[EstimatorSettings], made[FeedForwardSettings], made[AdaptationSettings]
+    return made
+
+
+def read_machine_document(name: str) -> Any:
+    """YAML document of the mapping file that `read_machine` reads.
+
+    Raises:
+        ValueError: It cannot be read.
+    """
+    return read_yaml(config_path('machines', name))
+
+
+def read_machine(name: str) -> MachineFile:
+    """Mapping file of a machine: a path, or the name of one in ``config/machines``.
+
+    Raises:
+        ValueError: It cannot be read or is invalid; one line that names file, actuator and key.
+    """
+    path = config_path('machines', name)
+    file = parse_machine(read_machine_document(name), str(path))
+    try:
+        check_outputs(file)
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from None
+    return file
+
+
+def machine_configurations(file: MachineFile, where: str) -> dict[str, Configuration]:
+    """Configuration of each actuator of a machine, with its seal files; ``where`` names the mapping file.
+
+    Raises:
+        ValueError: A seal file cannot be read or is invalid; one line that names the actuator.
+    """
+    configurations = {}
+    for actuator in file.actuators:
+        try:
+            configurations[actuator.name] = load_configuration(
+                actuator.selection, actuator.settings, actuator.feedforward, actuator.adaptation
+            )
+        except ValueError as error:
+            raise ValueError(f'{where}: {actuator.name}: {error}') from None
+    return configurations
 
 
 def unknown_parameters(node: str, names: Iterable[str]) -> str:
@@ -218,7 +293,11 @@ def unknown_parameters(node: str, names: Iterable[str]) -> str:
         SERVO_SIMULATOR_PARAMETERS,
     )
 
-    tables = {'friction_estimator': FRICTION_ESTIMATOR_PARAMETERS, 'servo_simulator': SERVO_SIMULATOR_PARAMETERS}
+    tables = {
+        'friction_estimator': FRICTION_ESTIMATOR_PARAMETERS,
+        'machine_estimator': MACHINE_ESTIMATOR_PARAMETERS,
+        'servo_simulator': SERVO_SIMULATOR_PARAMETERS,
+    }
     owners = {name: other for other, groups in tables.items() for group in groups for name in group.names()}
     names = sorted(names)
     similar = similar_names(names, [name for group in tables[node] for name in group.names()])

@@ -20,6 +20,19 @@ def test_every_node_answers_round_trips():
     assert wakes < 3.0  # the effect of config/fastdds.xml; four to eight times without
 
 
+def test_a_machine_is_timed_and_its_bags_replay_to_the_byte():
+    found = run_json('bench/machine.py', '--actuators', '2', '--rounds', '1', '--seconds', '0.5', '--rate', '100')
+    assert list(found) == ['one actuator, own messages', 'machine of 2', 'machine of 2, answers together']
+    assert [figures['replay identical'] for figures in found.values()] == ['', True, True]
+
+
+def test_what_the_live_view_costs_is_timed():
+    found = run_json('bench/monitor.py', '--seconds', '1.5', '--rounds', '1')
+    assert list(found) == ['one actuator', 'machine of three']
+    for figures in found.values():
+        assert min(value for name, value in figures.items() if name != 'load of the machine') > 0.0
+
+
 def test_the_start_is_timed():
     found = run_json('bench/start.py', '--times', '1')
     assert len(found) == 4

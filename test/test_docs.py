@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -162,6 +163,22 @@ def test_the_servo_on_the_desk_runs_as_the_readme_says_and_gets_its_feed_forward
     assert verdict.recorded_feedforwards > 500
 
 
+def test_the_commands_of_the_live_view_print_an_address_that_answers(checkout: Path):
+    lines = commands(' monitor', (ROOT / 'docs' / 'monitor.md').read_text())
+    assert len(lines) == 3
+    for command in lines:
+        words = command.replace('.venv/bin', str(ROOT / '.venv' / 'bin')).split()
+        environment = graph_environment(free_domain())
+        with subprocess.Popen(words, cwd=checkout, env=environment, stdout=subprocess.PIPE, text=True) as process:
+            address = process.stdout.readline().split()[1]
+            try:
+                with urllib.request.urlopen(address, timeout=TIMEOUT) as answer:  # noqa: S310  our own server
+                    assert b'<title>Seal friction: monitor</title>' in answer.read()
+            finally:
+                process.send_signal(signal.SIGINT)
+                assert process.wait(TIMEOUT) == 0
+
+
 def test_the_workspace_builds_and_runs_as_the_readme_says(workspace: Path):
     build, source = (line for line in commands('') if line.startswith(('colcon ', 'source ')))
     (ros_run,) = (line for line in commands(' ros') if line.startswith('ros2 run'))
@@ -180,7 +197,7 @@ def test_the_workspace_builds_and_runs_as_the_readme_says(workspace: Path):
 
 def test_services_named_in_the_readme_are_those_of_the_node():
     (call,) = (line for line in commands(' ros') if line.startswith('ros2 service call'))
-    source = (ROOT / 'seal_friction_ros' / 'nodes' / 'friction_estimator.py').read_text()
+    source = (ROOT / 'seal_friction_ros' / 'nodes' / 'estimator_node.py').read_text()
     assert call.split()[3] == '/left_actuator/friction_estimator/start_recording'
     assert "Trigger, '~/start_recording'" in source
     assert call.split()[4] == 'std_srvs/srv/Trigger'
@@ -248,3 +265,10 @@ def test_every_figure_is_made_by_a_command():
 def test_the_units_are_in_the_table_of_the_demo():
     headings = [str(column.header) for column in (*demo.friction_table([]).columns, *demo.run_table([]).columns)]
     assert {'pressure [bar]', 'measured [N]', 'p99 [us]'} <= set(headings)
+
+
+def test_the_demo_says_when_the_machine_was_too_busy():
+    figures = {'missed ticks': '30', 'ticks': '20000'}
+    assert demo.busy_text(0.2, 2, figures) == ''
+    assert '1.9 processes ran before the demo began, on 2 cores' in demo.busy_text(1.9, 2, figures)
+    assert 'missed 1.5 % of its ticks' in demo.busy_text(0.2, 2, {'missed ticks': '300', 'ticks': '20000'})

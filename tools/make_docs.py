@@ -9,8 +9,9 @@ import re
 import sys
 from pathlib import Path
 
-from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS
+from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, MachineOptions
 from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.foundation.units import QUANTITIES
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.geometry import SealGeometry
@@ -19,6 +20,7 @@ from seal_friction_ros.core.friction.laws.friction_coefficient import Coefficien
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import Mounting
+from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.core.lubrication.grease import Grease
@@ -35,6 +37,7 @@ from seal_friction_ros.core.lubrication.lubrication_case import (
 )
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
+from seal_friction_ros.core.machine.machine_file import INPUTS
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
@@ -46,10 +49,12 @@ from fault_rows import SIGNAL_ROWS, Row
 from faults import REQUIRED, TRIALS
 
 from seal_friction_ros.core.friction.seal_file import keys_of_law
+from seal_friction_ros.core.friction.temperature import TemperatureScale
 
 DOCS = Path(__file__).parents[1] / 'docs'
 RECORDS = (
     *(group.record_type for group in (*FRICTION_ESTIMATOR_PARAMETERS, *SERVO_SIMULATOR_PARAMETERS)),
+    MachineOptions,
     TuningSettings,
     RecordedAxisSettings,
     SealGeometry,
@@ -58,8 +63,10 @@ RECORDS = (
     PowerLaw,
     CoefficientTable,
     VelocityTerms,
+    Presliding,
     Mounting,
     ForceSumCorrection,
+    TemperatureScale,
     Uncertainty,
     Groove,
     Rubber,
@@ -141,10 +148,18 @@ def other_faults() -> str:
     return '\n'.join([f'| fault | {" | ".join(REQUIRED)} |', '|---' * 5 + '|', *rows])
 
 
+def machine_inputs() -> str:
+    """Markdown table of the inputs of a mapping file, with the units that each takes; the first is SI."""
+    rows = ['| input | units |', '|---|---|']
+    rows += [f'| `{name}` | {", ".join(QUANTITIES[quantity])} |' for name, quantity in INPUTS.items()]
+    return '\n'.join(rows)
+
+
 def filled(text: str) -> str:
     """Text of a page with every table in it made anew."""
     tables = {record_type.__name__: table(record_type) for record_type in RECORDS}
     tables['friction_laws'] = friction_laws()
+    tables['machine_inputs'] = machine_inputs()
     tables |= {'signal_faults': signal_faults(), 'other_faults': other_faults()}
     return re.sub(
         r'<!-- table: (\w+) -->\n.*?<!-- end -->',

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
+from monitor_picture import draw_monitor
 
 from seal_friction_ros.files import config_path
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
@@ -44,7 +45,7 @@ DATA_ARROWS = (  # from, to, colour
     ((3.35, 4.81), (3.35, 4.42), style.BLUE),
 )
 CORE_ROOMS = ('tuning', 'servo', 'estimation, identification,\noring_contact, lubrication', 'friction', 'foundation')
-OFFLINE_ROOMS = ('commands', 'reports', 'identification, tuning,\ncontact', 'replay', 'bags', 'work')
+OFFLINE_ROOMS = ('commands', 'reports', 'identification, tuning,\ncontact, monitor', 'replay', 'bags', 'work')
 
 
 def draw_architecture(path: Path) -> None:
@@ -90,9 +91,10 @@ def draw_architecture(path: Path) -> None:
 
 
 def main() -> int:
-    """Draw the architecture, a replay of the pull test, charts of its seal, the servo and the lubricated contact."""
+    """Draw architecture, live view, replay of the pull test, charts of its seal, servo and lubricated contact."""
     FIGURES.mkdir(parents=True, exist_ok=True)
     draw_architecture(FIGURES / 'architecture.png')
+    draw_monitor(FIGURES / 'monitor.png')
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         import_thesis(folder / 'inputs')

@@ -33,11 +33,34 @@ stage() {
     shift
     sum=$({ cat "${files[@]}"; printf '%s\n' "$PWD" "${PYTHON:-}" "${ROS_DISTRO:-wheels}"; } | sha256sum)
     [ "$(cat ".venv/.done-$name" 2>/dev/null)" = "$sum" ] && return
+    say "$name"
     "$@"
     mkdir -p .venv && printf '%s\n' "$sum" >".venv/.done-$name"
 }
 
-run_logged() { "$@" >>"$log" 2>&1 || fail "'$1 ${2:-} ${3:-}' failed; the last lines of $log: $(tail -n 3 "$log" | tr '\n' ' ')"; }
+# What the log says last, every second on a terminal, else every 20 s; until this script ends it.
+show_log() {
+    local began=$SECONDS line
+    while sleep 1 && kill -0 $$ 2>/dev/null; do
+        line=$(tail -c 400 "$log" | tr '\r' '\n' | grep -a -v '^ *$' | tail -n 1 | cut -c 1-90) || line=
+        if [ -t 2 ]; then
+            printf '\r\033[Ksetup: %3d s  %s' "$SECONDS" "$line" >&2
+        elif [ $((SECONDS - began)) -ge 20 ]; then
+            began=$SECONDS
+            say "$SECONDS s  $line"
+        fi
+    done
+}
+
+run_logged() {
+    local code=0 watch
+    show_log & watch=$!
+    "$@" >>"$log" 2>&1 || code=$?
+    kill "$watch" 2>/dev/null || true
+    wait "$watch" 2>/dev/null || true
+    [ ! -t 2 ] || printf '\r\033[K' >&2
+    [ $code = 0 ] || fail "'$1 ${2:-} ${3:-}' failed; the last lines of $log: $(tail -n 3 "$log" | tr '\n' ' ')"
+}
 
 install_requirements() {
     # With a distribution ROS, its build tools and the numpy that its messages were built against come from there.

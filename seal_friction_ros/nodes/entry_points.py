@@ -23,9 +23,19 @@ def friction_estimator() -> int:
     return _run('friction_estimator')
 
 
+def machine_estimator() -> int:
+    """Run the estimator of a machine."""
+    return _run('machine_estimator')
+
+
 def servo_simulator() -> int:
     """Run the simulator."""
     return _run('servo_simulator')
+
+
+def friction_monitor() -> int:
+    """Run the live view."""
+    return _run('friction_monitor')
 
 
 def bag_player() -> int:

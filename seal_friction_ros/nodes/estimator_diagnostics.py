@@ -2,15 +2,24 @@
 
 import time
 from collections import Counter, deque
+from collections.abc import Collection
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationState
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.messages import INPUTS
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
-from seal_friction_ros.core.estimation.seal_health import SealHealth, findings, followed, health_values
+from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate, SealTemperature, Status
+from seal_friction_ros.core.estimation.seal_health import (
+    SealHealth,
+    Starts,
+    findings,
+    followed,
+    health_values,
+    with_sample,
+)
+from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 _SHORTEST_SILENCE = 0.9  # [s] in a shorter interval, no estimate means no fault if the interval before had one
@@ -77,19 +86,26 @@ class MissingSamples:
 
 
 class EstimatorDiagnostics:
-    """Counts since activation, and rates, ages and latencies of the present interval."""
+    """Counts since activation, and rates, ages and latencies of the present interval.
 
-    def __init__(self) -> None:
+    Args:
+        inputs: Names of the inputs.
+    """
+
+    def __init__(self, inputs: Collection[str] = INPUTS) -> None:
+        self._inputs = inputs
         self._received: Counter[str] = Counter()
         self._malformed: Counter[str] = Counter()
-        self._missing = {name: MissingSamples() for name in INPUTS}
+        self._missing = {name: MissingSamples() for name in inputs}
         self._by_status: Counter[int] = Counter()
         self._feedforwards_by_limit: Counter[int] = Counter()
         self._feedforward_force = self._feedforward_sign = 0.0
-        self._input_age = -1.0
+        self._estimate = NO_ESTIMATE
         self._latencies: list[int] = []
-        self._health = SealHealth()
+        self._health, self._starts = SealHealth(), Starts()
         self._adaptation = NOT_ADAPTED
+        self._newest: dict[type, FrictionEstimate | FeedForward] = {}
+        self._status = self._limited = 0  # bits of all answers since the newest were taken
         self.start_interval()
 
     def start_interval(self) -> None:
@@ -108,6 +124,10 @@ class EstimatorDiagnostics:
         self._received[name] += 1
         self._missing[name].on_stamp(stamp)
 
+    def on_received(self, name: str) -> None:
+        """Count one message of an input whose stamps do not tell what is missing."""
+        self._received[name] += 1
+
     def on_malformed(self, name: str) -> None:
         """Count one message of an input that cannot be decoded."""
         self._malformed[name] += 1
@@ -116,17 +136,25 @@ class EstimatorDiagnostics:
         """Count one estimate; ``latency`` [ns] is the time since its velocity sample was taken."""
         self._by_status[estimate.status] += 1
         self._latencies.append(latency)
-        self._input_age = estimate.input_age
+        self._estimate = self._newest[FrictionEstimate] = estimate
+        self._status |= estimate.status
 
-    def on_adaptation(self, state: AdaptationState) -> None:
-        """Follow what is learnt; ``state`` after the newest sample."""
-        self._adaptation = state
-        self._health = followed(self._health, state)
+    def on_adaptation(
+        self,
+        parameters: EstimatorParameters,
+        before: EstimatorState,
+        state: EstimatorState,
+        temperature: SealTemperature,
+    ) -> None:
+        """Follow what is learnt from the newest sample, whose estimate `on_estimate` has counted."""
+        self._adaptation = state.adaptation
+        self._starts = with_sample(self._starts, self._estimate)
+        self._health = followed(self._health, parameters, before, state, temperature)
 
     def health(self, parameters: EstimatorParameters) -> DiagnosticStatus:
         """Indicators of the seals, WARN with what a person should know."""
-        said = findings(parameters, self._health, _count(self._by_status, Status.MODEL_DISAGREES) > 0)
-        values = health_values(parameters, self._adaptation, self._health)
+        said = findings(parameters, self._health, self._estimate.status)
+        values = health_values(parameters, self._adaptation, self._health, self._starts)
         return DiagnosticStatus(
             level=DiagnosticStatus.WARN if said else DiagnosticStatus.OK,
             message='; '.join(said) or 'no finding',
@@ -143,11 +171,26 @@ class EstimatorDiagnostics:
         if force:
             self._feedforward_sign = force
         self._feedforward_force = force
+        self._newest[FeedForward] = feedforward
+        self._limited |= feedforward.limited
+
+    def take_newest(self, actuator: str) -> list[NamedAnswer]:
+        """The newest answers since the last call, for who looks on: each with the bits of all answers since then."""
+        bits = {FrictionEstimate: {'status': self._status}, FeedForward: {'limited': self._limited}}
+        found = [NamedAnswer(actuator, answer._replace(**bits[kind]), b'') for kind, answer in self._newest.items()]
+        self._newest.clear()
+        self._status = self._limited = 0
+        return found
+
+    @property
+    def received(self) -> dict[str, int]:
+        """Messages of each input since activation, well-formed or not."""
+        return {name: self._received[name] + self._malformed[name] for name in self._inputs}
 
     @property
     def silent_inputs(self) -> list[str]:
         """Inputs without a message in this interval."""
-        return [name for name in INPUTS if self._received[name] == self._received_before[name]]
+        return [name for name in self._inputs if self._received[name] == self._received_before[name]]
 
     def report(
         self, active: bool, refused: bool, graph: GraphFindings, parameters: EstimatorParameters | None = None
@@ -168,7 +211,7 @@ class EstimatorDiagnostics:
             level = DiagnosticStatus.WARN
         values = self._input_values(seconds, graph) | self._output_values(seconds)
         if active and parameters is not None:
-            values |= health_values(parameters, self._adaptation, self._health)
+            values |= health_values(parameters, self._adaptation, self._health, self._starts)
         values |= {f'{name} best effort only, from': node for name, node in graph.best_effort.items()}
         return DiagnosticStatus(
             level=level,
@@ -187,7 +230,7 @@ class EstimatorDiagnostics:
         status &= ~sum(_NEAR_REST_MESSAGES)
         said: list[str] = []
         if parameters is not None:
-            said = findings(parameters, self._health, bool(status & Status.MODEL_DISAGREES))
+            said = findings(parameters, self._health, status)
         if status:
             return DiagnosticStatus.WARN, '; '.join([str(Status(status).name), *said])
         if self._malformed != self._malformed_before:
@@ -215,7 +258,7 @@ class EstimatorDiagnostics:
 
     def _input_values(self, seconds: float, graph: GraphFindings) -> dict[str, str]:
         values: dict[str, str] = {}
-        for name in INPUTS:
+        for name in self._inputs:
             recent = self._received[name] - self._received_before[name]
             values[f'{name} publishers'] = str(graph.publisher_counts[name])
             values[f'{name} rate [Hz]'] = f'{recent / seconds:.1f}'
@@ -237,7 +280,7 @@ class EstimatorDiagnostics:
             'feed-forward reversals [1/s]': f'{self._reversals / seconds:.1f}',
             'feed-forward travel [N/s]': f'{self._travel / seconds:.0f}',
             'feed-forward [N]': f'{self._feedforward_force:.3f}',
-            'input age [s]': f'{self._input_age:.4f}',
+            'input age [s]': f'{self._estimate.input_age:.4f}',
             **latency_values(self._latencies),
         }
 

@@ -9,7 +9,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from seal_friction_ros.core.estimation.messages import INPUTS, OUTPUTS
 from seal_friction_ros.nodes import qos
 
 
@@ -28,7 +27,9 @@ class GraphWatch:
     Args:
         node: Node that has the endpoints.
         inputs: Subscription of each input; always the present one.
-        outputs: Publisher of each message type.
+        input_types: Message type of each input.
+        outputs: Publishers.
+        output_types: Message type of each publisher whose topic is the node's alone, by its key in ``outputs``.
         subscribe: Subscribes to an input with a QoS profile, in place of the present subscription.
     """
 
@@ -36,16 +37,20 @@ class GraphWatch:
         self,
         node: Node,
         inputs: Mapping[str, Subscription],
-        outputs: Mapping[str, Publisher],
+        input_types: Mapping[str, str],
+        outputs: Mapping[Any, Publisher],
+        output_types: Mapping[Any, str],
         subscribe: Callable[[str, QoSProfile], None],
     ) -> None:
         self._node = node
         self._inputs = inputs
+        self._input_types = input_types
         self._outputs = outputs
+        self._output_types = output_types
         self._subscribe = subscribe
         self._best_effort: dict[str, str] = {}
         self._without_node_name: set[str] = set()
-        self._incompatible_outputs: set[str] = set()
+        self._incompatible_outputs: set[Any] = set()
         self._connections: list[int] = []
         self._endpoint_counts: list[int] = []
         self._other_definitions: list[str] = []
@@ -57,7 +62,7 @@ class GraphWatch:
             silent_inputs: Inputs without recent messages.
             retry: Whether to subscribe again to silent inputs whose publishers offer best effort only.
         """
-        counts = {name: self._publisher_count(name) for name in INPUTS}
+        counts = {name: self._publisher_count(name) for name in self._input_types}
         duplicates = self.duplicate_publishers()
         unheard = self._retry_silent_inputs(silent_inputs) if retry else []
         unheard += self._incompatible_subscribers() + self._nodes_with_other_definitions()
@@ -65,7 +70,7 @@ class GraphWatch:
 
     def has_changed(self) -> bool:
         """Whether a publisher of an input has appeared or disappeared since the last call."""
-        before, self._connections = self._connections, [self._publisher_count(name) for name in INPUTS]
+        before, self._connections = self._connections, [self._publisher_count(name) for name in self._input_types]
         return self._connections != before
 
     def duplicate_publishers(self) -> list[str]:
@@ -73,20 +78,20 @@ class GraphWatch:
 
         Output topics count too: another estimator may publish them.
         """
-        topics = [self._inputs[name].topic_name for name in INPUTS if self._publisher_count(name) > 1]
-        answers = [self._outputs[type_name].topic_name for type_name in OUTPUTS.values()]
+        topics = [self._inputs[name].topic_name for name in self._input_types if self._publisher_count(name) > 1]
+        answers = [self._outputs[key].topic_name for key in self._output_types]
         topics += [topic for topic in answers if self._node.count_publishers(topic) > 1]
         return [f'{topic} has several publishers: {", ".join(map(full_name, self._find(topic)))}' for topic in topics]
 
-    def on_incompatible_subscriber(self, type_name: str, _event: Any) -> None:
+    def on_incompatible_subscriber(self, key: Any, _event: Any) -> None:
         """Note an output with an incompatible subscriber; discovery reports the name of the node later."""
-        self._incompatible_outputs.add(type_name)
+        self._incompatible_outputs.add(key)
 
     def _incompatible_subscribers(self) -> list[str]:
         """Nodes that request a QoS which an output does not offer."""
         texts = []
-        for type_name in sorted(self._incompatible_outputs):
-            output = self._outputs[type_name]
+        for key in sorted(self._incompatible_outputs):
+            output = self._outputs[key]
             for subscriber in self._node.get_subscriptions_info_by_topic(output.topic_name):
                 reason = incompatibility(output.qos_profile, subscriber.qos_profile)
                 if reason:
@@ -96,8 +101,8 @@ class GraphWatch:
 
     def _nodes_with_other_definitions(self) -> list[str]:
         """Nodes with another definition of a message; looked up only after a change of the graph, as it takes 1 ms."""
-        types = {self._inputs[name].topic_name: type_name for name, type_name in INPUTS.items()}
-        types |= {self._outputs[type_name].topic_name: type_name for type_name in OUTPUTS.values()}
+        types = {self._inputs[name].topic_name: type_name for name, type_name in self._input_types.items()}
+        types |= {self._outputs[key].topic_name: type_name for key, type_name in self._output_types.items()}
         counts = [
             count(topic) for topic in types for count in (self._node.count_publishers, self._node.count_subscribers)
         ]
@@ -133,10 +138,16 @@ class GraphWatch:
                 else:
                     self._without_node_name.add(name)  # the name may be known at the next call
                 break
-            reason = why_unheard(publisher, INPUTS[name], requested)
+            reason = why_unheard(publisher, self._input_types[name], requested)
             if reason:
                 reasons.append(f'{topic}: {reason}')
         return reasons
+
+    def publishers_text(self, name: str) -> str:
+        """Words on the publishers of an input."""
+        found = [full_name(publisher) for publisher in self._find(self._inputs[name].topic_name)]
+        topic = self._inputs[name].topic_name
+        return f'{", ".join(found)} publishes {topic}' if found else f'nobody publishes {topic}'
 
     def _find(self, topic: str) -> list[TopicEndpointInfo]:
         """Discovered publishers of a topic, in order of their names."""

@@ -1,9 +1,9 @@
 """Base class of the nodes: lifecycle, parameters from dataclasses, diagnostics once a second."""
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any, TypeVar
 
-import seal_friction_msgs.msg
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
@@ -23,8 +23,16 @@ _DIAGNOSTICS_PERIOD = 1.0  # [s]
 
 
 def message_class(type_name: str) -> Any:
-    """Python class of a message of this project, from its full type name."""
-    return getattr(seal_friction_msgs.msg, type_name.rpartition('/')[2])
+    """Python class of a message, from its full type name.
+
+    Raises:
+        ValueError: The type is not installed.
+    """
+    package, _, name = type_name.partition('/msg/')
+    try:
+        return getattr(import_module(f'{package}.msg'), name)
+    except (ImportError, AttributeError):
+        raise ValueError(f'{type_name} is not installed: install the package {package}') from None
 
 
 class ManagedNode(LifecycleNode):
@@ -46,11 +54,14 @@ class ManagedNode(LifecycleNode):
         super().__init__(name, **kwargs)
         self.active = False
         self.configured = False
-        self._groups = {group.record_type: group for group in groups}
+        self._groups = groups
         self._diagnostics_timer: Any = None
         self._diagnostics_publisher: Any = None
         try:
             for group in groups:
+                declare(self, group)
+            self._groups += self.more_groups()
+            for group in self._groups[len(groups) :]:
                 declare(self, group)
         except ParameterException as error:
             raise ValueError(str(error)) from None
@@ -61,12 +72,16 @@ class ManagedNode(LifecycleNode):
             raise ValueError(unknown_parameters(name, unknown))
         if unknown:
             self.get_logger().warning(f'ignored: {unknown_parameters(name, unknown)}')
-        floats = {name for group in groups for name in numbers(group)}
+        floats = {name for group in self._groups for name in numbers(group)}
         self.add_pre_set_parameters_callback(lambda changes: [with_declared_type(p, floats) for p in changes])
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.add_post_set_parameters_callback(self._on_parameters_set)
 
     # --- overridden by subclasses ---
+
+    def more_groups(self) -> tuple[ParameterGroup, ...]:
+        """Groups of parameters that depend on other parameters, which are declared already."""
+        return ()
 
     def make(self) -> None:
         """Create everything that the node needs while it is configured.
@@ -106,19 +121,22 @@ class ManagedNode(LifecycleNode):
 
     # --- parameters ---
 
-    def settings(self, record_type: type[Record], **changed: Any) -> Record:
+    def settings(self, record_type: type[Record], prefix: str | None = None, **changed: Any) -> Record:
         """The dataclass made from the present parameters; ``changed`` overrides fields.
+
+        Without a ``prefix`` it is that of the first group of the type.
 
         Raises:
             ValueError: A value is invalid.
         """
-        return read(self, record_type, self._groups[record_type].prefix, **changed)
+        found = (group.prefix for group in self._groups if group.record_type is record_type)
+        return read(self, record_type, next(found) if prefix is None else prefix, **changed)
 
     def _on_set_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         """Accept or reject a set of changes as a whole."""
         values = {p.name: p.value for p in parameters}
         made: dict[type, Any] = {}
-        for record_type, group in self._groups.items():
+        for group in self._groups:
             names = {name: field for name, field in group.names().items() if name in values}
             fixed = sorted(names.keys() & group.fixed())
             if fixed and self.configured:
@@ -127,7 +145,8 @@ class ManagedNode(LifecycleNode):
             if not names:
                 continue
             try:
-                made[record_type] = self.settings(record_type, **{f: values[name] for name, f in names.items()})
+                changed = {field: values[name] for name, field in names.items()}
+                made[group.record_type] = self.settings(group.record_type, group.prefix, **changed)
             except (ValueError, TypeError) as error:
                 return SetParametersResult(successful=False, reason=str(error))
         try:

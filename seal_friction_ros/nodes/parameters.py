@@ -20,6 +20,8 @@ def declare(node: Node, group: ParameterGroup) -> None:
         rclpy.exceptions.ParameterException: An override has the wrong type or is out of bounds.
     """
     defaults = {field.name: field.default for field in dataclasses.fields(group.record_type)}
+    if group.defaults is not None:
+        defaults = {name: getattr(group.defaults, name) for name in defaults}
     described, fixed = meanings(group.record_type), group.fixed()
     for name, field in group.names().items():
         default = defaults[field]

@@ -18,13 +18,21 @@ from seal_friction_ros.core.estimation.records import Force, Position, Pressure,
 from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, measured_force_sum, one_correction
 from seal_friction_ros.core.servo.controller import Limited
+from seal_friction_ros.core.servo.cylinder import pressure_force
 from seal_friction_ros.core.servo.motions import PullTest, RoundedWave, Setpoint, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
 from seal_friction_ros.core.servo.pull_rig import PullRig, init_pull_rig, pull_rig, step_pull_rig
 from seal_friction_ros.core.servo.sensors import Readings, SensorSettings, read
-from seal_friction_ros.core.servo.simulator_options import PLANT, SERVO_SIMULATOR_PARAMETERS, WAVES, SimulatorSettings
+from seal_friction_ros.core.servo.simulator_options import (
+    PLANT,
+    SERVO_SIMULATOR_PARAMETERS,
+    WAVES,
+    SimulatorSettings,
+    StandardMessages,
+    servo_parameters,
+)
 from seal_friction_ros.files import load_seals
-from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes import qos, standard_messages
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
 
@@ -60,23 +68,34 @@ class ServoSimulator(ManagedNode):
             self.get_logger().warning('numba is not installed: the simulation is slow; apt-get install python3-numba')
         self._period = round(_SECOND / self._settings.rate)
         self._make_servo()
-        for topic in _OUTPUTS:
-            if topic != 'servo_reference' or self._settings.wave in WAVES:
-                self._sensor_publishers[topic] = self.create_lifecycle_publisher(
-                    message_class(INPUTS[topic]), topic, qos.STREAM, qos_overriding_options=qos.overridable()
-                )
+        self._joint = self.settings(StandardMessages).joint
+        for topic, kind in self._outputs_by_topic().items():
+            self._sensor_publishers[topic] = self.create_lifecycle_publisher(
+                kind, topic, qos.STREAM, qos_overriding_options=qos.overridable()
+            )
         if self._settings.publish_clock:
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', qos.CLOCK)
-        self._subscribe('friction_feedforward', FEEDFORWARD_TYPE, self._on_feedforward)
+        if self._settings.feedforward_message == 'own':
+            self._subscribe('friction_feedforward', message_class(FEEDFORWARD_TYPE), self._on_feedforward)
+        else:
+            topic, kind, force_of = standard_messages.FEEDFORWARDS[self._settings.feedforward_message]
+            self._subscribe(topic, kind, lambda message: self._on_effort(force_of(message, self._joint)), raw=False)
         if self._settings.wave == 'topic':
-            self._subscribe('servo_reference', REFERENCE_TYPE, self._on_reference)
+            self._subscribe('servo_reference', message_class(REFERENCE_TYPE), self._on_reference)
 
-    def _subscribe(self, topic: str, type_name: str, callback: Any) -> None:
+    def _outputs_by_topic(self) -> dict[str, Any]:
+        """Type of the message on each topic."""
+        if self._settings.messages == 'standard':
+            return standard_messages.outputs(self.settings(StandardMessages))
+        own = {topic: message_class(INPUTS[topic]) for topic in _OUTPUTS}
+        if self._settings.wave not in WAVES:
+            del own['servo_reference']
+        return own
+
+    def _subscribe(self, topic: str, kind: Any, callback: Any, raw: bool = True) -> None:
         options = qos.overridable()
         self._inputs.append(
-            self.create_subscription(
-                message_class(type_name), topic, callback, qos.STREAM, raw=True, qos_overriding_options=options
-            )
+            self.create_subscription(kind, topic, callback, qos.STREAM, raw=raw, qos_overriding_options=options)
         )
 
     def _make_servo(self) -> None:
@@ -95,14 +114,7 @@ class ServoSimulator(ManagedNode):
     def _servo_parameters(self, changed: dict[type, Any] | None = None) -> ServoParameters:
         kinds = (SimulatorSettings, SealSelection, *PLANT.values())
         used = {kind: (changed or {}).get(kind) or self.settings(kind) for kind in kinds}
-        settings = used[SimulatorSettings]
-        period = 1.0 / settings.rate
-        return ServoParameters(
-            seals=load_seals(used[SealSelection]),
-            control_period=period,
-            inner_step=period / math.ceil(period / settings.inner_step - 1e-9),
-            **{name: used[kind] for name, kind in PLANT.items()},
-        )
+        return servo_parameters(used[SimulatorSettings], used, load_seals(used[SealSelection]))
 
     def release(self) -> None:
         """Destroy publishers and subscriptions."""
@@ -188,6 +200,11 @@ class ServoSimulator(ManagedNode):
         except ValueError as error:
             self._malformed('friction_feedforward', error)
 
+    def _on_effort(self, force: float | None) -> None:
+        """Take the force of a standard message; it counts from its receipt."""
+        if force is not None and self.active:
+            self._feedforward = FeedForward(self._origin + self._index * self._period, force, 0.0, 0)
+
     def _on_reference(self, data: bytes) -> None:
         try:
             self._reference = decode(REFERENCE_TYPE, data)
@@ -235,14 +252,14 @@ class ServoSimulator(ManagedNode):
         true, limited = self._outputs, 0
         pressures = true.pressure_a, true.pressure_b
         force_sum = measured_force_sum(self._lacking, true.force_sum, *pressures)
+        if self._settings.messages == 'standard':  # a load cell: everything on the rod but pressures and seals
+            force_sum = true.force_sum - pressure_force(self._servo.cylinder, *pressures)
         readings = Readings(pressures, true.velocity, force_sum, true.position)
         self._delayed.append((stamp, read(self._sensors, self._index, readings)))
         if self._clock_publisher is not None:
             seconds, nanoseconds = divmod(stamp, _SECOND)
             self._clock_publisher.publish(ClockMessage(clock=Time(sec=seconds, nanosec=nanoseconds)))
-        if reference is not None and 'servo_reference' in self._sensor_publishers:
-            data = encode(ServoReference(stamp, *reference, FRAME))
-            self._sensor_publishers['servo_reference'].publish(data)
+        self._publish_reference(stamp, reference)
         while len(self._delayed) > self._delay:
             self._publish(*self._delayed.popleft())
         if self._rig is not None:
@@ -278,8 +295,24 @@ class ServoSimulator(ManagedNode):
             return 0.0
         return newest.force
 
+    def _publish_reference(self, stamp: int, reference: Setpoint | None) -> None:
+        if reference is None:
+            return
+        if self._settings.messages == 'standard':
+            for topic, message in standard_messages.reference_messages(stamp, reference, self._joint).items():
+                if topic in self._sensor_publishers:
+                    self._sensor_publishers[topic].publish(message)
+        elif 'servo_reference' in self._sensor_publishers:
+            data = encode(ServoReference(stamp, *reference, FRAME))
+            self._sensor_publishers['servo_reference'].publish(data)
+
     def _publish(self, stamp: int, readings: Readings) -> None:
         send = self._sensor_publishers
+        if self._settings.messages == 'standard':
+            options = self.settings(StandardMessages)
+            for topic, message in standard_messages.sensor_messages(stamp, readings, options).items():
+                send[topic].publish(message)
+            return
         if readings.pressure is not None:
             send['cylinder_pressure'].publish(encode(Pressure(stamp, *readings.pressure), FRAME))
         if readings.force_sum is not None:

@@ -27,8 +27,8 @@ class CountedEstimator(FrictionEstimator):
         """Whether the watchdog will act at its next call."""
         return self.active and is_tick_due(self._state, self._now())
 
-    def _on_input(self, name: str, data: bytes) -> None:
-        super()._on_input(name, data)
+    def on_input(self, name: str, data: bytes) -> None:
+        super().on_input(name, data)
         self.taken += 1
 
     def _send(self, answer: Output, frame_id: bytes) -> None:

@@ -3,9 +3,11 @@
 from html.parser import HTMLParser
 from pathlib import Path
 
+from harness.page_in_browser import check_in_browser
+
 LOADED = {'src', 'href', 'srcset', 'data', 'action', 'poster'}  # attributes that fetch something
 STUBS = {'svg': b'<?xml version="1.0"?><svg xmlns="http://www.w3.org/2000/svg"/>', 'png': b'\x89PNG\r\n\x1a\n'}
-FOREIGN = {'script', 'link', 'iframe', 'object', 'embed', 'base', 'meta'}
+FOREIGN = {'link', 'iframe', 'object', 'embed', 'base', 'meta'}
 
 
 class Page(HTMLParser):
@@ -32,7 +34,7 @@ class Page(HTMLParser):
             self._open.append([f'{tag}.{attributes["class"]}' if 'class' in attributes else tag, ''])
 
     def handle_data(self, data):
-        for element in self._open:
+        for element in self._open[-1:] if self._open and self._open[-1][0] == 'script' else self._open:
             element[1] += data
 
     def handle_endtag(self, tag):
@@ -64,6 +66,7 @@ class Page(HTMLParser):
         assert self.links
         assert all(link.startswith('data:image/svg+xml;base64,') for link in self.links)
         assert set(self.tags).isdisjoint(FOREIGN - {'meta'})
+        assert self.tags.count('script') == len(self.figures) + bool(self.figures)
         style = self.texts['style'][0]
         assert 'url(' not in style
         assert '@import' not in style
@@ -80,7 +83,8 @@ class Page(HTMLParser):
 
 
 def checked_page(path: Path) -> Page:
-    """The page at a path, after `Page.check`."""
+    """The page at a path, after `Page.check` and, where there is a browser, `check_in_browser`."""
     page = Page(path)
     page.check()
+    check_in_browser(path)
     return page

@@ -16,6 +16,7 @@ from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
 from seal_friction_ros.offline.bags.bag import BagWriter
 
 SECOND = 1_000_000_000  # [ns]
+START = 1_700_000_000 * SECOND  # [ns]
 TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}
 
 
@@ -50,7 +51,7 @@ class Day:
     one_direction: bool = False
 
 
-def samples(day: Day, seconds: float, seed: int, start: int = 1_700_000_000 * SECOND) -> Iterator[RodSample]:
+def samples(day: Day, seconds: float, seed: int, start: int = START) -> Iterator[RodSample]:
     """The samples of a day: trapezoids of velocity with ramps of a tenth of the stroke."""
     rng = np.random.default_rng(seed)
     count = round(seconds / day.period)
@@ -83,7 +84,7 @@ def samples(day: Day, seconds: float, seed: int, start: int = 1_700_000_000 * SE
         before, counted = velocity, measured
 
 
-def write_day(path: Path, day: Day, seconds: float, seed: int = 0, start: int = 1_700_000_000 * SECOND) -> Path:
+def write_day(path: Path, day: Day, seconds: float, seed: int = 0, start: int = START) -> Path:
     """A bag with the inputs of a day."""
     with BagWriter(path) as writer:
         for sample in samples(day, seconds, seed, start):

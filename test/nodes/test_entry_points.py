@@ -16,7 +16,7 @@ def has_default_action(pid: int, number: signal.Signals) -> bool:
     return not int(caught.split()[1], 16) >> (number - 1) & 1
 
 
-@pytest.mark.parametrize('node', ['friction_estimator', 'servo_simulator'])
+@pytest.mark.parametrize('node', ['friction_estimator', 'servo_simulator', 'friction_monitor'])
 @pytest.mark.parametrize('delay', [0.0, 0.2, 0.5, 1.0, 2.0])  # [s]
 def test_sigint_ends_a_node_that_starts_without_a_traceback(node: str, delay: float):
     code = f'from seal_friction_ros.nodes.entry_points import {node}; print(flush=True); {node}()'

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.messages import INPUTS
 from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, MissingSamples
@@ -47,3 +48,17 @@ def test_slow_motion_as_each_reversal_has_it_is_no_warning_and_a_quarter_of_a_se
 @pytest.mark.parametrize('bit', [Status.FASTER_THAN_IDENTIFIED, Status.DIRECTION_NOT_IDENTIFIED])
 def test_one_estimate_beyond_the_identified_motion_is_a_warning(bit):
     assert level_of(bit, 0.01) == (DiagnosticStatus.WARN, bit.name)
+
+
+def test_who_looks_on_gets_the_newest_answers_with_the_bits_of_all_since_the_last_look():
+    statistics = EstimatorDiagnostics()
+    assert statistics.take_newest('boom') == []
+    for number, (status, limited) in enumerate([(0, 0), (int(Status.FORCE_STALE), int(Limited.CLAMP)), (0, 0)]):
+        statistics.on_estimate(NO_ESTIMATE._replace(stamp=number, status=status), 1)
+        statistics.on_feedforward(FeedForward(number, float(number), 0.9, limited))
+    estimate, feedforward = statistics.take_newest('boom')
+    assert (estimate.actuator, estimate.record.stamp, estimate.record.status) == ('boom', 2, Status.FORCE_STALE)
+    assert (feedforward.record.force, feedforward.record.limited) == (2.0, Limited.CLAMP)
+    assert statistics.take_newest('boom') == []
+    statistics.on_estimate(NO_ESTIMATE, 1)
+    assert [answer.record.status for answer in statistics.take_newest('boom')] == [0]

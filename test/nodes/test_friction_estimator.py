@@ -68,7 +68,7 @@ def test_a_clock_that_is_set_changes_no_time_of_receipt_and_what_was_recorded_ve
     step = 0
     clocks = {name: getattr(time, name) for name in ('monotonic', 'monotonic_ns', 'perf_counter_ns', 'sleep')}
     set_clock = SimpleNamespace(time_ns=lambda: time.time_ns() + step, **clocks)
-    monkeypatch.setattr('seal_friction_ros.nodes.friction_estimator.time', set_clock)
+    monkeypatch.setattr('seal_friction_ros.nodes.estimator_node.time', set_clock)
     recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     with graph({'stamp_age_max': EstimatorSettings().stamp_age_max, **recording}) as g:
         g.connect()

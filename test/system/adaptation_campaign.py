@@ -65,11 +65,12 @@ def simulated(kind: str, seconds: float, seed: int) -> dict[str, Any]:
     day = day_of(kind, seed)
     state, health, worst, found, settled = estimator.init(PARAMETERS), SealHealth(), 0.0, [], []
     for number, sample in enumerate(samples(day, seconds, seed)):
+        before = state
         state, _ = step(PARAMETERS, state, sample)
         adaptation = state.adaptation
-        before = health.change.changes
-        health = followed(health, adaptation)
-        if health.change.changes > before:
+        known = health.change.changes
+        health = followed(health, PARAMETERS, before, state)
+        if health.change.changes > known:
             found.append(health.learnt)
         time = number * day.period
         if time < BEGIN:

@@ -1,6 +1,7 @@
 """Force times wanted velocity is never negative: random laws, gains and references through the pipeline of the node.
 
-``python test/system/feedforward_sign.py --cases 100000``. Each case is a reference of 30 samples. Slew limit, force
+``python test/system/feedforward_sign.py --cases 100000``. Each case is a reference of 30 samples; in every
+second case the force follows elastic seals. Slew limit, force
 limit and fade are out of the way, since they alone may delay a reversal; the lead is random. Exit code 1 if a force
 acts against the reference, or is not exactly 0 N with ``scale`` 0.
 """
@@ -28,6 +29,7 @@ from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulom
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import read_yaml
 
@@ -92,10 +94,13 @@ def random_reference(rng: np.random.Generator) -> list[tuple[float, float]]:
 def violations(seed: int) -> list[str]:
     """What goes wrong in one case."""
     rng = np.random.default_rng([14, seed])
-    seals = (MountedSeal(random_seal(rng), 'a'), MountedSeal(random_seal(rng), 'b'))
+    elastic = np.random.default_rng([19, seed])
+    presliding = Presliding(stiffness=10.0 ** elastic.uniform(3, 8), yield_exponent=elastic.uniform(0.0, 5.0))
+    seals = tuple(MountedSeal(replace(random_seal(rng), presliding=presliding), chamber) for chamber in 'ab')
     scale = 0.0 if rng.random() < 0.2 else rng.uniform(0.0, 2.0)
     settings = FeedForwardSettings(
         scale=scale,
+        presliding=seed % 2 == 1,
         smoothing_velocity=10.0 ** rng.uniform(-5, -1),
         lead_time=0.5 * rng.random() ** 4,
         slew_limit=1e9,

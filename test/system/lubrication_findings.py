@@ -9,7 +9,7 @@ import dataclasses
 import json
 from collections.abc import Sequence
 
-from seal_friction_ros.core.lubrication.findings import Findings, findings
+from seal_friction_ros.core.lubrication.findings import Findings, error_of_levels, findings
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.transient import run_transient
 from seal_friction_ros.offline.contact.lubrication_runs import run_case, run_study, single_case
@@ -48,7 +48,7 @@ SINGLE = (
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """A number, and its change with twice the time step and with half the cells; None: not computed."""
+    """A number, and its errors by time step and by grid, each from three levels; None: not computed."""
 
     case: str
     name: str
@@ -60,34 +60,34 @@ class Row:
 def all_findings(names: Sequence[str]) -> list[Row]:
     """The findings of every case, and those of the study of the first case."""
     rows = []
-    for name in names:
-        found = run_case(single_case(name, 'finding'))
+    cases = [single_case(name, 'finding') for name in names]
+    layer = dataclasses.replace(cases[0].seal, body='bonded_layer')
+    cases.append(dataclasses.replace(cases[0], name=f'{cases[0].name}, layer', seal=layer))
+    for case in cases:
+        name, found = case.name, run_case(case)
         values = found.found._asdict()
         rows += [
             Row(name, key, values[key], found.step_errors[key], found.grid_errors[key]) for key in found.step_errors
         ]
         rows.append(Row(name, 'mass_defect', found.result.mass_defect))
         rows.append(Row(name, 'retried_steps', found.result.retried_steps))
-    return rows + study_rows(single_case(names[0], 'study'))
+    return rows + study_rows(cases[0])
 
 
 def study_rows(case: LubricationCase) -> list[Row]:
     """Deviation of friction over tau_c from its mean, with the errors of step and grid."""
     n = case.numerics
-    longer = dataclasses.replace(n, time_step=2.0 * n.time_step)
-    coarser = dataclasses.replace(n, cells=max(32, n.cells // 2))
-    fine, step_, grid = (run_study(dataclasses.replace(case, numerics=g), 1).table for g in (n, longer, coarser))
-    return [
-        Row(
-            f'tau_c = {stress / 1e6:g} MPa',
-            name,
-            getattr(fine, name)[i],
-            abs(getattr(step_, name)[i] - getattr(fine, name)[i]),
-            abs(getattr(grid, name)[i] - getattr(fine, name)[i]),
-        )
-        for i, stress in enumerate(fine.solid_shear_stress)
-        for name in ('friction', 'solid_share', 'deviation', 'curve_deviation')
-    ]
+    levels = [n]
+    levels += [dataclasses.replace(n, time_step=factor * n.time_step) for factor in (2.0, 4.0)]
+    levels += [dataclasses.replace(n, cells=max(32, n.cells // factor)) for factor in (2, 4)]
+    tables = [run_study(dataclasses.replace(case, numerics=level), 1).table for level in levels]
+    rows = []
+    for i, stress in enumerate(tables[0].solid_shear_stress):
+        for name in ('friction', 'solid_share', 'deviation', 'curve_deviation'):
+            fine, *others = (getattr(table, name)[i] for table in tables)
+            by_step, by_grid = error_of_levels(fine, *others[:2]), error_of_levels(fine, *others[2:])
+            rows.append(Row(f'tau_c = {stress / 1e6:g} MPa', name, fine, by_step, by_grid))
+    return rows
 
 
 def influence(names: Sequence[str]) -> dict[str, dict[str, list[float]]]:

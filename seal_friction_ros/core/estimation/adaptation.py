@@ -19,6 +19,8 @@ own:
   s follows the median of the last six z. A load step within a stroke spoils two z, an offset that drifts makes them
   alternate; the median of an even number of values passes on neither. The standard deviation of s is that of the median
   of independent z, from their mean absolute deviation, and the distance that s still has to go.
+- Force sum, friction of the law and velocity go through **the same two lags**, of which the acceleration is taken: so
+  inertia and friction are compared at one and the same time, also while the rod accelerates.
 - **Noise**, the standard deviation of the residual: it grows with each residual outside its 95 % band and shrinks with
   each one inside, so that the band holds 95 % in the long run, whatever the distribution.
 
@@ -54,9 +56,12 @@ BAND_95 = 1.959964  # [-] half the width of the band over its standard deviation
 ONE_SIDED_95 = 1.644854  # [-] 95 % of a normal distribution are below it
 OUTLIER = 4.0  # [-] residual over its standard deviation above which a sample is a spike, or a load step
 STEP_SAMPLES = 2  # outliers in a row that are a load step
-ACCELERATION_TIME = 0.005  # [s] time constant of each of the two lags that the acceleration is taken with
+LAG = 0.005  # [s] time constant of each of the two lags of all signals, with which the acceleration is taken
+SETTLED = 0.95  # [-] of the friction, which its lagging value must have reached after a reversal
+LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
-LEARNING_INTERVAL = 0.004  # [s] least time between two samples that are learnt from
+LEARNING_INTERVAL = 4_000_000  # [ns] least time between two samples that are learnt from: what it costs at 1 kHz
+LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 FEWEST_REVERSALS = 3  # before which no scale is believed
 FORGETTING_TIME = 3600.0  # [s] without a reversal in which the scale becomes as uncertain as the seal file
 LARGEST_CHANGE = 0.1  # [-] of the scale in one reversal
@@ -143,20 +148,31 @@ class Learnt(NamedTuple):
     reversals: int  # number of z so far
 
 
+class Lagging(NamedTuple):
+    """Signals after one lag, or after two: what has the same lags can be compared."""
+
+    velocity: float  # [m/s]
+    force_sum: float  # [N]
+    friction: float  # [N] f d of the law; 0.0 at rest
+    travel: float  # [m] integrated velocity
+
+
 class AdaptationState(NamedTuple):
     """What one sample leaves for the next."""
 
-    stamp: int  # [ns] of the last sample; `NEVER` before the first
-    velocity: float  # [m/s] after one lag
-    lagging_velocity: float  # [m/s] after two
-    travel: float  # [m] integrated velocity
+    stamp: int  # [ns] of the last sample that was taken; `NEVER` before the first
+    once: Lagging
+    twice: Lagging
+    acceleration: float  # [m/s^2] of the velocity after two lags
+    travel: float  # [m] integrated velocity, without a lag
     learnt: Learnt
     learnt_stamp: int  # [ns] of the last sample that was learnt from
 
 
 NO_LEVEL = Level(0, NEVER, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
 NOTHING_LEARNT = Learnt(0, 0.0, 0, 0, -1.0, NO_LEVEL, NO_LEVEL, 1.0, -1.0, 1.0, Ratios(1.0, 1.0, 1.0, 1.0, 1.0, 1.0), 0)
-NOT_ADAPTED = AdaptationState(NEVER, 0.0, 0.0, 0.0, NOTHING_LEARNT, NEVER)
+NO_SIGNALS = Lagging(0.0, 0.0, 0.0, 0.0)
+NOT_ADAPTED = AdaptationState(NEVER, NO_SIGNALS, NO_SIGNALS, 0.0, 0.0, NOTHING_LEARNT, NEVER)
 """State before the first sample."""
 
 
@@ -174,8 +190,44 @@ class Slide(NamedTuple):
     is_identified: bool  # whether the law was identified at this pressure and speed
 
 
+class Reading(NamedTuple):
+    """One reading of the friction, after two lags."""
+
+    direction: int  # -1 or 1
+    force: float  # [N] y
+    friction: float  # [N] f of the law
+    travel: float  # [m]
+    missed: float  # [N] residual of the sample itself, without lags but for the inertia
+
+
 @compilable
-def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) -> tuple[AdaptationState, float]:
+def is_due(state: AdaptationState, stamp: int) -> bool:
+    """Whether the sample of this stamp is to be learnt from: the last one is old enough, or the clock went back."""
+    return not 0 <= stamp - state.stamp < LEARNING_INTERVAL
+
+
+@compilable
+def residual(
+    settings: AdaptationSettings, state: AdaptationState, velocity: float, force_sum: float, friction: float
+) -> float:
+    """What a reading [N] is more than was learnt before: y - s f d - b; 0.0 at rest.
+
+    Args:
+        settings: With the moving mass.
+        state: Before this sample is learnt from, its acceleration that of the last sample taken.
+        velocity: [m/s] 0.0 at rest.
+        force_sum: [N]
+        friction: Of the law [N], >= 0.
+    """
+    if velocity == 0.0:
+        return 0.0
+    learnt = state.learnt
+    reading = force_sum - settings.moving_mass * state.acceleration - learnt.offset
+    return reading - learnt.scale * friction if velocity > 0.0 else reading + learnt.scale * friction
+
+
+@compilable
+def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) -> AdaptationState:
     """Learn from one sample.
 
     Args:
@@ -184,47 +236,68 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
         slide: The sample.
 
     Returns:
-        The next state, and the residual [N] of this sample before it is learnt from: y - s f d - b; 0.0 at rest.
+        The next state.
     """
     stamp, velocity, force_sum, friction, _, _, _, learns, _ = slide
-    last, first_lag, second_lag, travel, learnt, learnt_stamp = state
+    last, once, twice, _, travel, learnt, learnt_stamp = state
+    direction = (1 if velocity > 0.0 else -1) if velocity != 0.0 else 0
     elapsed = (stamp - last) * 1e-9 if last != NEVER else 0.0
-    acceleration = 0.0
-    if 0.0 < elapsed <= LONGEST_STEP:
-        lag = elapsed + ACCELERATION_TIME
-        first_lag += elapsed / lag * (velocity - first_lag)
-        acceleration = (first_lag - second_lag) / lag
-        second_lag += elapsed / lag * (first_lag - second_lag)
-        travel += velocity * elapsed
-    else:
-        first_lag, second_lag, learns = velocity, velocity, False
-    residual = 0.0
-    if velocity != 0.0:
-        direction = 1 if velocity > 0.0 else -1
-        reading = force_sum - settings.moving_mass * acceleration
-        residual = reading - learnt.scale * friction * direction - learnt.offset
+    if not 0.0 < elapsed <= LONGEST_STEP:  # nobody knows how far the rod went meanwhile
+        once = Lagging(velocity, force_sum, friction * direction, travel)
+        return AdaptationState(stamp, once, once, 0.0, travel, _interrupted(learnt), learnt_stamp)
+    share = elapsed / (elapsed + LAG)
+    newest = (velocity - once.velocity) / (elapsed + LAG)
+    acceleration = (once.velocity + share * (velocity - once.velocity) - twice.velocity) / (elapsed + LAG)
+    inertia = settings.moving_mass * acceleration
+    missed = force_sum - inertia - learnt.scale * friction * direction - learnt.offset
+    learns = learns and direction != 0 and _is_even(settings, acceleration, newest, learnt.scale * friction)
+    if learns and _is_spike(learnt, direction, missed):
+        force_sum += between(-OUTLIER * learnt.noise, missed, OUTLIER * learnt.noise) - missed
+    travel += velocity * elapsed
+    once = _lagging(once, Lagging(velocity, force_sum, friction * direction, travel), share)
+    twice = _lagging(twice, once, share)
+    if learns and twice.friction * direction >= SETTLED * friction > 0.0:
         since = (stamp - learnt_stamp) * 1e-9 if learnt_stamp != NEVER else LONGEST_STEP
-        is_due = since >= LEARNING_INTERVAL or direction != learnt.direction
-        if learns and is_due and friction > 0.0 and _is_even(settings, acceleration, learnt.scale * friction):
-            since = between(0.0, since, LONGEST_STEP)
-            learnt = _learn(settings, learnt, slide, since, direction, travel, reading, residual)
-            learnt_stamp = stamp
-    return AdaptationState(stamp, first_lag, second_lag, travel, learnt, learnt_stamp), residual
+        reading = Reading(direction, twice.force_sum - inertia, twice.friction * direction, twice.travel, missed)
+        learnt = _learn(settings, learnt, slide, between(0.0, since, LONGEST_STEP), reading)
+        learnt_stamp = stamp
+    return AdaptationState(stamp, once, twice, acceleration, travel, learnt, learnt_stamp)
 
 
 @compilable
-def _learn(
-    settings: AdaptationSettings,
-    learnt: Learnt,
-    slide: Slide,
-    elapsed: float,
-    direction: int,
-    travel: float,
-    reading: float,
-    residual: float,
-) -> Learnt:
-    """What is learnt after one more reading y [N], ``elapsed`` [s] after the one before."""
+def _lagging(before: Lagging, newest: Lagging, share: float) -> Lagging:
+    """Signals after one more lag."""
+    velocity, force_sum, friction, travel = before
+    return Lagging(
+        velocity + share * (newest.velocity - velocity),
+        force_sum + share * (newest.force_sum - force_sum),
+        friction + share * (newest.friction - friction),
+        travel + share * (newest.travel - travel),
+    )
+
+
+@compilable
+def _interrupted(learnt: Learnt) -> Learnt:
+    """What is learnt, without the strokes that are not yet compared."""
+    direction, offset, samples, outliers, noise, _, _, scale, std, median, ratios, reversals = learnt
+    return Learnt(
+        direction, offset, samples, outliers, noise, NO_LEVEL, NO_LEVEL, scale, std, median, ratios, reversals
+    )
+
+
+@compilable
+def _is_spike(learnt: Learnt, direction: int, missed: float) -> bool:
+    """Whether a residual ``missed`` [N] is too large for the noise, and the first of its kind."""
+    if learnt.noise < 0.0 or direction != learnt.direction or learnt.outliers + 1 >= STEP_SAMPLES:
+        return False
+    return abs(missed) > OUTLIER * learnt.noise
+
+
+@compilable
+def _learn(settings: AdaptationSettings, learnt: Learnt, slide: Slide, elapsed: float, newest: Reading) -> Learnt:
+    """What is learnt after one more reading, ``elapsed`` [s] after the one before."""
     last_direction, offset, samples, outliers, noise, level, before, scale, std, median, ratios, reversals = learnt
+    direction, reading, friction, _, missed = newest
     if noise < 0.0:
         noise = slide.friction_std
     if direction != last_direction:
@@ -232,23 +305,21 @@ def _learn(
             ratio = _ratio(before, level)
             old_scale = scale
             scale, std, median, ratios = _learnt_scale(settings, scale, std, ratios, reversals, ratio)
-            offset += (old_scale - scale) * slide.friction * direction
+            offset += (old_scale - scale) * friction * direction
             reversals += 1
         before, level, samples, outliers = level, NO_LEVEL, 0, 0
-    elif abs(residual) > OUTLIER * noise:
+    elif abs(missed) > OUTLIER * noise:
         outliers += 1
-        if outliers < STEP_SAMPLES:  # a spike counts as the largest residual that is none
-            reading += between(-OUTLIER * noise, residual, OUTLIER * noise) - residual
-        else:
+        if outliers >= STEP_SAMPLES:
             samples, outliers = 0, 0
     else:
         outliers = 0
     samples += 1
-    outside = 1.0 if abs(residual) > BAND_95 * noise else 0.0
+    outside = 1.0 if abs(missed) > BAND_95 * noise else 0.0
     noise *= 1.0 + elapsed / WIDTH_TIME * (outside - OUTSIDE)
     if slide.is_identified:
-        level = _averaged(level, slide, elapsed, direction, travel, reading)
-    offset += _share(elapsed, WINDOW, samples) * (reading - scale * slide.friction * direction - offset)
+        level = _averaged(level, slide, elapsed, newest)
+    offset += _share(elapsed, WINDOW, samples) * (reading - scale * friction * direction - offset)
     return Learnt(direction, offset, samples, outliers, noise, level, before, scale, std, median, ratios, reversals)
 
 
@@ -256,7 +327,8 @@ def _learn(
 def with_scale(friction: ActuatorFriction, learnt: Learnt, stamp: int, uses_scale: bool) -> ActuatorFriction:
     r"""Friction by what is learnt, with the standard deviation of the next reading.
 
-    With ``uses_scale`` it is :math:`\sigma = \max(\sigma_e, \sigma_s f)` with :math:`\sigma_e` the noise. Without, the
+    With ``uses_scale`` it is :math:`\sigma = \max(\sigma_e, \sigma_s f, 0.01 f)` with :math:`\sigma_e` the noise: a
+    force that stands still has no residual, and nobody knows a friction to less than 1 % (our choice). Without, the
     friction misses :math:`m = |s - 1| f`, and the band that holds 95 % of a normal distribution about m is
     :math:`(m + 1.64 \sigma) / 1.96` where that is wider. While nothing is learnt, the deviation is that of the seal
     file; over an hour without a reversal its variance comes back, since friction in one direction may change unseen.
@@ -267,14 +339,14 @@ def with_scale(friction: ActuatorFriction, learnt: Learnt, stamp: int, uses_scal
         stamp: Of this sample [ns].
         uses_scale: Whether the estimate has the scale.
     """
-    coulomb, file_std, stiction, in_identified_range, velocity_friction = friction
-    if learnt.scale_std < 0.0:
+    scale_std = learnt.scale_std
+    if scale_std < 0.0:
         return friction
-    sliding = coulomb + velocity_friction
-    std = max(learnt.scale_std * sliding, learnt.noise)
-    reversal, forgotten = learnt.before.stamp, 1.0
-    if reversal != NEVER:
-        forgotten = between(0.0, (stamp - reversal) * 1e-9 / FORGETTING_TIME, 1.0)
+    coulomb, file_std, stiction, in_identified_range, velocity_friction = friction
+    sliding, reversal = coulomb + velocity_friction, learnt.before.stamp
+    least = (scale_std if scale_std > LEAST_STD else LEAST_STD) * sliding
+    std = learnt.noise if learnt.noise > least else least
+    forgotten = between(0.0, (stamp - reversal) * 1e-9 / FORGETTING_TIME, 1.0) if reversal != NEVER else 1.0
     std = math.sqrt(std * std + forgotten * file_std * file_std)
     if not uses_scale:
         missed = (abs(learnt.scale - 1.0) * sliding + ONE_SIDED_95 * std) / BAND_95
@@ -310,17 +382,26 @@ def disagrees(
 
 
 @compilable
-def _is_even(settings: AdaptationSettings, acceleration: float, friction: float) -> bool:
-    """Whether inertia is small, or known and no larger than the friction [N]."""
+def _is_even(settings: AdaptationSettings, acceleration: float, newest: float, friction: float) -> bool:
+    """Whether the speed is even: little inertia against the friction [N], or little acceleration if no mass is known.
+
+    Args:
+        settings: With the limits.
+        acceleration: [m/s^2] after two lags, which takes the inertia off.
+        newest: [m/s^2] after one: noisier, but it shows a change earlier.
+        friction: Scaled [N].
+    """
+    largest = abs(acceleration) if abs(acceleration) > abs(newest) else abs(newest)
     if settings.moving_mass > 0.0:
-        return settings.moving_mass * abs(acceleration) <= friction
-    return abs(acceleration) <= settings.acceleration_max
+        return settings.moving_mass * largest <= LARGEST_INERTIA * friction
+    return largest <= settings.acceleration_max
 
 
 @compilable
-def _averaged(level: Level, slide: Slide, elapsed: float, direction: int, travel: float, reading: float) -> Level:
-    """Level after one more sample."""
+def _averaged(level: Level, slide: Slide, elapsed: float, newest: Reading) -> Level:
+    """Level after one more reading."""
     _, _, mean_reading, friction, pressure_a, pressure_b, place, variance, covariance, duration, samples = level
+    direction, reading, newest_friction, travel, _ = newest
     samples += 1
     share = _share(elapsed, LONGEST_MEMORY, samples)
     further, higher = travel - place, reading - mean_reading
@@ -328,7 +409,7 @@ def _averaged(level: Level, slide: Slide, elapsed: float, direction: int, travel
         direction,
         slide.stamp,
         mean_reading + share * higher,
-        friction + share * (slide.friction - friction),
+        friction + share * (newest_friction - friction),
         pressure_a + share * (slide.pressure_a - pressure_a),
         pressure_b + share * (slide.pressure_b - pressure_b),
         place + share * further,

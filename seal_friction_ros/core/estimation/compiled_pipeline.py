@@ -28,6 +28,7 @@ from seal_friction_ros.core.estimation.messages import (
     PRESSURE_TYPE,
     REFERENCE_TYPE,
     SECOND,
+    TEMPERATURE_TYPE,
     TICK_TYPE,
     VELOCITY_TYPE,
     Layout,
@@ -38,6 +39,7 @@ from seal_friction_ros.core.estimation.pipeline import (
     receive_force,
     receive_pressure,
     receive_reference,
+    receive_temperature,
     receive_tick,
     receive_velocity,
     send,
@@ -48,10 +50,11 @@ from seal_friction_ros.core.estimation.records import (
     FrictionEstimate,
     Pressure,
     ServoReference,
+    Temperature,
     Velocity,
     WatchdogTick,
 )
-from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
+from seal_friction_ros.core.foundation.compiled import INNER, compiled, for_compiler
 
 Bytes = npt.NDArray[np.uint8]
 Integers = npt.NDArray[np.int64]
@@ -67,23 +70,25 @@ class Kind(IntEnum):
     FORCE = 1
     PRESSURE = 2
     REFERENCE = 3
-    TICK = 4
-    VELOCITY = 5
-    ESTIMATE = 6
-    FEEDFORWARD = 7
-    CONFIGURATION = 8
-    OTHER_ESTIMATE = 9
+    TEMPERATURE = 4
+    TICK = 5
+    VELOCITY = 6
+    ESTIMATE = 7
+    FEEDFORWARD = 8
+    CONFIGURATION = 9
+    OTHER_ESTIMATE = 10
     """of another estimator"""
 
 
-_FORCE, _PRESSURE, _REFERENCE, _TICK, _VELOCITY = (
-    int(kind) for kind in (Kind.FORCE, Kind.PRESSURE, Kind.REFERENCE, Kind.TICK, Kind.VELOCITY)
+_FORCE, _PRESSURE, _REFERENCE, _TEMPERATURE, _TICK, _VELOCITY = (
+    int(kind) for kind in (Kind.FORCE, Kind.PRESSURE, Kind.REFERENCE, Kind.TEMPERATURE, Kind.TICK, Kind.VELOCITY)
 )
 _LAYOUTS = {layout.message_type: layout for layout in LAYOUTS}
 _INPUT_TYPES = {
     _FORCE: FORCE_TYPE,
     _PRESSURE: PRESSURE_TYPE,
     _REFERENCE: REFERENCE_TYPE,
+    _TEMPERATURE: TEMPERATURE_TYPE,
     _TICK: TICK_TYPE,
     _VELOCITY: VELOCITY_TYPE,
 }
@@ -210,6 +215,15 @@ def _number(data: Bytes, offset: int) -> float:
 
 
 @compiled
+def _numbers(data: Bytes, offset: int, count: int) -> tuple[float, float, float]:
+    """The first ``count`` numbers of a message, 1 to 3, then zeros."""
+    first = _number(data, offset)
+    second = _number(data, offset + 8) if count > 1 else 0.0
+    third = _number(data, offset + 16) if count > 2 else 0.0
+    return first, second, third
+
+
+@compiled
 def _head_size(frame_length: int) -> int:
     """As `messages.head_size`."""
     return (12 + frame_length + 7) // 8 * 8
@@ -258,7 +272,6 @@ def _receive_all(
 ) -> tuple[PipelineState, int]:
     """The pass; the number of the first message whose answer is not finite, or -1."""
     data, message_offsets, cursor = outbox.data, outbox.message_offsets, outbox.cursor
-    first, second, third = 0.0, 0.0, 0.0
     for i in range(len(kinds)):
         kind = kinds[i]
         if not _FORCE <= kind <= _VELOCITY:
@@ -266,17 +279,15 @@ def _receive_all(
         offset, received = message_offsets[i], receipts[i]
         body = offset + 4 + _head_size(_integer(data, offset + 12, 4))
         stamp = _stamp(data, offset)
-        first = _number(data, body)
-        if _NUMBERS[kind] > 1:
-            second = _number(data, body + 8)
-        if _NUMBERS[kind] > 2:
-            third = _number(data, body + 16)
+        first, second, third = _numbers(data, body, _NUMBERS[kind])
         if kind == _VELOCITY:
             state = receive_velocity(parameters, state, Velocity(stamp, first, i), received, outbox)
         elif kind == _PRESSURE:
             state = receive_pressure(parameters, state, Pressure(stamp, first, second), received, outbox)
         elif kind == _FORCE:
             state = receive_force(parameters, state, Force(stamp, first), received, outbox)
+        elif kind == _TEMPERATURE:
+            state = receive_temperature(parameters, state, Temperature(stamp, first, second), received, outbox)
         elif kind == _TICK:
             state = receive_tick(parameters, state, WatchdogTick(stamp, first, i), received, outbox)
         else:
@@ -287,7 +298,7 @@ def _receive_all(
     return state, -1
 
 
-@overload(send, jit_options={'error_model': 'numpy'})
+@overload(send, jit_options=INNER)
 def _send(emit: Any, record: Any, frame_id: Any) -> Any:
     """`pipeline.send` in compiled code: the record goes into the outbox. The frame is the number of the message."""
     del emit, frame_id  # overload compares the names with those of `send`

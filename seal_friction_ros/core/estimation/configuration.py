@@ -13,9 +13,9 @@ from typing import Any, NamedTuple, get_type_hints
 
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorParameters, EstimatorSettings
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.feedforward import FADED_OUT, FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
-from seal_friction_ros.core.estimation.records import Force, Pressure
+from seal_friction_ros.core.estimation.records import NO_TEMPERATURE, Force, Pressure
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.mounting import CHAMBERS_TEXT, check_chambers
 from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of
@@ -269,9 +269,13 @@ def _state(configuration: Configuration, document: Any, version: int) -> Pipelin
         return init(configuration.parameters())._replace(
             pressure=pressure, force=force, refused=bool(document['refused'])
         )
-    estimator = {'adaptation': _encoded_record(NOT_ADAPTED)} | document['estimator']  # older bags are without it
-    state: PipelineState = _parsed(PipelineState, document | {'estimator': estimator})
-    if not all(map(_is_finite, (state.estimator, state.feedforward, state.friction, state.reference))):
+    # Older bags are without adaptation, temperature and elements of the feed-forward.
+    estimator = {'adaptation': _encoded_record(NOT_ADAPTED)} | document['estimator']
+    guided = _encoded_record(FADED_OUT) | document['feedforward']
+    document = {'temperature': _encoded_record(NO_TEMPERATURE)} | document
+    state: PipelineState = _parsed(PipelineState, document | {'estimator': estimator, 'feedforward': guided})
+    computed = state.estimator, state.feedforward, state.friction, state.reference, state.temperature
+    if not all(map(_is_finite, computed)):
         raise ValueError('configuration: a number in the state is not finite')
     return state
 

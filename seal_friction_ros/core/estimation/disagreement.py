@@ -6,20 +6,24 @@ in another unit, an area of the force sum that is off, another seal. All thresho
 
 import math
 from collections.abc import Sequence
-from statistics import median
+from itertools import pairwise
+from statistics import fmean, median, pstdev
 from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.adaptation import Learnt
+from seal_friction_ros.core.estimation.adaptation import FEWEST_REVERSALS, Learnt
 from seal_friction_ros.core.friction.actuator import SealNumbers, friction_of_seals
 from seal_friction_ros.core.friction.mounting import pressure_at_seal
 
 FROZEN = 0.05  # [-] a share of the friction below this is none
 PRESSURE_UNITS = {'psi': 6894.757, 'bar': 1e5, 'kPa': 1e3, 'MPa': 1e6}  # [Pa]
 IMPLAUSIBLE = 0.01  # [-] of the highest identified pressure, below which a unit may be wrong
-EXPLAINED = 1.3  # [-] a unit explains the friction up to this factor
-HALF = 0.06  # [-] how near to a half or twice the friction counts as such
+EXPLAINED = 1.3  # [-] a unit explains the friction up to this factor: one day differs as much from another
+BEYOND = 1.5  # [-] of the highest identified pressure, up to which one below the lowest may be in another unit
+HALF = 0.06  # [-] how near to a half or twice the friction counts as such, if the seal file states less
+HALVED = 0.7  # [-] a ratio above it is nearer to 1 than to a half
+LAST = 12  # reversals that tell the ratio; older ones tell an area
 FEWEST_STROKES = 6  # for a line of the offset over the pressure
 STRAIGHT = 0.95  # [-] least correlation of that line
 
@@ -42,6 +46,27 @@ def last_reversal(learnt: Learnt) -> Reversal:
     return Reversal(level.stamp, ratio, level.friction, offset, level.pressure_a, level.pressure_b)
 
 
+class Stroke(NamedTuple):
+    """What a stroke shows at its end, learnt from or not."""
+
+    stamp: int  # [ns]
+    direction: int  # -1 or 1
+    reading: float  # [N] force sum less inertia, mean over the last half second
+    friction: float  # [N] of the law
+    pressure_a: float  # [Pa, gauge]
+    pressure_b: float  # [Pa, gauge]
+
+
+def reversal_between(before: Stroke, after: Stroke) -> Reversal | None:
+    """The reversal between two strokes that nothing is learnt from; None if they do not show friction."""
+    law = before.friction + after.friction
+    if before.direction * after.direction >= 0 or law <= 0.0:
+        return None
+    ratio = after.direction * (after.reading - before.reading) / law
+    offset = 0.5 * (before.reading + after.reading)
+    return Reversal(after.stamp, ratio, 0.5 * law, offset, after.pressure_a, after.pressure_b)
+
+
 def likely_reason(seals: tuple[SealNumbers, ...], reversals: Sequence[Reversal]) -> str:
     """The likely reason why the friction of the last reversals is not that of the law, as a clause; '' if it is.
 
@@ -51,44 +76,80 @@ def likely_reason(seals: tuple[SealNumbers, ...], reversals: Sequence[Reversal])
     """
     if not reversals:
         return ''
-    ratio = median(reversal.ratio for reversal in reversals)
+    fault = input_fault(seals, reversals) or _area_error(reversals)
+    if fault:
+        return fault
+    newest = reversals[-1]
+    ratio = median(reversal.ratio for reversal in reversals[-LAST:])
+    law = friction_of_seals(seals, newest.pressure_a, newest.pressure_b, 0.0)
+    stated = max(2.0 * law.coulomb_friction_std / law.coulomb_friction, HALF) if law.coulomb_friction > 0.0 else HALF
+    shown = f'the force sum shows {ratio:.2f} times the friction of the seal file'
+    if (abs(2.0 * ratio - 1.0) < stated and ratio < HALVED) or abs(0.5 * ratio - 1.0) < HALF:
+        return f'{shown}: is an area in it halved or doubled? Else it is another seal, or it has changed'
+    return f'{shown}: another seal, or it has changed'
+
+
+def input_fault(seals: tuple[SealNumbers, ...], reversals: Sequence[Reversal]) -> str:
+    """Clause on an input that no seal explains: frozen, of the wrong sign or unit; '' if there is none.
+
+    It holds outside the identified pressures, too, where the law itself says little.
+    """
+    recent = reversals[-LAST:]
+    if len(recent) < FEWEST_REVERSALS:
+        return ''
+    ratio = median(reversal.ratio for reversal in recent)
     if abs(ratio) < FROZEN:
         return 'the force sum does not follow the motion: is its sensor frozen or not connected?'
     if ratio < 0.0:
         return 'the friction drives: the sign of the velocity or of the force sum is wrong'
-    unit = _unit(seals, reversals)
-    if unit:
-        return f'the pressure looks like {unit}, not Pa'
-    area = _area_error(reversals)
-    if area:
-        return area
-    for factor, name in ((0.5, 'half of'), (2.0, 'twice')):
-        if abs(ratio / factor - 1.0) < HALF:
-            return (
-                f'the force sum shows {name} the friction of the seal file: is an area in it halved or doubled? '
-                'Else it is another seal'
-            )
-    return f'the force sum shows {ratio:.2f} times the friction of the seal file: another seal, or it has changed'
+    unit = _unit(seals, recent)
+    return f'the pressure looks like {unit}, not Pa' if unit else ''
 
 
 def _unit(seals: tuple[SealNumbers, ...], reversals: Sequence[Reversal]) -> str:
-    """Unit in which the pressures explain the friction, if they are too small to be Pa."""
+    """Unit in which the pressures explain the friction, if they are too small to be Pa.
+
+    Below the identified pressures the unit that takes them inside is enough, if it does not contradict the friction.
+    """
     highest = min(seal.pressure_high for seal in seals)
+    lowest = max(seal.pressure_low for seal in seals)
     if not math.isfinite(highest):
         return ''
-    newest = reversals[-1]
-    pair = newest.pressure_a, newest.pressure_b
-    seen = [abs(pressure_at_seal(seal.chamber, *pair)) for seal in seals]
-    if max(seen) > IMPLAUSIBLE * highest or max(seen) == 0.0:
+    pairs = [(reversal.pressure_a, reversal.pressure_b) for reversal in reversals]
+    largest = max(abs(pressure_at_seal(seal.chamber, *pair)) for seal in seals for pair in pairs)
+    if largest > IMPLAUSIBLE * highest or largest == 0.0:
         return ''
-    misses = {}
-    for name, factor in PRESSURE_UNITS.items():
-        if max(seen) * factor <= highest:
-            law = friction_of_seals(seals, pair[0] * factor, pair[1] * factor, 0.0).coulomb_friction
-            misses[name] = abs(math.log(newest.ratio * newest.friction / law)) if newest.ratio > 0.0 < law else math.inf
-    as_given = abs(math.log(newest.ratio)) if newest.ratio > 0.0 else math.inf
+
+    def laws(factor: float) -> list[float]:
+        """Friction by the law with pressures times ``factor``: mean of the strokes before and after each reversal."""
+        each = [friction_of_seals(seals, a * factor, b * factor, 0.0).coulomb_friction for a, b in pairs]
+        return [0.5 * (before + after) for before, after in pairwise(each)]
+
+    as_given = laws(1.0)
+
+    def miss(factor: float) -> float:
+        """Misfit of that law with the friction shown: its scatter, and its mean beyond `EXPLAINED`.
+
+        What speed adds to the law is taken from the law at the pressures as given.
+        """
+        ratios = [
+            reversal.ratio * reversal.friction / max(law + reversal.friction - given, 1e-9)
+            for reversal, law, given in zip(reversals[1:], laws(factor), as_given, strict=True)
+        ]
+        if min(ratios) <= 0.0:
+            return math.inf
+        logs = [math.log(ratio) for ratio in ratios]
+        return math.hypot(pstdev(logs), max(abs(fmean(logs)) - math.log(EXPLAINED), 0.0))
+
+    most = highest if largest >= lowest else BEYOND * highest
+    inside = [name for name, factor in PRESSURE_UNITS.items() if lowest <= largest * factor <= most]
+    misses = {name: miss(PRESSURE_UNITS[name]) for name in inside}
     best = min(misses, key=lambda name: misses[name], default='')
-    return best if best and misses[best] < min(math.log(EXPLAINED), as_given) else ''
+    if not best:
+        return ''
+    if largest < lowest:
+        return best if misses[best] < math.log(2.0) else ''
+    return best if misses[best] < 0.5 * miss(1.0) else ''
 
 
 def _area_error(reversals: Sequence[Reversal]) -> str:

@@ -16,6 +16,8 @@ from seal_friction_ros.core.estimation.adaptation import (
     Slide,
     adapt,
     disagrees,
+    is_due,
+    residual,
     with_scale,
 )
 from seal_friction_ros.core.estimation.conditioned_velocity import (
@@ -33,6 +35,7 @@ from seal_friction_ros.core.estimation.records import (
     FrictionEstimate,
     Pressure,
     RodSample,
+    SealTemperature,
     Status,
 )
 from seal_friction_ros.core.foundation.compiled import compilable
@@ -41,6 +44,8 @@ from seal_friction_ros.core.friction.actuator import (
     ActuatorFriction,
     MountedSeal,
     SealNumbers,
+    at_temperature,
+    at_unknown_temperature,
     friction_of_seals,
     numbers_of_seals,
 )
@@ -51,7 +56,14 @@ from seal_friction_ros.core.friction.force_sum_correction import (
     one_correction,
 )
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, MotionLimits, motion_limits
-from seal_friction_ros.core.friction.states import SLIDING, UNKNOWN, StateFriction, is_at_rest, state_friction
+from seal_friction_ros.core.friction.presliding import PreslidingNumbers, presliding_numbers
+from seal_friction_ros.core.friction.states import UNKNOWN, StateFriction, is_at_rest, state_friction
+from seal_friction_ros.core.friction.temperature import (
+    NO_SCALE,
+    TemperatureScale,
+    is_identified_at,
+    one_temperature_scale,
+)
 
 
 @dataclass(frozen=True)
@@ -83,6 +95,14 @@ class EstimatorSettings:
     )
     force_timeout: float = parameter(
         0.1, unit='s', lower=1e-3, upper=1.0, description='Largest time between the stamps of velocity and force sum.'
+    )
+    temperature_timeout: float = parameter(
+        10.0,
+        unit='s',
+        lower=1e-3,
+        upper=3600.0,
+        description='Largest time between the stamps of velocity and temperature; only with `temperature` in a seal '
+        'file.',
     )
     stamp_age_max: float = parameter(
         1.0,
@@ -143,7 +163,7 @@ class EstimatorParameters:
     """Settings of the estimator and the seals of the actuator.
 
     Raises:
-        ValueError: There is no seal, or two seals have different corrections of the force sum.
+        ValueError: There is no seal, or two seals have different corrections of the force sum or temperature parts.
     """
 
     COMPILED: ClassVar = (
@@ -154,9 +174,12 @@ class EstimatorParameters:
         'force_sum_correction',
         'limits_motion',
         'motion_limits',
+        'elasticity',
         'adaptation',
         'adapts',
         'uses_scale',
+        'has_temperature_scale',
+        'temperature_scale',
     )
 
     settings: EstimatorSettings
@@ -175,13 +198,20 @@ class EstimatorParameters:
     limits_motion: bool = field(init=False, repr=False, compare=False)
     """whether a seal file tells in which motion the seal was identified"""
     motion_limits: MotionLimits = field(init=False, repr=False, compare=False)
+    has_temperature_scale: bool = field(init=False, repr=False, compare=False)
+    """whether the seal files have a ``temperature`` part"""
+    temperature_scale: TemperatureScale = field(init=False, repr=False, compare=False)
+    elasticity: PreslidingNumbers | None = field(init=False, repr=False, compare=False)
+    """of all seals together; None (rigid) if a seal file does not tell: then compiled code has no elements"""
 
     def __post_init__(self) -> None:
         if not self.seals:
             raise ValueError('EstimatorParameters.seals is empty: name at least one seal')
         seals = [mounted.seal for mounted in self.seals]
         correction = one_correction(seal.force_sum_correction for seal in seals)
+        temperature_scale = one_temperature_scale(seal.temperature for seal in seals)
         motions = [seal.identified_motion for seal in seals]
+        elastic = [seal.presliding for seal in seals if seal.presliding]
         derived = {
             'seal_numbers': numbers_of_seals(self.seals),
             'depends_on_velocity': any(seal.depends_on_velocity for seal in seals),
@@ -189,8 +219,11 @@ class EstimatorParameters:
             'force_sum_correction': correction or NO_CORRECTION,
             'limits_motion': any(motion != ANY_MOTION for motion in motions),
             'motion_limits': motion_limits(motions),
+            'elasticity': presliding_numbers(elastic) if len(elastic) == len(seals) else None,
             'adapts': self.adaptation.mode != 'off',
             'uses_scale': self.adaptation.mode == 'on',
+            'has_temperature_scale': temperature_scale is not None,
+            'temperature_scale': temperature_scale or NO_SCALE,
         }
         for name, value in derived.items():
             object.__setattr__(self, name, value)
@@ -263,6 +296,8 @@ _SLOWER_THAN_IDENTIFIED = int(Status.SLOWER_THAN_IDENTIFIED)
 _DIRECTION_NOT_IDENTIFIED = int(Status.DIRECTION_NOT_IDENTIFIED)
 _FORCE_CONTAINS_LOAD = int(Status.FORCE_CONTAINS_LOAD)
 _MODEL_DISAGREES = int(Status.MODEL_DISAGREES)
+_TEMPERATURE_MISSING = int(Status.TEMPERATURE_MISSING)
+_OUTSIDE_IDENTIFIED_TEMPERATURE = int(Status.OUTSIDE_IDENTIFIED_TEMPERATURE)
 _EXTRAPOLATED = int(EXTRAPOLATED)
 
 NO_VELOCITY = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
@@ -307,9 +342,40 @@ def step(
     if not seen.status & _PRESSURE_MISSING:
         pressure = state.pressure
         friction = friction_of_seals(parameters.seal_numbers, pressure.chamber_a, pressure.chamber_b, seen.velocity)
+    if parameters.has_temperature_scale:
+        seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
     if not parameters.adapts:
-        return state, estimate_of(parameters, seen, friction)
+        return state, estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
     return _adapted_step(parameters, state, seen, friction)
+
+
+@compilable
+def temperature_in_use(law: TemperatureScale, temperature: SealTemperature) -> float:
+    """Temperature [K] that the friction is taken at: the newest one however old, before the first the reference."""
+    return law.reference if temperature.stamp == NEVER else temperature.kelvin
+
+
+@compilable
+def _at_seal_temperature(
+    parameters: EstimatorParameters, seen: Observation, friction: ActuatorFriction, temperature: SealTemperature
+) -> tuple[Observation, ActuatorFriction]:
+    """Friction at the temperature of the seals, and status bits if that is old or outside the identified ones.
+
+    An old temperature stays in use, since a seal warms up in minutes and a step back to the reference would be a step
+    of the force (our choice); the standard deviation then holds any of the identified temperatures.
+    """
+    stamp, velocity, force_sum, status, input_age = seen
+    law = parameters.temperature_scale
+    kelvin = temperature_in_use(law, temperature)
+    fault = 0
+    if temperature.stamp == NEVER or abs(stamp - temperature.stamp) * 1e-9 > parameters.settings.temperature_timeout:
+        fault |= _TEMPERATURE_MISSING
+    if not is_identified_at(law, kelvin):
+        fault |= _OUTSIDE_IDENTIFIED_TEMPERATURE
+    friction = at_temperature(friction, law, kelvin)
+    if fault:
+        friction = at_unknown_temperature(friction, law)
+    return Observation(stamp, velocity, force_sum, status | fault, input_age), friction
 
 
 @compilable
@@ -317,53 +383,41 @@ def _adapted_step(
     parameters: EstimatorParameters, state: EstimatorState, seen: Observation, friction: ActuatorFriction
 ) -> tuple[EstimatorState, FrictionEstimate]:
     """Second half of a step with adaptation: estimate by what was learnt before, then learn from this sample."""
-    settings, known = parameters.adaptation, state.adaptation
+    settings, uses_scale, known = parameters.adaptation, parameters.uses_scale, state.adaptation
+    stamp, velocity, force_sum, status, input_age = seen
     learnt = known.learnt
-    estimate = estimate_of(parameters, seen, with_scale(friction, learnt, seen.stamp, parameters.uses_scale))
-    stamp, coulomb, std, breakaway, acting, kind, direction, status, input_age, _, _, _, _ = estimate
-    is_usable, is_identified = not status & ~_EXTRAPOLATED, status == 0
-    if disagrees(settings, learnt, friction, parameters.uses_scale, seen.velocity == 0.0):
-        status |= _MODEL_DISAGREES
+    adapted = with_scale(friction, learnt, stamp, uses_scale)
+    if disagrees(settings, learnt, friction, uses_scale, velocity == 0.0):
+        seen = Observation(stamp, velocity, force_sum, status | _MODEL_DISAGREES, input_age)
     law = friction.coulomb_friction + friction.velocity_friction
-    pressure = state.pressure
+    scale_std = learnt.scale_std
+    if scale_std < 0.0:
+        scale_std = friction.coulomb_friction_std / law if law > 0.0 else 0.0
+    left = 0.0
+    if velocity != 0.0 and not status & (_NO_STATE | _NO_FORCE_SUM):
+        left = residual(settings, known, velocity, force_sum, law)
+        if not uses_scale:
+            left += (learnt.scale - 1.0) * law * (1.0 if velocity > 0.0 else -1.0)
+    estimate = estimate_of(parameters, seen, adapted, learnt.scale, scale_std, learnt.offset, left)
+    if not is_due(known, stamp):
+        return state, estimate
+    status = estimate.status & ~_MODEL_DISAGREES
+    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _ = state
     slide = Slide(
         stamp,
-        seen.velocity,
-        seen.force_sum,
+        velocity,
+        force_sum,
         law,
         friction.coulomb_friction_std,
         pressure.chamber_a,
         pressure.chamber_b,
-        is_usable,
-        is_identified,
+        not status & ~_EXTRAPOLATED,
+        status == 0,
     )
-    known, residual = adapt(settings, known, slide)
-    if kind != SLIDING or status & _NO_FORCE_SUM:
-        residual = 0.0
-    elif not parameters.uses_scale:
-        residual += (learnt.scale - 1.0) * law * direction
-    scale_std = learnt.scale_std
-    if scale_std < 0.0:
-        scale_std = std / law if law > 0.0 else 0.0
-    last, at_rest, _, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, _ = state
-    state = EstimatorState(
-        last, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known
-    )
-    return state, FrictionEstimate(
-        stamp,
-        coulomb,
-        std,
-        breakaway,
-        acting,
-        kind,
-        direction,
-        status,
-        input_age,
-        learnt.scale,
-        scale_std,
-        learnt.offset,
-        residual,
-    )
+    known = adapt(settings, known, slide)
+    return EstimatorState(
+        last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known
+    ), estimate
 
 
 @compilable
@@ -376,7 +430,7 @@ def assess_inputs(
     pressure in use.
     """
     # One unpacking takes a quarter of the time of an attribute each.
-    stamp, given, newest_pressure, newest_force, refused, stamp_age = sample
+    stamp, given, newest_pressure, newest_force, refused, stamp_age, _ = sample
     last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known = state
     settings = parameters.settings
     status = _INPUT_REFUSED if refused else 0
@@ -457,8 +511,19 @@ def _is_uncertain(settings: EstimatorSettings, motion: ConditionedVelocity, at_r
 
 
 @compilable
-def estimate_of(parameters: EstimatorParameters, seen: Observation, friction: ActuatorFriction) -> FrictionEstimate:
-    """Second half of a step: friction that acts on the rod, from the friction of all seals at the pressure in use."""
+def estimate_of(
+    parameters: EstimatorParameters,
+    seen: Observation,
+    friction: ActuatorFriction,
+    scale: float,
+    scale_std: float,
+    offset: float,
+    residual: float,
+) -> FrictionEstimate:
+    """Second half of a step: friction that acts on the rod, from the friction of all seals at the pressure in use.
+
+    ``scale``, ``scale_std``, ``offset`` and ``residual`` [N] are what adaptation adds to the estimate.
+    """
     stamp, velocity, force_sum, status, input_age = seen
     coulomb, coulomb_std, stiction, in_identified_range, velocity_friction = friction
     breakaway = coulomb + stiction if parameters.settings.use_stiction else coulomb
@@ -482,10 +547,10 @@ def estimate_of(parameters: EstimatorParameters, seen: Observation, friction: Ac
         acting.direction,
         status,
         input_age,
-        1.0,  # compiled code takes no defaults
-        0.0,
-        0.0,
-        0.0,
+        scale,
+        scale_std,
+        offset,
+        residual,
     )
 
 

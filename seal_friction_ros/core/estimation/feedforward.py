@@ -9,6 +9,16 @@ with v the wanted velocity, `wanted_velocity`, and f the friction of the seals a
 law or the velocity terms of the seal file add to it. One gain s scales everything, so F is 0 N for s = 0, and F v >=
 0 for every law, gain and velocity: the force never acts against the wanted motion.
 
+With ``presliding`` and seals whose files tell their elasticity, the friction is that of the seals after the wanted
+displacement, `presliding.element_forces`, with f for the sliding friction:
+
+.. math::
+    F = s\,\max(F_f\,\mathrm{sgn}(v), 0) \tanh(v / w), \qquad F_f = \sum_i f_i, \quad \Delta x = v_l\,\Delta t
+
+where v_l is the velocity ``lead_time`` ahead and v the present one. Just after a reversal the sheared seal still pushes
+the rod, now in the direction of motion. To cancel this push, the force would have to act against the wanted motion: it
+is 0 N instead until the seal resists, which leaves the push to the controller.
+
 The velocity comes from the reference and not from the rod, so the feed-forward closes no loop: too large a force makes
 an error, but no limit cycle. A gain below 1 leaves some friction to the controller, which a wrong model needs. tanh is
 smooth through zero here, where it shapes a command; the friction itself is never smoothed.
@@ -28,6 +38,12 @@ from seal_friction_ros.core.estimation.records import NEVER, FrictionEstimate, S
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.parameters import check, parameter
+from seal_friction_ros.core.friction.presliding import (
+    NO_ELEMENTS,
+    Elements,
+    PreslidingNumbers,
+    element_forces,
+)
 from seal_friction_ros.core.friction.states import UNKNOWN
 
 FASTEST = 100.0  # [m/s] no rod is faster
@@ -76,6 +92,11 @@ class FeedForwardSettings:
         upper=0.5,
         description='How far ahead the velocity is seen; the delay of the force loop.',
     )
+    presliding: bool = parameter(
+        False,
+        unit='',
+        description='At a reversal the force follows the elasticity of the seals, where their seal files have it.',
+    )
     use_measured_velocity: bool = parameter(
         False, unit='', description='From the rod instead of the reference; closes a loop, so it can limit-cycle.'
     )
@@ -107,6 +128,8 @@ class FeedForwardState(NamedTuple):
     fade: float  # [-] 0: faded out, 1: not faded
     friction: float  # [N] f of the last usable estimate; negative before the first
     velocity: float  # [m/s] last usable wanted velocity
+    elements: Elements = NO_ELEMENTS  # [N] forces of the sheared seals after the wanted displacement
+    led_velocity: float = 0.0  # [m/s] last usable wanted velocity ``lead_time`` ahead, beyond a reversal too
 
 
 class FeedForward(NamedTuple):
@@ -118,7 +141,7 @@ class FeedForward(NamedTuple):
     limited: int  # bits of `Limited`
 
 
-FADED_OUT = FeedForwardState(NEVER, 0.0, 0.0, -1.0, 0.0)
+FADED_OUT = FeedForwardState(NEVER, 0.0, 0.0, -1.0, 0.0, NO_ELEMENTS, 0.0)
 """State before the first estimate."""
 FADED_IN = FADED_OUT._replace(fade=1.0)
 """State in a simulation that shall not begin with a fade."""
@@ -136,20 +159,25 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
 
 
 @compilable
+def led_velocity(settings: FeedForwardSettings, velocity: float, acceleration: float) -> float:
+    """Velocity [m/s] ``lead_time`` ahead of the given one, beyond a reversal too; NaN if that is NaN or infinite."""
+    if not math.isfinite(velocity):
+        return math.nan
+    led = velocity + settings.lead_time * acceleration
+    if not math.isfinite(led):
+        led = velocity
+    return between(-FASTEST, led, FASTEST)
+
+
+@compilable
 def wanted_velocity(settings: FeedForwardSettings, velocity: float, acceleration: float) -> float:
     """Velocity v [m/s] of the equation, ``lead_time`` ahead of the given one; NaN if that is NaN or infinite.
 
     The lead takes the force away before a reversal, but the force changes its sign only with the reference: a force
     ahead of it would act against the wanted motion.
     """
-    if not math.isfinite(velocity):
-        return math.nan
-    led = velocity + settings.lead_time * acceleration
-    if not math.isfinite(led):
-        led = velocity
-    if led * velocity < 0.0:
-        return 0.0
-    return between(-FASTEST, led, FASTEST)
+    led = led_velocity(settings, velocity, acceleration)
+    return 0.0 if led * velocity < 0.0 else led
 
 
 @compilable
@@ -161,6 +189,14 @@ def compensation(settings: FeedForwardSettings, friction: float, velocity: float
 
 
 @compilable
+def elastic_compensation(settings: FeedForwardSettings, friction_force: float, velocity: float) -> float:
+    """Force [N] for a friction force F_f [N] of sheared seals and the present wanted velocity [m/s]."""
+    if not friction_force * velocity > 0.0:
+        return 0.0
+    return settings.scale * abs(friction_force) * math.tanh(velocity / settings.smoothing_velocity)
+
+
+@compilable
 def step(
     settings: FeedForwardSettings,
     state: FeedForwardState,
@@ -169,6 +205,22 @@ def step(
     friction: float,
     velocity: float,
 ) -> tuple[FeedForwardState, FeedForward]:
+    """`elastic_step` with rigid seals."""
+    return elastic_step(settings, None, state, stamp, received, friction, velocity, velocity, velocity)
+
+
+@compilable
+def elastic_step(
+    settings: FeedForwardSettings,
+    elasticity: PreslidingNumbers | None,
+    state: FeedForwardState,
+    stamp: int,
+    received: int,
+    friction: float,
+    velocity: float,
+    present: float,
+    led: float,
+) -> tuple[FeedForwardState, FeedForward]:
     """Feed-forward at one moment.
 
     Without a usable friction and velocity the last usable ones are faded out over ``fade_time``; with them the force
@@ -176,25 +228,32 @@ def step(
 
     Args:
         settings: Settings.
+        elasticity: Of the seals; None: rigid, which makes no difference between ``presliding`` on and off.
         state: From `init` or the step before.
         stamp: For the header of the answer [ns].
         received: Now [ns], on the clock of receipt.
         friction: f at ``velocity`` [N]; negative: none is usable.
         velocity: From `wanted_velocity`; NaN: not usable.
+        present: Wanted velocity without lead [m/s].
+        led: From `led_velocity` [m/s].
     """
-    last_received, last_force, last_fade, last_friction, last_velocity = state
+    last_received, last_force, last_fade, last_friction, last_velocity, elements, last_led = state
     elapsed = 0.0 if last_received == NEVER or received < last_received else (received - last_received) * 1e-9
     valid = friction >= 0.0 and not math.isnan(velocity)
     if not friction >= 0.0:
         friction = last_friction
     if math.isnan(velocity):
-        velocity = last_velocity
+        velocity, present, led = last_velocity, last_velocity, last_led
     short = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
     change = short / settings.fade_time if valid else -elapsed / settings.fade_time
     fade = between(0.0, last_fade + change, 1.0)
 
     limited = _FADE if fade < 1.0 or not valid else 0
     wanted = compensation(settings, friction, velocity)
+    if elasticity is not None:  # noqa: SIM102  compiled code drops the branch only for a bare None
+        if settings.presliding and friction >= 0.0:
+            elements, friction_force = element_forces(elasticity, elements, 0.5 * (last_led + led) * short, friction)
+            wanted = elastic_compensation(settings, friction_force, present)
     clamped = between(-settings.force_limit, wanted, settings.force_limit)
     if clamped != wanted:
         limited |= _CLAMP
@@ -205,4 +264,4 @@ def step(
     if settings.scale == 0.0:
         force = 0.0
     feedforward = FeedForward(stamp, fade * force + 0.0, settings.scale * fade, limited)
-    return FeedForwardState(received, force, fade, friction, velocity), feedforward
+    return FeedForwardState(received, force, fade, friction, velocity, elements, led), feedforward

@@ -20,6 +20,7 @@ from seal_friction_ros.core.estimation.records import (
     Position,
     Pressure,
     ServoReference,
+    Temperature,
     Velocity,
     WatchdogTick,
 )
@@ -35,12 +36,14 @@ ESTIMATE_TYPE = f'{PACKAGE}/msg/FrictionEstimate'
 FEEDFORWARD_TYPE = f'{PACKAGE}/msg/FrictionFeedForward'
 TICK_TYPE = f'{PACKAGE}/msg/WatchdogTick'
 CONFIGURATION_TYPE = f'{PACKAGE}/msg/EstimatorConfiguration'
+TEMPERATURE_TYPE = 'sensor_msgs/msg/Temperature'
 
 INPUTS: dict[str, str] = {
     'cylinder_pressure': PRESSURE_TYPE,
     'force_sum': FORCE_TYPE,
     'servo_reference': REFERENCE_TYPE,
     'rod_position': POSITION_TYPE,
+    'seal_temperature': TEMPERATURE_TYPE,
     'rod_velocity': VELOCITY_TYPE,
 }
 """Topic that the estimator subscribes to -> message type. The position is only recorded."""
@@ -48,7 +51,7 @@ INPUTS: dict[str, str] = {
 OUTPUTS: dict[str, str] = {'friction_estimate': ESTIMATE_TYPE, 'friction_feedforward': FEEDFORWARD_TYPE}
 """Topic that the estimator publishes -> message type."""
 
-Input = Pressure | Force | ServoReference | Position | Velocity | WatchdogTick
+Input = Pressure | Force | ServoReference | Position | Temperature | Velocity | WatchdogTick
 """A message that the estimator takes."""
 Output = FrictionEstimate | FeedForward
 """A message that the estimator makes."""
@@ -102,6 +105,7 @@ LAYOUTS = (
     Layout(VELOCITY_TYPE, Velocity, 'd'),
     Layout(POSITION_TYPE, Position, 'd'),
     Layout(REFERENCE_TYPE, ServoReference, 'ddd'),
+    Layout(TEMPERATURE_TYPE, Temperature, 'dd'),
     Layout(TICK_TYPE, WatchdogTick, 'd'),
     Layout(ESTIMATE_TYPE, FrictionEstimate, 'ddddBbIddddd', lambda estimate: FrictionState(estimate.state), 8),
     Layout(FEEDFORWARD_TYPE, FeedForward, 'ddI'),

@@ -117,6 +117,24 @@ FRICTION_ESTIMATOR_PARAMETERS = (
 )
 """Every parameter that the node ``friction_estimator`` declares."""
 
+
+@dataclass(frozen=True)
+class MachineOptions:
+    """The machine, one ROS parameter per field."""
+
+    machine: str = parameter(
+        '', unit='', live=False, description='Mapping file: a path, or the name of one in config/machines.'
+    )
+
+
+MACHINE_ESTIMATOR_PARAMETERS = (
+    ParameterGroup(StartOptions),
+    ParameterGroup(MachineOptions),
+    ParameterGroup(InputOptions),
+    ParameterGroup(RecordingOptions),
+)
+"""Every parameter that the node ``machine_estimator`` declares; those of each actuator come from its mapping file."""
+
 _VELOCITY_TERMS = 'velocity_terms of the seal file'
 REMOVED_PARAMETERS = {
     'feedforward.coulomb_scale': 'feedforward.scale',

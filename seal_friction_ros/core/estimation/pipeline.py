@@ -27,7 +27,12 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     condition_velocity,
     confirmed_velocity,
 )
-from seal_friction_ros.core.estimation.estimator import NO_VELOCITY, EstimatorParameters, EstimatorState
+from seal_friction_ros.core.estimation.estimator import (
+    NO_VELOCITY,
+    EstimatorParameters,
+    EstimatorState,
+    temperature_in_use,
+)
 from seal_friction_ros.core.estimation.estimator import step as estimator_step
 from seal_friction_ros.core.estimation.feedforward import (
     FADED_IN,
@@ -35,29 +40,36 @@ from seal_friction_ros.core.estimation.feedforward import (
     FASTEST,
     FeedForwardSettings,
     FeedForwardState,
+    elastic_step,
+    led_velocity,
     usable,
     wanted_velocity,
 )
-from seal_friction_ros.core.estimation.feedforward import step as feedforward_step
 from seal_friction_ros.core.estimation.messages import Input, Output, encode, type_of
 from seal_friction_ros.core.estimation.records import (
     NEVER,
     NO_FORCE,
     NO_PRESSURE,
+    NO_TEMPERATURE,
     Force,
     Position,
     Pressure,
     RodSample,
+    SealTemperature,
     ServoReference,
+    Temperature,
     Velocity,
     WatchdogTick,
 )
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
+from seal_friction_ros.core.foundation.units import ZEROS
 from seal_friction_ros.core.friction.actuator import friction_of_seals
+from seal_friction_ros.core.friction.temperature import COLDEST, HOTTEST, scale_at
 
 ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
 LARGEST_ACCELERATION = 1e6  # [m/s^2] no rod accelerates faster
+ZERO_CELSIUS = ZEROS['degC']  # [K]
 TICK_INTERVAL = 9_000_000  # [ns] the watchdog acts if no feed-forward was made for this time
 
 Emit = Callable[[Output, bytes], object]
@@ -103,6 +115,7 @@ class PipelineState(NamedTuple):
     receipt: ReceiptTimes = ReceiptTimes()
     refused: bool = False  # whether no input may act: one has several publishers, or the node is stopping
     clock_offset: int = 0  # [ns] what the clock of the stamps shows after the clock of receipt
+    temperature: SealTemperature = NO_TEMPERATURE
 
 
 def init(parameters: PipelineParameters) -> PipelineState:
@@ -156,16 +169,16 @@ def send(emit: Any, record: Any, frame_id: Any) -> None:
 @compilable
 def receive_velocity(parameters: Any, state: PipelineState, velocity: Any, received: int, emit: Any) -> PipelineState:
     """An estimate, and with a reference a feed-forward."""
-    known, guided, _, pressure, force, reference, receipt, refused, offset = state
+    known, guided, _, pressure, force, reference, receipt, refused, offset, temperature = state
     stamp, given, frame_id = velocity
     is_new = known.stamp != stamp
-    sample = RodSample(stamp, given, pressure, force, refused, (received + offset - stamp) * 1e-9)
+    sample = RodSample(stamp, given, pressure, force, refused, (received + offset - stamp) * 1e-9, temperature)
     known, estimate = estimator_step(parameters.estimator, known, sample)
     send(emit, estimate, frame_id)
     if is_new and not estimate.status & NO_VELOCITY:
         receipt = ReceiptTimes(received, receipt.pressure, receipt.force, receipt.reference)
     friction = estimate.coulomb_friction if usable(parameters.feedforward, estimate) else -1.0
-    state = PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
+    state = PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature)
     if receipt.reference == NEVER and not parameters.feedforward.use_measured_velocity:
         return state
     return _feed_forward(parameters, state, stamp, received, frame_id, emit)
@@ -176,29 +189,50 @@ def receive_pressure(
     _parameters: Any, state: PipelineState, newest: Pressure, received: int, _emit: Any
 ) -> PipelineState:
     """Keep the pressure for the next velocity sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset = state
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
     if newest.stamp != pressure.stamp:
         receipt = ReceiptTimes(receipt.velocity, received, receipt.force, receipt.reference)
-    return PipelineState(known, guided, friction, newest, force, reference, receipt, refused, offset)
+    return PipelineState(known, guided, friction, newest, force, reference, receipt, refused, offset, temperature)
 
 
 @compilable
 def receive_force(parameters: Any, state: PipelineState, newest: Force, received: int, _emit: Any) -> PipelineState:
     """Keep the force sum for the next velocity sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset = state
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
     if newest.stamp != force.stamp and abs(newest.force) <= parameters.estimator.settings.force_max:
         receipt = ReceiptTimes(receipt.velocity, receipt.pressure, received, receipt.reference)
-    return PipelineState(known, guided, friction, pressure, newest, reference, receipt, refused, offset)
+    return PipelineState(known, guided, friction, pressure, newest, reference, receipt, refused, offset, temperature)
 
 
 @compilable
 def receive_reference(_parameters: Any, state: PipelineState, wanted: Any, received: int, _emit: Any) -> PipelineState:
     """Condition the reference and keep it for the next velocity sample; one that is not finite is no new sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset = state
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
     if wanted.stamp != reference.velocity.stamp and math.isfinite(wanted.velocity):
         reference = condition_reference(reference, wanted)
         receipt = ReceiptTimes(receipt.velocity, receipt.pressure, receipt.force, received)
-    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
+    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature)
+
+
+@compilable
+def receive_temperature(
+    parameters: Any, state: PipelineState, newest: Temperature, _received: int, _emit: Any
+) -> PipelineState:
+    """Keep the median of three temperatures for the next velocity sample; one that no rubber seal has is no sample.
+
+    After a pause longer than the timeout the three begin anew: the older ones say nothing of now.
+    """
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
+    kelvin = newest.temperature + ZERO_CELSIUS
+    if COLDEST <= kelvin <= HOTTEST and newest.stamp != temperature.newest_stamp:
+        stamp, used, last_stamp, last, before = temperature
+        if abs(newest.stamp - last_stamp) * 1e-9 > parameters.estimator.settings.temperature_timeout:
+            last, before = 0.0, 0.0
+        if before > 0.0:
+            lower, higher = (last, before) if last < before else (before, last)
+            stamp, used = newest.stamp, between(lower, kelvin, higher)
+        temperature = SealTemperature(stamp, used, newest.stamp, kelvin, last)
+    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature)
 
 
 @compilable
@@ -220,6 +254,7 @@ _RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, Any], PipelineSta
     Force: receive_force,
     ServoReference: receive_reference,
     Position: receive_position,
+    Temperature: receive_temperature,
     WatchdogTick: receive_tick,
 }
 
@@ -263,38 +298,49 @@ def _feed_forward(
     parameters: Any, state: PipelineState, stamp: int, received: int, frame_id: Any, emit: Any
 ) -> PipelineState:
     """Make and emit the feed-forward of this moment."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset = state
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
     settings = parameters.feedforward
-    velocity = _wanted_velocity(settings, known, reference, receipt, received)
+    present, acceleration = _reference_motion(settings, known, reference, receipt, received)
+    velocity = led = present
+    if not settings.use_measured_velocity:
+        velocity = wanted_velocity(settings, present, acceleration)
+        led = led_velocity(settings, present, acceleration)
     ground = friction
     if refused or not _is_fresh(receipt, received, settings.estimate_timeout):
         ground = -1.0
     if ground >= 0.0 and parameters.estimator.depends_on_velocity and not math.isnan(velocity):
         seals, used = parameters.estimator.seal_numbers, known.pressure
         added = friction_of_seals(seals, used.chamber_a, used.chamber_b, velocity).velocity_friction
+        if parameters.estimator.has_temperature_scale:
+            law = parameters.estimator.temperature_scale
+            added *= scale_at(law, temperature_in_use(law, temperature))
         if parameters.estimator.uses_scale:
             added *= known.adaptation.learnt.scale
         ground += added
         ground = max(ground, 0.0)
-    guided, compensation = feedforward_step(settings, guided, stamp, received, ground, velocity)
+    elasticity = parameters.estimator.elasticity
+    guided, compensation = elastic_step(settings, elasticity, guided, stamp, received, ground, velocity, present, led)
     send(emit, compensation, frame_id)
-    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset)
+    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature)
 
 
 @compilable
-def _wanted_velocity(
+def _reference_motion(
     settings: FeedForwardSettings, known: EstimatorState, reference: Reference, receipt: ReceiptTimes, received: int
-) -> float:
-    """Conditioned velocity [m/s] of the reference with its lead, or with ``use_measured_velocity`` of the rod."""
+) -> tuple[float, float]:
+    """Conditioned velocity [m/s] and acceleration [m/s^2] of the reference, or of the rod.
+
+    With ``use_measured_velocity`` they are the rod's, its acceleration 0. The velocity is NaN if it is not usable.
+    """
     if settings.use_measured_velocity:
-        return confirmed_velocity(known.motion)
+        return confirmed_velocity(known.motion), 0.0
     if not _is_younger(receipt.reference, received, settings.reference_timeout):
-        return math.nan
+        return math.nan, 0.0
     given = reference.velocity
     velocity, acceleration = confirmed_velocity(given), 0.0
     if given.samples >= SETTLING and (velocity != 0.0 or given.half_width == 0.0):  # noise at rest is no start
         acceleration = reference.acceleration
-    return wanted_velocity(settings, velocity, acceleration)
+    return velocity, acceleration
 
 
 @compilable

@@ -39,6 +39,8 @@ class Status(IntFlag):
     DIRECTION_NOT_IDENTIFIED = 1048576
     FORCE_CONTAINS_LOAD = 2097152
     MODEL_DISAGREES = 4194304
+    TEMPERATURE_MISSING = 8388608
+    OUTSIDE_IDENTIFIED_TEMPERATURE = 16777216
 
 
 EXTRAPOLATED = (
@@ -46,6 +48,7 @@ EXTRAPOLATED = (
     | Status.FASTER_THAN_IDENTIFIED
     | Status.SLOWER_THAN_IDENTIFIED
     | Status.DIRECTION_NOT_IDENTIFIED
+    | Status.OUTSIDE_IDENTIFIED_TEMPERATURE
 )
 """Status bits of good inputs that are outside what a law was identified with."""
 
@@ -65,8 +68,27 @@ class Force(NamedTuple):
     force: float  # [N] positive on extension
 
 
+class Temperature(NamedTuple):
+    """One sample of the temperature of the seals, as sensor_msgs/Temperature has it."""
+
+    stamp: int  # [ns]
+    temperature: float  # [degC]
+    variance: float = 0.0  # [K^2] 0.0: not known; nothing depends on it
+
+
+class SealTemperature(NamedTuple):
+    """Temperature of the seals in use: the median of the last three readings, so that no single one is believed."""
+
+    stamp: int  # [ns] of the newest reading when there were three; `NEVER` before that
+    kelvin: float  # [K]
+    newest_stamp: int = NEVER  # [ns] of the newest reading
+    newest: float = 0.0  # [K] the newest reading; 0.0: none
+    before: float = 0.0  # [K] the one before; 0.0: none
+
+
 NO_PRESSURE = Pressure(NEVER, 0.0, 0.0)
 NO_FORCE = Force(NEVER, 0.0)
+NO_TEMPERATURE = SealTemperature(NEVER, 0.0)
 
 
 class Velocity(NamedTuple):
@@ -111,6 +133,7 @@ class RodSample(NamedTuple):
     force: Force
     refused: bool = False  # whether an input has several publishers, so that none may act
     stamp_age: float = 0.0  # [s] time of receipt after the stamp; negative for a stamp in the future
+    temperature: SealTemperature = NO_TEMPERATURE
 
 
 class FrictionEstimate(NamedTuple):

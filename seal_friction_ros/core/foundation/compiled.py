@@ -5,7 +5,8 @@
   where `compiled` code calls it (replay of long bags, servo plant): the same source, the same bytes.
 
 What a friction law needs beyond numbers is here too: `bound` binds the parameters of a law to its function, `evaluate`
-calls it, `unrolled` loops over records of different types, and `for_compiler` converts records for compiled code.
+calls it, `unrolled` loops over records of different types, `chosen_by_type` is a table of functions by the type of a
+record, and `for_compiler` converts records for compiled code.
 
 numba is imported where it is used: it takes half a second, and the live node does without.
 
@@ -17,7 +18,7 @@ import dataclasses
 import inspect
 from bisect import bisect_right
 from collections import namedtuple
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pkgutil import resolve_name
 from types import FunctionType
@@ -27,7 +28,9 @@ import numpy as np
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
-_compilable: list[Callable[..., Any]] = []
+INNER: Any = {'error_model': 'numpy', 'no_cpython_wrapper': True, 'no_cfunc_wrapper': True}
+"""How a function is compiled that compiled code alone calls: without the ways in for Python and C, a fifth faster."""
+
 _waiting: list[Callable[..., Any]] = []  # compilable functions that the compiler does not know yet
 
 
@@ -35,7 +38,7 @@ _waiting: list[Callable[..., Any]] = []  # compilable functions that the compile
 def has_compiler() -> bool:
     """Whether numba is installed; loads it."""
     try:
-        import numba  # noqa: F401
+        resolve_name('numba')
     except ModuleNotFoundError:
         return False
     return True
@@ -76,7 +79,7 @@ def make_known() -> None:
         function = _waiting.pop()
         known = _with_unrolled_loops(function)
         if known is function:
-            register_jitable(error_model='numpy')(function)
+            register_jitable(**INNER)(function)
         else:
             _stand_in(function, known)
 
@@ -109,6 +112,28 @@ def _parameter_names(function: Callable[..., float]) -> tuple[str, ...]:
 def evaluate(function: Bound, first: float, second: float) -> float:
     """Value of a bound function. Compiled code calls it through this name."""
     return function(first, second)
+
+
+def chosen_by_type(functions: Mapping[type, Callable[..., Any]]) -> Callable[..., Any]:
+    """One function of a record and more arguments: the function in the table for the type of the record.
+
+    Compiled code chooses when it is compiled. The functions are `compiled` or `compilable`; the record may also be what
+    `for_compiler` made of it.
+    """
+    by_name = {kind.__name__: getattr(function, 'py_func', function) for kind, function in functions.items()}
+    as_given = {kind.__name__: function for kind, function in functions.items()}
+
+    def chosen(record: Any, *arguments: Any) -> Any:
+        return as_given[type(record).__name__](record, *arguments)
+
+    if has_compiler():
+        from numba.extending import overload
+
+        @overload(chosen, strict=False, jit_options=INNER)
+        def _implementation(record: Any, *_: Any) -> Callable[..., Any]:
+            return by_name[record.instance_class.__name__]
+
+    return chosen
 
 
 def for_compiler(value: Any) -> Any:
@@ -231,7 +256,7 @@ def _stand_in(function: Callable[..., Any], known: Callable[..., Any]) -> None:
     """Compiled code that calls ``function`` calls ``known``."""
     from numba.extending import overload
 
-    @overload(function, strict=False, jit_options={'error_model': 'numpy'})
+    @overload(function, strict=False, jit_options=INNER)
     def _implementation(*_: Any, **__: Any) -> Callable[..., Any]:
         return known
 
@@ -241,7 +266,7 @@ def _teach_the_compiler() -> None:
     """Once: what `evaluate` and `bisect_right` are in compiled code."""
     from numba.extending import overload
 
-    @overload(evaluate, jit_options={'error_model': 'numpy'})
+    @overload(evaluate, jit_options=INNER)
     def _evaluate(function: Any, first: Any, second: Any) -> Callable[..., Any]:
         del first, second  # `overload` compares the names with those of `evaluate`
         called = _jitted(function.instance_class.function)
@@ -265,4 +290,4 @@ def _teach_the_compiler() -> None:
 def _jitted(function: Callable[..., Any]) -> Callable[..., Any]:
     import numba
 
-    return cast(Callable[..., Any], numba.njit(error_model='numpy')(function))
+    return cast(Callable[..., Any], numba.njit(**INNER)(function))

@@ -48,6 +48,7 @@ class ParameterGroup(NamedTuple):
     record_type: type
     prefix: str = ''  # start of each parameter name, with its dot
     live: bool = True  # False: no parameter of the group can change while the node is configured
+    defaults: Any = None  # record with other defaults than those of its fields
 
     def names(self) -> dict[str, str]:
         """Name of each parameter -> field of the dataclass."""
@@ -153,6 +154,14 @@ def similar_names(unknown: Sequence[str], known: Iterable[str]) -> dict[str, str
         for match in difflib.get_close_matches(name.rpartition('.')[2], full_names, n=1):
             similar[name] = difflib.get_close_matches(name, full_names[match], n=1, cutoff=0.0)[0]
     return similar
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """What an unknown word was meant to be, if a known one is similar, and every known one."""
+    names = sorted(known)
+    similar = difflib.get_close_matches(word, names, n=1)
+    asked = f'did you mean {similar[0]}? ' if similar else ''
+    return f'{asked}there {"is" if len(names) == 1 else "are"} {", ".join(names) or "none"}'
 
 
 def name_and_source(document: Any, kind: str) -> tuple[str, str]:

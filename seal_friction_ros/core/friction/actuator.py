@@ -17,6 +17,13 @@ from seal_friction_ros.core.friction.laws.velocity_terms import (
     with_velocity_terms,
 )
 from seal_friction_ros.core.friction.mounting import CHAMBERS, CHAMBERS_TEXT, pressure_at_seal
+from seal_friction_ros.core.friction.presliding import Presliding
+from seal_friction_ros.core.friction.temperature import (
+    TemperatureScale,
+    one_temperature_scale,
+    scale_at,
+    std_of_unknown,
+)
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,9 @@ class Seal(CheckedParameters):
     pressure_min: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='Lowest pressure identified.')
     pressure_max: float = parameter(unit='Pa', lower=1.0, upper=1e9, description='Highest pressure identified.')
     identified_motion: IdentifiedMotion = ANY_MOTION
+    presliding: Presliding | None = None  # None: rigid, or not known
     force_sum_correction: ForceSumCorrection | None = None  # of the machine that the seal was measured in
+    temperature: TemperatureScale | None = None  # None: the friction is not known to depend on it
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -261,6 +270,34 @@ def sliding_friction_of_seals(
     return total
 
 
+@compilable
+def at_temperature(friction: ActuatorFriction, law: TemperatureScale, temperature: float) -> ActuatorFriction:
+    r"""Friction at ``temperature`` [K] from that at the reference.
+
+    Every force has the scale. The error of k is added to the standard deviation:
+    :math:`\sigma^2 = (s \sigma_0)^2 + (s f \sigma_k (T - T_0))^2`.
+
+    Args:
+        friction: By the seal files, at the reference temperature.
+        law: Of the seals.
+        temperature: [K] finite.
+    """
+    coulomb, std, stiction, in_identified_range, velocity_friction = friction
+    scale = scale_at(law, temperature)
+    unsure = (coulomb + velocity_friction) * law.coefficient_std * (temperature - law.reference)
+    std = scale * math.sqrt(std * std + unsure * unsure)
+    return ActuatorFriction(scale * coulomb, std, scale * stiction, in_identified_range, scale * velocity_friction)
+
+
+@compilable
+def at_unknown_temperature(friction: ActuatorFriction, law: TemperatureScale) -> ActuatorFriction:
+    """The same friction, with the spread of the scale over the identified temperatures in its standard deviation."""
+    coulomb, std, stiction, in_identified_range, velocity_friction = friction
+    unsure = (coulomb + velocity_friction) * std_of_unknown(law)
+    std = math.sqrt(std * std + unsure * unsure)
+    return ActuatorFriction(coulomb, std, stiction, in_identified_range, velocity_friction)
+
+
 def numbers_of_seals(seals: tuple[MountedSeal, ...]) -> tuple[SealNumbers, ...]:
     """The seals of an actuator as numbers."""
     return tuple(mounted.numbers for mounted in seals)
@@ -269,5 +306,7 @@ def numbers_of_seals(seals: tuple[MountedSeal, ...]) -> tuple[SealNumbers, ...]:
 def actuator_friction(
     seals: tuple[MountedSeal, ...], pressure_a: float, pressure_b: float, velocity: float = 0.0
 ) -> ActuatorFriction:
-    """`friction_of_seals` for seals that are not numbers yet; same arguments."""
-    return friction_of_seals(numbers_of_seals(seals), pressure_a, pressure_b, velocity)
+    """`friction_of_seals` for seals that are not numbers yet, at a temperature that is not known; same arguments."""
+    friction = friction_of_seals(numbers_of_seals(seals), pressure_a, pressure_b, velocity)
+    law = one_temperature_scale(mounted.seal.temperature for mounted in seals)
+    return friction if law is None else at_unknown_temperature(friction, law)

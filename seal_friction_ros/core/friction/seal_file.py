@@ -12,9 +12,9 @@ A seal file looks like this; every law and every field is in docs/seal_files.md:
     uncertainty: {relative_std: 0.08, absolute_std: 0.3}
     identified_pressure: [0.0, 6.9e+6]
 
-Optional are ``velocity_terms``, ``stiction_ratio``, ``friction_scale``, ``identified_speed``,
-``identified_directions``, ``mounting``, ``force_sum_correction``, and ``identification``: what ``seal_friction
-identify`` reports about its data. This module ignores the latter.
+Optional are ``velocity_terms``, ``presliding``, ``stiction_ratio``, ``friction_scale``, ``identified_speed``,
+``identified_directions``, ``mounting``, ``force_sum_correction``, ``temperature``, and ``identification``: what
+``seal_friction identify`` reports about its data. This module ignores the latter.
 """
 
 import dataclasses
@@ -39,11 +39,13 @@ from seal_friction_ros.core.friction.laws.law import FrictionLaw, Law
 from seal_friction_ros.core.friction.laws.normal_force import NORMAL_FORCE_LAWS, NormalForceLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import Mounting
+from seal_friction_ros.core.friction.presliding import Presliding
+from seal_friction_ros.core.friction.temperature import TemperatureScale
 
 _COMMON = {
     'name', 'source', 'geometry', 'coulomb_law', 'stiction', 'stiction_ratio', 'velocity_terms', 'uncertainty',
     'identified_pressure', 'identified_speed', 'identified_directions', 'identification', 'mounting',
-    'force_sum_correction', 'friction_scale',
+    'force_sum_correction', 'friction_scale', 'presliding', 'temperature',
 }  # fmt: skip
 _PARTS: dict[type, str] = {
     SealGeometry: 'geometry',
@@ -76,10 +78,16 @@ def parse_seal(document: Any) -> Seal:
     terms = None
     if 'velocity_terms' in document:
         terms = from_mapping(VelocityTerms, document['velocity_terms'], f'{where}: velocity_terms')
+    presliding = None
+    if 'presliding' in document:
+        presliding = from_mapping(Presliding, document['presliding'], f'{where}: presliding')
     correction = None
     if 'force_sum_correction' in document:
         given = document['force_sum_correction']
         correction = from_mapping(ForceSumCorrection, given, f'{where}: force_sum_correction')
+    temperature = None
+    if 'temperature' in document:
+        temperature = from_mapping(TemperatureScale, document['temperature'], f'{where}: temperature')
     about = document.get('identification', {})
     if not isinstance(about, Mapping) or not _can_be_recorded(about):
         raise ValueError(f'{where}: identification is not a mapping of texts, finite numbers, and lists of them')
@@ -98,8 +106,10 @@ def parse_seal(document: Any) -> Seal:
         'coulomb_law': law,
         'uncertainty': uncertainty,
         'velocity_terms': terms,
+        'presliding': presliding,
         'identified_motion': from_mapping(IdentifiedMotion, motion, f'{where}: identified'),
         'force_sum_correction': correction,
+        'temperature': temperature,
     }
     return from_mapping(Seal, numbers, where, **made)
 

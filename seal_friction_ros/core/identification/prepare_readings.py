@@ -42,8 +42,10 @@ def prepare_logs(logs: Sequence[RecordedLog], chambers: Sequence[str]) -> Prepar
     """
     for log in logs:
         check_log(log)
-    of_strokes = [(i, stroke) for i, log in enumerate(logs) for stroke in signal_preparation.strokes(*log[1:])]
-    even = [signal_preparation.even_sliding(*log[1:]) for log in logs]
+    of_strokes = [
+        (i, stroke) for i, log in enumerate(logs) for stroke in signal_preparation.strokes(log.signals, log.sliding)
+    ]
+    even = [signal_preparation.even_sliding(log.signals, log.sliding) for log in logs]
     held = [sum(len(stroke.samples) for source, stroke in of_strokes if source == i) for i in range(len(logs))]
     counts = [int(part.sum()) for part in even]
     if sum(held) < HELD_LOG * sum(counts):
@@ -87,6 +89,7 @@ def _held(logs: Sequence[RecordedLog], rows: _Rows, chambers: Sequence[str]) -> 
     ways = [_travel(log.signals) for log in logs]
     travel = np.array([ways[number][r.samples].mean() for number, r in rows])
     readings = FrictionReadings(at, force, source, group, level, names, by, False, samples, travel)
+    readings = replace(readings, temperature=_temperatures(logs, rows))
     return with_predictable_groups(readings), pressures
 
 
@@ -95,6 +98,15 @@ def _travel(signals: signal_preparation.Signals) -> FloatArray:
     steps = np.diff(signals.time, prepend=signals.time[:1])
     steps = np.minimum(steps, signal_preparation.LONGEST_GAP)
     return np.asarray(np.cumsum(np.nan_to_num(np.abs(signals.velocity)) * steps))
+
+
+def _temperatures(logs: Sequence[RecordedLog], rows: _Rows) -> FloatArray:
+    """Mean temperature of each reading [K]; empty if a log has none."""
+    columns = [log.temperature for log in logs]
+    known = [column for column in columns if column is not None]
+    if len(known) < len(columns):
+        return np.empty(0)
+    return np.array([known[number][reading.samples].mean() for number, reading in rows])
 
 
 def with_predictable_groups(readings: FrictionReadings) -> FrictionReadings:
@@ -118,7 +130,7 @@ def _parts_of_strokes(source: IntArray, level: IntArray) -> IntArray:
 def _breakaway(
     logs: Sequence[RecordedLog], chambers: Sequence[str], dynamic: FrictionReadings
 ) -> FrictionReadings | None:
-    rows = [(i, peak) for i, log in enumerate(logs) for peak in signal_preparation.breakaways(*log[1:])]
+    rows = [(i, peak) for i, log in enumerate(logs) for peak in signal_preparation.breakaways(log.signals, log.sliding)]
     if not rows:
         return None
     at, _, force, source = _columns(rows, chambers)
@@ -126,6 +138,7 @@ def _breakaway(
     several = len(np.unique(source)) > 1
     group = level if dynamic.left_out_by == 'pressure' else source if several else _parts_of_strokes(source, level)
     found = replace(dynamic, at=at, force=force, source=source, group=group, level=level, samples=())
+    found = replace(found, temperature=_temperatures(logs, rows))
     return replace(found, travel=np.empty(0), dwell=np.array([peak.dwell for _, peak in rows]))
 
 
@@ -153,10 +166,11 @@ def _swept(
             'drive longer strokes at even speed, in both directions'
         )
     every = -(-sum(counts) // MOST_SWEPT)
-    parts = [
-        log.signals.taken(np.flatnonzero(index)[:: min(every, count // FEWEST_SWEPT)])
-        for log, index, count in zip(logs, even, counts, strict=True)
+    taken = [
+        np.flatnonzero(index)[:: min(every, count // FEWEST_SWEPT)] for index, count in zip(even, counts, strict=True)
     ]
+    parts = [log.signals.taken(index) for log, index in zip(logs, taken, strict=True)]
+    warm = [log.temperature[index] for log, index in zip(logs, taken, strict=True) if log.temperature is not None]
     counts = [len(part.time) for part in parts]
     joined = signal_preparation.Signals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     both = np.column_stack((joined.pressure_a, joined.pressure_b))
@@ -172,6 +186,7 @@ def _swept(
         names=tuple(log.name for log in logs),
         left_out_by='block',
         are_samples=True,
+        temperature=np.concatenate(warm) if len(warm) == len(logs) else np.empty(0),
     )
     return readings, both
 

@@ -44,6 +44,8 @@ class RecordedLog(NamedTuple):
     name: str
     signals: Signals
     sliding: Sliding
+    temperature: FloatArray | None = None  # [K] of each sample; None if not recorded
+    position: FloatArray | None = None  # [m] likewise
 
 
 class ManualReadings(NamedTuple):
@@ -75,6 +77,8 @@ class FrictionReadings:
     """[m] way of the rod since the start of its source, shape (n,); empty if unknown"""
     dwell: FloatArray = field(default_factory=lambda: np.empty(0))
     """[s] time at rest before each breakaway, shape (n,); empty if unknown"""
+    temperature: FloatArray = field(default_factory=lambda: np.empty(0))
+    """[K] of each reading, shape (n,); empty if unknown"""
 
     @property
     def count(self) -> int:
@@ -114,6 +118,7 @@ class FrictionReadings:
             samples=tuple(self.samples[i] for i in where) if self.samples else (),
             travel=self.travel[where] if len(self.travel) else self.travel,
             dwell=self.dwell[where] if len(self.dwell) else self.dwell,
+            temperature=self.temperature[where] if len(self.temperature) else self.temperature,
         )
 
     def without(self, out: BoolArray) -> 'FrictionReadings':
@@ -190,7 +195,7 @@ def check_log(log: RecordedLog) -> None:
         ValueError: Too few samples, missing or impossible values, no motion, motion in one direction only, or a clipped
             sensor.
     """
-    name, signals, sliding = log
+    name, signals, sliding, *_ = log
     if len(signals.time) < 20:
         raise ValueError(
             f'{name}: {len(signals.time)} samples are too few: record several strokes in both directions, at '

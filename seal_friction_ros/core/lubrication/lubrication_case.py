@@ -21,6 +21,7 @@ from seal_friction_ros.core.foundation.parameters import (
     name_and_source,
     parameter,
 )
+from seal_friction_ros.core.lubrication.elasticity import BODIES
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
@@ -51,6 +52,12 @@ class SealBody(CheckedParameters):
     section_height: float = parameter(
         1e-3, unit='m', lower=1e-5, upper=0.1, description='Depth at which the seal is held.'
     )
+    body: str = parameter(
+        'half_plane',
+        unit='',
+        description='half_plane: the kernel of a half-plane, zero at the section height. bonded_layer: an '
+        'incompressible layer of that height, bonded to a rigid base.',
+    )
     mooney_c10: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='C_10.')
     mooney_c01: float = parameter(1.785e6, unit='Pa', lower=0.0, upper=1e9, description='C_01.')
     solid_shear_stress: float = parameter(
@@ -59,6 +66,8 @@ class SealBody(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.body not in BODIES:
+            raise ValueError(f'SealBody.body = {self.body!r} is not one of {", ".join(BODIES)}')
         if self.modulus <= 0.0:
             raise ValueError('SealBody.mooney_c10 and mooney_c01 are both 0 Pa: give the seal a stiffness')
 

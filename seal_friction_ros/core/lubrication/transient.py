@@ -2,8 +2,10 @@ r"""A whole motion of one seal, step by step: `initial_state`, then `transient_s
 
 The spool drives the contact through the groove (`groove`): lag e, velocity of the contact v = spool velocity - de/dt.
 A step first computes v from the balance of spring and friction, with the film of the previous step and with sticking,
-then the film by one implicit Euler step with that v (our choice: first order in the step, like the film itself). Forces
-are positive where they resist a motion to the right, so friction has the sign of the velocity.
+then the film with that v. The film is integrated by the backward differentiation formula of second order with variable
+steps (BDF2, [Hairer1993]_ section III.5), which damps as the implicit Euler step does. The first step, and all steps of
+a seal that hands lubricant over to the wall, are implicit Euler steps: each of them conserves what is handed over (our
+choice). Forces are positive where they resist a motion to the right, so friction has the sign of the velocity.
 """
 
 import dataclasses
@@ -24,7 +26,7 @@ from seal_friction_ros.core.lubrication.contact import (
     dry_contact,
     film_properties,
 )
-from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.elasticity import BODIES
 from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
@@ -58,7 +60,7 @@ class LubricationModel:
     def __post_init__(self) -> None:
         case, numerics = self.case, self.case.numerics
         width = numerics.film_width / numerics.cells
-        plane = HalfPlane(numerics.cells, width, case.seal.modulus, case.seal.section_height)
+        plane = BODIES[case.seal.body](numerics.cells, width, case.seal.modulus, case.seal.section_height)
         place = (np.arange(numerics.cells) + 0.5) * width - 0.5 * numerics.film_width
         radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
         object.__setattr__(self, 'contact', LubricatedContact(plane, case.topography, case.grease))
@@ -80,6 +82,15 @@ class LubricationModel:
         return FilmEnds(self.case.air.pressure_left, self.case.air.pressure_right, left, right)
 
 
+class StepBefore(NamedTuple):
+    """What the formula of second order needs of the step before."""
+
+    thickness: FloatArray  # theta h at its start [m], shape (n,)
+    creep: FloatArray  # at its start [m], shape (n,)
+    step: float  # [s]
+    velocity: float  # of the contact, mean of the step [m/s]
+
+
 class TransientState(NamedTuple):
     """State of a seal between two steps."""
 
@@ -89,6 +100,7 @@ class TransientState(NamedTuple):
     state: ContactState
     wall_film: WallFilm | None  # film on the wall outside the seal; None where it is flooded
     creep: FloatArray  # viscoelastic part of the deflection [m], shape (n,); zeros for an elastic seal
+    before: StepBefore | None = None  # None: the next step is an implicit Euler step
 
     @property
     def contact_place(self) -> float:
@@ -185,23 +197,24 @@ def transient_step(
     width = contact.half_plane.cell_width
     step = time - moment.time
     velocity, lag = _slide(model, moment, step, position)
+    at_end = _velocity_at_end(moment, velocity, step)
     contact_place = position - lag
     way = contact_place - moment.contact_place
     ends, taken = _supply(model, moment, way, step)
+    start = start_of_step(moment, step)
     compliance, creep_kept = 1.0, np.zeros(1)
     if case.viscoelasticity:
-        relaxing = step / case.viscoelasticity.relaxation_time
+        relaxing = start.step / case.viscoelasticity.relaxation_time
         slow = case.viscoelasticity.stiffening / (1.0 + case.viscoelasticity.stiffening)
         compliance = 1.0 - slow + slow * relaxing / (1.0 + relaxing)
-        creep_kept = moment.creep / (1.0 + relaxing)
+        creep_kept = start.creep / (1.0 + relaxing)
     rigid = model.rigid_gap(contact_place) + creep_kept
-    old = moment.state.saturation * moment.state.gap
-    done = contact_step(contact, moment.state, rigid, -velocity, ends, old, step, compliance)
+    done = contact_step(contact, moment.state, rigid, -at_end, ends, start.thickness, start.step, compliance)
     state = done.state
 
     film_volume = float((state.saturation * state.gap).sum()) * width
-    gained = (float(done.flow[0]) - float(done.flow[-1])) * step
-    defect = abs(film_volume - float(old.sum()) * width - gained) / film_volume
+    gained = (float(done.flow[0]) - float(done.flow[-1])) * start.step
+    defect = abs(film_volume - float(start.thickness.sum()) * width - gained) / film_volume
     wall_film = moment.wall_film
     if wall_film is not None:
         wall_film = _wall_film_after(model, moment, wall_film, taken, done.flow * step, contact_place)
@@ -211,8 +224,45 @@ def transient_step(
         creep = creep_kept + slow * relaxing / (1.0 + relaxing) * contact.half_plane.deflection(
             state.pressure + solid_pressure
         )
-    after = TransientState(time, position, lag, state, wall_film, creep)
-    return after, _forces(model, after, velocity), done.iterations, defect
+    before = None if wall_film is not None else StepBefore(_thickness(moment), moment.creep, step, velocity)
+    after = TransientState(time, position, lag, state, wall_film, creep, before)
+    return after, _forces(model, after, at_end), done.iterations, defect
+
+
+def _thickness(moment: TransientState) -> FloatArray:
+    """Film theta h [m], shape (n,)."""
+    thickness: FloatArray = moment.state.saturation * moment.state.gap
+    return thickness
+
+
+def start_of_step(moment: TransientState, step: float) -> StepBefore:
+    r"""Start and length of the implicit Euler step that is one step of BDF2.
+
+    With :math:`w = \Delta t_n / \Delta t_{n-1}` the formula is
+
+    .. math:: u_{n+1} - \frac{(1 + w)^2 u_n - w^2 u_{n-1}}{1 + 2 w} = \frac{1 + w}{1 + 2 w} \Delta t_n\, \dot u_{n+1}.
+
+    Where it would start from less than no film, the step is an implicit Euler step.
+    """
+    thickness, creep, before = _thickness(moment), moment.creep, moment.before
+    if before is None:
+        return StepBefore(thickness, creep, step, 0.0)
+    ratio = step / before.step
+    now, earlier = (1.0 + ratio) ** 2 / (1.0 + 2.0 * ratio), ratio**2 / (1.0 + 2.0 * ratio)
+    start = now * thickness - earlier * before.thickness
+    if start.min() <= 0.0:
+        return StepBefore(thickness, creep, step, 0.0)
+    length = step * (1.0 + ratio) / (1.0 + 2.0 * ratio)
+    return StepBefore(start, now * creep - earlier * before.creep, length, 0.0)
+
+
+def _velocity_at_end(moment: TransientState, velocity: float, step: float) -> float:
+    """Velocity of the contact [m/s] at the end of a step, from its mean over this step and over the one before."""
+    before = moment.before
+    if before is None or velocity * before.velocity <= 0.0:
+        return velocity
+    at_end = velocity + (velocity - before.velocity) * step / (step + before.step)
+    return at_end if at_end * velocity > 0.0 else velocity
 
 
 def _edge_force(model: LubricationModel, moment: TransientState) -> float:

@@ -10,6 +10,7 @@ motions are our choice.
 """
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ from seal_friction_ros.core.estimation.records import Force, Pressure, ServoRefe
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.force_sum_correction import measured_force_sum
 from seal_friction_ros.core.servo import position_servo as servo
+from seal_friction_ros.core.servo.controller import Measurement
+from seal_friction_ros.core.servo.cylinder import pressure_force
 from seal_friction_ros.core.servo.motions import Setpoint, Sine, Step, Trapezoid, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.core.servo.tracking import reversals, tracking_peak, tracking_rms
@@ -30,6 +33,17 @@ from seal_friction_ros.core.servo.tracking import reversals, tracking_peak, trac
 SETTLING_PERIODS, EVALUATED_PERIODS = 2, 4  # of the sine
 SETTLING_TIME = 0.1  # [s] of rest after a motion before reversals count as a limit cycle
 STEP_START = 0.02  # [s]
+ENCODER_WINDOW = 10  # samples of the difference quotient that is the velocity of an encoder (our choice)
+
+
+class AxisSensors(NamedTuple):
+    """What an axis measures."""
+
+    force_sensor: bool = True  # False: the force sum is A_a p_a - A_b p_b from the measured pressures
+    encoder_step: float = 0.0  # [m] counts of an encoder are position and velocity; 0: sensors of both, without steps
+
+
+IDEAL_SENSORS = AxisSensors()
 
 
 class Axis(NamedTuple):
@@ -37,6 +51,7 @@ class Axis(NamedTuple):
 
     servo: ServoParameters
     pipeline: PipelineParameters
+    sensors: AxisSensors = IDEAL_SENSORS
 
 
 class AxisRun(NamedTuple):
@@ -76,7 +91,9 @@ def without_feedforward(settings: FeedForwardSettings) -> FeedForwardSettings:
 def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: FloatArray | None = None) -> AxisRun:
     """Run the loop from rest at the start of the wave.
 
-    The feed-forward does not fade in.
+    The feed-forward does not fade in. With an encoder, position and velocity of the controller and velocity of the
+    estimator are those of its counts, the velocity over `ENCODER_WINDOW` samples, and the controller has the measured
+    pressures; otherwise the controller measures without error.
 
     Args:
         axis: Servo, estimator and feed-forward.
@@ -86,7 +103,8 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
         noise: Errors of the sensors of the estimator, repeated after the last row; shape (k, 4), columns chamber a
             [Pa], chamber b [Pa], force sum [N], velocity [m/s]. None: no errors.
     """
-    plant, parameters = axis
+    plant, parameters, sensors = axis
+    counts: deque[float] = deque(maxlen=ENCODER_WINDOW + 1)
     lacking = parameters.estimator.force_sum_correction
     period = plant.control_period
     whole, part = divmod(delay / period + 1e-9, 1.0)
@@ -107,16 +125,27 @@ def run_closed_loop(axis: Axis, wave: Wave, samples: int, delay: float, noise: F
         stamp = round(i * period * 1e9)
         setpoint = wave.at(i * period)
         a, b, f, v = errors[i % len(errors)]
+        pressures = out.pressure_a + a, out.pressure_b + b
+        force_sum, velocity = out.force_sum, out.velocity + v
+        if not sensors.force_sensor:
+            force_sum, f = pressure_force(plant.cylinder, *pressures), 0.0
+        if sensors.encoder_step:
+            counts.append(sensors.encoder_step * round(out.position / sensors.encoder_step))
+            velocity = (counts[-1] - counts[0]) / (max(len(counts) - 1, 1) * period)
         messages: list[Input] = [
-            Pressure(stamp, out.pressure_a + a, out.pressure_b + b),
-            Force(stamp, measured_force_sum(lacking, out.force_sum, out.pressure_a, out.pressure_b) + f),
+            Pressure(stamp, *pressures),
+            Force(stamp, measured_force_sum(lacking, force_sum, out.pressure_a, out.pressure_b) + f),
         ]
-        messages += [ServoReference(stamp, *setpoint), Velocity(stamp, out.velocity + v)]
+        messages += [ServoReference(stamp, *setpoint), Velocity(stamp, velocity)]
         for message in messages:
             estimation = pipeline.receive(parameters, estimation, message, stamp, emit)
         forces.append(newest.force)
         force = (1.0 - part) * forces[-1 - back] + part * forces[-2 - back]
-        state, out = servo.step(plant, state, setpoint, force)
+        if sensors.encoder_step:
+            measured = Measurement(counts[-1], velocity, *pressures)
+            state, out = servo.step_measured(plant, state, measured, setpoint, force)
+        else:
+            state, out = servo.step(plant, state, setpoint, force)
         end = (i + 1) * period
         rows.append((end, wave.at(end).position, out.position, out.velocity, out.friction_force, force))
     return AxisRun(*np.array(rows).T)

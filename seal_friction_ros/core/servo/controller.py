@@ -2,15 +2,14 @@ r"""Position loop over a load-pressure (force) loop, with a friction feed-forwar
 
 .. math::
     F &= K_p (x_r - x) + K_d (v_r - v) + K_i \textstyle\int (x_r - x) + m a_r + b v_r + k (x_r - x_k) + F_{ff} \\
-    Q &= A (\alpha v + (1 - \alpha) v_r + \tau a_r) + G (F / A - (p_a - p_b)), \qquad G = \omega_F V_t / (4 \beta) \\
-    u &= Q / (K \sqrt{(p_s - p_r - \mathrm{sgn}(Q) p_L) / 2})
+    p_L &= p_a - \alpha_A p_b, \quad \alpha_A = A_b / A_a, \quad v_c = \alpha v + (1 - \alpha) v_r + \tau a_r
 
-Inner loop: at standstill the load pressure follows F / A with the bandwidth omega_F. alpha compensates the natural
-velocity feedback of a force-controlled cylinder; the remaining share acts on the velocity error as damping,
-(1 - alpha) A^2 / G. tau = 2 zeta / omega + T / 2 is the delay of spool and sampling. The last line inverts the orifice.
+Inner loop: at standstill the load pressure p_L follows F / A_a with the bandwidth omega_F; the valve opening is that of
+`oil_opening` or `air_opening`. alpha compensates the natural velocity feedback of a force-controlled cylinder; the
+remaining share acts on the velocity error as damping. tau = 2 zeta / omega + T / 2 is the delay of spool and sampling.
 
 Source: [Merritt1967]_ chapter 6 for the orifice and V_t / (4 beta), [Alleyne1999]_ for force loop and velocity
-feedback; their arrangement here is our choice.
+feedback, [Jelali2003]_ chapter 4 for the load pressure of two areas; their arrangement here is our choice.
 """
 
 import math
@@ -22,10 +21,19 @@ import numpy as np
 from scipy.linalg import expm
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
+from seal_friction_ros.core.foundation.compiled import chosen_by_type, compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
+from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
+from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.motions import Setpoint
 from seal_friction_ros.core.servo.plant import Constants
+from seal_friction_ros.core.servo.pneumatics import (
+    ADIABATIC_INDEX,
+    REFERENCE_PRESSURE,
+    PneumaticValve,
+    air_pressures_at_rest,
+    flow_function,
+)
 
 
 class Limited(IntFlag):
@@ -75,9 +83,9 @@ class Gains(NamedTuple):
     """Gains and limits for compiled code."""
 
     controller: ServoController
-    pressure: float  # G [m^3/(s Pa)]
     valve_delay: float  # tau [s]
-    force_max: float  # [N] of the supply pressure
+    extending_force_max: float  # [N] of the supply pressure
+    retracting_force_max: float  # [N] likewise, a magnitude
     reach: float  # largest reference position [m]
     period: float  # sample time [s]
 
@@ -109,11 +117,12 @@ class Command(NamedTuple):
 def gains(controller: ServoController, c: Constants, period: float) -> Gains:
     """Gains and limits for a plant and a sample time [s]."""
     valve, cylinder = c.valve, c.cylinder
+    drop = valve.supply_pressure - valve.return_pressure
     return Gains(
         controller=for_compiler(controller),
-        pressure=controller.force_bandwidth * cylinder.mid_volume / (2.0 * cylinder.bulk_modulus),
         valve_delay=2.0 * valve.damping_ratio / valve.natural_frequency + 0.5 * period,
-        force_max=cylinder.area * (valve.supply_pressure - valve.return_pressure),
+        extending_force_max=cylinder.area_b * drop + cylinder.rod_area * valve.supply_pressure,
+        retracting_force_max=cylinder.area_b * drop - cylinder.rod_area * valve.return_pressure,
         reach=max(cylinder.limit - controller.stop_distance, 0.0),
         period=period,
     )
@@ -140,6 +149,112 @@ def limit_reference(g: Gains, last: float, reference: Setpoint) -> tuple[Setpoin
 
 
 @compiled
+def oil_opening(
+    valve: ServoValve, cylinder: Cylinder, bandwidth: float, measured: Measurement, force: float, speed: float
+) -> float:
+    r"""Opening of the valve for a force command with oil [-], not limited.
+
+    .. math::
+        Q &= A_a v_c + G (F / A_a - p_L), \qquad G = \omega_F / [\beta (1 / V_a + \alpha_A^2 / V_b)] \\
+        s &= Q / (K \sqrt{\Delta p / (1 + \alpha_A^3)}), \qquad
+            \Delta p = p_s - \alpha_A p_r - p_L \;(Q > 0), \quad \alpha_A p_s - p_r + p_L \;(Q < 0)
+
+    Q is the flow into chamber a; alpha_A Q leaves chamber b. V_a and V_b are those in mid-stroke. The last line inverts
+    both orifices at even speed.
+
+    Args:
+        valve: The valve.
+        cylinder: The cylinder.
+        bandwidth: omega_F [rad/s].
+        measured: By the sensors.
+        force: Force command F [N].
+        speed: v_c [m/s].
+    """
+    ratio = cylinder.area_ratio
+    both = 1.0 + ratio * ratio * (cylinder.mid_volume_a / cylinder.mid_volume_b)
+    gain = bandwidth * cylinder.mid_volume_a / (both * cylinder.bulk_modulus)
+    load_pressure = measured.pressure_a - ratio * measured.pressure_b
+    flow = cylinder.area_a * speed + gain * (force / cylinder.area_a - load_pressure)
+    if flow > 0.0:
+        drop = valve.supply_pressure - ratio * valve.return_pressure - load_pressure
+    else:
+        drop = ratio * valve.supply_pressure - valve.return_pressure + load_pressure
+    share = 1.0 + ratio * ratio * ratio
+    return flow / (valve.orifice_gain * math.sqrt(max(drop, 2.0 * valve.transition_pressure) / share))
+
+
+class LoadPressureGains(NamedTuple):
+    """Linear model of the load pressure: dp_L/dt = opening s - motion v - leakage p_L."""
+
+    opening: float  # [Pa/s]
+    motion: float  # [Pa/m]
+    leakage: float  # [1/s]
+
+
+@compiled
+def air_gains(
+    valve: PneumaticValve, cylinder: Cylinder, pressures: tuple[float, float], position: float, extends: bool
+) -> LoadPressureGains:
+    r"""Gains of the load pressure with air, adiabatic, without leakage.
+
+    .. math::
+        \dot p_L &= \gamma \Big[ \frac{p_0 C f_a}{V_a} + \alpha_A \frac{p_0 C f_b}{V_b} \Big] s
+            - \gamma \Big[ \frac{p_a A_a}{V_a} + \alpha_A \frac{p_b A_b}{V_b} \Big] v, \qquad
+        f = p_1 \psi(p_2 / p_1) / p_0
+
+    with absolute pressures, supply to chamber a and chamber b to exhaust while the rod ``extends``, and the other way
+    round. A tenth of the supply pressure is the least f p_0, so that a full chamber does not ask for an infinite
+    opening (our choice).
+
+    Args:
+        valve: The valve.
+        cylinder: The cylinder.
+        pressures: Of chamber a and b [Pa, gauge].
+        position: [m].
+        extends: Whether the valve opens supply to chamber a.
+
+    Source: linearising feedback as in [Richer2000]_.
+    """
+    a, b, supply = pressures[0] + AMBIENT, pressures[1] + AMBIENT, valve.supply_pressure + AMBIENT
+    least, ratio = 0.1 * supply, cylinder.area_ratio
+    volume_a = cylinder.mid_volume_a + cylinder.area_a * position
+    volume_b = cylinder.mid_volume_b - cylinder.area_b * position
+    if extends:
+        flow_a, flow_b = (
+            supply * flow_function(valve, min(a / supply, 1.0)),
+            b * flow_function(valve, min(AMBIENT / b, 1.0)),
+        )
+    else:
+        flow_a, flow_b = (
+            a * flow_function(valve, min(AMBIENT / a, 1.0)),
+            supply * flow_function(valve, min(b / supply, 1.0)),
+        )
+    by_opening = max(flow_a, least) / volume_a + ratio * max(flow_b, least) / volume_b
+    by_motion = a * cylinder.area_a / volume_a + ratio * b * cylinder.area_b / volume_b
+    conductance = ADIABATIC_INDEX * REFERENCE_PRESSURE * valve.sonic_conductance
+    return LoadPressureGains(conductance * by_opening, ADIABATIC_INDEX * by_motion, 0.0)
+
+
+@compiled
+def air_opening(
+    valve: PneumaticValve, cylinder: Cylinder, bandwidth: float, measured: Measurement, force: float, speed: float
+) -> float:
+    """Opening of the valve for a force command with air [-], not limited; arguments as of `oil_opening`.
+
+    With the gains of `air_gains`: s = [omega_F (F / A_a - p_L) + motion v_c] / opening.
+    """
+    pressures = measured.pressure_a, measured.pressure_b
+    load_pressure = pressures[0] - cylinder.area_ratio * pressures[1]
+    motion = air_gains(valve, cylinder, pressures, measured.position, True).motion
+    wanted = bandwidth * (force / cylinder.area_a - load_pressure) + motion * speed
+    return wanted / air_gains(valve, cylinder, pressures, measured.position, wanted > 0.0).opening
+
+
+valve_opening = chosen_by_type({ServoValve: oil_opening, PneumaticValve: air_opening})
+"""Opening of the valve for a force command [-], not limited."""
+
+
+@compiled
 def control(
     g: Gains, c: Constants, state: ControllerState, measured: Measurement, reference: Setpoint, feedforward: float
 ) -> tuple[ControllerState, Command]:
@@ -156,7 +271,7 @@ def control(
     Returns:
         The next state and the spool command.
     """
-    valve, area, load, k = c.valve, c.cylinder.area, c.load, g.controller
+    load, k = c.load, g.controller
     setpoint, limited = limit_reference(g, state.reference, reference)
     if not math.isfinite(feedforward):
         feedforward, limited = 0.0, limited | 8
@@ -166,16 +281,13 @@ def control(
     known = inertia + viscous + load.spring_stiffness * (setpoint.position - load.spring_position)
     damping = k.velocity_gain * (setpoint.velocity - measured.velocity)
     unlimited = k.position_gain * error + damping + integral + known + feedforward
-    force = min(max(unlimited, -g.force_max), g.force_max)
+    force = min(max(unlimited, -g.retracting_force_max), g.extending_force_max)
     if force != unlimited:
         limited |= 16
 
-    load_pressure = measured.pressure_a - measured.pressure_b
     alpha = k.velocity_compensation
     speed = alpha * measured.velocity + (1.0 - alpha) * setpoint.velocity + g.valve_delay * setpoint.acceleration
-    flow = area * speed + g.pressure * (force / area - load_pressure)
-    drop = valve.supply_pressure - valve.return_pressure - math.copysign(load_pressure, flow * load_pressure)
-    opening = flow / (valve.orifice_gain * math.sqrt(max(drop, 2.0 * valve.transition_pressure) / 2.0))
+    opening = valve_opening(c.valve, c.cylinder, k.force_bandwidth, measured, force, speed)
     spool = min(max(opening, -1.0), 1.0)
     if spool != opening:
         limited |= 32
@@ -184,36 +296,56 @@ def control(
     return ControllerState(setpoint.position, integral), Command(spool, force, limited)
 
 
+def oil_gains(valve: ServoValve, cylinder: Cylinder) -> LoadPressureGains:
+    r"""Gains of the load pressure with oil, at null, in mid-stroke, without load.
+
+    .. math:: \dot p_L = \beta (1 / V_a + \alpha_A^2 / V_b) (K_q s - A_a v - K_c p_L)
+
+    K_q is the flow gain of one land at the pressure drop of even speed. Leakage of a single-rod cylinder is taken as
+    that of a balanced one (our choice: it only damps).
+
+    Source: [Merritt1967]_ chapter 6, linearised.
+    """
+    ratio = cylinder.area_ratio
+    stiffness = cylinder.bulk_modulus * (1.0 / cylinder.mid_volume_a + ratio**2 / cylinder.mid_volume_b)
+    drop = max(valve.supply_pressure - ratio * valve.return_pressure, 2.0 * valve.transition_pressure)
+    flow_gain = valve.orifice_gain * math.sqrt(drop / (1.0 + ratio**3))
+    leakage = cylinder.internal_leakage + 0.5 * cylinder.external_leakage + valve.null_leakage
+    return LoadPressureGains(stiffness * flow_gain, stiffness * cylinder.area_a, stiffness * leakage)
+
+
+def air_gains_at_null(valve: PneumaticValve, cylinder: Cylinder) -> LoadPressureGains:
+    """Gains of the load pressure with air, at null, in mid-stroke, without load."""
+    return air_gains(valve, cylinder, air_pressures_at_rest(valve, cylinder), 0.0, True)
+
+
+load_pressure_gains = chosen_by_type({ServoValve: oil_gains, PneumaticValve: air_gains_at_null})
+"""Gains of the load pressure, at null, in mid-stroke, without load."""
+
+
 def transition_matrix(g: Gains, c: Constants, held: bool = False) -> FloatArray:
     r"""State transition matrix of the linearised servo over one sample, in mid-stroke, at null, without friction.
 
     State: x, v, p_L, s, s'/omega, integral. The plant between two samples is exact (matrix exponential). With ``held``
-    the rod does not move.
-
-    .. math:: \dot p_L = \frac{4 \beta}{V_t} (K_q s - A v - K_{c} p_L), \quad K_q = K \sqrt{(p_s - p_r)/2}
-
-    Source: [Merritt1967]_ chapter 6, linearised.
+    the rod does not move. p_L follows `load_pressure_gains`.
     """
-    valve, cylinder, load, k = c.valve, c.cylinder, c.load, g.controller
-    drop = max(valve.supply_pressure - valve.return_pressure, 2.0 * valve.transition_pressure)
-    flow_gain = valve.orifice_gain * math.sqrt(drop / 2.0)
-    leakage = cylinder.internal_leakage + 0.5 * cylinder.external_leakage + valve.null_leakage
-    stiffness = 2.0 * cylinder.bulk_modulus / cylinder.mid_volume
-    area, w = cylinder.area, valve.natural_frequency
+    valve, load, k, pressure = c.valve, c.load, g.controller, load_pressure_gains(c.valve, c.cylinder)
+    area, w = c.cylinder.area_a, valve.natural_frequency
     plant = np.zeros((6, 6))
     plant[0, 1] = 1.0
     plant[1, :3] = -load.spring_stiffness / load.mass, -load.viscous_damping / load.mass, area / load.mass
-    plant[2, 1:4] = -stiffness * area, -stiffness * leakage, stiffness * flow_gain
+    plant[2, 1:4] = -pressure.motion, -pressure.leakage, pressure.opening
     plant[3, 4] = w
     plant[4, 3:6] = -w, -2.0 * valve.damping_ratio * w, w
     if held:
         plant[:2] = plant[:, :2] = 0.0
     sampled = expm(plant * g.period)[:5]  # last column: the command, held
 
-    by_force = g.pressure / area / flow_gain
+    by_load_pressure = k.force_bandwidth / pressure.opening
+    by_force = by_load_pressure / area
     by_position = -by_force * (k.position_gain + k.integral_gain * g.period)
-    by_velocity = -by_force * k.velocity_gain + k.velocity_compensation * area / flow_gain
-    feedback = np.array([by_position, by_velocity, -g.pressure / flow_gain, 0.0, 0.0, by_force])
+    by_velocity = -by_force * k.velocity_gain + k.velocity_compensation * pressure.motion / pressure.opening
+    feedback = np.array([by_position, by_velocity, -by_load_pressure, 0.0, 0.0, by_force])
     matrix = np.zeros((6, 6))
     matrix[:5, :5] = sampled[:, :5]
     matrix[:5] += np.outer(sampled[:, 5], feedback)

@@ -1,10 +1,11 @@
 """Position servo with seal friction.
 
 ``state = init(parameters)``, then ``state, outputs = step(parameters, state, reference, feedforward)``: one sample of
-the controller, over which valve, cylinder and load advance in inner steps. `control` and `advance` do the two halves of
-a sample, for sensors (noise, delay) between them or for a rig without controller.
+the controller, over which valve, cylinder and load advance in inner steps. `step_measured` takes what the
+sensors of the controller say; `advance` is for a rig without controller.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled, keep
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal, friction_of_seals
-from seal_friction_ros.core.friction.states import state_friction
+from seal_friction_ros.core.friction.states import StateFriction, state_friction
 from seal_friction_ros.core.servo.controller import (
     Command,
     ControllerState,
@@ -26,19 +27,23 @@ from seal_friction_ros.core.servo.controller import (
     gains,
     spectral_radius,
 )
+from seal_friction_ros.core.servo.cylinder import Cylinder
+from seal_friction_ros.core.servo.elastic_plant import NO_SHEAR, ElasticSeals, SealShear, elastic_step, for_elastic_step
+from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.motions import Setpoint
 from seal_friction_ros.core.servo.plant import (
     Constants,
-    Cylinder,
     Load,
     PlantState,
-    ServoValve,
+    Valve,
     chamber_pressures,
     constants,
     fastest_rate,
     force_sum,
     inner_step,
+    pressures_at_rest,
 )
+from seal_friction_ros.core.servo.pneumatics import REFERENCE_TEMPERATURE
 
 LARGEST_RATE_TIMES_STEP = 2.5  # [-] the stability limit of Runge-Kutta of fourth order is 2.78 on the real axis
 
@@ -52,17 +57,18 @@ class ServoParameters(CheckedParameters):
             fastest part of the plant, or the closed loop is unstable.
     """
 
-    valve: ServoValve = field(default_factory=ServoValve)
+    valve: Valve = field(default_factory=ServoValve)  # its type says what the fluid is
     cylinder: Cylinder = field(default_factory=Cylinder)
     load: Load = field(default_factory=Load)
     controller: ServoController = field(default_factory=ServoController)
     seals: tuple[MountedSeal, ...]
+    elastic: ElasticSeals | None = None  # None: the seals are rigid
     control_period: float = parameter(5e-4, unit='s', lower=1e-6, upper=0.1, description='Controller sample time.')
     inner_step: float = parameter(1e-4, unit='s', lower=1e-8, upper=0.1, description='Time step of the plant.')
     constants: Constants = field(init=False, repr=False, compare=False)
     gains: Gains = field(init=False, repr=False, compare=False)
     kept: Any = field(init=False, repr=False, compare=False)
-    """constants, gains, inner step and number of inner steps for compiled code"""
+    """constants, gains, inner step, number of inner steps, and elasticity or None for compiled code"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -78,7 +84,16 @@ class ServoParameters(CheckedParameters):
                 f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
                 f'{LARGEST_RATE_TIMES_STEP / rate:.3g} s for the fastest part, {part}'
             )
+        if self.elastic is not None:
+            damping = max(self.elastic.bristle_damping, 0.0) / self.load.mass
+            swing = math.sqrt(self.elastic.stiffness / self.load.mass) + damping
+            if swing * self.inner_step > LARGEST_RATE_TIMES_STEP:
+                raise ValueError(
+                    f'ServoParameters.inner_step = {self.inner_step} s is too long: at most '
+                    f'{LARGEST_RATE_TIMES_STEP / swing:.3g} s for the mass on its elastic seals'
+                )
         c = constants(self.valve, self.cylinder, self.load, self.seals)
+        elastic = for_elastic_step(self.elastic, c)
         g = gains(self.controller, c, self.control_period)
         radius = spectral_radius(g, c)
         if radius > 1.0 + 1e-9:
@@ -86,7 +101,7 @@ class ServoParameters(CheckedParameters):
                 f'ServoParameters: the closed loop is unstable, the largest eigenvalue of its transition matrix is '
                 f'{radius:.4f}: lower position_gain, velocity_compensation or force_bandwidth, or control_period'
             )
-        for name, value in (('constants', c), ('gains', g), ('kept', keep((c, g, self.inner_step, steps)))):
+        for name, value in (('constants', c), ('gains', g), ('kept', keep((c, g, self.inner_step, steps, elastic)))):
             object.__setattr__(self, name, value)  # frozen dataclass: derived fields
 
 
@@ -95,6 +110,7 @@ class ServoState(NamedTuple):
 
     plant: PlantState
     controller: ControllerState
+    seals: SealShear = NO_SHEAR  # of elastic seals
 
 
 class ServoOutputs(NamedTuple):
@@ -118,48 +134,86 @@ NO_COMMAND = Command(0.0, 0.0, 0)
 
 
 def init(parameters: ServoParameters, position: float = 0.0) -> ServoState:
-    """Servo at rest at ``position`` [m], valve closed, chambers at the mean of supply and return pressure.
+    """Servo at rest at ``position`` [m], valve closed, chambers at `pressures_at_rest`.
 
     Raises:
         ValueError: The position is not between the end stops.
     """
     if not abs(position) <= parameters.cylinder.limit:
         raise ValueError(f'position = {position} m is not within the stroke, +-{parameters.cylinder.limit} m')
-    mean = (parameters.valve.supply_pressure + parameters.valve.return_pressure) / 2.0
-    plant = PlantState(position, 0.0, mean, mean, 0.0, 0.0, 0.0, 0.0, 0, 0)
-    return ServoState(plant, ControllerState(position, 0.0))
+    a, b = pressures_at_rest(parameters.valve, parameters.cylinder)
+    temperature = getattr(parameters.valve, 'temperature', REFERENCE_TEMPERATURE)
+    plant = PlantState(position, 0.0, a, b, 0.0, 0.0, 0.0, 0.0, temperature, temperature, 0, 0)
+    return ServoState(plant, ControllerState(position, 0.0), NO_SHEAR)
 
 
 @compiled
-def _advance(kept: Any, state: PlantState, command: float, load_force: float) -> PlantState:
-    c, _gains, time, steps = kept.value
-    for _ in range(steps):
-        state = inner_step(c, state, command, load_force, time)
-    return state
+def _advance_elastic(
+    c: Constants,
+    elastic: Any,
+    inner: tuple[float, int],
+    plant: PlantState,
+    seals: SealShear,
+    force: tuple[float, float],
+) -> tuple[PlantState, SealShear]:
+    """Plant and seals over one sample, with spool command and load force [N] in ``force``.
+
+    Compiled code has only one of the two branches: the compiler knows whether ``elastic`` is None.
+    """
+    time, steps = inner
+    command, load_force = force
+    if elastic is None:
+        for _ in range(steps):
+            plant = inner_step(c, plant, command, load_force, time)
+    else:
+        for _ in range(steps):
+            plant, seals = elastic_step(c, elastic, plant, seals, command, load_force, time)
+    return plant, seals
+
+
+@compiled
+def _advance(kept: Any, plant: PlantState, command: float, load_force: float) -> PlantState:
+    c, _gains, time, steps, elastic = kept.value
+    return _advance_elastic(c, elastic, (time, steps), plant, NO_SHEAR, (command, load_force))[0]
 
 
 def advance(parameters: ServoParameters, state: PlantState, spool: float, load_force: float = 0.0) -> PlantState:
-    """Valve, cylinder and load over one sample, with constant spool command [-1 to 1] and force on the rod [N]."""
+    """Valve, cylinder and load over one sample, with constant spool command [-1 to 1] and force on the rod [N].
+
+    Raises:
+        ValueError: The seals are elastic: their state is in `ServoState`, so `step` it.
+    """
+    if parameters.elastic is not None:
+        raise ValueError('advance: the seals of this servo are elastic; use step, or ServoParameters.elastic = None')
     return _advance(parameters.kept, state, min(max(spool, -1.0), 1.0), load_force)
 
 
 @compiled
 def measure(c: Constants, state: PlantState) -> Measurement:
     """Measurement of ideal sensors."""
-    pressure_a, pressure_b = chamber_pressures(c, state[:8])
+    pressure_a, pressure_b = chamber_pressures(c, state[:10])
     return Measurement(state.position, state.velocity, pressure_a, pressure_b)
 
 
 @compiled
-def _outputs(kept: Any, plant: PlantState, command: Command, load_force: float) -> ServoOutputs:
+def _with_elastic_seals(elastic: Any, shear: SealShear, rigid: StateFriction) -> StateFriction:
+    """Friction that acts: of elastic seals the force of their shear, else that of rigid ones."""
+    if elastic is None:
+        return rigid
+    return StateFriction(rigid.state, rigid.direction, shear.friction)
+
+
+@compiled
+def _outputs(kept: Any, plant: PlantState, shear: SealShear, command: Command, load_force: float) -> ServoOutputs:
     """Outputs in a state of the plant; friction by `state_friction` of the estimator, at rest where V = 0 exactly."""
-    c, _gains, _time, _steps = kept.value
-    a, b = chamber_pressures(c, plant[:8])
-    force = force_sum(c, plant[:8], load_force)
+    c, _gains, _time, _steps, elastic = kept.value
+    a, b = chamber_pressures(c, plant[:10])
+    force = force_sum(c, plant[:10], load_force)
     seals = friction_of_seals(c.seals, a, b, plant.velocity)
     coulomb = seals.coulomb_friction
     sliding, breakaway = coulomb + seals.velocity_friction, coulomb + seals.stiction
     acting = state_friction(plant.velocity, force, plant.velocity == 0.0, sliding, breakaway)
+    acting = _with_elastic_seals(elastic, shear, acting)
     measured = (plant.position, plant.velocity, a, b, plant.spool, force)
     return ServoOutputs(*measured, acting.friction_force, coulomb, breakaway, acting.state, acting.direction, command)
 
@@ -167,18 +221,18 @@ def _outputs(kept: Any, plant: PlantState, command: Command, load_force: float) 
 def outputs(
     parameters: ServoParameters, plant: PlantState, command: Command = NO_COMMAND, load_force: float = 0.0
 ) -> ServoOutputs:
-    """Outputs of the servo in a state of its plant, with a force from outside on the rod [N]."""
-    return _outputs(parameters.kept, plant, command, load_force)
+    """Outputs of the servo in a state of its plant, with a force from outside on the rod [N]; seals not sheared."""
+    return _outputs(parameters.kept, plant, NO_SHEAR, command, load_force)
 
 
 @compiled
 def _step(
     kept: Any, state: ServoState, reference: Setpoint, feedforward: float, load_force: float
 ) -> tuple[ServoState, ServoOutputs]:
-    c, g, _time, _steps = kept.value
+    c, g, time, steps, elastic = kept.value
     controller, command = control(g, c, state.controller, measure(c, state.plant), reference, feedforward)
-    plant = _advance(kept, state.plant, command.spool, load_force)
-    return ServoState(plant, controller), _outputs(kept, plant, command, load_force)
+    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, load_force))
+    return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, load_force)
 
 
 def step(
@@ -198,6 +252,23 @@ def step(
         load_force: Force from outside on the rod [N], positive on extension, constant over the step.
     """
     return _step(parameters.kept, state, reference, feedforward, load_force)
+
+
+@compiled
+def _step_measured(
+    kept: Any, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float
+) -> tuple[ServoState, ServoOutputs]:
+    c, g, time, steps, elastic = kept.value
+    controller, command = control(g, c, state.controller, measured, reference, feedforward)
+    plant, shear = _advance_elastic(c, elastic, (time, steps), state.plant, state.seals, (command.spool, 0.0))
+    return ServoState(plant, controller, shear), _outputs(kept, plant, shear, command, 0.0)
+
+
+def step_measured(
+    parameters: ServoParameters, state: ServoState, measured: Measurement, reference: Setpoint, feedforward: float = 0.0
+) -> tuple[ServoState, ServoOutputs]:
+    """As `step`, but the controller has the measurement of real sensors."""
+    return _step_measured(parameters.kept, state, measured, reference, feedforward)
 
 
 class Trajectory(NamedTuple):

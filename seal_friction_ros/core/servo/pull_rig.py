@@ -4,8 +4,10 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.servo.controller import ServoController
+from seal_friction_ros.core.servo.cylinder import Cylinder
+from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.motions import PullTest
-from seal_friction_ros.core.servo.plant import Cylinder, PlantState, ServoValve
+from seal_friction_ros.core.servo.plant import PlantState
 from seal_friction_ros.core.servo.position_servo import ServoOutputs, ServoParameters, advance, init, outputs
 
 

@@ -12,6 +12,32 @@ def tracking_rms(reference: FloatArray, position: FloatArray) -> float:
     return math.sqrt(float(np.mean((reference - position) ** 2)))
 
 
+def reversal_rms(reference: FloatArray, position: FloatArray) -> float:
+    """Root mean square error near the reversals [m]: where the reference is in the outer tenths of its range.
+
+    Unlike the dwell it holds for a rod on elastic seals, which never rests. The tenths are our choice.
+
+    Args:
+        reference: Of a periodic motion [m], shape (n,).
+        position: [m], shape (n,).
+    """
+    middle, half = 0.5 * (reference.max() + reference.min()), 0.5 * np.ptp(reference)
+    outer = np.abs(reference - middle) >= 0.8 * half
+    return tracking_rms(reference[outer], position[outer])
+
+
+def error_area(reference: FloatArray, position: FloatArray, period: float, turns: int) -> float:
+    """Integral of the magnitude of the error over time, per reversal [m s].
+
+    Args:
+        reference: [m], shape (n,).
+        position: [m], shape (n,).
+        period: Sample time [s].
+        turns: Reversals of the reference in these samples.
+    """
+    return float(np.abs(reference - position).sum()) * period / turns
+
+
 def tracking_peak(reference: FloatArray, position: FloatArray) -> float:
     """Largest tracking error [m]; both of shape (n,) [m]."""
     return float(np.abs(reference - position).max())

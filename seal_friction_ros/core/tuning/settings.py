@@ -50,6 +50,8 @@ class RecordedAxisSettings(CheckedParameters):
     )
     friction_error: float = parameter(0.3, unit='1', lower=0.0, upper=0.9, description='Largest relative model error.')
     delay_error: float = parameter(0.2, unit='1', lower=0.0, upper=1.0, description='Likewise of the whole delay.')
+    area_a: float = parameter(0.0, unit='m2', lower=0.0, upper=10.0, description='Of chamber a, for --command-topic.')
+    area_b: float = parameter(0.0, unit='m2', lower=0.0, upper=10.0, description='Of chamber b, for --command-topic.')
 
 
 class Outcome(Protocol):

@@ -152,10 +152,9 @@ class TuningProblem:
         hold_time: float = SEARCH_HOLD,
     ) -> tuple[AxisRun, AxisRun, AxisRun]:
         """Sine, move and step of `case`."""
-        plant, parameters = self.axis
         delay = self.settings.delay + delay_error * self.whole_delay
-        wrong = with_wrong_friction(parameters._replace(feedforward=feedforward), friction_error)
-        return self.motions(hold_time).runs(Axis(plant, wrong), max(delay, 0.0), self.noise)
+        wrong = with_wrong_friction(self.axis.pipeline._replace(feedforward=feedforward), friction_error)
+        return self.motions(hold_time).runs(self.axis._replace(pipeline=wrong), max(delay, 0.0), self.noise)
 
     def without(self) -> Performance:
         """Performance without feed-forward."""

@@ -31,6 +31,7 @@ from seal_friction_ros.offline.bags.mcap_writer import FILE_MODE, Description, M
 PRESSURE_TOPIC = '/cylinder_pressure'
 VELOCITY_TOPIC = '/rod_velocity'
 POSITION_TOPIC = '/rod_position'
+TEMPERATURE_TOPIC = '/seal_temperature'
 FORCE_TOPIC = '/force_sum'
 REFERENCE_TOPIC = '/servo_reference'
 ESTIMATE_TOPIC = '/friction_estimate'

@@ -18,7 +18,11 @@ The rig file describes the columns of the log, their units, signs and areas. The
       savitzky_golay: {window: 0.2, order: 2, largest_gap: 0.05} # absent: the terms are a velocity
     sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # for identification; absent: these values
     position: {terms: [{column: 4, unit: mm, gain: -1.0}]} # absent: that of the velocity, if it is made from position
+    temperature: {column: 7, unit: degC} # of the seals; K or degC; absent: not known
     load: position              # for identification; the force sum holds a load that follows position; absent: auto
+    reference_position: {terms: [{column: 7, unit: mm}]} # for tune; absent: the bag has no reference
+    reference_velocity: {terms: [{column: 8, unit: mm/s}]} # absent: the slope of the position
+    reference_acceleration: {terms: [{column: 9, unit: m/s2}]} # absent: 0
 """
 
 from array import array
@@ -31,32 +35,45 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, encode
-from seal_friction_ros.core.estimation.records import Force, Pressure, Velocity
+from seal_friction_ros.core.estimation.messages import (
+    FORCE_TYPE,
+    POSITION_TYPE,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    TEMPERATURE_TYPE,
+    VELOCITY_TYPE,
+    encode,
+)
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, from_mapping, parameter
-from seal_friction_ros.core.foundation.units import unit_size
+from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, unit_size
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding, slope
 from seal_friction_ros.files import read_yaml
-from seal_friction_ros.offline.bags.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagWriter
+from seal_friction_ros.offline.bags.bag import (
+    FORCE_TOPIC,
+    POSITION_TOPIC,
+    PRESSURE_TOPIC,
+    REFERENCE_TOPIC,
+    TEMPERATURE_TOPIC,
+    VELOCITY_TOPIC,
+    BagWriter,
+)
 from seal_friction_ros.offline.work.progress import progress
 
 _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one beyond the int32 seconds of a ROS stamp
 _LONGEST_LINE = 1 << 18  # characters
 _SHOWN = 40  # characters of an invalid cell in an error message
 _PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
+_REFERENCES = {
+    'reference_position': 'length',
+    'reference_velocity': 'velocity',
+    'reference_acceleration': 'acceleration',
+}
+"""Optional columns of the wanted motion -> their quantity."""
 _LOADS = ('auto', 'none', 'position')
 _HEADERS = ('none', 'row', 'comment')
-_QUANTITIES = {
-    'number': ('1',),
-    'time': ('s', 'ms', 'us', 'ns'),
-    'length': ('m', 'mm', 'um', 'in'),
-    'velocity': ('m/s', 'mm/s', 'in/s'),
-    'pressure': ('Pa', 'kPa', 'MPa', 'bar', 'psi'),
-    'force': ('N', 'kN', 'lbf'),
-    'area': ('m2', 'mm2', 'in2'),
-}
-_QUANTITY_OF = {unit: quantity for quantity, units in _QUANTITIES.items() for unit in units}
+_QUANTITY_OF = {unit: quantity for quantity, units in QUANTITIES.items() for unit in units}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +146,11 @@ class Rig(CheckedParameters):
     savitzky_golay: SavitzkyGolay | None
     sliding: Sliding
     position: Combination | None = None
+    temperature: Term | None = None
     load: str = 'auto'
+    reference_position: Combination | None = None
+    reference_velocity: Combination | None = None
+    reference_acceleration: Combination | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -143,13 +164,16 @@ class Rig(CheckedParameters):
         if self.load == 'position' and self.position is None and self.savitzky_golay is None:
             raise ValueError('Rig.load = position but the rig file has no position: add the column of the position')
         wanted['velocity'] = 'velocity' if self.savitzky_golay is None else 'length'
-        wanted['position'] = 'length'
+        wanted |= {'position': 'length', 'temperature': 'temperature'} | _REFERENCES
+        given = [name for name in _REFERENCES if getattr(self, name) is not None]
+        if given and self.reference_position is None and self.reference_velocity is None:
+            raise ValueError(f'Rig.{given[0]} without reference_position or reference_velocity')
         for where, term in self.terms():
             quantity = wanted[where.split('.')[0]]
             if not term.is_a(quantity):
                 raise ValueError(
                     f'{where}.unit = {term.unit!r} with gain_unit = {term.gain_unit!r} is not a {quantity}: '
-                    f'use one of {", ".join(_QUANTITIES[quantity])}'
+                    f'use one of {", ".join(QUANTITIES[quantity])}'
                 )
             if self.header == 'none' and term.column_name:
                 raise ValueError(f'{where}.column_name = {term.column_name!r} but header = none: the log has no names')
@@ -160,8 +184,12 @@ class Rig(CheckedParameters):
         for part in _PARTS[1:]:
             for number, term in enumerate(getattr(self, part).terms):
                 yield f'{part}.terms[{number}]', term
-        for number, term in enumerate(() if self.position is None else self.position.terms):
-            yield f'position.terms[{number}]', term
+        if self.temperature is not None:
+            yield 'temperature', self.temperature
+        for part in ('position', *_REFERENCES):
+            combination = getattr(self, part)
+            for number, term in enumerate(() if combination is None else combination.terms):
+                yield f'{part}.terms[{number}]', term
 
     @property
     def known_position(self) -> Combination | None:
@@ -188,6 +216,17 @@ class Samples(NamedTuple):
     velocity: FloatArray  # [m/s]
 
 
+class Track(NamedTuple):
+    """Position, wanted motion and temperature of a log for a bag; arrays of shape (n,); None: not in the log."""
+
+    position: FloatArray | None = None  # [m]
+    reference: tuple[FloatArray, FloatArray, FloatArray] | None = None  # [m, m/s, m/s^2]
+    temperature: FloatArray | None = None  # [K]
+
+
+NO_TRACK = Track()
+
+
 def import_log(log: Path, rig_file: Path, out: Path) -> ImportSummary:
     """Convert a measured log to a bag.
 
@@ -202,15 +241,18 @@ def import_log(log: Path, rig_file: Path, out: Path) -> ImportSummary:
         BagError: ``out`` exists already or cannot be made.
     """
     rig = read_rig(rig_file)
-    return write_samples(out, read_samples(log, rig).samples, rig.frame_id)
+    read = read_samples(log, rig)
+    return write_samples(out, read.samples, rig.frame_id, read.track)
 
 
 class ReadLog(NamedTuple):
     """A log in SI units, and its columns."""
 
-    samples: 'Samples'
+    samples: Samples
     columns: dict[Term, FloatArray]  # values in the log, in the units of the terms
     position: FloatArray | None = None  # [m] shape (n,); None if the rig file has none
+    temperature: FloatArray | None = None  # [K] likewise
+    track: Track = NO_TRACK  # what the bag gets
 
 
 def read_samples(log: Path, rig: Rig) -> ReadLog:
@@ -223,7 +265,29 @@ def read_samples(log: Path, rig: Rig) -> ReadLog:
     position = rig.known_position
     with np.errstate(invalid='ignore', over='ignore'):
         places = None if position is None else _combined(position, cells.columns, len(cells.line_numbers))
-    return ReadLog(_samples(log, rig, cells), cells.columns, places)
+        term = rig.temperature
+        warm = None if term is None else ZEROS[term.unit] + term.size * cells.columns[term]
+    samples = _samples(log, rig, cells)
+    track = Track(None if rig.position is None else places, _reference(rig, cells, samples), warm)
+    return ReadLog(samples, cells.columns, places, warm, track)
+
+
+def _reference(rig: Rig, cells: '_Cells', samples: Samples) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Wanted position, velocity and acceleration; without a column of the velocity, the slope of the position."""
+    count = len(samples.stamp)
+    parts = [getattr(rig, name) for name in _REFERENCES]
+    if not any(parts):
+        return None
+    with np.errstate(invalid='ignore', over='ignore'):
+        position, velocity, acceleration = (
+            None if part is None else _combined(part, cells.columns, count) for part in parts
+        )
+        if position is None:
+            position = np.full(count, np.nan)
+        if velocity is None:
+            seconds = (samples.stamp - samples.stamp[0]) * 1e-9
+            velocity = np.gradient(position, seconds) if count > 1 else np.zeros(count)
+    return position, velocity, np.zeros(count) if acceleration is None else acceleration
 
 
 def read_rig(path: Path) -> Rig:
@@ -239,13 +303,15 @@ def read_rig(path: Path) -> Rig:
     if missing:
         raise ValueError(f'{path}: rig file lacks {", ".join(missing)}')
     velocity, filter_values = _taken_out(document['velocity'], 'savitzky_golay')
-    parts = {part: _combination(document[part], f'{path}: {part}') for part in _PARTS[1:-1]}
+    parts: dict[str, Any] = {part: _combination(document[part], f'{path}: {part}') for part in _PARTS[1:-1]}
     parts['velocity'] = _combination(velocity, f'{path}: velocity')
-    if 'position' in document:
-        parts['position'] = _combination(document['position'], f'{path}: position')
+    if 'temperature' in document:
+        parts['temperature'] = from_mapping(Term, document['temperature'], f'{path}: temperature')
+    optional = [part for part in ('position', *_REFERENCES) if part in document]
+    parts |= {part: _combination(document[part], f'{path}: {part}') for part in optional}
     return from_mapping(
         Rig,
-        {key: value for key, value in document.items() if key not in (*_PARTS, 'sliding', 'position')},
+        {key: value for key, value in document.items() if key not in (*_PARTS, 'sliding', 'temperature', *optional)},
         str(path),
         time=from_mapping(Term, document['time'], f'{path}: time'),
         savitzky_golay=None
@@ -408,8 +474,8 @@ def _stamps(log: Path, rig: Rig, cells: _Cells) -> NDArray[np.int64]:
     return stamps
 
 
-def write_samples(out: Path, samples: Samples, frame_id: str) -> ImportSummary:
-    """Write samples as a bag: pressure, force sum, then velocity, all three with the stamp of their row.
+def write_samples(out: Path, samples: Samples, frame_id: str, track: Track = NO_TRACK) -> ImportSummary:
+    """Write samples as a bag: temperature, pressure, force sum, position, reference, velocity, stamped as their row.
 
     The velocity comes last, since it triggers the estimate.
 
@@ -417,13 +483,33 @@ def write_samples(out: Path, samples: Samples, frame_id: str) -> ImportSummary:
         BagError: ``out`` exists already or cannot be made.
     """
     frame = frame_id.encode()
+    nothing = [None] * len(samples.stamp)
+    positions = nothing if track.position is None else track.position.tolist()
+    temperatures = nothing if track.temperature is None else (track.temperature - ZEROS['degC']).tolist()
+    references: Any = nothing
+    if track.reference is not None:
+        references = zip(*(column.tolist() for column in track.reference), strict=True)
+    columns = [array.tolist() for array in samples]
     with BagWriter(out) as writer, progress(f'import {out.name}', len(samples.stamp)) as advance:
-        for count, row in enumerate(zip(*(array.tolist() for array in samples), strict=True), start=1):
+        for count, (row, position, reference, celsius) in enumerate(
+            zip(zip(*columns, strict=True), positions, references, temperatures, strict=True), start=1
+        ):
             stamp, chamber_a, chamber_b, force_sum, velocity = row
+            if celsius is not None:
+                writer.write(TEMPERATURE_TOPIC, TEMPERATURE_TYPE, stamp, encode(Temperature(stamp, celsius), frame))
             pressure = encode(Pressure(stamp, chamber_a, chamber_b), frame)
             force = encode(Force(stamp, force_sum), frame)
             writer.write(PRESSURE_TOPIC, PRESSURE_TYPE, stamp, pressure)
             writer.write(FORCE_TOPIC, FORCE_TYPE, stamp, force)
+            if position is not None:
+                writer.write(POSITION_TOPIC, POSITION_TYPE, stamp, encode(Position(stamp, position), frame))
+            if reference is not None:
+                writer.write(
+                    REFERENCE_TOPIC,
+                    REFERENCE_TYPE,
+                    stamp,
+                    encode(ServoReference(stamp, reference[0], reference[1], reference[2], frame)),
+                )
             writer.write(VELOCITY_TOPIC, VELOCITY_TYPE, stamp, encode(Velocity(stamp, velocity, frame)))
             if count % 1000 == 0:
                 advance(1000)

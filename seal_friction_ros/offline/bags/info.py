@@ -8,6 +8,7 @@ from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, ESTIMATE_TYPE, decode, decode_text
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.machine.machine_snapshot import is_machine_text, machine_of_text
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
 
 
@@ -55,10 +56,7 @@ def bag_info(bag: Path) -> BagInfo:
                 states[FrictionState(estimate.state).name] += 1
                 status.update([str(bit.name) for bit in Status if estimate.status & bit] or ['all good'])
             elif message.type_name == CONFIGURATION_TYPE:
-                selection = parse_snapshot(decode_text(message.data)).configuration.selection
-                seals = [
-                    f'{seal} on chamber {c}' for seal, c in zip(selection.seals, selection.seal_chambers, strict=True)
-                ]
+                seals = _seals(decode_text(message.data))
         except ValueError as error:
             raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
     if not count:
@@ -73,3 +71,20 @@ def bag_info(bag: Path) -> BagInfo:
         for topic, info in sorted(bag_topics(bag).items())
     }
     return BagInfo(str(bag), times[0], duration, count, topics, dict(states), dict(status), seals)
+
+
+def _seals(text: str) -> list[str]:
+    """Each seal with its chamber in the text of a configuration, of a machine with the name of its actuator.
+
+    Raises:
+        ValueError: The text is no configuration.
+    """
+    if is_machine_text(text):
+        selections = {f'{one.name}: ': one.selection for one in machine_of_text(text).actuators}
+    else:
+        selections = {'': parse_snapshot(text).configuration.selection}
+    return [
+        f'{name}{seal} on chamber {chamber}'
+        for name, one in selections.items()
+        for seal, chamber in zip(one.seals, one.seal_chambers, strict=True)
+    ]

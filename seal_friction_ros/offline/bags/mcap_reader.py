@@ -284,6 +284,22 @@ def file_topics(path: Path) -> Iterator[tuple[str, str, int]]:
                 yield message.channel.topic, message.channel.type_name, 1
 
 
+def file_definitions(path: Path) -> Iterator[tuple[str, str, str]]:
+    """Message type, encoding and text of each definition of a finished file; a type may come several times.
+
+    Raises:
+        ValueError: As `file_messages`.
+    """
+    with path.open('rb') as file:
+        layout = scan_finished(file)
+        channels = layout.channels.values() if layout.channels else (m.channel for m in messages(file, layout))
+        seen = set()
+        for channel in channels:
+            if channel.type_name not in seen:
+                seen.add(channel.type_name)
+                yield channel.type_name, channel.definition_encoding, channel.definition.decode(errors='replace')
+
+
 def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], None] | None = None) -> Iterator[Message]:
     """Messages of a file in order of log time; equal times in the order of the file.
 

@@ -10,6 +10,8 @@ from seal_friction_ros.offline.bags.mcap_reader import LARGEST_CHUNK
 _TOPICS = 'SELECT id, name, type FROM topics'
 _COUNTS = 'SELECT topic_id, count(*) FROM messages GROUP BY topic_id'
 _MESSAGES = 'SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id'
+_DEFINITIONS = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
+_MOST_DEFINITIONS = 10_000
 _LONGEST_NAME = 1024  # characters of a topic or a type
 
 
@@ -38,6 +40,21 @@ def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
             if number not in names or not isinstance(log_time, int) or not isinstance(data, bytes):
                 raise ValueError(f'a message of topic {number!r} at {log_time!r} is invalid')
             yield *names[number], log_time, data
+
+
+def file_definitions(path: Path) -> list[tuple[str, str, str]]:
+    """Message type, encoding and text of each definition; empty for a file of Humble and before.
+
+    Raises:
+        ValueError: The file is not such a database.
+        sqlite3.Error: It is damaged.
+    """
+    with _opened(path) as database:
+        if database.execute("SELECT count(*) FROM sqlite_schema WHERE name = 'message_definitions'").fetchone() == (0,):
+            return []
+        _check_plain(database, 'message_definitions')
+        rows = database.execute(_DEFINITIONS).fetchmany(_MOST_DEFINITIONS)
+        return [row for row in rows if all(isinstance(text, str) for text in row)]
 
 
 @contextmanager

@@ -5,7 +5,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation import messages
-from seal_friction_ros.offline.bags.bag import ESTIMATE_TOPIC, FEEDFORWARD_TOPIC, BagError, TopicInfo, bag_topics
+from seal_friction_ros.offline.bags.bag import (
+    ESTIMATE_TOPIC,
+    FEEDFORWARD_TOPIC,
+    TEMPERATURE_TOPIC,
+    BagError,
+    TopicInfo,
+    bag_topics,
+)
 
 ANSWER_TOPICS = {messages.ESTIMATE_TYPE: ESTIMATE_TOPIC, messages.FEEDFORWARD_TYPE: FEEDFORWARD_TOPIC}
 """Message type of an answer -> topic, if the bag has no topic of that type."""
@@ -27,6 +34,7 @@ class Topics(NamedTuple):
     feedforward: str
     configuration: str
     tick: str
+    temperature: str
 
     @property
     def answers(self) -> dict[str, str]:
@@ -44,6 +52,7 @@ TYPES = Topics(
     feedforward=messages.FEEDFORWARD_TYPE,
     configuration=messages.CONFIGURATION_TYPE,
     tick=messages.TICK_TYPE,
+    temperature=messages.TEMPERATURE_TYPE,
 )
 """Message type of each topic."""
 
@@ -57,7 +66,7 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
         known: Result of `bag_topics`, if already known.
 
     Raises:
-        BagError: There is no velocity topic, or a type has several topics.
+        BagError: There is no velocity topic, or a type of this project has several topics.
     """
     names = []
     below = f'/{namespace.strip("/")}/'.replace('//', '/')
@@ -65,6 +74,8 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
     topics = {topic: info for topic, info in known.items() if topic.startswith(below) and not topic.endswith(RECORDED)}
     for wanted in TYPES:
         found = sorted(topic for topic, info in topics.items() if info.type_name == wanted and info.message_count)
+        if len(found) > 1 and wanted == TYPES.temperature:  # a standard type: others may be of a motor or a battery
+            found = [topic for topic in found if topic.endswith(TEMPERATURE_TOPIC)]
         if len(found) > 1:
             raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
         names.append(found[0] if found else '')

@@ -15,7 +15,7 @@ def add_parser(commands: Any) -> None:
         'adapt today --seal my_seal.yaml --out my_seal_today.yaml',
     )  # fmt: skip
     parser.add_argument('bags', type=Path, nargs='+', metavar='BAG')
-    parser.add_argument('--seal', type=Path, required=True, metavar='FILE', help='seal file to begin with')
+    cli.add_file(parser, '--seal', 'seals', 'seal file to begin with', required=True, metavar='SEAL')
     cli.add_namespace(parser)
     cli.add_target(parser, '--out', SEAL_FILE, metavar='FILE', required=True, help='seal file to write')
 
@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     numbers = write_adapted_seal(arguments.bags, arguments.seal, arguments.out, arguments.namespace)
     summary = (
-        f'scale {numbers["scale"]:.4f} +- {numbers["scale_std"]:.4f} after {numbers["reversals"]} reversals\n'
-        f'{arguments.out}: written, friction_scale {numbers["friction_scale"]:.4f}'
+        f'scale {numbers["scale"]:.4f} +- {numbers["scale_std"]:.4f} after {numbers["reversals"]} reversals; '
+        f'friction_scale {numbers["friction_scale"]:.4f}'
     )
     return cli.print_result(arguments, numbers, summary)

@@ -12,7 +12,7 @@ def add_parser(commands: Any) -> None:
         commands, 'charts', run, 'write a page with the curves of a seal file',
         'charts ms28775_114 --out ms28775_114.html',
     )  # fmt: skip
-    parser.add_argument('seal', help='seal file: a path, or the name of one in config/seals')
+    cli.add_file(parser, 'seal', 'seals', 'seal file', metavar='SEAL')
     cli.add_page(parser)
 
 
@@ -22,4 +22,4 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.reports.seal_charts import write_seal_charts
 
     numbers = write_seal_charts(config_path('seals', arguments.seal), arguments.out)
-    return cli.print_result(arguments, numbers, f'{arguments.out}: written')
+    return cli.print_result(arguments, numbers, '')

@@ -5,11 +5,13 @@ import dataclasses
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
+from seal_friction_ros.core.foundation.parameters import meant
+from seal_friction_ros.offline.work.status import show_status
 from seal_friction_ros.offline.work.targets import PAGE, Kind, checked_targets
 from seal_friction_ros.packages import needed
 
@@ -19,6 +21,54 @@ SUCCESS, DIFFERENT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
 
 # -- parsers and options ----------------------------------------------------------------------------------------------
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser whose errors are one line that says what is meant, or what there is."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with one line and the exit code of unusable input."""
+        example = self.get_default('examples')
+        hint = f'; for example: {example[0]}' if example and 'required' in message else ''
+        self.exit(UNUSABLE, f'{self.prog}: {message}{hint}; {self.prog} --help says more\n')
+
+    def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
+        """As of the base class; the parser of a command names its own unknown options."""
+        if not any(isinstance(action, argparse._SubParsersAction) for action in self._actions):
+            for word in args or ():
+                self._check_option(word.partition('=')[0])
+        known, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self._refuse(unknown[0].partition('=')[0])
+        return known, unknown
+
+    def _check_option(self, word: str) -> None:
+        """Check an option before the others, so that a mistyped one is not told to be missing."""
+        if word.startswith('--') and word != '--' and not any(option.startswith(word) for option in self._options()):
+            self._refuse(word)
+
+    def _options(self) -> list[str]:
+        return [option for action in self._actions for option in action.option_strings if option.startswith('--')]
+
+    def _refuse(self, word: str) -> NoReturn:
+        if not word.startswith('-'):
+            self.error(f'{word} is one argument too many')
+        self.error(f'there is no option {word}: {meant(word, self._options())}')
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Check a command, or a choice of an option."""
+        if action.choices is None or value in action.choices:
+            return
+        is_command = isinstance(action, argparse._SubParsersAction)
+        what = f'{action.metavar or "value"}'.lower() if is_command else f'value of {"/".join(action.option_strings)}'
+        self.error(f'{value} is no {what}: {meant(str(value), action.choices)}')
+
+
+def add_group(commands: Any, name: str, metavar: str, description: str, *examples: str) -> Any:
+    """Add a command that has kinds, each with a parser of its own; returns the subparsers for them."""
+    parser = commands.add_parser(name, **_help(description, examples))
+    parser.set_defaults(examples=[f'seal_friction {example}' for example in examples])
+    return parser.add_subparsers(title=f'{metavar.lower()}s', required=True, metavar=metavar)
 
 
 def add_command(
@@ -39,18 +89,35 @@ def add_command(
         examples: Command lines for ``--help``, without ``seal_friction``.
         needs: Optional packages that it does not work without, though it could be imported.
     """
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name,
-        help=description,
-        description=description,
-        epilog='\n'.join(['examples:' if examples[1:] else 'example:', *(f'  seal_friction {e}' for e in examples)])
-        if examples
-        else None,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser: argparse.ArgumentParser = commands.add_parser(name, **_help(description, examples))
     parser.add_argument('--json', action='store_true', help='print the numbers as one JSON object on stdout')
-    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={}, needs=needs)
+    of_user = [f'seal_friction {example}' for example in examples]
+    parser.set_defaults(run=run, command=parser.prog.split()[1], targets={}, needs=needs, examples=of_user)
     return parser
+
+
+def _help(description: str, examples: Sequence[str]) -> dict[str, Any]:
+    """Description and examples for ``--help``."""
+    lines = ['examples:' if examples[1:] else 'example:', *(f'  seal_friction {example}' for example in examples)]
+    shown = {'help': description, 'description': description, 'epilog': '\n'.join(lines)}
+    return {**shown, 'formatter_class': argparse.RawDescriptionHelpFormatter}
+
+
+def add_file(parser: Any, option: str, folder: str, what: str, **options: Any) -> None:
+    """Add an argument for a file of ``config/FOLDER``: a path, or the name of one there, which the shell completes."""
+    text = f'{what}: a path, or the name of one in config/{folder}'
+    action: Any = parser.add_argument(option, help=text, **options)
+    action.completer = lambda prefix, **_: _file_names(folder, prefix)
+
+
+def _file_names(folder: str, prefix: str) -> list[str]:
+    """Names in ``config/FOLDER`` and paths of YAML files that begin with what is typed."""
+    from seal_friction_ros.files import config_names
+
+    beside, start = Path(prefix).parent, Path(prefix).name
+    found = [path for path in beside.glob(f'{start}*') if path.is_dir() or path.suffix in ('.yaml', '.yml')]
+    paths = [f'{path}/' if path.is_dir() else str(path) for path in sorted(found)]
+    return [name for name in (*config_names(folder), *paths) if name.startswith(prefix)]
 
 
 def add_target(parser: argparse.ArgumentParser, option: str, kind: Kind, **options: Any) -> None:
@@ -68,15 +135,15 @@ def add_page(parser: argparse.ArgumentParser, option: str = '--out', *, required
     add_target(parser, option, PAGE, required=required, metavar='FILE.html', help=text)
 
 
-def add_namespace(parser: argparse.ArgumentParser, condition: str = '') -> None:
+def add_namespace(parser: Any) -> None:
     """Add the option that restricts a bag to one namespace."""
-    parser.add_argument('--namespace', default='', help=f'{condition}use only topics below it')
+    parser.add_argument('--namespace', default='', help='use only topics below it')
 
 
 def add_configuration(parser: argparse.ArgumentParser) -> None:
     """Add the options that replace the configuration of a bag or the default one."""
     parser.add_argument('--params', type=Path, metavar='FILE', help='ROS parameter file of the estimator')
-    parser.add_argument('--seal', type=Path, metavar='FILE', help='seal file for every seal')
+    add_file(parser, '--seal', 'seals', 'seal file for every seal', metavar='SEAL')
 
 
 def add_workers(parser: argparse.ArgumentParser, what: str) -> None:
@@ -127,6 +194,14 @@ def non_negative(text: str) -> float:
     return value
 
 
+def positive(text: str) -> float:
+    """Type of an option: a finite number above 0."""
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'{text} is not a finite number above 0')
+    return value
+
+
 def at_least_one(text: str) -> int:
     """Type of an option: a whole number of at least 1."""
     value = int(text)
@@ -139,13 +214,28 @@ def at_least_one(text: str) -> int:
 
 
 def print_result(arguments: argparse.Namespace, numbers: Any, summary: str, code: int = SUCCESS) -> int:
-    """Print the summary, or with ``--json`` the numbers and, on stderr, the summary; return the exit code."""
+    """Print the summary and what was written, or with ``--json`` the numbers and the rest on stderr; the exit code."""
+    values = vars(arguments)
+    written = [text for name, kind in arguments.targets.items() if (text := written_text(values[name], kind))]
+    summary = '\n'.join([*([summary] if summary else []), *written])
+    show_status('')
     if arguments.json:
         print(json.dumps(json_value(numbers), allow_nan=False))
         print(summary, file=sys.stderr)
     else:
         print(summary)
     return code
+
+
+def written_text(target: Path | None, kind: Kind) -> str:
+    """That a target was written, with the page and the figures beside it; empty if there is none."""
+    if target is None or not target.exists():
+        return ''
+    page = target.with_suffix('.html') if kind.has_page and kind is not PAGE else target
+    figures = page.with_name(f'{page.stem}_figures')
+    beside = [str(page)] if page != target and page.is_file() else []
+    beside += [f'figures in {figures}'] if kind.has_page and figures.is_dir() else []
+    return ', '.join([f'{target}: written', *beside])
 
 
 def options_from(arguments: argparse.Namespace, record: type[Any]) -> dict[str, Any]:
@@ -155,6 +245,7 @@ def options_from(arguments: argparse.Namespace, record: type[Any]) -> dict[str, 
 
 def print_error(text: str) -> None:
     """Print one line on stderr."""
+    show_status('')
     print(f'seal_friction: {text}', file=sys.stderr)
 
 

@@ -12,8 +12,8 @@ from seal_friction_ros.offline.work.targets import SEAL_FILE, mark
 def add_parser(commands: Any) -> None:
     """Add the command."""
     description = 'compute the lubricated contact of a seal'
-    parser = commands.add_parser('ehl', help=description, description=description)
-    steps = parser.add_subparsers(title='commands', required=True, metavar='COMMAND')
+    examples = ('ehl run inner_seal --out inner_seal.html', 'ehl map inner_seal --seal-file mapped.yaml')
+    steps = cli.add_group(commands, 'ehl', 'COMMAND', description, *examples)
     run = cli.add_command(
         steps, 'run', run_case, 'compute friction, film and contact over a motion',
         'ehl run inner_seal --out inner_seal.html',
@@ -37,7 +37,7 @@ def add_parser(commands: Any) -> None:
     )  # fmt: skip
     cli.add_target(chart, '--seal-file', SEAL_FILE, metavar='FILE.yaml', help='seal file to write')
     for step in (run, study, chart):
-        step.add_argument('case', help='case file: a path, or the name of one in config/ehl')
+        cli.add_file(step, 'case', 'ehl', 'case file', metavar='CASE')
         cli.add_workers(step, 'runs')
         cli.add_page(step, required=False)
     for step in (study, chart):
@@ -118,4 +118,4 @@ def _with_page(
     if arguments.out is None:
         return numbers, summary
     figures = tuple(write_page(arguments.out))
-    return {**numbers, 'page': arguments.out, 'figures': figures}, f'{summary}\n{arguments.out}: written'
+    return {**numbers, 'page': arguments.out, 'figures': figures}, summary

@@ -24,8 +24,8 @@ def add_parser(commands: Any) -> None:
         parser, '--next', DATA_SHEET, metavar='SHEET.csv',
         help='data sheet of the pressures and speeds that would make the law certain; a page goes beside it',
     )  # fmt: skip
-    parser.add_argument('--rig', help='rig file of the logs: a path, or the name of one in config/rigs')
-    parser.add_argument('--seal', help='seal file with the geometry of the ring: a path, or one in config/seals')
+    cli.add_file(parser, '--rig', 'rigs', 'rig file of the logs')
+    cli.add_file(parser, '--seal', 'seals', 'seal file with the geometry of the ring')
     parser.add_argument(
         '--squeeze-force', action='store_true', help='normal force from the geometry, even if --seal has one'
     )
@@ -50,6 +50,11 @@ def add_parser(commands: Any) -> None:
         type=cli.non_negative,
         metavar='SHARE',
         help='relative standard deviation between runs, if known',
+    )
+    parser.add_argument(
+        '--presliding',
+        action='store_true',
+        help='identify the elasticity of the seals from the reversals of logs or bags, too',
     )
     parser.add_argument(
         '--refuse-changed',
@@ -80,7 +85,7 @@ def _kind(text: str) -> tuple[str, tuple[str, ...]]:
     return name, _chambers(chambers)
 
 
-NOT_FOR_KINDS = ('report', 'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed')
+NOT_FOR_KINDS = ('report', 'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding')
 """options that several kinds of seals do not take"""
 
 
@@ -148,5 +153,4 @@ def run(arguments: argparse.Namespace) -> int:
         written |= {'sheet': arguments.next, 'sheet_page': page}
         numbers |= next_readings.numbers_of(design)
         text = '\n'.join([text, *(f'next: {line}' for line in next_readings.texts_of(found, design))])
-    written_text = ', '.join(str(written[key]) for key in ('seal_file', 'sheet', 'sheet_page') if key in written)
-    return cli.print_result(arguments, numbers | written, f'{text}\n{written_text}: written')
+    return cli.print_result(arguments, numbers | written, text)

@@ -20,25 +20,30 @@ from seal_friction_ros.offline.commands import (
     identify,
     import_data,
     info,
+    monitor,
+    new,
     oring,
     recover,
     replay,
     report,
+    seals,
     servo,
     sheet,
     spool,
+    topics,
     tune,
 )
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.status import as_typed, show_status
 from seal_friction_ros.packages import as_missing, needed
 
 GROUPS = {
     'replay': (info, replay, compare, recover, report, import_data),
-    'identify': (identify, sheet, spool, charts),
-    'watch': (health, adapt),
+    'identify': (identify, sheet, spool, seals, charts),
+    'watch': (monitor, topics, health, adapt),
     'tune': (tune, servo),
     'compute': (oring, ehl),
-    'machine': (doctor,),
+    'machine': (new, doctor),
 }
 
 # Before numpy is loaded: the last bits of a sum depend on the number of threads, and the long, narrow matrices of a fit
@@ -47,14 +52,26 @@ for _library in ('OPENBLAS', 'MKL', 'OMP'):
     os.environ.setdefault(f'{_library}_NUM_THREADS', '1')
 
 
+class _Version(argparse.Action):
+    """Prints the version, which is read only if it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print and exit."""
+        from seal_friction_ros.files import package_version
+
+        print(f'seal_friction {package_version()}')
+        parser.exit()
+
+
 def make_parser() -> argparse.ArgumentParser:
     """Make the parser of the command line."""
-    parser = argparse.ArgumentParser(
+    parser = cli.Parser(
         prog='seal_friction',
-        usage='seal_friction [-h] COMMAND ...',
+        usage='seal_friction [-h] [--version] COMMAND ...',
         description='Seal friction from bags and logs, without ROS.',
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument('--version', action=_Version, nargs=0, help='print the version and exit')
     commands = parser.add_subparsers(prog='seal_friction', required=True, metavar='COMMAND', help=argparse.SUPPRESS)
     lines = []
     for title, modules in GROUPS.items():
@@ -79,7 +96,9 @@ def main(arguments: list[str] | None = None) -> int:
         if '_ARGCOMPLETE' in os.environ:  # a shell asks for completions
             needed('argcomplete').autocomplete(parser)
         parsed = parser.parse_args(arguments)
-        with cli.checked(parsed):
+        typed = sys.argv[1:] if arguments is None else arguments
+        show_status(f'{parsed.command} ...')  # packages take a second to load
+        with as_typed(typed), cli.checked(parsed):
             cli.check_packages(parsed)
             return int(parsed.run(parsed))
     except BrokenPipeError:
@@ -96,6 +115,7 @@ def main(arguments: list[str] | None = None) -> int:
         cli.print_error(error_text(error))
         return cli.UNUSABLE
     except KeyboardInterrupt:
+        show_status('')
         return cli.INTERRUPTED
 
 

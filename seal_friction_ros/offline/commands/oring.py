@@ -13,7 +13,7 @@ def add_parser(commands: Any) -> None:
         commands, 'oring', run, 'compute contact stress and normal force of an O-ring by finite elements',
         'oring ms28775_114 --out my_seal.yaml --report oring.html',
     )  # fmt: skip
-    parser.add_argument('case', metavar='CASE', help='case file: a path, or the name of one in config/oring')
+    cli.add_file(parser, 'case', 'oring', 'case file', metavar='CASE')
     help_text = 'gauge pressures, instead of those in the file'
     parser.add_argument('--pressures', type=float, nargs='+', default=(), metavar='PA', help=help_text)
     cli.add_target(parser, '--out', SEAL_FILE, metavar='SEAL.yaml', help='seal file to write')

@@ -24,5 +24,5 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.reports.bag_report import write_report
 
     summary = write_report(arguments.bag, arguments.out, arguments.namespace)
-    warning = f'warning: {PLACEHOLDER_WARNING}\n' if summary.numbers['placeholder_seals'] else ''
-    return cli.print_result(arguments, summary, f'{warning}{arguments.out}: written')
+    warning = f'warning: {PLACEHOLDER_WARNING}' if summary.numbers['placeholder_seals'] else ''
+    return cli.print_result(arguments, summary, warning)

@@ -16,4 +16,4 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate and write the page."""
     from seal_friction_ros.offline.reports.servo_charts import write_servo_charts
 
-    return cli.print_result(arguments, write_servo_charts(arguments.out), f'{arguments.out}: written')
+    return cli.print_result(arguments, write_servo_charts(arguments.out), '')

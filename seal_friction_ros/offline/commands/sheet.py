@@ -18,19 +18,22 @@ def add_parser(commands: Any) -> None:
         parser, '--out', DATA_SHEET, required=True, metavar='SHEET.csv', help='sheet to write; a page goes beside it'
     )
     parser.add_argument(
-        '--pressures', type=_pressures, default=(0.0, 1000.0, 10), metavar='LOW:HIGH:STEPS', help='default 0:1000:10'
+        '--pressures', type=_pressures, default=(0.0, 70.0, 10), metavar='LOW:HIGH:STEPS', help='default 0:70:10'
     )
     parser.add_argument('--tests', type=int, default=3, help='default 3')
     parser.add_argument('--seals', type=int, default=2, help='seals that share the pressure, default 2')
-    parser.add_argument('--seal', help='seal file whose geometry is filled in: a path, or the name of one')
-    parser.add_argument('--pressure-unit', choices=('psi', 'bar', 'MPa', 'kPa'), default='psi')
-    parser.add_argument('--force-unit', choices=('lbf', 'N', 'kN'), default='lbf')
-    parser.add_argument('--length-unit', choices=('in', 'mm'), default='in')
+    cli.add_file(parser, '--seal', 'seals', 'seal file whose geometry is filled in')
+    parser.add_argument('--pressure-unit', choices=('bar', 'MPa', 'kPa', 'psi'), default='bar', help='default bar')
+    parser.add_argument('--force-unit', choices=('N', 'kN', 'lbf'), default='N', help='default N')
+    parser.add_argument('--length-unit', choices=('mm', 'in'), default='mm', help='default mm')
 
 
 def _pressures(text: str) -> tuple[float, float, int]:
-    low, high, steps = text.split(':')
-    return float(low), float(high), int(steps)
+    try:
+        low, high, steps = text.split(':')
+        return float(low), float(high), int(steps)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text} is not LOW:HIGH:STEPS, for example 0:70:10') from None
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -58,4 +61,4 @@ def run(arguments: argparse.Namespace) -> int:
     sheet, page = arguments.out, arguments.out.with_suffix('.html')
     write_sheet(plan, sheet)
     write_data_sheet_page(plan, page)
-    return cli.print_result(arguments, {'sheet': sheet, 'page': page}, f'{sheet}, {page}: written')
+    return cli.print_result(arguments, {'sheet': sheet, 'page': page}, '')

@@ -28,4 +28,4 @@ def run(arguments: argparse.Namespace) -> int:
 
     law = SpoolEvaluation(cycles=arguments.cycles, evaluated_cycle=arguments.cycle, moving_average=arguments.average)
     numbers = write_spool_report(arguments.table, arguments.out, law, arguments.reference)
-    return cli.print_result(arguments, numbers, f'{arguments.out}: written')
+    return cli.print_result(arguments, numbers, '')

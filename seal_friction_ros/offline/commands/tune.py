@@ -18,17 +18,30 @@ def add_parser(commands: Any) -> None:
         'tune --bag BAG --out feedforward.yaml',
         needs=('numba',),
     )  # fmt: skip
-    parser.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
+    simulated = parser.add_argument_group('on the simulated servo, without --bag')
+    recorded = parser.add_argument_group('on a recorded axis')
+    groups: Any = {
+        (TuningSettings,): simulated,
+        (RecordedAxisSettings,): recorded,
+        (TuningSettings, RecordedAxisSettings): parser,
+    }
+    recorded.add_argument('--bag', type=Path, help='tune on this bag of a real axis instead of the simulated servo')
+    help_text = 'tune on this simulated machine: parameter file of servo_simulator'
+    simulated.add_argument('--machine', type=Path, metavar='FILE.yaml', help=help_text)
+    help_text = 'topic of the command that the controller took; prints the gain from force to this command'
+    recorded.add_argument('--command-topic', metavar='TOPIC', help=help_text)
     help_text = 'parameter file to write; a report goes beside it'
     cli.add_target(parser, '--out', PARAMETER_FILE, required=True, metavar='FILE.yaml', help=help_text)
     cli.add_configuration(parser)
-    cli.add_namespace(parser, 'with --bag: ')
+    cli.add_namespace(recorded)
+    help_text = 'write the parameters of this actuator of machine_estimator, instead of those of friction_estimator'
+    parser.add_argument('--actuator', default='', metavar='NAME', help=help_text)
     for name, meaning in _settings().items():
-        condition = '' if name in meanings(TuningSettings) else 'with --bag: '
         unit = f' [{meaning.unit}]' if meaning.unit else ''
-        text = f'{condition}{meaning.description}{unit}'.replace('%', '%%')
+        text = f'{meaning.description}{unit}'.replace('%', '%%')
         number = int if name == 'seed' else float
-        parser.add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
+        kinds = tuple(kind for kind in (TuningSettings, RecordedAxisSettings) if name in meanings(kind))
+        groups[kinds].add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
 
 
 def _settings() -> dict[str, Meaning]:
@@ -40,19 +53,40 @@ def run(arguments: argparse.Namespace) -> int:
     """Tune on the simulated servo or on a bag."""
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.tune_report import write_tuning_page
-    from seal_friction_ros.offline.tuning.tune import page_of, tune_bag, tune_simulator, write_parameters
+    from seal_friction_ros.offline.tuning.recorded_command import read_output_gain
+    from seal_friction_ros.offline.tuning.tune import (
+        DEFAULT_MACHINE,
+        load_machine,
+        page_of,
+        tune_bag,
+        tune_simulator,
+        write_parameters,
+    )
 
     given = _given(arguments)
     configuration = chosen_configuration(arguments.params, arguments.seal)
+    gain = None
     if arguments.bag:
+        if arguments.command_topic:
+            gain = read_output_gain(
+                arguments.bag, arguments.command_topic, RecordedAxisSettings(**given), arguments.namespace
+            )
         tuning: Any = tune_bag(arguments.bag, RecordedAxisSettings(**given), configuration, arguments.namespace)
     else:
-        tuning = tune_simulator(TuningSettings(**given), configuration)
+        machine = load_machine(arguments.machine) if arguments.machine else DEFAULT_MACHINE
+        tuning = tune_simulator(TuningSettings(**given), configuration, machine)
     page = page_of(arguments.out)
     numbers = {**tuning.numbers, 'file': arguments.out, 'page': page, 'figures': write_tuning_page(tuning, page)}
-    write_parameters(arguments.out, tuning)
+    write_parameters(arguments.out, tuning, arguments.actuator)
+    text = tuning.summary
+    if gain is not None:
+        numbers['output_gain'], numbers['output_gain_standard_error'] = gain.gain, gain.standard_error
+        text += (
+            f'\noutput_gain: {gain.gain:.4g} +- {gain.standard_error:.2g} in units of {arguments.command_topic} per N. '
+            f'In the mapping file, under output:\ngain: {gain.gain:.4g}'
+        )
     code = cli.SUCCESS if tuning.found.better_in_every_case else cli.DIFFERENT
-    return cli.print_result(arguments, numbers, f'{tuning.summary}\n{arguments.out} and {page}: written', code)
+    return cli.print_result(arguments, numbers, text, code)
 
 
 def _given(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -64,7 +98,10 @@ def _given(arguments: argparse.Namespace) -> dict[str, Any]:
     kind, other = (RecordedAxisSettings, TuningSettings) if arguments.bag else (TuningSettings, RecordedAxisSettings)
     given = {name: value for name in _settings() if (value := getattr(arguments, name)) is not None}
     foreign = [name for name in given if name in meanings(other) and name not in meanings(kind)]
-    if foreign or (arguments.namespace and not arguments.bag):
-        name = (foreign or ['namespace'])[0].replace('_', '-')
+    foreign += ['machine'] if arguments.machine and arguments.bag else []
+    foreign += ['namespace'] if arguments.namespace and not arguments.bag else []
+    foreign += ['command_topic'] if arguments.command_topic and not arguments.bag else []
+    if foreign:
+        name = foreign[0].replace('_', '-')
         raise ValueError(f'--{name} is {"not for" if arguments.bag else "only for"} a --bag')
     return given

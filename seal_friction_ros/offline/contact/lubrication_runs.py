@@ -15,7 +15,8 @@ import numpy as np
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
-from seal_friction_ros.core.lubrication.findings import Findings, discretisation_errors, findings
+from seal_friction_ros.core.friction.presliding import presliding_of_map
+from seal_friction_ros.core.lubrication.findings import Findings, check_time_step, discretisation_errors, findings
 from seal_friction_ros.core.lubrication.friction_map import (
     MemoryLength,
     SteadyFriction,
@@ -133,14 +134,16 @@ class CaseRun:
 
 
 def run_case(case: LubricationCase) -> CaseRun:
-    """Run a case once, and twice more with a coarser step and a coarser grid for the discretisation errors.
+    """Run a case once, and four times more with longer steps and coarser grids for the discretisation errors.
 
     Raises:
         NotConvergedError: A step did not converge at the smallest step size.
+        ValueError: The time step is too long for an error of the findings.
     """
+    check_time_step(case)
     motion = case.motion
     steps = round(motion.duration / case.numerics.time_step)
-    with progress(f'{case.name}: 3 runs', steps + steps // 2 + steps) as on_step:
+    with progress(f'{case.name}: 5 runs', steps + steps // 2 + steps // 4 + 2 * steps) as on_step:
         result = run_transient(case, on_step=on_step)
         found = findings(result)
         by_step, by_grid = discretisation_errors(case, found, partial(run_transient, on_step=on_step))
@@ -305,7 +308,8 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
     law, case = computed.law, computed.case
     creeping = fmean(law.sliding_friction(p, law.speeds[0]) / law.coulomb_friction(p) for p in law.pressures)
     pressures = [rounded(value, 7) for value in law.pressures]
-    return {
+    elastic = presliding_of_map(law)
+    document: dict[str, Any] = {
         'name': name,
         'source': f'computed by seal_friction ehl map from the case {case.name}; '
         'steady sliding, mean of both directions',
@@ -322,3 +326,7 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
         'uncertainty': {'relative_std': 0.1},
         'identified_pressure': [pressures[0], pressures[-1]],
     }
+    if elastic is not None:
+        numbers = asdict(elastic)
+        document['presliding'] = {key: n if key == 'elements' else rounded(n, 7) for key, n in numbers.items()}
+    return document

@@ -22,8 +22,8 @@ from seal_friction_ros.core.identification.readings import FEWEST_PRESSURES, Man
 from seal_friction_ros.files import config_path, read_yaml
 
 TITLE = 'seal friction data sheet'
-PRESSURE_UNITS = ('psi', 'bar', 'MPa', 'kPa')
-FORCE_UNITS = ('lbf', 'N', 'kN')
+PRESSURE_UNITS = ('bar', 'MPa', 'kPa', 'psi')
+FORCE_UNITS = ('N', 'kN', 'lbf')
 SPEED_UNITS = ('mm/s', 'm/s', 'in/s')
 KINDS = ('static', 'dynamic')
 DIRECTIONS = {'retract': -1, 'extend': 1}
@@ -64,9 +64,9 @@ class FrictionTestPlan:
     steps: int  # between the pressures
     tests: int
     seals: int  # number of seals that share the pressure and whose friction is measured together
-    pressure_unit: str = 'psi'
-    force_unit: str = 'lbf'
-    length_unit: str = 'in'
+    pressure_unit: str = 'bar'
+    force_unit: str = 'N'
+    length_unit: str = 'mm'
     geometry: SealGeometry | None = None  # filled in, if known
     points: tuple[tuple[float, float], ...] = ()
     """pressure and speed of each row, in place of evenly spaced pressures at any speed; increasing"""

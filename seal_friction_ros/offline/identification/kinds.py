@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification import runs
 from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_breakaway
 from seal_friction_ros.core.identification.force_correction import NOTICED
+from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.several_kinds import (
     KindsFit,
     KindsIdentification,
@@ -25,6 +27,7 @@ from seal_friction_ros.core.identification.several_kinds import (
 from seal_friction_ros.core.identification.validation import PredictionUncertainty, prediction_uncertainty
 from seal_friction_ros.offline.identification.results import rounded_value
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
+from seal_friction_ros.offline.identification.wording import one_run_text
 
 LARGEST_ERROR = 0.5  # out-of-sample error above which laws are not saved (our choice)
 
@@ -217,11 +220,7 @@ def _warnings_of(result: SeveralKinds) -> Iterator[str]:
         yield f'the areas in the force sum are off: {change}; the laws are fitted with the corrected areas'
     between = result.between_runs
     if between.std > 0.0 and not between.freedom and not result.is_stated:
-        yield (
-            'this is one run, so the data do not show how runs differ (mounted anew, another day): a prior of '
-            f'{100.0 * between.std:.0f} % is in the standard deviation; repeat runs, or give a known value with '
-            '--run-to-run'
-        )
+        yield one_run_text(between)
     one_way = [
         n for n, index in zip(fit.data.readings.names, fit.data.readings.two_sided, strict=True) if not len(index)
     ]
@@ -238,41 +237,14 @@ def kinds_numbers(result: SeveralKinds) -> dict[str, Any]:
     """Numbers for JSON."""
     found, fit = result.found, result.found.fit
     readings = fit.corrected_readings()
-    each = fit.frictions(readings.at)
-    total = each.sum(axis=1)
+    total = fit.frictions(readings.at).sum(axis=1)
     measured = readings.magnitudes(fit.offsets)
-    masks = list(readings.levels.values())
-    share, share_std = shares(found)
     conditions, correlation = proposed_conditions(fit.data, found.rivals)
 
-    def means(values: FloatArray) -> list[float]:
-        return [_value(values[inside].mean()) for inside in masks]
-
-    kinds = []
-    for k, kind in enumerate(fit.data.kinds):
-        pressure = readings.at.pressure[:, fit.data.columns_of(k)].mean(axis=1)
-        kinds.append(
-            {
-                'name': kind.name,
-                'seal_chambers': list(kind.chambers),
-                'law': law_texts(fit)[k],
-                'pressure_exponent': fit.rung.exponents[k],
-                'friction_at_one_bar': _value(fit.rises[k]),
-                'friction_N': _value(each[:, k].mean()),
-                'rising_N': _value(fit.parts[k]),
-                'rising_standard_error_N': _value(found.errors[k]),
-                'law_spread_N': _value(found.spread[k]),
-                'division_std_N': _value(found.division_std[k]),
-                'share': _value(share[k]),
-                'share_std': _value(share_std[k]),
-                'pressure_correlation': _value(found.together[k]),
-                'pressure_Pa': means(pressure),
-                'fitted_N': means(each[:, k]),
-            }
-        )
+    means = partial(_level_means, readings)
     return {
         'law': '; '.join(law_texts(fit)),
-        'kinds': kinds,
+        'kinds': [_kind_numbers(found, k) for k in range(len(fit.data.kinds))],
         'seal_chambers': list(result.sources.chambers),
         'friction_at_no_pressure_N': _value(fit.constant),
         'viscous_friction': _value(fit.viscous),
@@ -297,6 +269,35 @@ def kinds_numbers(result: SeveralKinds) -> dict[str, Any]:
         'data': [file._asdict() for file in result.sources.files],
         'warnings': list(result.warnings),
         'remarks': list(result.sources.remarks),
+    }
+
+
+def _level_means(readings: FrictionReadings, values: FloatArray) -> list[float]:
+    """Mean of one value per reading at each pressure level."""
+    return [_value(values[inside].mean()) for inside in readings.levels.values()]
+
+
+def _kind_numbers(found: KindsIdentification, k: int) -> dict[str, Any]:
+    """Numbers of the kind of index ``k``."""
+    fit, (share, share_std) = found.fit, shares(found)
+    readings, kind = fit.corrected_readings(), fit.data.kinds[k]
+    friction = fit.frictions(readings.at)[:, k]
+    return {
+        'name': kind.name,
+        'seal_chambers': list(kind.chambers),
+        'law': law_texts(fit)[k],
+        'pressure_exponent': fit.rung.exponents[k],
+        'friction_at_one_bar': _value(fit.rises[k]),
+        'friction_N': _value(friction.mean()),
+        'rising_N': _value(fit.parts[k]),
+        'rising_standard_error_N': _value(found.errors[k]),
+        'law_spread_N': _value(found.spread[k]),
+        'division_std_N': _value(found.division_std[k]),
+        'share': _value(share[k]),
+        'share_std': _value(share_std[k]),
+        'pressure_correlation': _value(found.together[k]),
+        'pressure_Pa': _level_means(readings, readings.at.pressure[:, fit.data.columns_of(k)].mean(axis=1)),
+        'fitted_N': _level_means(readings, friction),
     }
 
 

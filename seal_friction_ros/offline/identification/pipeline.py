@@ -40,8 +40,10 @@ from seal_friction_ros.core.identification.selection import (
     score_ladder,
     variation_of,
 )
+from seal_friction_ros.core.identification.temperature import at_reference, fit_temperature
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.data_sheet import geometry_of_seal_file
+from seal_friction_ros.offline.identification.presliding import identify_presliding
 from seal_friction_ros.offline.identification.results import (
     Identification,
     IdentificationData,
@@ -72,6 +74,7 @@ class IdentifyOptions:
     squeeze_force: bool = False  # compute the normal force from the geometry, even if the seal file has one
     law: str | None = None  # law to save instead of the recommended one
     run_to_run: float | None = None  # [-] relative standard deviation between runs, if known from elsewhere
+    presliding: bool = False  # identify the elasticity of the seals from the reversals of the logs, too
     refuse_changed: bool = False  # refuse sources whose friction differs, instead of fitting them together
     name: str = ''  # of the seal; empty: the name of the seal file
 
@@ -86,22 +89,23 @@ def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Iden
             measure instead.
     """
     data = gather(paths, options)
+    elastic = identify_presliding(data.sources) if options.presliding else None
     selection = select_law(data, options.law)
     _check_one_seal(diagnostics.swept_logs_compared(data.used, selection.fit), options.refuse_changed)
     quality = assess(data, selection, options.run_to_run)
-    as_measured = seal_document(data, selection, quality, options.name or name)
+    as_measured = seal_document(data, selection, quality, options.name or name, presliding=elastic)
     levels = _levels(data, selection, quality, as_measured)
     document = as_measured
     if quality.settled is not None:
-        document = seal_document(data, selection, quality, options.name or name, quality.settled)
+        document = seal_document(data, selection, quality, options.name or name, quality.settled, elastic)
     warnings = tuple(warnings_of(data, selection, quality, levels))
     remarks = (*data.sources.remarks, *remarks_on(data, selection))
-    document['identification'] = identification_section(data, selection, quality, levels, warnings)
-    return Identification(data, selection, quality, levels, document, as_measured, warnings, remarks)
+    document['identification'] = identification_section(data, selection, quality, levels, warnings, elastic)
+    return Identification(data, selection, quality, levels, document, as_measured, warnings, remarks, elastic)
 
 
 def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationData:
-    """Read the sources, correct the force sum, and exclude a pressure that does not belong to the others.
+    """Read the sources, correct the force sum, take all readings to one temperature, exclude a pressure that is off.
 
     Raises:
         ValueError: The data are unfit for identification.
@@ -114,6 +118,13 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
     if correction is not None and correction.is_significant:
         sources = sources.corrected(correction)
         prepared = sources.prepare()
+    warmth = fit_temperature(prepared.readings)
+    if warmth is not None and not warmth.why_not:
+        breakaway = prepared.breakaway
+        prepared = prepared._replace(
+            readings=at_reference(prepared.readings, warmth),
+            breakaway=None if breakaway is None else at_reference(breakaway, warmth),
+        )
     readings = _with_normal_force(prepared.readings, ring)
     outlier = None
     if not readings.are_samples and len(readings.levels) >= 4:
@@ -124,7 +135,7 @@ def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationDat
     used = readings
     if outlier is not None:
         used = readings.without(readings.level == outlier.level)
-    return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction)
+    return IdentificationData(sources, prepared._replace(readings=readings), used, ring, outlier, correction, warmth)
 
 
 def _power_laws(readings: FrictionReadings) -> tuple[CandidateLaw, ...]:

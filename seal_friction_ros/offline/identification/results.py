@@ -21,8 +21,14 @@ from seal_friction_ros.core.identification.readings import FrictionReadings, Pre
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
 from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, is_beaten
+from seal_friction_ros.core.identification.temperature import TemperatureFit
 from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
 from seal_friction_ros.offline.identification.load_numbers import load_numbers
+from seal_friction_ros.offline.identification.presliding import (
+    IdentifiedPresliding,
+    presliding_numbers,
+    presliding_part,
+)
 from seal_friction_ros.offline.identification.sources import Sources
 from seal_friction_ros.offline.work.seal_writer import rounded
 
@@ -46,6 +52,7 @@ class IdentificationData:
     ring: Ring | None
     outlier: Outlier | None
     correction: ForceCorrection | None  # of an area in the force sum, made if it is significant; None if unknown
+    temperature: TemperatureFit | None = None  # all readings are at its reference if it is identified
 
     def is_outlier(self, level: int) -> bool:
         """Whether a pressure level is the outlier, which the law is not fitted to."""
@@ -118,6 +125,7 @@ class Identification:
     as_measured: dict[str, Any]  # seal file with the law of the readings as measured; the same without a drift
     warnings: tuple[str, ...]  # limits of the law that its user has to know
     remarks: tuple[str, ...]  # assumptions, and how an option changes them
+    presliding: IdentifiedPresliding | None = None  # None if it was not asked for
 
 
 def rounded_value(value: float) -> float:
@@ -131,6 +139,7 @@ def seal_document(
     quality: LawQuality,
     name: str,
     settled: SettledLaw | None = None,
+    presliding: IdentifiedPresliding | None = None,
 ) -> dict[str, Any]:
     """Seal file of the selected law, or of that law for the ``settled`` seal, checked as the node checks it.
 
@@ -167,6 +176,11 @@ def seal_document(
     lacking = _what_the_force_sum_lacks(data, selection.fit)
     if lacking is not None:
         document['force_sum_correction'] = asdict(lacking)
+    warmth = data.temperature
+    if warmth is not None and not warmth.why_not:
+        document['temperature'] = _json_value(asdict(warmth.scale))
+    if presliding is not None:
+        document['presliding'] = _json_value(presliding_part(presliding))
     parse_seal(document)
     return document
 
@@ -205,6 +219,15 @@ def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> 
     return ForceSumCorrection(**areas, offset=rounded_value(offset) if matters else 0.0, contains_load=contains_load)
 
 
+def _without_nan(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Rounded numbers without those that are not known, at any depth."""
+    return {
+        key: _without_nan(value) if isinstance(value, Mapping) else value
+        for key, value in _json_value(numbers).items()
+        if value is not None
+    }
+
+
 def _json_value(value: Any) -> Any:
     """Value with each number rounded; None for a number that is not finite."""
     if isinstance(value, Mapping):
@@ -222,6 +245,7 @@ def identification_section(
     quality: LawQuality,
     levels: Sequence[PressureLevel],
     warnings: Sequence[str],
+    presliding: IdentifiedPresliding | None = None,
 ) -> dict[str, Any]:
     """Section ``identification`` of the seal file, which records how it was made; the node ignores it."""
     measured, fitted = _json_value([[level.measured for level in levels], [level.fitted for level in levels]])
@@ -249,7 +273,8 @@ def identification_section(
         }
     )
     load = load_numbers([(source.file.name, source.load) for source in data.sources.each])
-    return section if load is None else section | {'load': load}
+    section |= {} if load is None else {'load': load}
+    return section if presliding is None else section | {'presliding': _without_nan(presliding_numbers(presliding))}
 
 
 def identification_numbers(found: Identification) -> dict[str, Any]:
@@ -296,10 +321,12 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
         }
     )
     return numbers | {
+        'temperature': data.temperature and data.temperature._asdict(),
         'breakaway': quality.breakaway and _breakaway_numbers(found),
         'stiction': quality.breakaway and quality.breakaway._asdict(),
         'changes': [change._asdict() for change in quality.changes if change.is_changed],
         'load': found.document['identification'].get('load'),
+        'presliding': found.document['identification'].get('presliding'),
         'samples_used': data.prepared.used,
         'samples_total': data.prepared.total,
         'samples_left_out': data.prepared.left_out,

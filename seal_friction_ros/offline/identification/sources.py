@@ -9,15 +9,16 @@ import math
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
-from seal_friction_ros.core.estimation.messages import FORCE_TYPE, PRESSURE_TYPE, VELOCITY_TYPE, decode, decode_text
+from seal_friction_ros.core.estimation.messages import VELOCITY_TYPE, decode, decode_text
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.foundation.units import UNITS
+from seal_friction_ros.core.foundation.units import UNITS, ZEROS
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.load_over_position import (
     LoadOverPosition,
@@ -197,7 +198,7 @@ def without_load_of(source: Source, chambers: Sequence[str], options: SourceOpti
     """
     if source.log is None or source.load_position is None:
         return source
-    name, signals, sliding = source.log
+    name, signals, sliding, temperature, position = source.log
     try:
         load = fit_load(signals, source.load_position, chambers, sliding)
     except ValueError as error:
@@ -207,7 +208,9 @@ def without_load_of(source: Source, chambers: Sequence[str], options: SourceOpti
     if options.largest_acceleration is None:
         limit = min(max(sliding.largest_acceleration, known_acceleration(load)), LARGEST_ACCELERATION)
         sliding = replace(sliding, largest_acceleration=limit)
-    return source._replace(log=RecordedLog(name, cleaned, sliding), load=load, remarks=(*source.remarks, *texts))
+    return source._replace(
+        log=RecordedLog(name, cleaned, sliding, temperature, position), load=load, remarks=(*source.remarks, *texts)
+    )
 
 
 def _data_file(path: Path) -> DataFile:
@@ -236,7 +239,7 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
             check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
-    recorded = RecordedLog(path.name, signals, sliding)
+    recorded = RecordedLog(path.name, signals, sliding, log.temperature, log.position)
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
     if log.position is None or rig.load == 'none':
         return source
@@ -281,14 +284,15 @@ def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
 
 
 def _read_bag(path: Path, options: SourceOptions) -> Source:
-    """Signals of a bag: one row for each velocity message, with the newest pressure and force before it."""
+    """Signals of a bag: one row for each velocity message, with what came newest before it."""
     topics = find_topics(path, options.namespace)
     missing = [name for name in ('pressure', 'force') if not getattr(topics, name)]
     if missing:
         raise ValueError(f'{path}: no {" and no ".join(missing)} messages: they are needed to identify friction')
-    rows, stamps = array('d'), array('q')  # numbers side by side: an hour at 1 kHz is 144 MB
-    pressures, force = (math.nan, math.nan), math.nan
-    chambers, document = None, None
+    rows, stamps = array('d'), array('q')  # numbers side by side: an hour at 1 kHz is 202 MB
+    newest: dict[str, tuple[float, ...]] = {topics.pressure: (math.nan, math.nan), topics.force: (math.nan,)}
+    newest |= {topics.position or 'no position': (math.nan,), topics.temperature or 'none': (math.nan, math.nan)}
+    chambers, document, holds_load = None, None, False
     remarks: tuple[str, ...] = ()
     total = sum(info.message_count for info in bag_topics(path).values())
     with progress(f'read {path.name}', total) as advance:
@@ -297,14 +301,12 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
                 if message.topic == topics.velocity:
                     sample = decode(VELOCITY_TYPE, message.data)
                     stamps.append(sample.stamp)
-                    rows.extend((sample.velocity, *pressures, force))
-                elif message.topic == topics.pressure:
-                    pressure = decode(PRESSURE_TYPE, message.data)
-                    pressures = pressure.chamber_a, pressure.chamber_b
-                elif message.topic == topics.force:
-                    force = decode(FORCE_TYPE, message.data).force
+                    rows.extend((sample.velocity, *chain.from_iterable(newest.values())))
+                elif message.topic in newest:
+                    newest[message.topic] = decode(message.type_name, message.data)[1:]
                 elif message.topic == topics.configuration:
                     configuration = parse_snapshot(decode_text(message.data)).configuration
+                    holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
                     chambers, document = configuration.selection.seal_chambers, configuration.seal_documents[0]
                     if configuration.has_placeholder:
                         document, remarks = None, (_placeholder_remark(path, chambers),)
@@ -314,12 +316,23 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
                 advance(1000)
     stamp = np.frombuffer(stamps, dtype=np.int64)
     kept = np.diff(np.maximum.accumulate(stamp), prepend=stamp[:1] - 1) > 0  # stamps above all stamps before
-    columns = np.frombuffer(rows, dtype=np.float64).reshape(-1, 4).T.copy()
+    columns = np.frombuffer(rows, dtype=np.float64).reshape(-1, 7).T.copy()
     columns[~(np.abs(columns) < 1e15)] = np.nan  # [SI] no measurement is as large
     del rows
-    signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns).taken(kept)
-    log = RecordedLog(path.resolve().name, signals, _sliding(Sliding(), options))
-    return Source(_data_file(path), chambers, log, seal_document=document, remarks=remarks)
+    signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns[:4]).taken(kept)
+    temperature = _from_the_first(columns[5] + ZEROS['degC'])[kept] if topics.temperature else None
+    position = columns[4][kept] if topics.position else None
+    log = RecordedLog(path.resolve().name, signals, _sliding(Sliding(), options), temperature, position)
+    places = position if holds_load else None
+    return Source(_data_file(path), chambers, log, seal_document=document, remarks=remarks, load_position=places)
+
+
+def _from_the_first(temperature: FloatArray) -> FloatArray:
+    """A temperature that holds before its first message, too: a sensor of 1 Hz comes after the first samples."""
+    finite = np.flatnonzero(np.isfinite(temperature))
+    if len(finite):
+        temperature[: finite[0]] = temperature[finite[0]]
+    return temperature
 
 
 def _placeholder_remark(path: Path, chambers: Sequence[str]) -> str:

@@ -5,12 +5,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.foundation.units import BAR, ZEROS
 from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.breakaway import BreakawayFit
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.readings import has_pressures
 from seal_friction_ros.core.identification.run_in import SettledLaw
+from seal_friction_ros.core.identification.runs import BetweenRuns
+from seal_friction_ros.core.identification.temperature import TemperatureFit
+from seal_friction_ros.offline.identification.presliding import presliding_text
 from seal_friction_ros.offline.identification.results import (
     Identification,
     IdentificationData,
@@ -140,14 +143,19 @@ def _parameter_texts(selection: LawSelection) -> Iterator[str]:
             yield f'{parameter.name} is 0: these data show no such effect'
 
 
+def one_run_text(between: BetweenRuns) -> str:
+    """That data of one run do not show how runs differ, and what stands for it."""
+    return (
+        'this is one run, so the data do not show how runs differ (mounted anew, another day): a prior of '
+        f'{100.0 * between.std:.0f} % is in the standard deviation; repeat runs, or give a known value with '
+        '--run-to-run'
+    )
+
+
 def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequence[PressureLevel]) -> Iterator[str]:
     between = quality.between_runs
     if between.std > 0.0 and not between.freedom and not quality.is_stated:
-        yield (
-            'this is one run, so the data do not show how runs differ (mounted anew, another day): a prior of '
-            f'{100.0 * between.std:.0f} % is in the standard deviation; repeat runs, or give a known value with '
-            '--run-to-run'
-        )
+        yield one_run_text(between)
     if quality.told_apart > TOLD_APART:
         yield (
             f'laws that fit these data nearly as well differ by {100.0 * quality.told_apart:.0f} % where speed and '
@@ -196,6 +204,8 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
         total, used = sum(prepared.total.values()), sum(prepared.used.values())
         why = ', '.join(f'{name} {100.0 * count / total:.0f} %' for name, count in prepared.left_out.items())
         yield f'{used} of {total} samples used ({100.0 * used / total:.0f} %); not used: {why}'
+    if data.temperature is not None:
+        yield _temperature_text(data.temperature)
     gain = _pressure_gain(selection)
     if gain is not None and gain[1]:
         yield f'pressure pays: {gain[0]}'
@@ -210,6 +220,17 @@ def remarks_on(data: IdentificationData, selection: LawSelection) -> Iterator[st
     )
     if prepared.breakaway is None and prepared.readings.are_samples:
         yield 'breakaway is not identified from logs without held pressures'
+
+
+def _temperature_text(found: TemperatureFit) -> str:
+    low, high, reference = (one - ZEROS['degC'] for one in (found.lowest, found.highest, found.reference))
+    if found.why_not:
+        return f'no effect of temperature is identified at {low:.4g} to {high:.4g} degC: {found.why_not}'
+    return (
+        f'friction changes by {-100.0 * found.coefficient:+.2g} % per kelvin (standard error '
+        f'{100.0 * found.error:.1g} %) from {low:.4g} to {high:.4g} degC; the law, and every number here, is for '
+        f'{reference:.4g} degC'
+    )
 
 
 def summary(found: Identification) -> str:
@@ -234,6 +255,8 @@ def summary(found: Identification) -> str:
             lines.append(f'  {name:32} {validation.rms:9.4g} N RMS  {100.0 * validation.error:5.1f} %{mark}')
         elif why_not:
             lines.append(f'  {name:32} not fitted: {why_not}')
+    if found.presliding is not None:
+        lines += [presliding_text(found.presliding)]
     lines += [f'95 % band: holds {100.0 * quality.coverage:.0f} % of the left-out readings']
     lines += [f'note: {remark}' for remark in found.remarks]
     lines += [f'warning: {warning}' for warning in found.warnings]

@@ -84,7 +84,8 @@ class AnswerStream:
         if self._discarded:
             self._count_difference(lambda: f'{name}: the ones before it were not recorded', self._discarded)
             self._discarded = 0
-        if self._size is None and pending and len(data) == len(pending[0]) - GROWN[self.type_name]:
+        grown = GROWN.get(self.type_name)
+        if self._size is None and pending and grown is not None and len(data) == len(pending[0]) - grown:
             self._size = len(data)
             pending = self.pending = deque(answer[: self._size] for answer in pending)
         while data in islice(pending, 1, None) and data != pending[0]:  # some were not recorded
@@ -131,12 +132,14 @@ def replay_result(
 
 
 def _kind(type_name: str) -> str:
-    return {ESTIMATE_TYPE: 'estimate', FEEDFORWARD_TYPE: 'feed-forward'}[type_name]
+    return {ESTIMATE_TYPE: 'estimate', FEEDFORWARD_TYPE: 'feed-forward'}.get(type_name, 'command')
 
 
 def _difference(type_name: str, name: str, recorded: bytes, expected: bytes) -> str:
     if not expected:
         return f'{name}: recorded, but no velocity sample before it'
+    if type_name not in DECODERS:
+        return f'{name}: other bytes'
     decode = DECODERS[type_name]
     try:
         was, now = decode(recorded), decode(expected)

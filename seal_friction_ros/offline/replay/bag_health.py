@@ -5,7 +5,8 @@ with its length.
 """
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +25,8 @@ from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.block_reader import read_in_bulk
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.bags.topics import find_topics
-from seal_friction_ros.offline.replay.compiled_replay import kinds_of_topics
+from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations, kinds_of_topics
+from seal_friction_ros.offline.work.executor import run_all
 
 REST = 0.5  # [s] our choice: after a rest of this length a start counts as a breakaway
 START = 0.1  # [s] our choice: the friction of a start is the largest within this time
@@ -38,7 +40,7 @@ class BagHealth(NamedTuple):
     scale_std: FloatArray  # [-]
     offset: FloatArray  # [N] at the end of a stroke
     friction: FloatArray  # [N] Coulomb friction by the seal file
-    noise: float  # [N] standard deviation of the residual of good samples; NaN without any
+    noise: float  # [N] standard deviation of the residual at even speed, at the end; NaN if none was seen
     starts: FloatArray  # [-] largest friction of each start after a rest, over the Coulomb friction then
     learnt: AdaptationState | None  # at the end; None if the bag has no estimate
 
@@ -62,7 +64,6 @@ def bag_health(
     """
     rows: list[FloatArray] = []
     starts: list[float] = []
-    squares, good = 0.0, 0
     end, follower = learnt, _Starts()
     try:
         for estimates, known in _observed(bag, namespace, override, learnt):
@@ -80,17 +81,27 @@ def bag_health(
                     ]
                 )[:, int(first and changed.size > 0 and changed[0] == 0) :]
             )
-            slides = (estimates['state'] == SLIDING) & (estimates['status'] == 0)
-            squares += float((estimates['residual'][slides] ** 2).sum())
-            good += int(slides.sum())
             starts += follower.taken(estimates)
     except (UnsuitedError, OSError, *ERRORS) as error:
         raise BagError(f'{bag}: {error}: `seal_friction replay` tells more') from None
     table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
     table = table[:, np.append(True, np.diff(table[1]) != 0.0)] if table.shape[1] else table  # ends of blocks
-    noise = float(np.sqrt(squares / good)) if good else float('nan')
+    noise = end.learnt.noise if end is not None and end.learnt.noise >= 0.0 else float('nan')
     time, scale, scale_std, offset, friction = table
     return BagHealth(time, scale, scale_std, offset, friction, noise, np.array(starts), end)
+
+
+def health_of_bags(
+    bags: Sequence[Path], namespace: str = '', override: Configuration | None = None, workers: int = 1
+) -> list[BagHealth]:
+    """`bag_health` of bags, ``workers`` of them at a time; the estimator is compiled once, before they begin.
+
+    Raises:
+        BagError: A bag cannot be read, or not in blocks: the first of them.
+    """
+    compile_now(first_configurations(bags, namespace, override))
+    calls = [partial(bag_health, bag, namespace, override) for bag in bags]
+    return run_all(f'health of {len(bags)} bags', calls, workers)
 
 
 class _Starts:

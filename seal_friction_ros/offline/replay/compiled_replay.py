@@ -3,7 +3,7 @@
 Compiling takes seconds, so it pays for long bags. Unusual bags are left to `replay`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -31,9 +31,10 @@ from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import block_reader
+from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.bags.block_reader import KindOf, read_in_bulk
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
-from seal_friction_ros.offline.bags.topics import TYPES, Topics
+from seal_friction_ros.offline.bags.topics import TYPES, Topics, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 
 _RECORDED = {ESTIMATE_TYPE: Kind.ESTIMATE, FEEDFORWARD_TYPE: Kind.FEEDFORWARD}
@@ -85,15 +86,44 @@ def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: 
     return replay_result(velocities, streams, versions, is_cut=is_cut)
 
 
-def compile_now() -> None:
-    """Compile in this process, so that worker processes inherit the compiled code."""
-    parameters = default_configuration().parameters()
+def compile_now(configurations: Iterable[Configuration] = ()) -> None:
+    """Compile in this process, so that worker processes inherit the compiled code.
+
+    Args:
+        configurations: What the bags are replayed with; each kind of law is compiled once. None: the default one.
+    """
     none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((3, 0), np.int64))
-    _, answers = receive_all(parameters, init(parameters), none)
+    for configuration in list(configurations) or [default_configuration()]:
+        parameters = configuration.parameters()
+        _, answers = receive_all(parameters, init(parameters), none)
     _compare(
         0, 0, False, (answers.data, none.offsets, none.sizes), (none.data, none.offsets, none.sizes), none.sizes, 0
     )
     block_reader.compile_now()
+
+
+def first_configurations(bags: Sequence[Path], namespace: str, override: Configuration | None) -> list[Configuration]:
+    """What each bag is replayed with at its beginning; the default where a bag has no configuration or is unreadable.
+
+    Only for `compile_now`: the replay itself reports what is wrong with a bag.
+
+    Args:
+        bags: The bags.
+        namespace: Use only topics below it.
+        override: Configuration instead of the recorded ones.
+    """
+    return [override] if override else [_first_configuration(bag, namespace) for bag in bags]
+
+
+def _first_configuration(bag: Path, namespace: str) -> Configuration:
+    try:
+        topic = find_topics(bag, namespace).configuration
+        if topic:
+            first = next(message.data for message in read_messages(bag) if message.topic == topic)
+            return parse_snapshot(decode_text(first)).configuration
+    except (StopIteration, ValueError, OSError, *ERRORS):
+        pass
+    return default_configuration()
 
 
 def kinds_of_topics(topics: Topics) -> KindOf:

@@ -9,6 +9,7 @@ from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.offline.bags.bag import bag_topics
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
+from seal_friction_ros.offline.replay.machine_replay import is_machine_bag
 from seal_friction_ros.offline.replay.replay import count_messages, replay
 from seal_friction_ros.offline.work.executor import Outcome, try_all
 from seal_friction_ros.offline.work.progress import progress
@@ -31,7 +32,7 @@ def verify(
     """
     known = bag_topics(bag)
     total = count_messages(known)
-    if total >= bulk_from and has_compiler():
+    if total >= bulk_from and has_compiler() and not is_machine_bag(bag, known):
         from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
 
         with progress(f'replay {bag.name}', total) as advance:
@@ -51,9 +52,12 @@ def replay_many(
     """
     bulk_from = BULK_FROM
     if sum(map(_size, bags)) > _INPUT_SIZE * BULK_FROM and has_compiler():
-        from seal_friction_ros.offline.replay.compiled_replay import compile_now  # noqa: PLC0415  loads the compiler
+        from seal_friction_ros.offline.replay.compiled_replay import (  # noqa: PLC0415  loads the compiler
+            compile_now,
+            first_configurations,
+        )
 
-        compile_now()
+        compile_now(first_configurations(bags, namespace, override))
         bulk_from = 0
     calls = [partial(verify, bag, override, namespace, bulk_from=bulk_from) for bag in bags]
     outcomes = try_all(f'replay {len(bags)} bags', calls, workers)

@@ -37,10 +37,11 @@ from seal_friction_ros.offline.bags.bag import (
 )
 from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS, RECORDED, Topics, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
+from seal_friction_ros.offline.replay.machine_replay import is_machine_bag, replay_machine
 from seal_friction_ros.offline.work.progress import progress
 
 
-def chosen_configuration(params: Path | None, seal: Path | None) -> Configuration | None:
+def chosen_configuration(params: Path | None, seal: str | Path | None) -> Configuration | None:
     """Configuration from a ROS parameter file and a seal file for all seals; None if neither is given.
 
     Raises:
@@ -79,7 +80,7 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
     configuration = override or default_configuration()
     parameters = configuration.parameters()
     state = init(parameters)
-    inputs = {topics.pressure, topics.velocity, topics.force, topics.reference, topics.tick} - {''}
+    inputs = {topics.pressure, topics.velocity, topics.force, topics.reference, topics.tick, topics.temperature} - {''}
     if not topics.configuration:
         data = encode_text(snapshot_text(first_snapshot(configuration)._replace(recorded=Recorded(None))))
         yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, data), ())
@@ -121,6 +122,8 @@ def replay(
         BagError: The bag cannot be read, or ``out`` exists already; then nothing is left at ``out``.
     """
     known = bag_topics(bag)
+    if is_machine_bag(bag, known):
+        return replay_machine(bag, out)
     topics = find_topics(bag, namespace, known)
     total = count_messages(known)
     with progress(f'replay {bag.name}', total) as advance:

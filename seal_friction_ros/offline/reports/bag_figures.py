@@ -67,6 +67,9 @@ def live_figure(run: RecordedRun, levels: Sequence[PressureLevel]) -> Plot:
     heights = {'height_ratios': [5.0, 0.35, 6.0, 0.35], 'hspace': 0.02}
     figure, axes = style.new_figure(friction_summary(levels), 6.6, nrows=4, gridspec_kw=heights)
     whole, part = slice(0, len(run.time)), slice(first, last + 1)
+    for strip, above in ((axes[1], axes[0]), (axes[3], axes[2])):
+        strip.sharex(above)
+    style.link(axes[0], TIME_LABEL)
     _draw_friction(axes[0], run, whole, None)
     _draw_states(axes[1], run, whole)
     axes[0].axvspan(run.time[first], run.time[last], color=style.BLACK, alpha=0.08, lw=0)

@@ -6,20 +6,33 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
-from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation
+from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation, verdicts
 from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel
-from seal_friction_ros.offline.reports.bag_figures import friction_summary, run_figures
+from seal_friction_ros.offline.reports.bag_figures import run_figures
 from seal_friction_ros.offline.reports.figure_style import house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, number
-from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Columns, ReportSummary, Table, table_of, write_page
-from seal_friction_ros.offline.reports.tracking_evaluation import TrackingStretch
+from seal_friction_ros.offline.reports.page import (
+    PARAMETER_HEADS,
+    Columns,
+    ReportSummary,
+    Table,
+    head_of,
+    seals_text,
+    table_of,
+    write_page,
+)
+from seal_friction_ros.offline.reports.tracking_evaluation import TrackingEvaluation, TrackingStretch
 from seal_friction_ros.offline.reports.tracking_figures import stretch_name, tracking_plots, tracking_summary
+from seal_friction_ros.offline.reports.verdicts import BagNumbers
 
+_FIRST_DATE = 86_400_000_000_000 * 365  # [ns] a stamp before 1971 is no date (our choice)
 _SHOWN_CONFIGURATIONS = 2  # so many of the first and of the last, in a bag with more
 
 
@@ -48,11 +61,17 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         out,
         'bag',
         run_figures(run, evaluation) + (tracking_plots(run, tracking) if tracking else []),
+        verdict=verdicts.of_bag(_verdict_numbers(bag, run, evaluation, tracking, has_placeholder)),
+        head=head_of(f'report {bag}', bag.name, data_date(evaluation.start), seals_text(mounted_seals(run))),
+        warnings=[
+            *([_sentence(PLACEHOLDER_WARNING)] if has_placeholder else []),
+            *evaluation.friction.notes,
+            *(tracking.notes if tracking else ()),
+        ],
         run=run,
         evaluation=evaluation,
-        warnings=[_sentence(PLACEHOLDER_WARNING)] if has_placeholder else [],
         limits=bag_evaluation,
-        summary=friction_summary(evaluation.friction.sliding),
+        verdict_limits=verdicts,
         start=datetime.fromtimestamp(evaluation.start // 1_000_000_000, UTC),
         sliding_table=_level_table(evaluation.friction.sliding, 'strokes'),
         breakaway_table=_level_table(evaluation.friction.breakaway, 'starts'),
@@ -66,6 +85,39 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
     )
     numbers = bag_evaluation.evaluation_numbers(evaluation) | {'placeholder_seals': has_placeholder}
     return ReportSummary(out, figures, numbers | {'tracking': tracking_evaluation.tracking_numbers(tracking)})
+
+
+def data_date(stamp: int) -> str:
+    """Date of a stamp [ns] as text; a stamp near 0 is that of a clock which began there."""
+    if stamp < _FIRST_DATE:
+        return 'data without a date'
+    return f'data of {datetime.fromtimestamp(stamp // 1_000_000_000, UTC):%Y-%m-%d %H:%M} UTC'
+
+
+def mounted_seals(run: RecordedRun) -> list[str]:
+    """Names of the seals of the first configuration; none if it is unknown."""
+    for _, text in run.configurations[:1]:
+        try:
+            return [Path(str(name)).stem for name in json.loads(text)['selection']['seals']]
+        except (ValueError, LookupError, TypeError):
+            return []
+    return []
+
+
+def _verdict_numbers(
+    bag: Path, run: RecordedRun, evaluation: BagEvaluation, tracking: TrackingEvaluation | None, has_placeholder: bool
+) -> BagNumbers:
+    sliding, compensated = evaluation.friction.sliding, tracking.compensated if tracking else None
+    return BagNumbers(
+        bag=str(bag),
+        strokes=sum(len(level.events) for level in sliding),
+        in_band=sum(level.in_band for level in sliding),
+        flagged=evaluation.flagged / evaluation.estimates,
+        has_placeholder=has_placeholder,
+        has_reference=bool(np.isfinite(run.reference).any()),
+        tracking=tracking_summary(tracking) if tracking else '',
+        tracking_change=compensated.rms_change if compensated else None,
+    )
 
 
 def _sentence(text: str) -> str:
@@ -92,7 +144,7 @@ def _level_table(levels: Sequence[PressureLevel], events: str) -> Table:
         ('deviation [%]', lambda level: number(level.deviation_percent, 1, signed=True)),
         ('in 95 % band', lambda level: f'{level.in_band} of {len(level.events)} {events}'),
         ('samples', lambda level: level.samples),
-        (f'offset of the force sum [{unit}]', lambda level: number(level.offset, unit=size, signed=True)),
+        (f'force offset [{unit}]', lambda level: number(level.offset, unit=size, signed=True)),
     )
     return table_of(levels, columns)
 
@@ -107,9 +159,9 @@ _TRACKING_COLUMNS: Columns = (
     ('RMS error [µm]', lambda s: number(s.rms, 1, unit=UM)),
     ('change [%]', lambda s: number(s.rms_change, 1, signed=True)),
     ('peak error [µm]', lambda s: number(s.peak, 1, unit=UM)),
-    ('dwell per reversal [ms]', lambda s: 'no reversal' if s.dwell is None else number(s.dwell, 1, unit=MS)),
+    ('dwell [ms]', lambda s: 'no reversal' if s.dwell is None else number(s.dwell, 1, unit=MS)),
     ('change [%]', lambda s: number(s.dwell_change, 1, signed=True)),
-    ('dwell of the reference [ms]', lambda s: number(s.reference_dwell, 1, unit=MS)),
+    ('reference dwell [ms]', lambda s: number(s.reference_dwell, 1, unit=MS)),
     ('not sliding [%]', lambda s: number(s.not_sliding, 1, unit=0.01)),
 )
 

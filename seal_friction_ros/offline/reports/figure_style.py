@@ -22,6 +22,7 @@ BLUE, SKY, ORANGE, VERMILLION, GREEN, PURPLE = '#0072b2', '#56b4e9', '#e69f00', 
 WIDTH = 8.6  # [inch]
 _LEGEND_HEIGHT = 0.3  # [inch]
 COLUMNS = 1200  # of pixels across a figure
+DETAIL = 6000  # the same for the figure of a page, which is zoomed
 _STYLE = {
     'axes.axisbelow': True,
     'axes.grid': True,
@@ -188,9 +189,15 @@ def thinned(values: FloatArray, columns: int = COLUMNS) -> IntArray:
 
 
 def thin_line(ax: Axes, x: FloatArray, values: FloatArray, **look: Any) -> None:
-    """Line over ``x``, `thinned`."""
-    kept = thinned(values)
-    ax.plot(x[kept], values[kept], **look)
+    """Line over ``x``, `thinned`; in the figure of the page less so, since one zooms in there."""
+    kept, detailed = thinned(values), thinned(values, DETAIL)
+    line: Any = ax.plot(x[kept], values[kept], **look)[0]
+    line.detail = (x[detailed], values[detailed])
+
+
+def link(ax: Any, quantity: str) -> None:
+    """Let the x axis move with others of this quantity and these limits on the page, though it has no label."""
+    ax.x_quantity = quantity
 
 
 def true_spans(time: FloatArray, where: BoolArray) -> list[tuple[float, float]]:

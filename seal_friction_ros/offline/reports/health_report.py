@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,11 +13,13 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.offline.replay.bag_health import BagHealth
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
-from seal_friction_ros.offline.reports.page import ReportSummary, Table, write_page
+from seal_friction_ros.offline.reports.page import ReportSummary, Table, head_of, write_page
 
 INDEPENDENT = 8  # reversals between two scales that share no ratio: the median is over six, and the scale lags
 HOUR = 3600.0  # [s]
+_FIRST_DATE = 365.0 * 24.0 * HOUR  # [s] a stamp before 1971 is no date (our choice)
 SPREAD_OF_FRICTION = 0.2  # [-] least spread of the friction by the law that tells asymmetry from load
 
 
@@ -183,6 +186,7 @@ def write_health_report(
     }
     if out is None:
         return ReportSummary(Path(), (), numbers)
+    said = [f'{name}: {", ".join(texts)}' for name, texts in alarms.items() if texts]
     rows = [[day.name, day.reversals, *(_text(getattr(day, name)) for name in INDICATORS)] for day in days]
     table = Table(('bag', 'reversals', *(f'{text} [{unit}]' for text, unit in INDICATORS.values())), rows, (0,))
     trend_rows = [[text, _text(trends[name]), f'{unit}/h'] for name, (text, unit) in INDICATORS.items()]
@@ -190,13 +194,19 @@ def write_health_report(
         out,
         'health',
         [_figure(seen, changes)],
+        verdict=verdicts.of_health(said, len(changes), sum(day.reversals for day in days)),
+        head=head_of('health', *([f'{len(days)} bags'] if len(days) > 1 else [days[0].name]), *_dates(days)),
         days=days,
         table=table,
         trends=Table(('indicator', 'change an hour', 'unit'), trend_rows, (0, 2)),
-        changes=changes,
-        alarms=[f'{name}: {", ".join(said)}' for name, said in alarms.items() if said],
     )
     return ReportSummary(out, figures, numbers)
+
+
+def _dates(days: Sequence[Day]) -> tuple[str, ...]:
+    """Dates of the data, first to last."""
+    known = [f'{datetime.fromtimestamp(day.time, UTC):%Y-%m-%d}' for day in days if day.time > _FIRST_DATE]
+    return (f'data of {" to ".join(dict.fromkeys((known[0], known[-1])))}',) if known else ('data without a date',)
 
 
 def _text(one: Value) -> str:

@@ -16,6 +16,7 @@ from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
 from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.identification import diagnostics
 from seal_friction_ros.core.identification.calibration import Calibration
 from seal_friction_ros.core.identification.candidate_laws import normal_forces
 from seal_friction_ros.core.identification.fitting import offsets_of
@@ -25,9 +26,10 @@ from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.identification.pipeline import fitted_readings
 from seal_friction_ros.offline.identification.results import Identification, Ring, worst_left_out
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number
-from seal_friction_ros.offline.reports.page import Columns, Table, table_of, write_page
+from seal_friction_ros.offline.reports.page import Columns, Table, Verdict, head_of, table_of, write_page
 from seal_friction_ros.offline.work.seal_writer import seal_text
 
 PRIOR_ART_SEAL = 'ms28775_114_prior_art'  # the only ring with known charts
@@ -47,6 +49,12 @@ def write_identification_report(found: Identification, out: Path) -> tuple[Path,
         out,
         'identification',
         plots,
+        verdict=_verdict(found),
+        head=head_of(
+            'identify', ', '.join(file.name for file in found.data.sources.files[:3]), 'the data have no date'
+        ),
+        warnings=found.warnings,
+        worst=worst_left_out(found.levels),
         found=found,
         left_out_by=found.data.used.left_out_by,
         are_samples=found.data.prepared.readings.are_samples,
@@ -59,6 +67,21 @@ def write_identification_report(found: Identification, out: Path) -> tuple[Path,
         data_table=_data_table(found),
         document=seal_text(found.document),
     )
+
+
+def _verdict(found: Identification) -> Verdict:
+    quality, selection = found.quality, found.selection
+    numbers = verdicts.IdentificationNumbers(
+        law=selection.law.name,
+        error=selection.validation.error,
+        worst=worst_left_out(found.levels),
+        coverage=quality.coverage,
+        unsound=selection.fit.why_unsound,
+        outlier=found.data.outlier is not None,
+        changed=any(change.is_changed for change in quality.changes),
+        drifted=any(level.is_used and abs(level.drift) > diagnostics.SETTLED for level in found.levels),
+    )
+    return verdicts.of_identification(numbers)
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------
@@ -75,8 +98,8 @@ def _level_table(found: Identification) -> Table:
         ('std [N]', lambda level: number(level.std)),
         ('predicted unseen [N]', lambda level: number(level.left_out)),
         ('off [%]', lambda level: number(100.0 * (level.left_out / level.measured - 1.0), 1, signed=True)),
-        ('offset of the force sum [N]', lambda level: number(level.offset, signed=True)),
-        ('drift in the run [%]', lambda level: number(100.0 * level.drift, 1, signed=True)),
+        ('force offset [N]', lambda level: number(level.offset, signed=True)),
+        ('drift [%]', lambda level: number(100.0 * level.drift, 1, signed=True)),
         ('readings', lambda level: level.readings),
     )
     return table_of(found.levels, columns)
@@ -162,9 +185,17 @@ class _FittedReadings:
         return np.arange(0, self.readings.count, max(-(-self.readings.count // _DOTS), 1))
 
     def curve(self, pressure: FloatArray, mounted: tuple[MountedSeal, ...]) -> tuple[FloatArray, FloatArray]:
-        """Friction of all seals and its standard deviation [N], each at this pressure [Pa], at rest."""
+        """Friction of all seals and its standard deviation [N], each at this pressure [Pa], at `curve_speed`."""
         at_pressure = tuple(MountedSeal(one.seal, 'a') for one in mounted)
-        return fitted_readings(at_pressure, np.column_stack((pressure, pressure)), np.full(len(pressure), np.nan))
+        speed = np.full(len(pressure), self.curve_speed)
+        return fitted_readings(at_pressure, np.column_stack((pressure, pressure)), speed)
+
+    @property
+    def curve_speed(self) -> float:
+        """Speed [m/s] of the curves over pressure: the median of the readings; NaN if the law does not depend on it."""
+        speeds = np.abs(self.readings.at.velocity)
+        known = speeds[np.isfinite(speeds)]
+        return float(np.median(known)) if self.seal.depends_on_velocity and len(known) else float('nan')
 
 
 def identification_figures(found: Identification) -> list[Plot]:
@@ -201,7 +232,8 @@ def fitted_law_figure(shown: _FittedReadings) -> Plot:
     levels, size, are_samples = shown.found.levels, shown.size, shown.readings.are_samples
     title = 'Friction over pressure, law and readings'
     if shown.readings.left_out_by == 'pressure':
-        title = f'Error of the law at a pressure left out of the fit: at most {100.0 * worst_left_out(levels):.1f} %'
+        most = 100.0 * worst_left_out(levels)
+        title = f'At a pressure left out of the fit, the law is off the mean reading by {most:.1f} % at most'
     figure, ax = style.new_figure(title, 4.4)
     at_levels = [(level.pressure / BAR, level.measured, level.fitted, level.std) for level in levels]
     x, measured, fitted, std = np.array(at_levels).T
@@ -213,7 +245,8 @@ def fitted_law_figure(shown: _FittedReadings) -> Plot:
         pressure = np.linspace(min(shown.seal.pressure_min, highest), highest, 201)
         fitted, std = shown.curve(pressure, shown.mounted)
         style.fill_band(ax, pressure / BAR, fitted / size, BAND_95 * std / size, label='95 % band')
-        ax.plot(pressure / BAR, fitted / size, color=style.BLACK, lw=1.8, label='law')
+        at_speed = f' at {shown.curve_speed / MM:.3g} mm/s' if np.isfinite(shown.curve_speed) else ''
+        ax.plot(pressure / BAR, fitted / size, color=style.BLACK, lw=1.8, label=f'law{at_speed}')
         if shown.found.quality.settled is not None:
             settled = tuple(MountedSeal(parse_seal(shown.found.document), one.chamber) for one in shown.mounted)
             look = {'color': style.BLACK, 'lw': 1.2, 'ls': '--', 'label': 'law of the settled seal'}

@@ -20,9 +20,11 @@ from seal_friction_ros.core.lubrication.transient import TransientResult, last_c
 from seal_friction_ros.offline.contact.lubrication_comparison import Comparison
 from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, MapRuns, StudyRuns
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import number
-from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, parameter_rows, write_page
+from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, head_of, parameter_rows, write_page
+from seal_friction_ros.offline.work.status import command_line
 
 POSITION_LABEL, FRICTION_LABEL = 'position of the spool [mm]', 'friction [N]'
 _FRAMES = 80  # of the animation
@@ -60,8 +62,9 @@ def write_run_page(run: CaseRun, out: Path) -> tuple[Path, ...]:
     """
     result = run.result
     plots = [friction_loop_figure(result), motion_figure(result), film_figure(result)]
+    verdict = verdicts.of_lubrication(run.found.friction, run.found.solid_share, _largest_change(run))
     tables = {'found': run.found, 'finding_table': _finding_table(run)}
-    figures = _write_case_page(out, 'lubrication_run', plots, result.case, result=result, **tables)
+    figures = _write_case_page(out, 'lubrication_run', plots, result.case, verdict=verdict, result=result, **tables)
     animation = figures[0].parent / 'film.gif'
     _write_animation(result, animation)
     return (*figures, animation)
@@ -86,7 +89,9 @@ def write_study_page(case: LubricationCase, study: StudyRuns, out: Path) -> tupl
     ]
     table = Table(heads, rows)
     plots = [study_figure(study)]
-    return _write_case_page(out, 'lubrication_study', plots, case, study_table=table, half_width=REFERENCE_HALF_WIDTH)
+    verdict = verdicts.of_study(max(abs(deviation) for deviation in study.table.deviation))
+    values = {'verdict': verdict, 'study_table': table, 'half_width': REFERENCE_HALF_WIDTH}
+    return _write_case_page(out, 'lubrication_study', plots, case, **values)
 
 
 @house_style()
@@ -99,7 +104,10 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
     ]
     table = Table(heads, rows)
     plots = [map_figure(computed)]
-    return _write_case_page(out, 'lubrication_map', plots, computed.case, law=computed.law, map_table=table)
+    frictions = np.concatenate([row.friction for row in computed.rows])
+    verdict = verdicts.of_map(float(frictions.min()), float(frictions.max()), '--seal-file' in command_line())
+    values = {'verdict': verdict, 'law': computed.law, 'map_table': table}
+    return _write_case_page(out, 'lubrication_map', plots, computed.case, **values)
 
 
 @house_style()
@@ -109,9 +117,12 @@ def write_comparison_page(comparison: Comparison, out: Path) -> tuple[Path, ...]
     rows = [(name, f'{v:.3g}' if isinstance(v, float) else v) for name, v in comparison.numbers().items()]
     table = Table(('number', 'value'), rows, (0,))
     plots = [comparison_figure(comparison), friction_loop_figure(result), film_figure(result)]
-    return _write_case_page(
-        out, 'lubrication_comparison', plots, result.case, comparison=comparison, number_table=table
+    numbers = comparison.numbers()
+    verdict = verdicts.of_comparison_with_bag(
+        *(numbers[name] for name in ('measured_mean_N', 'computed_mean_N', 'correlation'))
     )
+    values = {'verdict': verdict, 'comparison': comparison, 'number_table': table}
+    return _write_case_page(out, 'lubrication_comparison', plots, result.case, **values)
 
 
 @house_style()
@@ -120,7 +131,16 @@ def write_spool_page(name: str, result: SpoolResult, labels: list[str], out: Pat
     frictions = dict[Any, FloatArray](enumerate(result.members, start=1)) | {'all': result.friction}
     rows = [(seal, number(float(np.abs(f[result.last_cycle]).max()), 3)) for seal, f in frictions.items()]
     table = Table(('seal', 'largest friction in the last cycle [N]'), rows, (0,))
-    return write_page(out, 'lubrication_spool', [spool_members_figure(result, labels)], name=name, seal_table=table)
+    verdict = verdicts.of_spool(float(np.abs(result.friction[result.last_cycle]).max()))
+    head = head_of(f'ehl run {name}', 'computed, no measured data')
+    values: dict[str, Any] = {'verdict': verdict, 'head': head, 'name': name, 'seal_table': table}
+    return write_page(out, 'lubrication_spool', [spool_members_figure(result, labels)], **values)
+
+
+def _largest_change(run: CaseRun) -> float:
+    """Largest relative change of the friction with a coarser step or grid [-]."""
+    changes = [abs(errors.get('friction', 0.0)) for errors in (run.step_errors, run.grid_errors)]
+    return max(changes) / abs(run.found.friction) if run.found.friction else float('inf')
 
 
 def _finding_table(run: CaseRun) -> Table:
@@ -141,7 +161,8 @@ def _write_case_page(
     parts = [(part.name, getattr(case, part.name)) for part in dataclasses.fields(case)]
     rows = [row for name, part in parts if dataclasses.is_dataclass(part) for row in parameter_rows(part, f'{name}.')]
     table = Table(PARAMETER_HEADS, rows, (0, 2, 3))
-    return write_page(out, template, plots, case=case, parameter_table=table, **values)
+    head = head_of(f'ehl run {case.name}', 'computed, no measured data')
+    return write_page(out, template, plots, head=head, case=case, parameter_table=table, **values)
 
 
 # -- figures ----------------------------------------------------------------------------------------------------------

@@ -19,9 +19,10 @@ from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFrictio
 from seal_friction_ros.core.oring_contact.results import OringResult, WallContact
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number, pressure_text
-from seal_friction_ros.offline.reports.page import Table, write_page
+from seal_friction_ros.offline.reports.page import Table, Verdict, head_of, write_page
 from seal_friction_ros.offline.reports.thesis_data import THESIS_SEAL, ThesisContact, appendix_b
 
 
@@ -72,6 +73,8 @@ def write_oring_report(computed: Computed, out: Path) -> tuple[Path, ...]:
         out,
         'oring',
         oring_figures(computed),
+        verdict=_verdict(computed),
+        head=head_of(f'oring {case.name}', 'computed, no measured data', case.name),
         file=computed.file,
         case=case,
         summary=computed.summary,
@@ -84,13 +87,25 @@ def write_oring_report(computed: Computed, out: Path) -> tuple[Path, ...]:
     )
 
 
+def _verdict(computed: Computed) -> Verdict:
+    area, summary = projected_area(computed.file.case.geometry), computed.summary
+    loaded = [result for result in computed.results if result.pressure]
+    return verdicts.of_oring(
+        summary.normal_force_N,
+        summary.pressure_Pa,
+        max((abs(result.axial_force / (result.pressure * area) - 1.0) for result in loaded), default=0.0),
+        max(abs(1.0 - result.volume_ratio) for result in computed.results),
+        bool(summary.friction_N),
+    )
+
+
 # -- tables -----------------------------------------------------------------------------------------------------------
 
 
 def _number_table(computed: Computed) -> Table:
     area = projected_area(computed.file.case.geometry)
     heads = (
-        'pressure [bar]', '[psi]', 'normal force [N]', 'on the other wall [N]', 'axial force [N]',
+        'pressure [bar]', '[psi]', 'normal force [N]', 'other wall [N]', 'axial force [N]',
         'off pressure times area [%]', 'peak contact stress [MPa]', 'contact width [mm]', 'volume lost [%]',
         'Newton steps',
     )  # fmt: skip

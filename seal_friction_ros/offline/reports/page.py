@@ -1,7 +1,9 @@
 """The page kit: a page from a template, with its figures inside and beside it.
 
-A page is self-contained: it loads neither style nor figures from elsewhere. The template engine escapes every value; a
-missing value is an error. A page contains neither time nor place, so the same input gives the same bytes.
+Every page begins with a verdict, what to do next, and where its numbers are from. A page is self-contained: it loads
+neither style nor figures from elsewhere, and its policy forbids it to. The template engine escapes every value; a
+missing value is an error. A page does not say when and on which machine it was made, so the same command on the same
+input gives the same bytes.
 """
 
 from base64 import b64encode
@@ -12,15 +14,21 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MPA, MS, PSI, UM
+from seal_friction_ros.files import package_version
 from seal_friction_ros.offline.reports.figure_style import Plot, render
 from seal_friction_ros.offline.reports.formatting import length_text, number, pressure_range, pressure_text, thousands
+from seal_friction_ros.offline.reports.plot_data import plot_data
 from seal_friction_ros.offline.work.atomic_file import write_whole
+from seal_friction_ros.offline.work.status import command_line, show_status
 
 TEMPLATES = Path(__file__).with_name('templates')
+MOST_OPEN = 3  # remarks that are not folded
+GOOD, LOOK, BAD = 'good', 'look', 'bad'
 PARAMETER_HEADS = ('parameter', 'value', 'unit', 'meaning')
 Columns = Sequence[tuple[str, Callable[[Any], Any]]]
 """head of each column, and the function that gives its cell of a record"""
@@ -32,6 +40,33 @@ class Table(NamedTuple):
     heads: Sequence[str]
     rows: Sequence[Sequence[Any]]
     text_columns: Sequence[int] = ()  # columns that hold text, which is aligned left; the others hold numbers
+
+
+class Verdict(NamedTuple):
+    """Result of a page in one line; the limits between the levels are our choice."""
+
+    level: str  # GOOD: use it; LOOK: read on first; BAD: do not use it as it is
+    text: str  # with the reason
+    next: str = ''  # what to do
+
+
+class Head(NamedTuple):
+    """Where the numbers of a page are from."""
+
+    command: str  # as typed, or what gives the same page
+    facts: tuple[str, ...] = ()  # date of the data, seals
+
+
+def head_of(command: str, *facts: str) -> Head:
+    """Head with the command as it was typed, or ``command`` if the page is not made by one."""
+    return Head(command_line() or f'seal_friction {command}', tuple(fact for fact in facts if fact))
+
+
+def seals_text(names: Sequence[str]) -> str:
+    """Names of seals with their number; at most three kinds are named."""
+    counts = {name: list(names).count(name) for name in names}
+    texts = [f'{count} \N{MULTIPLICATION SIGN} {name}' for name, count in counts.items()]
+    return ', '.join([*texts[:3], *(['more'] if texts[3:] else [])])
 
 
 def table_of(records: Iterable[Any], columns: Columns, text_columns: Sequence[int] = ()) -> Table:
@@ -72,29 +107,39 @@ def environment() -> Environment:
     return made
 
 
-def render_page(template: str, pictures: dict[str, bytes], **values: Any) -> str:
+def render_page(template: str, pictures: dict[str, bytes], plots: dict[str, Any], **values: Any) -> str:
     """HTML of a page.
 
     Args:
         template: Name of a file in ``templates/``, without suffix.
         pictures: Name of a figure -> SVG; a figure that is named in the template but missing here is left out.
+        plots: Name of a figure -> its data, see `plot_data`.
         values: What the template shows.
 
     Raises:
         jinja2.UndefinedError: The template names a value that is not in ``values``.
     """
     encoded = {name: b64encode(svg).decode() for name, svg in pictures.items()}
-    return environment().get_template(f'{template}.html').render(pictures=encoded, **values)
+    shared = {'script': _script(), 'version': package_version(), 'MOST_OPEN': MOST_OPEN}
+    return environment().get_template(f'{template}.html').render(pictures=encoded, plots=plots, **shared, **values)
 
 
-def write_page(out: Path, template: str, plots: Iterable[Plot], **values: Any) -> tuple[Path, ...]:
+@cache
+def _script() -> Markup:
+    return Markup((TEMPLATES / 'plots.js').read_text(encoding='utf-8'))  # noqa: S704  our own, without a value in it
+
+
+def write_page(
+    out: Path, template: str, plots: Iterable[Plot], *, warnings: Sequence[str] = (), **values: Any
+) -> tuple[Path, ...]:
     """Write a page, and each figure as PNG and SVG in ``<stem>_figures`` beside it; existing files are replaced.
 
     Args:
         out: HTML file.
         template: As of `render_page`.
         plots: The figures.
-        values: As of `render_page`.
+        warnings: Remarks below the verdict, the most important first; those after `MOST_OPEN` are folded.
+        values: As of `render_page`; ``verdict`` and ``head`` among them, unless the template is a form.
 
     Returns:
         Paths of the figures.
@@ -102,8 +147,11 @@ def write_page(out: Path, template: str, plots: Iterable[Plot], **values: Any) -
     Raises:
         ValueError: A file cannot be written.
     """
-    rendered = {plot.name: render(plot.figure) for plot in plots}
-    page = render_page(template, {name: kinds['svg'] for name, kinds in rendered.items()}, **values)
+    show_status('figures ...')
+    drawn = [(plot.name, render(plot.figure), plot_data(plot.figure)) for plot in plots]
+    rendered, data = {name: kinds for name, kinds, _ in drawn}, {name: content for name, _, content in drawn}
+    pictures = {name: kinds['svg'] for name, kinds in rendered.items()}
+    page = render_page(template, pictures, data, warnings=list(warnings), **values)
     folder = out.parent / f'{out.stem}_figures'
     files = {folder / f'{name}.{kind}': data for name, kinds in rendered.items() for kind, data in kinds.items()}
     try:

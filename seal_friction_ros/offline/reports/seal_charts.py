@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, MM, PSI
@@ -22,9 +23,10 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import is_at_rest, state_friction
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number
-from seal_friction_ros.offline.reports.page import Table, write_page
+from seal_friction_ros.offline.reports.page import Table, Verdict, head_of, write_page
 from seal_friction_ros.offline.reports.thesis_data import (
     THESIS_SEAL,
     dynamic_readings,
@@ -113,6 +115,8 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
         out,
         'seal',
         seal_figures(shown),
+        verdict=_verdict(shown),
+        head=head_of(f'charts {seal}', shown.seal.name),
         shown=shown,
         source=document.get('source', ''),
         is_physics_based=isinstance(law, PhysicsBased),
@@ -125,6 +129,20 @@ def write_seal_charts(seal: Path, out: Path) -> ChartsSummary:
     pressures, measured = _compared(shown)
     frictions = tuple(shown.friction(pressure).coulomb_friction for pressure in pressures)
     return ChartsSummary(out, figures, shown.seal.name, len(shown.mounted), pressures, frictions, measured)
+
+
+def _verdict(shown: ChartedSeal) -> Verdict:
+    at_most = shown.friction(shown.seal.pressure_max)
+    pressures, measured = _compared(shown)
+    off = [abs(shown.friction(p).coulomb_friction / mean - 1.0) for p, mean in zip(pressures, measured, strict=False)]
+    return verdicts.of_seal(
+        shown.seal.name,
+        at_most.coulomb_friction,
+        shown.seal.pressure_max,
+        at_most.coulomb_friction_std / at_most.coulomb_friction,
+        is_placeholder=shown.seal.name == PLACEHOLDER,
+        off=max(off, default=None),
+    )
 
 
 # -- the data under the figures ---------------------------------------------------------------------------------------

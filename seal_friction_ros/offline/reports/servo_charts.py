@@ -17,9 +17,17 @@ from seal_friction_ros.core.servo.position_servo import ServoParameters, Traject
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, tracking_peak, tracking_rms
 from seal_friction_ros.files import load_seals
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, length_text, length_unit, number
-from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, parameter_rows, write_page
+from seal_friction_ros.offline.reports.page import (
+    PARAMETER_HEADS,
+    Table,
+    head_of,
+    parameter_rows,
+    seals_text,
+    write_page,
+)
 
 CHART_PERIODS = 6  # of the reference, evaluated after `SETTLING_PERIODS`
 SHOWN_PERIODS = 2  # in the figures
@@ -102,6 +110,10 @@ def write_servo_charts(
         out,
         'servo',
         [figure_25(rubbing, free, wave), forces_figure(rubbing, wave)],
+        verdict=verdicts.of_servo(
+            rubbing.tracking.dwell, rubbing.tracking.dwell_share, rubbing.tracking.rms, free.tracking.rms
+        ),
+        head=head_of('servo', 'simulated, no measured data', seals_text([one.seal.name for one in servo.seals])),
         wave=wave,
         seals=len(servo.seals),
         rubbing=rubbing.tracking,

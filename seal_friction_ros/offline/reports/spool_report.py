@@ -1,6 +1,7 @@
 """Report of a measurement of several cycles, evaluated as in the spool-valve paper."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -8,8 +9,9 @@ from seal_friction_ros.core.foundation.units import MM
 from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation, SpoolFriction, evaluate_cycles
 from seal_friction_ros.offline.identification.sources import column_in_si, table_rows
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
-from seal_friction_ros.offline.reports.page import ReportSummary, write_page
+from seal_friction_ros.offline.reports.page import ReportSummary, head_of, write_page
 
 COLUMN_UNITS = {
     'time': {'s': 's', 'ms': 'ms'},
@@ -57,7 +59,16 @@ def write_spool_report(
         'lowest_normalised': float(found.normalised[~up].min()) if (~up).any() else None,
     }
     plots = [displacement_figure(found, settings)]
-    figures = write_page(out, 'spool_evaluation', plots, name=table.name, numbers=numbers, settings=settings)
+    verdict = verdicts.of_spool_measurement(found.reference_force, found.resonance)
+    head = head_of(f'spool {table}', table.name, 'the data have no date')
+    shown: dict[str, Any] = {
+        'verdict': verdict,
+        'head': head,
+        'name': table.name,
+        'numbers': numbers,
+        'settings': settings,
+    }
+    figures = write_page(out, 'spool_evaluation', plots, **shown)
     return ReportSummary(out, figures, numbers)
 
 

@@ -14,9 +14,10 @@ from seal_friction_ros.core.servo import closed_loop
 from seal_friction_ros.core.servo.closed_loop import SETTLING_PERIODS, AxisRun
 from seal_friction_ros.core.tuning.recorded_axis import NEAR_REVERSAL
 from seal_friction_ros.offline.reports import figure_style as style
+from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.formatting import DASH, force_unit, number, relative_change, signed_percent
-from seal_friction_ros.offline.reports.page import Table, write_page
+from seal_friction_ros.offline.reports.page import Table, head_of, write_page
 from seal_friction_ros.offline.tuning.tune import BagTuning, SimulatorTuning
 
 ZOOM = 0.22  # of the period, on each side of a reversal
@@ -33,7 +34,26 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
     """Write the page of a tuning; result and errors as of `write_page`."""
     found = tuning.found
     tables = {'parameter_table': _parameter_table(tuning), 'case_table': _case_table(tuning)}
-    shared = {'tuning': tuning, 'found': found, 'was': found.without, 'now': found.nominal, **tables}
+    law = None if isinstance(tuning, SimulatorTuning) else tuning.found.law
+    verdict = verdicts.of_tuning(
+        tuning.summary,
+        is_better=found.better_in_every_case and bool(found.feedforward.scale),
+        has_placeholder=tuning.task.has_placeholder,
+        mass=None if law is None else law.mass,
+        fitted=law is not None and law.mass_is_fitted,
+        bag=law is not None,
+    )
+    source = 'simulated servo, no measured data' if law is None else tuning.task.source
+    head = head_of('tune', source, tuning.task.seals)
+    shared: dict[str, Any] = {
+        'verdict': verdict,
+        'head': head,
+        'tuning': tuning,
+        'found': found,
+        'was': found.without,
+        'now': found.nominal,
+        **tables,
+    }
     if isinstance(tuning, SimulatorTuning):
         outcomes = [case.outcome for case in tuning.found.cases]
         special: dict[str, Any] = {

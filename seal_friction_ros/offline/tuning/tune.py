@@ -6,6 +6,7 @@ axis gives the same bytes.
 
 import math
 import textwrap
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,11 +31,19 @@ from seal_friction_ros.core.estimation.records import (
 )
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import meanings
-from seal_friction_ros.core.foundation.units import MM, MS
+from seal_friction_ros.core.foundation.units import MM, MS, UM
 from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum
-from seal_friction_ros.core.servo.closed_loop import Axis
-from seal_friction_ros.core.servo.position_servo import ServoParameters
+from seal_friction_ros.core.servo.closed_loop import IDEAL_SENSORS, Axis, AxisSensors
+from seal_friction_ros.core.servo.sensors import SensorSettings
+from seal_friction_ros.core.servo.simulator_options import (
+    PLANT,
+    SERVO_SIMULATOR_PARAMETERS,
+    SimulatorSettings,
+    StandardMessages,
+    servo_parameters,
+)
 from seal_friction_ros.core.servo.tracking import tracking_peak, tracking_rms
+from seal_friction_ros.core.tuning.other_plants import PlantOutcome, on_plants
 from seal_friction_ros.core.tuning.recorded_axis import RecordedMotion, RecordedTuning, Recording, tune_recorded_axis
 from seal_friction_ros.core.tuning.settings import (
     FORCE_MARGIN,
@@ -43,7 +52,7 @@ from seal_friction_ros.core.tuning.settings import (
     TuningSettings,
 )
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
-from seal_friction_ros.files import default_configuration
+from seal_friction_ros.files import default_configuration, read_parameters
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.replay import steps
@@ -54,7 +63,8 @@ from seal_friction_ros.offline.work.targets import mark
 CONTROL_PERIOD, INNER_STEP = 1e-3, 1e-4  # [s] of the simulated servo, as in servo_simulator
 NOISE_LENGTH = 8192  # samples of noise, which then repeats
 MADE_BY = f'# Feed-forward of friction_estimator, {mark("tune")}.'
-NODE = '/**/friction_estimator'  # in every namespace
+MADE_FOR_MACHINE = f'# Feed-forward of machine_estimator, {mark("tune")}.'
+NODE, MACHINE_NODE = '/**/friction_estimator', '/**/machine_estimator'  # in every namespace
 TUNED = ('scale', 'lead_time', 'smoothing_velocity', 'slew_limit', 'force_limit')
 PERFORMANCE = ('tracking_rms', 'tracking_peak', 'dwell', 'overshoot', 'limit_cycle_reversals')
 
@@ -97,6 +107,7 @@ class SimulatorTuning:
     task: TuningTask
     problem: TuningProblem
     found: Tuning
+    plants: tuple[PlantOutcome, ...] = ()  # rigid, elastic, LuGre; empty if the seal files have no presliding
 
     @property
     def summary(self) -> str:
@@ -111,7 +122,15 @@ class SimulatorTuning:
             f'Tracking RMS {was.tracking_rms / MM:.3g} to {now.tracking_rms / MM:.3g} mm, '
             f'dwell per reversal {was.dwell / MS:.3g} to {now.dwell / MS:.3g} ms; '
             f'{better} in every case with a model error up to {100.0 * worst.friction_error:.3g} % and a delay error '
-            f'up to {100.0 * worst.delay_error:.3g} %{end}{self.task.remarks(self.found)}'
+            f'up to {100.0 * worst.delay_error:.3g} %{end}{self._on_plants()}{self.task.remarks(self.found)}'
+        )
+
+    def _on_plants(self) -> str:
+        """Sentences on the other plants."""
+        return ''.join(
+            f' With {plant} seals: tracking RMS {was.tracking_rms / UM:.3g} to {now.tracking_rms / UM:.3g} um, near '
+            f'reversals {was.reversal_rms / UM:.3g} to {now.reversal_rms / UM:.3g} um.'
+            for plant, was, now in self.plants
         )
 
     @property
@@ -133,6 +152,9 @@ class SimulatorTuning:
                 {'friction_error': friction_error, 'delay_error': delay_error}
                 | {name: getattr(performance, name) for name in PERFORMANCE}
                 for friction_error, delay_error, performance in found.cases
+            ],
+            'plants': [
+                {'plant': plant, 'without': was._asdict(), 'with': now._asdict()} for plant, was, now in self.plants
             ],
             'settings': asdict(self.problem.settings),
         }
@@ -192,30 +214,67 @@ class BagTuning:
         }
 
 
-def tune_simulator(settings: TuningSettings, configuration: Configuration | None = None) -> SimulatorTuning:
-    """Tune on the simulated servo, with the seals of the configuration.
+class SimulatedMachine(NamedTuple):
+    """Plant and sensors of a simulated axis, without its seals."""
+
+    name: str
+    settings: SimulatorSettings
+    parts: Mapping[type, Any]  # records by type, as `servo_parameters` takes them
+    sensors: AxisSensors
+
+
+DEFAULT_MACHINE = SimulatedMachine(
+    'the simulated servo',
+    SimulatorSettings(rate=1.0 / CONTROL_PERIOD, inner_step=INNER_STEP),
+    {kind: kind() for kind in PLANT.values()},
+    IDEAL_SENSORS,
+)
+
+
+def load_machine(path: Path) -> SimulatedMachine:
+    """The machine of a parameter file of ``servo_simulator``.
+
+    With ``messages: standard``, ``standard.load_cell: false`` is an axis without force sensor, and ``standard.velocity:
+    false`` one with an encoder of ``sensors.position_resolution``.
+
+    Raises:
+        ValueError: The file has an error, or an encoder has no resolution.
+    """
+    made = read_parameters(path, 'servo_simulator', SERVO_SIMULATOR_PARAMETERS)
+    settings, standard, step = made[SimulatorSettings], made[StandardMessages], made[SensorSettings].position_resolution
+    sensors = IDEAL_SENSORS
+    if settings.messages == 'standard':
+        if not standard.velocity and not step:
+            raise ValueError(f'{path}: standard.velocity: false needs a sensors.position_resolution, the encoder step')
+        sensors = AxisSensors(standard.load_cell, 0.0 if standard.velocity else step)
+    return SimulatedMachine(f'the simulated machine {path.name}', settings, made, sensors)
+
+
+def tune_simulator(
+    settings: TuningSettings, configuration: Configuration | None = None, machine: SimulatedMachine = DEFAULT_MACHINE
+) -> SimulatorTuning:
+    """Tune on a simulated machine, with the seals of the configuration.
 
     Args:
         settings: Task of the axis, and errors of its model.
         configuration: Seals and estimator; its feed-forward has the parameters that are not tuned.
+        machine: Plant and sensors.
 
     Raises:
         ValueError: The servo cannot follow the task.
     """
     chosen = configuration or default_configuration()
     parameters = chosen.parameters()
-    servo = ServoParameters(seals=parameters.estimator.seals, control_period=CONTROL_PERIOD, inner_step=INNER_STEP)
-    problem = TuningProblem(Axis(servo, parameters), settings, sensor_noise(settings))
+    servo = servo_parameters(machine.settings, machine.parts, parameters.estimator.seals)
+    problem = TuningProblem(Axis(servo, parameters, machine.sensors), settings, sensor_noise(settings))
     with progress('tune', MOST_CANDIDATES) as advance:
         found = tune(problem, advance)
     motion = (
         f'sine of {settings.amplitude / MM:g} mm at {settings.frequency:g} Hz, '
         f'{settings.delay / MS:g} ms from velocity sample to controller, seed {settings.seed}'
     )
-    task = TuningTask(
-        'the simulated servo', motion, _seals_text(chosen), parameters.feedforward, TUNED, chosen.has_placeholder
-    )
-    return SimulatorTuning(task, problem, found)
+    task = TuningTask(machine.name, motion, _seals_text(chosen), parameters.feedforward, TUNED, chosen.has_placeholder)
+    return SimulatorTuning(task, problem, found, on_plants(problem, found.feedforward))
 
 
 def tune_bag(
@@ -337,13 +396,22 @@ def page_of(out: Path) -> Path:
     return out.with_suffix('.html')
 
 
-def parameter_text(tuning: SimulatorTuning | BagTuning) -> str:
-    """ROS parameter file of a feed-forward, with task and summary as a comment."""
+def parameter_text(tuning: SimulatorTuning | BagTuning, actuator: str = '') -> str:
+    """ROS parameter file of a feed-forward, with task and summary as a comment.
+
+    Args:
+        tuning: The result.
+        actuator: Of ``machine_estimator``, by its name in the mapping file; empty: for ``friction_estimator``.
+    """
     task, settings = tuning.task, tuning.found.feedforward
     comment = f'# Tuned on {task.source}: {task.motion}; seals: {task.seals}. {tuning.summary}'
     comment = ''.join(letter if letter.isprintable() else '?' for letter in comment)  # names come from outside
-    lines = [MADE_BY, *textwrap.wrap(comment, 110, subsequent_indent='# ', break_on_hyphens=False)]
-    lines += [f'{NODE}:', '  ros__parameters:', f'    {FEEDFORWARD_PREFIX.rstrip(".")}:']
+    lines = [
+        MADE_FOR_MACHINE if actuator else MADE_BY,
+        *textwrap.wrap(comment, 110, subsequent_indent='# ', break_on_hyphens=False),
+    ]
+    group = '.'.join([*([actuator] if actuator else []), FEEDFORWARD_PREFIX.rstrip('.')])
+    lines += [f'{MACHINE_NODE if actuator else NODE}:', '  ros__parameters:', f'    {group}:']
     for name, meaning in meanings(settings).items():
         value = yaml.safe_dump({name: getattr(settings, name)}).strip()
         unit = f'[{meaning.unit}] ' if meaning.unit else ''
@@ -351,13 +419,13 @@ def parameter_text(tuning: SimulatorTuning | BagTuning) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def write_parameters(out: Path, tuning: SimulatorTuning | BagTuning) -> None:
+def write_parameters(out: Path, tuning: SimulatorTuning | BagTuning, actuator: str = '') -> None:
     """Write the parameter file, completely or not at all.
 
     Raises:
         ValueError: The file cannot be written.
     """
     try:
-        write_whole(out, parameter_text(tuning).encode())
+        write_whole(out, parameter_text(tuning, actuator).encode())
     except OSError as error:
         raise ValueError(f'{out}: cannot write: {error.strerror or error}') from None

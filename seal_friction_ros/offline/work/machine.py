@@ -20,7 +20,7 @@ _FIRST_PORT, _PORTS_OF_A_DOMAIN = 7410, 250  # UDP port of participant 0 of doma
 _MOST_PARTICIPANTS = 120  # of a domain on one machine: so many ports it has
 _ANNOUNCED_TO = {'rclpy': 32, 'profile': 100}  # participants that a new one announces itself to
 _SMALLEST_SHARED_MEMORY = 64 << 20  # [bytes] of /dev/shm for a few nodes (our choice)
-_SHARED_MEMORY = Path('/dev/shm')  # noqa: S108
+_SHARED_MEMORY = Path('/dev/shm')  # noqa: S108  looked at, never written
 
 
 class Level(Enum):

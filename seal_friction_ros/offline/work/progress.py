@@ -4,6 +4,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from seal_friction_ros.offline.work.status import show_status
+
 try:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -43,6 +45,7 @@ def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]
     if not HAS_BAR:
         yield lambda _: None
         return
+    show_status('')
     console = Console(stderr=True)
     columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     shown = console.is_terminal
@@ -59,6 +62,7 @@ def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]
                 refreshed = time.monotonic()
 
         yield advance
+    show_status('...')
 
 
 def _shares(total: int | None, report: Callable[[float], None]) -> Callable[[float], None]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from statistics import fmean
 
 import pytest
-from harness.simulated_day import Day, samples
+from harness.simulated_day import SECOND, START, Day, samples
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
@@ -19,12 +19,13 @@ from seal_friction_ros.core.estimation.adaptation import (
     Ratios,
     _median,
     disagrees,
+    is_due,
     with_scale,
 )
 from seal_friction_ros.core.estimation.disagreement import Reversal, last_reversal, likely_reason
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, step
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
-from seal_friction_ros.core.estimation.records import Force, Pressure, Status
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Status
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
@@ -114,6 +115,41 @@ def test_off_every_number_is_as_before_and_nothing_is_learnt():
 def test_one_direction_alone_moves_no_scale():
     day = replace(DAY, one_direction=True, scale=lambda time: 1.0 + 0.05 * time)
     assert last_scale(day, 20.0) == 1.0
+
+
+@pytest.mark.parametrize(('stroke_time', 'speed'), [(0.055, 0.04), (0.1, 0.04), (0.055, 0.02)])
+def test_inertia_known_and_twice_the_friction_moves_the_scale_of_short_strokes_by_less_than_5_percent(
+    stroke_time, speed
+):
+    day = replace(DAY, period=1e-3, stroke_time=stroke_time, speed=speed, presliding=0.0, count=1e-8, dip=0.0)
+    estimates, reversals = run(day, 8.0, known=parameters('observe', moving_mass=day.mass))
+    assert estimates[-1].adaptation_scale == pytest.approx(1.0, abs=0.05)
+    assert len(reversals) > 20
+    assert not any(estimate.status & Status.MODEL_DISAGREES for estimate in estimates)
+
+
+def test_strokes_before_and_after_a_gap_are_not_compared():
+    def shifted(sample):
+        stamp, velocity, pressure, force, *rest = sample
+        stamp += SECOND * (stamp - START > 10.35 * SECOND)
+        return RodSample(stamp, velocity, pressure._replace(stamp=stamp), force._replace(stamp=stamp), *rest)
+
+    gap, whole = run(DAY, 12.9, changed=shifted)[1], run(DAY, 12.9)[1]
+    assert len(gap) == len(whole) - 1
+
+
+def test_no_residual_at_all_leaves_a_deviation_of_1_percent():
+    learnt = NOTHING_LEARNT._replace(scale_std=0.0, noise=0.0, before=NO_LEVEL._replace(stamp=5))
+    adapted = with_scale(ActuatorFriction(10.0, 1.0, 2.0, True, 0.0), learnt, 5, True)
+    assert adapted.coulomb_friction_std == pytest.approx(0.1)
+
+
+def test_a_rod_that_stamps_twice_or_goes_back_in_time_learns_on():
+    state = NOT_ADAPTED._replace(stamp=START)
+    assert not is_due(state, START)
+    assert not is_due(state, START + 3_000_000)
+    assert is_due(state, START + 4_000_000)
+    assert is_due(state, START - SECOND)
 
 
 def test_at_rest_no_scale_moves():

@@ -25,6 +25,7 @@ from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,
     PRESSURE_TYPE,
     REFERENCE_TYPE,
+    TEMPERATURE_TYPE,
     TICK_TYPE,
     VELOCITY_TYPE,
     decode,
@@ -32,7 +33,15 @@ from seal_friction_ros.core.estimation.messages import (
     type_of,
 )
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init, receive
-from seal_friction_ros.core.estimation.records import NEVER, Force, Pressure, ServoReference, Velocity, WatchdogTick
+from seal_friction_ros.core.estimation.records import (
+    NEVER,
+    Force,
+    Pressure,
+    ServoReference,
+    Temperature,
+    Velocity,
+    WatchdogTick,
+)
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal, friction_of_seals
@@ -44,7 +53,9 @@ from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.law import FrictionLaw
 from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.friction.temperature import TemperatureScale
 from seal_friction_ros.files import default_configuration, read_yaml
 
 SEALS = {path.stem: parse_seal(read_yaml(path)) for path in sorted((ROOT / 'config' / 'seals').glob('*.yaml'))}
@@ -90,6 +101,12 @@ SEALS |= {
 }
 
 
+WARM = TemperatureScale(reference=310.0, coefficient=0.013, coefficient_std=0.001, lowest=290.0, highest=340.0)
+SEALS |= {
+    name: dataclasses.replace(SEALS[name], temperature=WARM)
+    for name in ('power', 'viscous', 'from_elsewhere', 'constant')
+}
+
 MOUNTED_ON = {'from_elsewhere': 'difference', 'constant': 'ambient'}
 
 
@@ -113,6 +130,8 @@ def serialised(record: object, frame: bytes) -> tuple[Kind, bytes]:
             return Kind.VELOCITY, encode(record._replace(frame_id=frame))
         case ServoReference():
             return Kind.REFERENCE, encode(record._replace(frame_id=frame))
+        case Temperature():
+            return Kind.TEMPERATURE, encode(record, frame)
         case WatchdogTick():
             return Kind.TICK, encode(record._replace(frame_id=frame))
     return Kind.OTHER, b'something'
@@ -141,6 +160,7 @@ TYPES = {
     Kind.FORCE: FORCE_TYPE,
     Kind.VELOCITY: VELOCITY_TYPE,
     Kind.REFERENCE: REFERENCE_TYPE,
+    Kind.TEMPERATURE: TEMPERATURE_TYPE,
     Kind.TICK: TICK_TYPE,
 }
 
@@ -192,7 +212,7 @@ def runs(draw) -> list[tuple[Kind, bytes]]:
     for _ in range(draw(st.integers(1, 30))):
         stamp += draw(later)
         stamp = max(min(stamp, (2**31 - 1) * 10**9), -(2**31) * 10**9)
-        what = draw(st.integers(0, 8))
+        what = draw(st.integers(0, 9))
         at = stamp + draw(st.sampled_from([0, 0, 0, -200 * MS if stamp > 0 else 0]))
         if what in (0, 1):
             record: object = Pressure(at, draw(pressures), draw(pressures))
@@ -202,6 +222,8 @@ def runs(draw) -> list[tuple[Kind, bytes]]:
             record = ServoReference(at, 0.0, draw(small), draw(st.floats(-2.0, 2.0) | odd))
         elif what == 5:
             record = None
+        elif what == 9:
+            record = Temperature(at, draw(st.floats(-20.0, 120.0) | odd), draw(odd))
         elif what == 6:
             record = WatchdogTick(stamp, draw(odd))
         else:
@@ -272,6 +294,20 @@ def test_twenty_seconds_with_every_law_are_the_same_to_the_byte(actuator):
     assert_same(with_seals(ACTUATORS[actuator]), init(DEFAULT), noisy(1500, len(actuator)))
 
 
+def test_elastic_seals_are_the_same_to_the_byte():
+    parameters = with_seals(ACTUATORS['default'], presliding=True)
+    elastic = Presliding(stiffness=2e5, yield_exponent=1.5)
+    seals = tuple(
+        dataclasses.replace(m, seal=dataclasses.replace(m.seal, presliding=elastic)) for m in parameters.estimator.seals
+    )
+    elastic_parameters = parameters._replace(estimator=dataclasses.replace(parameters.estimator, seals=seals))
+    pieces = noisy(1500, 3)
+    assert_same(elastic_parameters, init(DEFAULT), pieces)
+    rigid, _ = one_by_one(parameters, init(DEFAULT), pieces, receipts(pieces))
+    sheared, _ = one_by_one(elastic_parameters, init(DEFAULT), pieces, receipts(pieces))
+    assert rigid.feedforward.elements != sheared.feedforward.elements
+
+
 @compiled
 def compiled_frictions(seals, a, b, v, out):
     for i in range(len(a)):
@@ -300,6 +336,7 @@ def test_what_the_decoder_refuses_is_refused_and_what_it_takes_is_taken(kind):
         Force(1, 2.0),
         Velocity(1, 2.0),
         ServoReference(1, 2.0, 3.0, 4.0),
+        Temperature(1, 2.0, 3.0),
         WatchdogTick(1, 2.0),
     )
     good = dict(serialised(record, b'rod') for record in records)[kind]

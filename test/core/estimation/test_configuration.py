@@ -30,11 +30,14 @@ from seal_friction_ros.core.estimation.records import (
     NEVER,
     NO_FORCE,
     NO_PRESSURE,
+    NO_TEMPERATURE,
     Force,
     Pressure,
+    SealTemperature,
     ServoReference,
     Velocity,
 )
+from seal_friction_ros.core.friction.presliding import NO_ELEMENTS, SLOTS, Elements
 from seal_friction_ros.files import load_configuration, read_yaml
 
 MS = 1_000_000  # [ns]
@@ -63,6 +66,7 @@ SNAPSHOT = Snapshot(
         ReceiptTimes(6, 4, NEVER, 5),
         refused=True,
         clock_offset=-7,
+        temperature=SealTemperature(2, 313.15),
     ),
 )
 
@@ -103,7 +107,13 @@ states = st.builds(
         conditioned,
         st.just(NOT_ADAPTED) | records(AdaptationState),
     ),
-    st.builds(FeedForwardState, stamps_or_never, usable, usable, usable, usable),
+    st.builds(
+        FeedForwardState,
+        stamps_or_never,
+        *[usable] * 4,
+        st.just(NO_ELEMENTS) | st.builds(Elements, *[usable] * SLOTS),
+        usable,
+    ),
     usable,
     st.just(NO_PRESSURE) | st.builds(Pressure, stamps, anything, anything),
     st.just(NO_FORCE) | st.builds(Force, stamps, anything),
@@ -111,6 +121,7 @@ states = st.builds(
     st.builds(ReceiptTimes, *[stamps_or_never] * 4),
     st.booleans(),
     stamps,
+    st.just(NO_TEMPERATURE) | records(SealTemperature),
 )
 
 
@@ -149,6 +160,14 @@ def test_a_snapshot_from_before_there_was_adaptation_has_learnt_nothing():
     back = parse_snapshot(json.dumps(document))
     assert back.configuration == CONFIGURATION
     assert back.state.estimator.adaptation == NOT_ADAPTED
+
+
+def test_a_snapshot_from_before_there_was_a_temperature_has_none_and_the_default_timeout():
+    document = json.loads(snapshot_text(SNAPSHOT))
+    del document['settings']['temperature_timeout'], document['state']['temperature']
+    back = parse_snapshot(json.dumps(document))
+    assert back.configuration == CONFIGURATION
+    assert back.state == SNAPSHOT.state._replace(pressure=back.state.pressure, temperature=NO_TEMPERATURE)
 
 
 @given(states)
@@ -313,3 +332,12 @@ def test_a_snapshot_of_the_version_before_is_taken_as_far_as_it_goes():
     assert back.state.pressure.stamp == SNAPSHOT.state.pressure.stamp
     assert back.state.refused
     assert back.state.feedforward == init(CONFIGURATION.parameters()).feedforward
+
+
+def test_a_snapshot_from_before_the_elastic_seals_begins_with_seals_not_sheared():
+    document = json.loads(snapshot_text(SNAPSHOT))
+    del document['state']['feedforward']['elements'], document['state']['feedforward']['led_velocity']
+    del document['feedforward']['presliding']
+    known = parse_snapshot(json.dumps(document))
+    assert known.state.feedforward == SNAPSHOT.state.feedforward
+    assert not known.configuration.feedforward.presliding

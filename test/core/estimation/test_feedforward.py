@@ -4,6 +4,7 @@ import dataclasses
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,11 +15,13 @@ from seal_friction_ros.core.estimation.feedforward import (
     FeedForwardSettings,
     Limited,
     compensation,
+    elastic_step,
     step,
     usable,
     wanted_velocity,
 )
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.friction.presliding import Presliding, initial_loading, presliding_numbers
 from seal_friction_ros.core.friction.states import FrictionState
 
 MS = 1_000_000  # [ns]
@@ -199,3 +202,49 @@ def test_a_setting_out_of_bounds_is_refused():
         FeedForwardSettings(fade_time=0.0)
     with pytest.raises(ValueError, match=r'estimate_timeout = 60\.0 s is above'):
         FeedForwardSettings(estimate_timeout=60.0)
+
+
+SPRINGS = presliding_numbers([Presliding(stiffness=1e5, yield_exponent=1.0)])
+ELASTIC = dataclasses.replace(SHARP, presliding=True, scale=1.0, smoothing_velocity=1e-6)
+
+
+def run_elastic(settings, elasticity, velocities, step_time=MS):
+    """Force at each wanted velocity, without lead, at a friction of 42 N [N]."""
+    state, forces = FADED_IN, []
+    for i, v in enumerate(velocities):
+        state, out = elastic_step(settings, elasticity, state, i * step_time, i * step_time, 42.0, v, v, v)
+        forces.append(out.force)
+    return np.array(forces)
+
+
+@given(st.lists(st.floats(-0.2, 0.2), max_size=40), st.floats(0.0, 2.0), st.floats(1e3, 1e7), st.floats(1e-6, 1.0))
+def test_with_elastic_seals_the_force_never_acts_against_the_wanted_velocity(velocities, scale, stiffness, width):
+    settings = dataclasses.replace(ELASTIC, scale=scale, smoothing_velocity=width)
+    forces = run_elastic(settings, presliding_numbers([Presliding(stiffness=stiffness)]), velocities)
+    assert all(force * velocity >= 0.0 for force, velocity in zip(forces.tolist(), velocities, strict=True))
+    assert all(np.abs(forces) <= scale * 42.0 * (1.0 + 1e-12))
+
+
+def test_after_a_reversal_the_force_is_0_until_the_seal_resists_and_then_follows_the_spring():
+    velocities = np.array([0.01] * 400 + [-0.01] * 400)
+    forces = run_elastic(ELASTIC, SPRINGS, velocities.tolist())
+    assert forces[399] == 42.0
+    way = (np.arange(401, 801) - 401) * 1e-5  # [m] since the reversal, in the middle between two velocities
+    spring = np.array([42.0 - 2.0 * initial_loading(SPRINGS, s / 2.0, 42.0) for s in way])
+    np.testing.assert_allclose(forces[400:], np.minimum(spring, 0.0), atol=1e-9)
+    assert np.count_nonzero(forces[400:] == 0.0) > 20
+    assert forces[-1] == -42.0
+
+
+@given(st.lists(st.floats(-0.2, 0.2), max_size=20))
+def test_rigid_seals_and_presliding_off_are_one_force_to_the_bit(velocities):
+    off = dataclasses.replace(ELASTIC, presliding=False)
+    plain = [row.force for row in [step_of(off, v) for v in velocities]]
+    assert run_elastic(ELASTIC, None, velocities[:1]).tolist() == plain[:1]
+    today = run_elastic(off, SPRINGS, velocities).tolist()
+    assert today == run_elastic(ELASTIC, None, velocities).tolist()
+
+
+def step_of(settings, velocity):
+    """Feed-forward of the first step."""
+    return step(settings, FADED_IN, 0, 0, 42.0, velocity)[1]

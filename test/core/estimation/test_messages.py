@@ -20,10 +20,12 @@ from seal_friction_ros.core.estimation.records import (
     Pressure,
     ServoReference,
     Status,
+    Temperature,
     Velocity,
     WatchdogTick,
 )
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.nodes.managed_node import message_class
 
 DEFINITIONS = ROOT / 'msg_defs' / 'msg'
 STAMP = 1_700_000_000_123_456_789  # [ns]
@@ -42,6 +44,11 @@ SAMPLES = {
         {'position': 0.01, 'velocity': -0.02, 'acceleration': 0.3},
         ServoReference(STAMP, 0.01, -0.02, 0.3),
         lambda record, frame: wire.encode(record._replace(frame_id=frame)),
+    ),
+    wire.TEMPERATURE_TYPE: (
+        {'temperature': 41.5, 'variance': 0.25},
+        Temperature(STAMP, 41.5, 0.25),
+        wire.encode,
     ),
     wire.TICK_TYPE: (
         {'idle_time': 0.25},
@@ -84,7 +91,7 @@ def as_rosbags(type_name: str, frame: bytes):
 
 
 def as_rclpy(type_name: str, frame: bytes):
-    message = getattr(messages, type_name.rpartition('/')[2])(**SAMPLES[type_name][0])
+    message = message_class(type_name)(**SAMPLES[type_name][0])
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(STAMP, 10**9)
     message.header.frame_id = frame.decode()
     return message
@@ -141,6 +148,7 @@ def test_padding_is_zero(type_name):
         wire.VELOCITY_TYPE: Velocity(stamp, ones, b''),
         wire.POSITION_TYPE: Position(stamp, ones),
         wire.REFERENCE_TYPE: ServoReference(stamp, ones, ones, ones),
+        wire.TEMPERATURE_TYPE: Temperature(stamp, ones, ones),
         wire.TICK_TYPE: WatchdogTick(stamp, ones),
         wire.FEEDFORWARD_TYPE: FeedForward(stamp, ones, ones, 0x01010101),
         wire.ESTIMATE_TYPE: FrictionEstimate(stamp, *[ones] * 4, FrictionState.SLIDING, 1, 0x01010101, *[ones] * 5),
@@ -306,7 +314,7 @@ def test_status_bits_in_the_message_definition_are_those_of_the_code():
 
 
 def test_status_bits_are_different_powers_of_two():
-    assert [bit.value for bit in Status] == [2**i for i in range(23)]
+    assert [bit.value for bit in Status] == [2**i for i in range(25)]
 
 
 def test_the_generated_message_has_the_constants_of_the_code():
@@ -319,7 +327,7 @@ CODES = {'double': 'd', 'uint8': 'B', 'int8': 'b', 'uint32': 'I'}
 
 @pytest.mark.parametrize('layout', wire.LAYOUTS, ids=lambda layout: layout.record.__name__)
 def test_the_table_of_layouts_is_that_of_the_generated_messages(layout):
-    generated = getattr(messages, layout.message_type.rpartition('/')[2]).get_fields_and_field_types()
+    generated = message_class(layout.message_type).get_fields_and_field_types()
     kinds = dict(zip(layout.fields, layout.codes, strict=True))
     assert list(generated) == ['header', *layout.fields]
     assert {name: CODES[kind] for name, kind in generated.items() if name != 'header'} == kinds

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.lubrication.contact import film_properties
-from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane
 from seal_friction_ros.core.lubrication.flow_factors import (
     PEKLENIK_NUMBERS,
     flow_factor_coefficients,
@@ -118,6 +118,39 @@ def test_fast_deflection_is_the_product_with_the_matrix():
 def test_half_plane_shallower_than_wide_is_refused():
     with pytest.raises(ValueError, match=r'depth = 0.0001 m is less than'):
         HalfPlane(100, 1e-5, MODULUS, 1e-4)
+
+
+@pytest.mark.parametrize('wave_number', [0.5, 1.0, 2.0, 5.0])  # times the height of the layer
+def test_a_bonded_layer_gives_way_to_a_wave_as_the_closed_form_says(wave_number):
+    height, cells = 1e-3, 2400
+    layer = BondedLayer(cells, 24.0 * height / cells, MODULUS, height)
+    x = (np.arange(cells) + 0.5 - cells / 2) * layer.cell_width
+    q, y = wave_number / height, wave_number
+    share = (math.sinh(2 * y) - 2 * y) / (math.cosh(2 * y) + 1 + 2 * y**2)
+    found = layer.deflection(1e6 * np.cos(q * x))[cells // 2]
+    assert found == pytest.approx(1e6 * 2.0 * share / (MODULUS * q) * math.cos(q * x[cells // 2]), rel=5e-3)
+
+
+def test_an_even_pressure_hardly_deflects_an_incompressible_layer():
+    layer, plane = (
+        kind(2400, 1e-5, MODULUS, 24e-3 if kind is HalfPlane else 1e-3) for kind in (BondedLayer, HalfPlane)
+    )
+    even = np.full(2400, 1e6)
+    assert abs(layer.deflection(even)[1200]) < 1e-3 * plane.deflection(even)[1200]
+
+
+def test_near_the_load_a_bonded_layer_is_a_half_plane_of_0_377_of_its_height():
+    height = 0.1
+    layer, plane = BondedLayer(200, 3e-6, MODULUS, height), HalfPlane(200, 3e-6, MODULUS, 0.377 * height)
+    assert layer.influence == pytest.approx(plane.influence, rel=1e-3)
+
+
+def test_bodies_push_back_alike():
+    """Reciprocity: the deflection here by a load there is that there by a load here; and no load gains energy."""
+    for body in (HalfPlane(64, 1e-5, MODULUS, 1e-3), BondedLayer(64, 1e-5, MODULUS, 1e-3)):
+        matrix = body.matrix()
+        assert np.array_equal(matrix, matrix.T)
+        assert np.linalg.eigvalsh(matrix).min() > 0.0
 
 
 def test_gmres_solves_and_says_when_it_cannot():

@@ -16,16 +16,9 @@ from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_frict
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.controller import ServoController
-from seal_friction_ros.core.servo.plant import (
-    AMBIENT,
-    Cylinder,
-    Load,
-    ServoValve,
-    fastest_rate,
-    inner_step,
-    signed_root,
-    stored_energy,
-)
+from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
+from seal_friction_ros.core.servo.hydraulics import ServoValve, signed_root
+from seal_friction_ros.core.servo.plant import Load, fastest_rate, inner_step, stored_energy
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs
 
 SEAL = parse_seal(yaml.safe_load((ROOT / 'config/seals/ms28775_114.yaml').read_text()))
@@ -54,7 +47,7 @@ def test_natural_frequency_is_that_of_merritt_within_1_percent():
     crossing = k + position[k] / (position[k] - position[k + 1])
     measured = 2.0 * math.pi * (len(k) - 1) / ((crossing[-1] - crossing[0]) * free.control_period)
     cylinder = free.cylinder
-    expected = math.sqrt(4.0 * cylinder.bulk_modulus * cylinder.area**2 / (cylinder.total_volume * free.load.mass))
+    expected = math.sqrt(2.0 * cylinder.bulk_modulus * cylinder.area_a**2 / (cylinder.mid_volume_a * free.load.mass))
     assert measured == pytest.approx(expected, rel=1e-4)
 
 
@@ -63,7 +56,7 @@ def test_pressure_of_a_locked_piston_rises_as_the_closed_form():
     locked = ServoParameters(valve=TIGHT_VALVE, cylinder=TIGHT_CYLINDER, seals=LOCK)
     valve, cylinder, opening = locked.valve, locked.cylinder, 0.05
     state = plant(locked, charge_a=1e6, spool=opening)
-    volume = cylinder.total_volume / 2.0
+    volume = cylinder.mid_volume_a
     for i in range(1, 5):
         state = advance(locked, state, opening)
         fall = cylinder.bulk_modulus * valve.orifice_gain * opening * i * locked.control_period / (2.0 * volume)
@@ -80,7 +73,7 @@ def test_pressure_of_a_locked_piston_leaks_away_as_the_closed_form():
     state = state._replace(charge_a=state.charge_a + 1e6, charge_b=state.charge_b - 1e6)
     for _ in range(100):
         state = advance(locked, state, 0.0)
-    rate = 4.0 * locked.cylinder.bulk_modulus / locked.cylinder.total_volume * (5e-14 + 6e-14)
+    rate = 2.0 * locked.cylinder.bulk_modulus / locked.cylinder.mid_volume_a * (5e-14 + 6e-14)
     expected = 2e6 * math.exp(-rate * 100 * locked.control_period)
     assert state.charge_a - state.charge_b == pytest.approx(expected, rel=1e-7)
 
@@ -137,8 +130,8 @@ def test_energy_in_is_stored_and_dissipated(load):
 def reference_solution(servo, commands, command_time):
     """Stick and slip as events of scipy's solver, the equations written again, with the laws and not their tables."""
     valve, cylinder, load = servo.valve, servo.cylinder, servo.load
-    area, beta, gain = cylinder.area, cylinder.bulk_modulus, valve.orifice_gain
-    middle = cylinder.total_volume / 2.0
+    area, beta, gain = cylinder.area_a, cylinder.bulk_modulus, valve.orifice_gain
+    middle = cylinder.mid_volume_a
     w, z = valve.natural_frequency, valve.damping_ratio
 
     def root(dp):
@@ -243,7 +236,7 @@ def test_cavitating_chamber_keeps_its_oil():
     # No flow: the charge depends on the volume alone, p_0 + beta ln(V_0 / V), while the cavity grows and collapses.
     shut = ServoParameters(valve=TIGHT_VALVE, cylinder=TIGHT_CYLINDER, load=Load(mass=50.0), seals=())
     state = plant(shut)
-    start, middle, area = state.charge_a, shut.cylinder.mid_volume, shut.cylinder.area
+    start, middle, area = state.charge_a, shut.cylinder.mid_volume_a, shut.cylinder.area_a
     lowest, collapsed = 0.0, False
     for i in range(400):
         state = advance(shut, state, 0.0, 3000.0 if i < 60 else -3000.0)

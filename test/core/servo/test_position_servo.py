@@ -21,8 +21,10 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.closed_loop import Axis, run_closed_loop, with_wrong_friction
 from seal_friction_ros.core.servo.controller import ControllerState, Limited, ServoController, control, limit_reference
+from seal_friction_ros.core.servo.cylinder import Cylinder
+from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.motions import Setpoint, Sine, Step
-from seal_friction_ros.core.servo.plant import Cylinder, Load, ServoValve, stored_energy
+from seal_friction_ros.core.servo.plant import Load, stored_energy
 from seal_friction_ros.core.servo.position_servo import (
     ServoParameters,
     advance,
@@ -190,7 +192,7 @@ def test_feedforward_that_is_not_finite_counts_as_zero():
 def test_command_beyond_what_supply_and_spool_can_do_is_cut_and_says_so():
     _, out = step(SERVO, init(SERVO), Setpoint(0.0, 0.0, 0.0), 1e9)
     assert out.command.limited == Limited.FORCE
-    assert out.command.force == pytest.approx(SERVO.cylinder.area * (SERVO.valve.supply_pressure - 1e5))
+    assert out.command.force == pytest.approx(SERVO.cylinder.area_a * (SERVO.valve.supply_pressure - 1e5))
     fast = measure(SERVO.constants, init(SERVO).plant)._replace(velocity=5.0)
     _, command = control(SERVO.gains, SERVO.constants, ControllerState(0.0, 0.0), fast, Setpoint(0.0, 0.0, 0.0), 0.0)
     assert command.limited == Limited.FORCE | Limited.SPOOL

@@ -17,7 +17,15 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, slope
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags import import_log as module
-from seal_friction_ros.offline.bags.bag import FORCE_TOPIC, PRESSURE_TOPIC, VELOCITY_TOPIC, BagError, read_messages
+from seal_friction_ros.offline.bags.bag import (
+    FORCE_TOPIC,
+    POSITION_TOPIC,
+    PRESSURE_TOPIC,
+    REFERENCE_TOPIC,
+    VELOCITY_TOPIC,
+    BagError,
+    read_messages,
+)
 from seal_friction_ros.offline.bags.import_log import import_log, read_rig
 
 DATA = ROOT.parent / 'shared' / 'data'
@@ -94,6 +102,33 @@ def test_units_signs_and_areas(tmp_path):
     by_hand = [10 * 4.4482216152605 - 2 * 0.0254**2 * 2e5 + 5, 20 * 4.4482216152605 - 2 * 0.0254**2 * 3e5 + 5]
     assert force[:2] == pytest.approx(by_hand, rel=1e-14)
     assert summary == (3, 0, 3_000_000_000, 3_041_500_000)
+
+
+def test_position_and_wanted_motion_come_into_the_bag(tmp_path):
+    time = np.arange(40) * 0.01
+    wanted = 0.02 * np.sin(3.0 * time)
+    log = ''.join(f'{1000 * t:.6f},2,10,1,{1000 * x!r}\n' for t, x in zip(time.tolist(), wanted.tolist(), strict=True))
+    position, reference = ({'terms': [{'column': 4, 'unit': 'mm'}]} for _ in range(2))  # YAML without aliases
+    _, bag = imported(tmp_path, log, changed(position=position, reference_position=reference))
+    rows = defaultdict(list)
+    for message in read_messages(bag):
+        rows[message.topic].append(DECODERS[message.type_name](message.data))
+    assert [p.position for p in rows[POSITION_TOPIC]] == pytest.approx(wanted)
+    assert [r.position for r in rows[REFERENCE_TOPIC]] == pytest.approx(wanted)
+    assert [r.velocity for r in rows[REFERENCE_TOPIC]][1:-1] == pytest.approx(0.06 * np.cos(3.0 * time[1:-1]), abs=2e-5)
+    last = [message.topic for message in read_messages(bag)][-1]
+    assert last == VELOCITY_TOPIC  # it makes the estimate
+
+
+@pytest.mark.parametrize(
+    ('rig', 'pattern'),
+    [
+        ({'reference_acceleration': {'constant': 0.0}}, 'without reference_position or reference_velocity'),
+        ({'reference_velocity': {'terms': [{'column': 1, 'unit': 'mm'}]}}, 'is not a velocity'),
+    ],
+)
+def test_a_wanted_motion_that_makes_no_sense_is_refused(tmp_path, rig, pattern):
+    assert_refused(tmp_path, pattern, rig=changed(**rig))
 
 
 def test_order_topics_stamps_and_frame(tmp_path):

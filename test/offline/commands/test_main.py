@@ -178,7 +178,14 @@ def test_help_loads_no_numerics_no_compiler_and_no_ros():
 
 
 @pytest.mark.parametrize(
-    ('typed', 'offered'), [('rep', ['replay', 'report']), ('replay bag --v', ['--verify']), ('report --x', [])]
+    ('typed', 'offered'),
+    [
+        ('rep', ['replay', 'report']),
+        ('replay bag --v', ['--verify']),
+        ('report --x', []),
+        ('charts ms28775_114_', ['ms28775_114_fem', 'ms28775_114_prior_art', 'ms28775_114_table']),
+        ('identify bag --rig d', ['delft']),
+    ],
 )
 def test_a_shell_is_told_what_may_come_next(typed: str, offered: list[str], tmp_path: Path):
     line, told = f'seal_friction {typed}', tmp_path / 'told'
@@ -188,3 +195,117 @@ def test_a_shell_is_told_what_may_come_next(typed: str, offered: list[str], tmp_
         [sys.executable, '-m', 'seal_friction_ros.offline.commands.main'], env=environment, cwd=tmp_path, check=True
     )
     assert told.read_text().split() == offered
+
+
+@pytest.mark.parametrize(
+    ('typed', 'words'),
+    [
+        (['reprot', 'bag'], ['reprot is no command', 'did you mean report?', 'charts', 'tune']),
+        (['import', 'lgo'], ['lgo is no source', 'did you mean log?', 'bag, log, thesis']),
+        (['report', 'bag', '--ot', 'x.html'], ['--ot', 'did you mean --out?', '--namespace']),
+        (['info', 'bag', 'other'], ['other is one argument too many']),
+        (['report', 'bag'], ['--out', 'for example: seal_friction report bags/pull_test --out pull_test.html']),
+        (['sheet', 'x', '--out', 'x.csv', '--force-unit', 'lb'], ['lb is no value of --force-unit', 'mean lbf?', 'kN']),
+        (['sheet', 'x', '--out', 'x.csv', '--pressures', '0:5'], ['0:5 is not LOW:HIGH:STEPS']),
+        ([], ['COMMAND']),
+    ],
+    ids=' '.join,
+)
+def test_a_mistyped_word_is_one_line_that_says_what_was_meant_and_what_there_is(typed, words, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(typed)
+    assert stopped.value.code == 2
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert [word for word in words if word not in said] == []
+
+
+@pytest.mark.parametrize(
+    ('typed', 'words'),
+    [
+        (['charts', 'ms28775_115', '--out', 'x.html'], ['no ms28775_115', 'mean ms28775_114?', 'delft_o_ring']),
+        (['replay', PULL_TEST, '--seal', 'placehodler'], ['mean placeholder?']),
+        (['oring', 'ms28775_115'], ['config/oring', 'mean ms28775_114?']),
+        (['import', 'log', 'x.csv', '--rig', 'delf', '--out', 'x'], ['config/rigs', 'mean delft?']),
+    ],
+    ids=lambda value: value[0],
+)
+def test_a_mistyped_seal_or_case_is_one_line_with_the_files_that_there_are(typed, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(typed) == 2
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert [word for word in words if word not in said] == []
+
+
+def test_the_version_is_that_of_the_manifest_and_the_package_runs_as_a_module():
+    command = [sys.executable, '-m', 'seal_friction_ros', '--version']
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    assert told[0] == 'seal_friction'
+    assert f'<version>{told[1]}</version>' in (ROOT / 'package.xml').read_text()
+
+
+def test_help_of_tune_has_a_group_for_each_kind_of_axis(capsys):
+    with pytest.raises(SystemExit):
+        main(['tune', '--help'])
+    groups = dict(re.findall(r'^(\w.*):\n((?:  .*\n)+)', capsys.readouterr().out, re.MULTILINE))
+    assert '--machine ' in groups['on the simulated servo, without --bag']
+    assert '--bag ' in groups['on a recorded axis']
+    assert '--command-topic ' in groups['on a recorded axis']
+
+
+@pytest.mark.parametrize('command', [c for c in parsers(make_parser()) if c], ids=' '.join)
+def test_every_command_has_an_example(command, capsys):
+    with pytest.raises(SystemExit):
+        main([*command, '--help'])
+    assert re.search(rf'^  seal_friction {" ".join(command)}\b', capsys.readouterr().out, re.MULTILINE)
+
+
+def test_a_command_says_every_file_that_it_wrote(tmp_path: Path, capsys):
+    page, sheet = tmp_path / 'page.html', tmp_path / 'sheet.csv'
+    assert main(['charts', 'ms28775_114', '--out', str(page)]) == 0
+    assert capsys.readouterr().out == f'{page}: written, figures in {tmp_path / "page_figures"}\n'
+    assert main(['sheet', 'rod_seal', '--out', str(sheet)]) == 0
+    assert capsys.readouterr().out == f'{sheet}: written, {sheet.with_suffix(".html")}\n'
+
+
+def test_a_sheet_is_metric_unless_asked_for(tmp_path: Path):
+    assert main(['sheet', 'rod_seal', '--seal', 'ms28775_114', '--out', str(tmp_path / 'sheet.csv')]) == 0
+    text = (tmp_path / 'sheet.csv').read_text()
+    assert all(f'[{unit}]' in text or f',{unit}' in text or f' {unit}' in text for unit in ('bar', 'N', 'mm'))
+    assert not re.search(r'\b(psi|lbf|inch)\b', text)
+
+
+def test_seals_lists_every_file_with_law_range_and_source(tmp_path: Path, capsys):
+    assert main(['seals', '--json']) == 0
+    listed = {seal['file']: seal for seal in json.loads(capsys.readouterr().out)['seals']}
+    assert set(listed) == {path.stem for path in (ROOT / 'config' / 'seals').glob('*.yaml')}
+    assert listed['ms28775_114']['law'] == 'physics_based'
+    assert listed['ms28775_114']['range'] == '0 to 68.9 bar'
+    assert listed['ms28775_114']['source'].startswith('Thesis.')
+    (tmp_path / 'bad.yaml').write_text('name: bad\n')
+    assert main(['seals', str(tmp_path)]) == 1
+    assert 'bad.yaml: unusable' in capsys.readouterr().out
+    assert main(['seals', str(tmp_path / 'absent')]) == 2
+
+
+def test_a_terminal_shows_at_once_what_is_being_done():
+    """Before the packages of the command are loaded, and nothing of it is left at the end."""
+    leader, follower = os.openpty()
+    command = [sys.executable, '-m', 'seal_friction_ros', 'info', PULL_TEST]
+    environment = {**os.environ, 'PYTHONPATH': str(ROOT), 'TERM': 'xterm'}
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=follower, env=environment) as process:
+        os.close(follower)
+        first = os.read(leader, 1000)
+        said = b''.join(iter(lambda: _read(leader), b''))
+    os.close(leader)
+    assert process.returncode == 0
+    assert b'info ...' in first
+    assert said.endswith(b'\r\x1b[K')
+
+
+def _read(handle: int) -> bytes:
+    try:
+        return os.read(handle, 1000)
+    except OSError:  # Linux: the other end is closed
+        return b''

@@ -224,7 +224,7 @@ def test_measured_motion_of_a_bag_is_run_and_its_force_compared(small, tmp_path,
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        (['run', 'nowhere'], 'nowhere.yaml: No such file'),
+        (['run', 'nowhere'], 'config/ehl has no nowhere: there are'),
         (['study', 'spool'], 'a spool has no study'),
         (['map', 'spool'], 'a spool has no friction map'),
         (['run', 'spool', '--bag', 'x'], 'a spool cannot be compared with a bag'),

@@ -173,7 +173,7 @@ def test_a_table_in_one_direction_is_taken_with_a_warning(tmp_path):
         ((str(THESIS), str(ROOT / 'bags' / 'pull_test')), 'cannot be fitted together'),
         (('missing.csv',), 'No such file'),
         ((str(ROOT / 'LICENSE'),), 'no log of a known rig'),
-        ((str(THESIS), '--seal', 'missing'), 'No such file'),
+        ((str(THESIS), '--seal', 'missing'), 'config/seals has no missing: there are'),
     ],
 )
 def test_sources_that_are_none_or_do_not_fit_are_refused(arguments, words, tmp_path):

@@ -3,16 +3,21 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from harness.simulated_day import SECOND, Day, write_day
 from paths import ROOT
 
+from seal_friction_ros.core.estimation import compiled_pipeline
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.core.friction.mounting import CHAMBERS
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.replay.bag_health import bag_health, health_of_bags
+from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
 from seal_friction_ros.offline.replay.parallel_replay import verify
+from seal_friction_ros.offline.replay.replay import chosen_configuration
 
 SEAL = ROOT / 'config' / 'seals' / 'ms28775_114.yaml'
 SEALS = mount_seals([read_yaml(SEAL)] * 2, CHAMBERS[:2])
@@ -94,3 +99,16 @@ def test_what_is_learnt_replays_to_the_same_bytes_one_by_one_and_compiled(mode, 
         verdict = verify(out, bulk_from=bulk_from)
         assert verdict.identical
         assert verdict.recorded_estimates == 3000
+
+
+def test_bags_are_followed_in_parallel_as_one_by_one_by_code_that_is_compiled_before(week):
+    override = chosen_configuration(None, SEAL)
+    alone = [bag_health(bag, '', override) for bag in week]
+    together = health_of_bags(week, '', override, workers=2)
+    for one, other in zip(alone, together, strict=True):
+        np.testing.assert_equal(one[:7], other[:7])
+    if hasattr(compiled_pipeline._receive_all, 'signatures'):  # compiled code, not Python
+        known = len(compiled_pipeline._receive_all.signatures)
+        compile_now(first_configurations(week, '', override))
+        bag_health(week[0], '', override)
+        assert len(compiled_pipeline._receive_all.signatures) == known

@@ -130,7 +130,7 @@ def test_a_closed_loop_is_shown_with_its_numbers(closed_loop, tmp_path):
     rows = page.table('stretch')
     for stretch, row in zip((without, compensated), rows, strict=True):
         assert row['RMS error [µm]'] == number(stretch['rms'] * 1e6, 1)
-        assert row['dwell per reversal [ms]'] == number(stretch['dwell'] * 1e3, 1)
+        assert row['dwell [ms]'] == number(stretch['dwell'] * 1e3, 1)
     assert number(compensated['rms_change'], 1, signed=True) in page.tables[0][2]
     assert compensated['rms_change'] < -60.0
     assert (without['settings']['scale'], compensated['settings']['scale']) == (0.0, 0.9)

@@ -129,6 +129,8 @@ def files_below(folder: Path) -> dict[str, bytes]:
 def test_two_runs_write_the_same_bytes(simulated: Path):
     one, two = (files_below(simulated / run) for run in ('one', 'two'))
     assert {'feedforward.yaml', 'feedforward.html', 'feedforward_figures/tracking.png'} <= set(one)
+    page = one.pop('feedforward.html').replace(b'/one/', b'/two/')  # it names the command
+    assert page == two.pop('feedforward.html')
     assert one == two
 
 

@@ -1,0 +1,159 @@
+"""What the live view costs an estimator: ``python bench/monitor.py [--seconds 10] [--rounds 5]``.
+
+The same estimator runs without the monitor and with it and its page open, in turn: one actuator with its own messages
+beside the simulated servo, and a machine of three actuators, both at 1 kHz. Processor time is that of the whole process
+of the estimator; the p99 of its latency is what its diagnostics say, the median over the seconds of a round.
+"""
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.browser import browser, chromium
+from harness.monitor_process import Reader, monitor
+from harness.moving_machine import machine
+from harness.processes import free_domain, node_process
+from harness.spin_nodes import SpunNodes, ros_context
+from paths import ROOT
+
+WARM_UP = 3.0  # [s] of a round, not counted: discovery, compilation of the page
+CASES = ('one actuator', 'machine of three')
+P99, RATE = 'latency p99 [us]', 'estimate rate [Hz]'
+
+
+class Round(NamedTuple):
+    """Figures of some seconds."""
+
+    cpu: float  # [us] of the estimator per estimate
+    p99: float  # [us]
+    monitor_cpu: float  # [s] of the monitor per second; 0.0 without
+
+
+class Listener(Node):
+    """Keeps the p99 that the estimator reports each second."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('bench', **kwargs)
+        self.p99: list[float] = []
+        self.rates: list[float] = []
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+
+    def _on_diagnostics(self, array: DiagnosticArray) -> None:
+        found = [v.value for status in array.status for v in status.values if v.key == P99 and v.value != 'none']
+        if found:
+            self.p99.append(max(map(float, found)))
+            self.rates.append(sum(float(v.value) for s in array.status for v in s.values if v.key == RATE))
+
+
+def cpu(pid: int) -> float:
+    """Processor time of a process [s]."""
+    threads = Path(f'/proc/{pid}/task').glob('*/schedstat')
+    return sum(int(thread.read_text().split()[0]) for thread in threads) * 1e-9
+
+
+@contextmanager
+def estimator(case: str, folder: Path, domain: int) -> Iterator[int]:
+    """Process number of a running estimator whose inputs come."""
+    with ExitStack() as stack:
+        if case == CASES[1]:
+            process = stack.enter_context(machine(folder, domain))
+        else:
+            simulator = ROOT / 'config' / 'servo_simulator.yaml'
+            log = folder / 'log'
+            stack.enter_context(node_process('servo_simulator', domain, {}, log, parameter_file=simulator))
+            process = stack.enter_context(node_process('friction_estimator', domain, {}, log))
+        yield process.pid
+
+
+def measure(pid: int, seconds: float, spun: SpunNodes, listener: Listener, watching: int) -> Round:
+    """One round."""
+    spun.spin(WARM_UP)
+    listener.p99.clear()
+    listener.rates.clear()
+    began, own, other = time.monotonic(), cpu(pid), cpu(watching) if watching else 0.0
+    spun.spin(seconds)
+    if not spun.spin_until(lambda: listener.p99):
+        raise RuntimeError('the estimator does not estimate any more')
+    taken = time.monotonic() - began
+    used = (cpu(watching) - other) / taken if watching else 0.0
+    estimates = median(listener.rates) * taken  # fewer than sent where processors are short
+    return Round((cpu(pid) - own) / estimates * 1e6, median(listener.p99), used)
+
+
+def run(case: str, seconds: float, rounds: int, *, with_browser: bool) -> dict[bool, list[Round]]:
+    """Rounds without and with the monitor, in turn."""
+    found: dict[bool, list[Round]] = {False: [], True: []}
+    domain = free_domain()
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        pid = stack.enter_context(estimator(case, folder, domain))
+        context = stack.enter_context(ros_context(domain))
+        listener = Listener(context=context)
+        stack.callback(listener.destroy_node)
+        spun = SpunNodes(context, listener)
+        if not spun.spin_until(lambda: listener.p99, 120.0):
+            raise RuntimeError(f'no estimates: {(folder / "log").read_text()}')
+        for _ in range(rounds):
+            found[False].append(measure(pid, seconds, spun, listener, 0))
+            with ExitStack() as page, monitor(domain) as (watching, url):
+                if with_browser:
+                    page.enter_context(browser(folder)).open(url)
+                else:
+                    Reader(url)
+                found[True].append(measure(pid, seconds, spun, listener, watching))
+    return found
+
+
+def main() -> int:
+    """Measure; print a table or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--seconds', type=float, default=10.0, help='of a round')
+    parser.add_argument('--rounds', type=int, default=5)
+    parser.add_argument('--cases', nargs='+', choices=CASES, default=list(CASES))
+    parser.add_argument('--browser', action='store_true', help='open the page in a headless Chromium on this machine')
+    parser.add_argument('--json', action='store_true')
+    arguments = parser.parse_args()
+    if arguments.browser and not chromium():
+        parser.error('chromium is not installed: apt-get install chromium')
+    figures = {}
+    for case in arguments.cases:
+        found = run(case, arguments.seconds, arguments.rounds, with_browser=arguments.browser)
+        pairs = list(zip(found[False], found[True], strict=True))
+        figures[case] = {
+            'processor per estimate, without [us]': round(median(one.cpu for one in found[False]), 1),
+            'processor, with [us]': round(median(one.cpu for one in found[True]), 1),
+            'ratio of processor time': round(median(b.cpu / a.cpu for a, b in pairs), 3),
+            'p99, without [us]': round(median(one.p99 for one in found[False]), 1),
+            'p99, with [us]': round(median(one.p99 for one in found[True]), 1),
+            'ratio of p99': round(median(b.p99 / a.p99 for a, b in pairs), 3),
+            'monitor itself [%]': round(100 * median(one.monitor_cpu for one in found[True]), 1),
+            'load of the machine': round(os.getloadavg()[0], 1),
+        }
+    if arguments.json:
+        print(json.dumps(figures))
+        return 0
+    table = Table(title=f'1 kHz, median of {arguments.rounds} rounds of {arguments.seconds:g} s')
+    for heading in ('', *next(iter(figures.values()))):
+        table.add_column(heading, justify='left' if not heading else 'right')
+    for case, values in figures.items():
+        table.add_row(case, *(str(value) for value in values.values()))
+    Console().print(table)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,122 @@
+"""The feed-forward as the message that a controller takes, as bytes (CDR, little endian, padding zero).
+
+Beside the message of this project, a command goes out as
+
+- the effort of a joint in a ``sensor_msgs/JointState``,
+- one number of a ``std_msgs/Float64MultiArray``, where all actuators with the same topic share one message,
+- a ``std_msgs/Float64``.
+
+A command is ``gain`` times the force: 1 for an effort [N], else units of the command per newton, for controllers that
+take a position, a velocity or a valve command. A command is 0 exactly where the force is 0.
+"""
+
+import math
+import struct
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from seal_friction_ros.core.estimation.messages import SECOND
+from seal_friction_ros.core.machine.machine import Machine, MachineState
+from seal_friction_ros.core.machine.machine_file import MachineFile, Output
+
+_ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little endian, no options
+
+
+class Command(NamedTuple):
+    """A message for a controller."""
+
+    topic: str
+    type_name: str  # ``package/Name``
+    data: bytes
+
+
+def commands(file: MachineFile, forces: Mapping[str, float], stamp: int) -> list[Command]:
+    """Messages for the controllers, one for each topic, in order of the mapping file.
+
+    Args:
+        file: The mapping file.
+        forces: Name of each actuator -> newest feed-forward [N]; one that is not finite or not there counts as 0.
+        stamp: Of the messages with a header [ns].
+
+    Returns:
+        The messages; an element of an array that no actuator has is 0.
+    """
+    topics: dict[str, list[tuple[Output, float]]] = {}
+    for actuator in file.actuators:
+        if actuator.output is not None:
+            command = actuator.output.gain * forces.get(actuator.name, 0.0)
+            topics.setdefault(actuator.output.topic, []).append(
+                (actuator.output, command if math.isfinite(command) else 0.0)
+            )
+    return [Command(topic, parts[0][0].type_name, _encoded(parts, stamp)) for topic, parts in topics.items()]
+
+
+def due_commands(machine: Machine, state: MachineState, has_feedforward: bool, received: int) -> list[Command]:
+    """Commands after a message: if it made a feed-forward, or an actuator has failed, whose command is 0 then.
+
+    Args:
+        machine: The machine.
+        state: After the message.
+        has_feedforward: Whether the message made one.
+        received: When the message was received [ns].
+    """
+    states = state.actuators
+    if not has_feedforward and not any(known.fault for known in states):
+        return []
+    forces = {actuator.name: known.force for actuator, known in zip(machine.actuators, states, strict=True)}
+    return commands(machine.file, forces, received + states[0].pipeline.clock_offset)
+
+
+def check_outputs(file: MachineFile) -> None:
+    """Check that actuators which share a topic have places of their own in one type.
+
+    Raises:
+        ValueError: Two do not; names both.
+    """
+    seen: dict[tuple[str, int, str], str] = {}
+    types: dict[str, str] = {}
+    for actuator in file.actuators:
+        output = actuator.output
+        if output is None:
+            continue
+        if types.setdefault(output.topic, output.type_name) != output.type_name:
+            raise ValueError(f'{actuator.name}: output.type = {output.type_name}: {output.topic} has another type')
+        place = output.topic, output.index, output.joint
+        if place in seen:
+            raise ValueError(
+                f'{actuator.name} and {seen[place]} have the same place in {output.topic}: give another index or joint'
+            )
+        seen[place] = actuator.name
+
+
+def _encoded(parts: list[tuple[Output, float]], stamp: int) -> bytes:
+    kind = parts[0][0].type_name
+    if kind == 'std_msgs/Float64':
+        return struct.pack('<4sd', _ENCAPSULATION, parts[0][1])
+    if kind == 'std_msgs/Float64MultiArray':
+        values = [0.0] * (1 + max(output.index for output, _ in parts))
+        for output, command in parts:
+            values[output.index] = command
+        # no dimensions, data_offset 0, then the data; the first number is aligned to 8
+        return struct.pack(f'<4sIII4x{len(values)}d', _ENCAPSULATION, 0, 0, len(values), *values)
+    return _joint_state(parts, stamp)
+
+
+def _joint_state(parts: list[tuple[Output, float]], stamp: int) -> bytes:
+    seconds, nanoseconds = divmod(stamp, SECOND)
+    body = bytearray(struct.pack('<iIIB', seconds, nanoseconds, 1, 0))  # an empty frame name has its end
+    _align(body, 4)
+    body += struct.pack('<I', len(parts))
+    for output, _ in parts:
+        name = output.joint.encode() + b'\x00'
+        _align(body, 4)
+        body += struct.pack('<I', len(name)) + name
+    _align(body, 4)
+    body += struct.pack('<III', 0, 0, len(parts))  # no positions, no velocities
+    _align(body, 8)
+    body += struct.pack(f'<{len(parts)}d', *(command for _, command in parts))
+    return _ENCAPSULATION + bytes(body)
+
+
+def _align(body: bytearray, size: int) -> None:
+    body += bytes(-len(body) % size)

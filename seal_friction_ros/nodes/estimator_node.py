@@ -1,0 +1,308 @@
+"""What the estimator of one actuator and that of a machine share: clock of receipt, recording, watch of the graph."""
+
+import time
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import QoSProfile
+from std_srvs.srv import Trigger
+
+from seal_friction_ros.core.estimation.node_options import InputOptions, RecordingOptions
+from seal_friction_ros.core.foundation.parameters import ParameterGroup
+from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
+from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
+from seal_friction_ros.nodes.input_watch import InputWatch
+from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
+from seal_friction_ros.nodes.recording import Recording
+
+_WATCH_PERIOD = 0.05  # [s]
+_WATCHDOG_PERIOD = 0.01  # [s] more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
+_HEALTH_PERIOD = 60.0  # [s]
+_INPUT_PERIOD = 0.5  # [s]
+_LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
+STOP_PERIOD = 0.005  # [s] between two forces while the node stops
+LAST_FORCES = (
+    10  # number of forces of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
+)
+_HEALTH, _MONITOR = 'health', 'monitor'  # keys of their publishers
+
+
+class EstimatorNode(ManagedNode):
+    """Lifecycle node that estimates and records; a subclass has the live path.
+
+    A subclass overrides what is listed first, makes ``_watch`` and calls `create_timers` in `make`, and calls `begin`
+    at the end of `start`.
+
+    Raises:
+        ValueError: A parameter has the wrong type or is out of bounds.
+    """
+
+    _watch: GraphWatch
+    _input_watch: InputWatch
+
+    def __init__(self, name: str, groups: tuple[ParameterGroup, ...], **kwargs: Any) -> None:
+        self._logged_errors: dict[str, str] = {}
+        self._inputs: dict[str, Any] = {}
+        self._outputs: dict[Any, Any] = {}
+        self._topics: dict[Any, str] = {}
+        self._timers: list[Any] = []
+        super().__init__(name, groups, **kwargs)
+        self._recording = Recording(self.get_fully_qualified_name())
+        self.create_service(Trigger, '~/start_recording', self._on_start_recording)
+        self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
+        self.create_service(Trigger, '~/reset_adaptation', self._on_reset_adaptation)
+
+    # --- overridden by subclasses ---
+
+    @property
+    def clock_offset(self) -> int:
+        """What the clock of the stamps shows after the clock of receipt [ns]."""
+        raise NotImplementedError
+
+    def set_clock_offset(self, offset: int) -> None:
+        """Use another offset [ns] from now on."""
+        raise NotImplementedError
+
+    def publish_configuration(self) -> None:
+        """Publish and record all that the next answer depends on."""
+        raise NotImplementedError
+
+    def reset_adaptation(self) -> None:
+        """Forget what the adaptation has learnt."""
+        raise NotImplementedError
+
+    def input_type(self, name: str) -> str:
+        """Message type of an input."""
+        raise NotImplementedError
+
+    def on_input(self, name: str, data: bytes) -> None:
+        """Take one message of an input."""
+        raise NotImplementedError
+
+    @property
+    def needed_inputs(self) -> Collection[str]:
+        """Inputs without which there is no good estimate."""
+        raise NotImplementedError
+
+    def received(self) -> Mapping[str, int]:
+        """Messages of each input since activation."""
+        raise NotImplementedError
+
+    def on_watchdog(self) -> None:
+        """Renew each feed-forward that no sample renews, so that it fades out; every `_WATCHDOG_PERIOD`."""
+        raise NotImplementedError
+
+    def fade_out(self) -> None:
+        """Fade every force to 0 N."""
+        raise NotImplementedError
+
+    def health(self) -> dict[str, DiagnosticStatus]:
+        """Indicators of the seals, by the name of the part."""
+        raise NotImplementedError
+
+    def newest_answers(self) -> list[NamedAnswer]:
+        """The newest answers of each actuator since the last call, see `EstimatorDiagnostics.take_newest`."""
+        raise NotImplementedError
+
+    # --- lifecycle ---
+
+    def release(self) -> None:
+        """Destroy publishers, subscriptions and timers."""
+        for subscription in self._inputs.values():
+            self.destroy_subscription(subscription)
+        for publisher in self._outputs.values():
+            self.destroy_publisher(publisher)
+        for timer in self._timers:
+            self.destroy_timer(timer)
+        self._inputs.clear()
+        self._outputs.clear()
+        self._timers.clear()
+
+    def create_timers(self) -> None:
+        """Timers of the graph, the watchdog and the health, and the publisher of the health."""
+        self._outputs[_HEALTH] = self.create_publisher(DiagnosticArray, '~/health', 10)
+        self._outputs[_MONITOR] = self.create_publisher(
+            message_class(MACHINE_TYPE), '~/monitor', qos.best_effort(qos.STREAM)
+        )
+        self._is_watched = False
+        self._timers = [
+            self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
+            self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog_timer),
+            self.create_steady_timer(_HEALTH_PERIOD, self._on_health_timer),
+            self.create_steady_timer(_INPUT_PERIOD, self._on_input_timer),
+        ]
+
+    def begin(self) -> None:
+        """Begin to record if ``record`` is set; at the end of `start`."""
+        self._logged_errors.clear()
+        self._receipt_offset = time.time_ns() - time.monotonic_ns()
+        self._received = 0
+        self._now = self._receipt_clock()
+        self._input_watch = InputWatch(self.needed_inputs, time.monotonic(), self._watch.publishers_text)
+        if self.settings(RecordingOptions).record:
+            self._start_recording()
+        else:
+            self.publish_configuration()
+        self.get_logger().info('estimating')
+
+    def finish(self) -> None:
+        """Bring the force to 0 N, stop estimating, finish the bag."""
+        if self.active:
+            self.fade_out()
+        self.active = False
+        outcome = self._recording.close()
+        if outcome:
+            self.get_logger().info(outcome)
+
+    def subscribe(self, name: str, profile: QoSProfile) -> None:
+        """Subscribe to an input, in place of the present subscription."""
+        if name in self._inputs:
+            self.destroy_subscription(self._inputs[name])
+        overriding = qos.overridable() if profile is qos.STREAM else None
+        self._inputs[name] = self.create_subscription(
+            message_class(self.input_type(name)),
+            name,
+            partial(self.on_input, name),
+            profile,
+            raw=True,
+            qos_overriding_options=overriding,
+            # An event of a subscription that is replaced meanwhile is a segmentation fault of the events executor.
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
+        self._topics[name] = self._inputs[name].topic_name
+
+    def _on_watchdog_timer(self) -> None:
+        self.on_watchdog()
+        self.publish_newest()
+
+    def publish_newest(self) -> None:
+        """Publish the newest answers for the live view, if there is one: 100 messages a second and not thousands."""
+        if self._is_watched and (newest := self.newest_answers()):
+            self._outputs[_MONITOR].publish(encode_together(newest))
+
+    # --- clock and graph ---
+
+    def _on_watch_timer(self) -> None:
+        """Publish diagnostics when a publisher of an input has appeared or disappeared; follow a clock that was set.
+
+        If the next bag is due, let it begin with a snapshot.
+        """
+        self._is_watched = self._outputs[_MONITOR].get_subscription_count() > 0
+        if self._watch.has_changed():
+            self.publish_diagnostics()
+        following = self._recording.continue_in_next_bag()
+        if following:
+            self.publish_configuration()
+            self.get_logger().info(f'recording to {following}')
+        if self.active and self._now == self._steady_time:
+            offset = time.time_ns() - self._now()
+            if abs(offset - self.clock_offset) > _LARGEST_CLOCK_STEP:
+                self._follow_clock(offset)
+
+    def _on_input_timer(self) -> None:
+        """Say what the node waits for, which input has stopped, and which is back."""
+        if not self.active:
+            return
+        for remark in self._input_watch.look(self.received(), time.monotonic()):
+            if remark.is_warning:
+                self.get_logger().warning(remark.text)
+            else:  # a line of its own: rclpy allows one severity a line
+                self.get_logger().info(remark.text)
+
+    def _follow_clock(self, offset: int) -> None:
+        """Judge the age of stamps by a clock that was set; the time of receipt goes on."""
+        self.get_logger().warning(f'the clock was set by {(offset - self.clock_offset) * 1e-9:.3f} s')
+        self.set_clock_offset(offset)
+        self.publish_configuration()
+
+    def _receipt_clock(self) -> Callable[[], int]:
+        return self._simulated_time if self.get_parameter('use_sim_time').value else self._steady_time
+
+    def _simulated_time(self) -> int:
+        """Time of receipt [ns] with ``use_sim_time``: it increases at every call, as the log time of a bag does."""
+        shown = self.get_clock().now().nanoseconds
+        if shown - self.clock_offset < self._received - _LARGEST_CLOCK_STEP:
+            self._follow_clock(shown - self._received)
+        self._received = max(shown - self.clock_offset, self._received + 1)
+        return self._received
+
+    def _steady_time(self) -> int:
+        """Time of receipt [ns]: the clock as it was at activation, which no setting of the clock changes."""
+        return time.monotonic_ns() + self._receipt_offset
+
+    # --- recording ---
+
+    def publish_recorded(self, key: Any, type_name: str, data: bytes) -> None:
+        """Publish a message by the publisher ``key``, and record it."""
+        self._outputs[key].publish(data)
+        self._recording.record(self._topics[key], type_name, self._now(), data)
+
+    def _start_recording(self) -> tuple[bool, str]:
+        """Start a bag, which begins with a snapshot; success, and the folder of the bag or the error."""
+        try:
+            path = self._recording.start(self.settings(RecordingOptions))
+        except ValueError as error:
+            self.log_error_once('recorder', str(error))
+            self.publish_configuration()
+            return False, str(error)
+        self.publish_configuration()
+        self.get_logger().info(f'recording to {path}')
+        return True, str(path)
+
+    def _on_start_recording(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        del request
+        if self.active:
+            response.success, response.message = self._start_recording()
+        else:
+            response.success, response.message = False, 'not active: nothing to record'
+        return response
+
+    def _on_stop_recording(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        del request
+        outcome = self._recording.stop()
+        response.success = bool(outcome) and not self._recording.failure
+        response.message = outcome or 'not recording'
+        return response
+
+    def _on_reset_adaptation(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        del request
+        response.success = self.active
+        response.message = 'scale 1, offset 0 N' if self.active else 'not active: nothing is learnt'
+        if self.active:
+            self.reset_adaptation()
+            self.publish_configuration()  # a replay forgets at the same message
+        return response
+
+    # --- diagnostics ---
+
+    def _on_health_timer(self) -> None:
+        """Publish the health of the seals while the adaptation learns."""
+        message = DiagnosticArray()
+        for part, status in self.health().items():
+            status.name = f'{self.get_fully_qualified_name()}: {part}'
+            message.status.append(status)
+        if message.status:
+            message.header.stamp = self.get_clock().now().to_msg()
+            self._outputs[_HEALTH].publish(message)
+
+    def report_graph(self, graph: GraphFindings) -> DiagnosticStatus:
+        """Log what is new about the graph and the recorder; status of the recorder."""
+        recorder = self._recording.report()
+        self.log_error_once('publishers', '; '.join(graph.duplicates))
+        self.log_error_once('unheard', '; '.join(graph.unheard))
+        self.log_error_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
+        return recorder
+
+    def log_error_once(self, subject: str, error: str) -> None:
+        """Log an error when it appears or changes, not every second."""
+        if error and error != self._logged_errors.get(subject):
+            self.get_logger().error(error)
+        self._logged_errors[subject] = error
+
+    def is_refused(self, duplicates: list[str]) -> bool:
+        """Whether the inputs are rejected, since these topics have several publishers."""
+        return bool(duplicates) and self.settings(InputOptions).refuse_second_publisher

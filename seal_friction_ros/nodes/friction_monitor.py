@@ -1,0 +1,278 @@
+"""Listens to every estimator of the graph for the web page of ``seal_friction monitor``; it publishes nothing.
+
+It is a process of its own and listens with best effort: no estimator waits for it. The middleware keeps the last
+messages of each topic and this node takes them at the pace of the view: it does not wake for every message.
+"""
+
+import argparse
+import os
+import queue
+import sys
+import time
+from collections.abc import Iterable, Mapping
+from concurrent.futures import Future
+from functools import partial
+from typing import Any, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.utilities import remove_ros_args
+
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS
+from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition
+from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.executor import run
+from seal_friction_ros.nodes.managed_node import message_class
+from seal_friction_ros.offline.bags.bag import message_definition
+from seal_friction_ros.offline.monitor.live_view import RATE, Answer, LiveView, Wanted
+from seal_friction_ros.offline.monitor.node_view import NodeView
+from seal_friction_ros.offline.monitor.server import MonitorServer
+
+ANSWER_TIMEOUT = 3.0  # [s] until a node that does not answer counts as one that did not change
+NICENESS = 10  # where processors are short, an estimator has nine times the share of the monitor (our choice)
+_SEARCH_PERIOD = 1.0  # [s] between two looks for new estimators
+_CONFIGURATION, _ANSWERS = '/configuration', '/monitor'  # ends of topics of a node
+_DEPTHS = {True: 8, False: 1}
+"""Of the queue of answers, whose bits must not be lost, and of an input, of which the newest is shown."""
+
+
+class _Asked(NamedTuple):
+    """A change of parameters that somebody waits for."""
+
+    node: str
+    values: dict[str, float]
+    deadline: float  # [s] of `time.monotonic`
+    answer: 'Future[Answer]'
+
+    def outcome(self) -> Answer:
+        """The answer, or that there was none in time."""
+        try:
+            return self.answer.result(max(self.deadline - time.monotonic(), 0.0))
+        except TimeoutError:
+            return Answer(False, f'NOT CONFIRMED: no answer from {self.node} within {ANSWER_TIMEOUT:g} s')
+
+
+class FrictionMonitor(Node):
+    """Feeds a `LiveView`.
+
+    Args:
+        allow_changes: Whether the page may change parameters of the feed-forward.
+    """
+
+    def __init__(self, allow_changes: bool = False, **kwargs: Any) -> None:
+        quiet = {'enable_rosout': False, 'start_parameter_services': False}
+        super().__init__('friction_monitor', **quiet, **kwargs)
+        self._listener = Node('friction_monitor_listener', **quiet, **kwargs)  # never spun: its messages are taken
+        self._clock_offset = time.time_ns() - time.monotonic_ns()
+        self.view = LiveView(self._received(), self._change if allow_changes else None)
+        self._nodes: dict[str, NodeView] = {}
+        self._topics: dict[str, dict[str, Any]] = {}
+        self._asked: queue.SimpleQueue[_Asked] = queue.SimpleQueue()
+        self._waiting: list[_Asked] = []
+        self._clients_by_node: dict[str, tuple[Any, Any]] = {}
+        self._allow_changes = allow_changes
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0 / RATE, self._on_timer, clock=steady)
+        self.create_timer(_SEARCH_PERIOD, self._search, clock=steady)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+        self._search()
+
+    def destroy_node(self) -> None:
+        """Destroy both nodes."""
+        self._listener.destroy_node()
+        super().destroy_node()
+
+    def _received(self) -> int:
+        """Time of receipt [ns]: the clock as it was at the start, which no setting of the clock changes."""
+        return time.monotonic_ns() + self._clock_offset
+
+    # --- what is there ---
+
+    def _search(self) -> None:
+        """Listen to estimators that have appeared, by their configurations, and to topics that they have added."""
+        for topic, types in self.get_topic_names_and_types():
+            node = topic.removesuffix(_CONFIGURATION)
+            if types == [CONFIGURATION_TYPE] and node != topic and node not in self._nodes:
+                self._nodes[node] = view = NodeView(node, _definitions)
+                self._topics[node] = {}
+                self.view.add(view)
+                self.create_subscription(
+                    message_class(CONFIGURATION_TYPE),
+                    topic,
+                    partial(self._on_configuration, view),
+                    qos.LATCHED,
+                    raw=True,
+                )
+                if self._allow_changes:
+                    self._clients_of(node)  # so that they are found before somebody presses OFF
+        for view in self._nodes.values():
+            if view.known:
+                self._listen(view)
+
+    def _on_configuration(self, view: NodeView, data: bytes) -> None:
+        with self.view.lock:
+            view.take(view.node + _CONFIGURATION, CONFIGURATION_TYPE, data, self._received())
+        self._listen(view)
+
+    def _listen(self, view: NodeView) -> None:
+        """Subscribe to what an estimator publishes and takes."""
+        namespace, _, name = view.node.rpartition('/')
+        found = self._topics[view.node]
+        wanted = {topic: full_name(kind) for topic, kind in view.input_topics.items()}
+        try:
+            answers = self.get_publisher_names_and_types_by_node(name, namespace or '/')
+            inputs = self.get_subscriber_names_and_types_by_node(name, namespace or '/')
+        except RuntimeError:  # NodeNameNonExistentError: it has gone, or its name is not known yet
+            return
+        wanted |= {topic: types[0] for topic, types in answers if topic == view.node + _ANSWERS}
+        if view.machine is None:
+            wanted |= {topic: types[0] for topic, types in inputs if types[0] in DECODERS}
+        for topic, type_name in wanted.items():
+            if topic not in found:
+                depth = _DEPTHS[topic == view.node + _ANSWERS]
+                found[topic] = (
+                    type_name,
+                    self._listener.create_subscription(
+                        message_class(type_name), topic, _never_called, _best_effort(depth), raw=True
+                    ),
+                )
+
+    def _on_diagnostics(self, array: DiagnosticArray) -> None:
+        with self.view.lock:
+            for status in array.status:
+                node, _, part = status.name.rpartition(': ')
+                if node in self._nodes:
+                    self._nodes[node].diagnostics[part] = {
+                        'level': ord(status.level),
+                        'message': status.message,
+                        'values': {value.key: value.value for value in status.values},
+                    }
+
+    # --- at the pace of the view ---
+
+    def _on_timer(self) -> None:
+        """Take the messages that have come, and add a row; send what the page asks for."""
+        now = self._received()
+        with self.view.lock:
+            for node, topics in self._topics.items():
+                for topic, (type_name, subscription) in topics.items():
+                    for data in _taken(subscription):
+                        self._nodes[node].take(topic, type_name, data, now)
+        self.view.sample(now)
+        self._send_changes()
+
+    # --- changes ---
+
+    def _change(self, wanted: Wanted) -> list[Answer]:
+        """Set parameters of nodes and read them back; called by a thread of the server."""
+        deadline = time.monotonic() + ANSWER_TIMEOUT
+        asked = [_Asked(node, values, deadline, Future()) for node, values in wanted.items()]
+        for one in asked:
+            self._asked.put(one)
+        return [one.outcome() for one in asked]
+
+    def _send_changes(self) -> None:
+        """Send what the page has asked for to the nodes that are there; what waits too long is not sent any more."""
+        while not self._asked.empty():
+            self._waiting.append(self._asked.get())
+        self._waiting = [one for one in self._waiting if time.monotonic() < one.deadline and not self._is_sent(one)]
+
+    def _is_sent(self, asked: _Asked) -> bool:
+        setter, reader = self._clients_of(asked.node)
+        if not (setter.service_is_ready() and reader.service_is_ready()):
+            return False
+        parameters = [
+            Parameter(name=name, value=ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value))
+            for name, value in asked.values.items()
+        ]
+        request = SetParametersAtomically.Request(parameters=parameters)
+        setter.call_async(request).add_done_callback(partial(self._on_set, asked))
+        return True
+
+    def _clients_of(self, node: str) -> tuple[Any, Any]:
+        """Clients of a node that set and read parameters."""
+        if node not in self._clients_by_node:
+            self._clients_by_node[node] = (
+                self.create_client(SetParametersAtomically, f'{node}/set_parameters_atomically'),
+                self.create_client(GetParameters, f'{node}/get_parameters'),
+            )
+        return self._clients_by_node[node]
+
+    def _on_set(self, asked: _Asked, future: Any) -> None:
+        result = future.result().result
+        if not result.successful:
+            asked.answer.set_result(Answer(False, f'REJECTED by {asked.node}: {result.reason}'))
+            return
+        _, reader = self._clients_of(asked.node)
+        request = GetParameters.Request(names=list(asked.values))
+        reader.call_async(request).add_done_callback(partial(self._on_read, asked))
+
+    def _on_read(self, asked: _Asked, future: Any) -> None:
+        values = dict(zip(asked.values, (value.double_value for value in future.result().values), strict=False))
+        shown = ', '.join(f'{name} = {value:g}' for name, value in values.items())
+        at = time.strftime('%H:%M:%S')
+        if values != asked.values:
+            asked.answer.set_result(
+                Answer(False, f'NOT CONFIRMED by {asked.node}: it has {shown or "no such parameter"}')
+            )
+            return
+        word = 'OFF' if all(n.endswith('scale') and v == 0.0 for n, v in values.items()) else 'changed'
+        asked.answer.set_result(Answer(True, f'{word}: confirmed by {asked.node} at {at}: {shown}'))
+
+
+def _definitions(types: Iterable[str]) -> Mapping[str, Definition]:
+    """Definitions of installed message types."""
+    return {kind: parse_definition(kind, message_definition(full_name(kind))[0]) for kind in types}
+
+
+def _best_effort(depth: int) -> QoSProfile:
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT, durability=DurabilityPolicy.VOLATILE)
+
+
+def _never_called(_data: bytes) -> None:
+    """Callback of a subscription whose messages are taken."""
+
+
+def _taken(subscription: Any) -> list[bytes]:
+    """Messages that have come since the last call, as bytes."""
+    found = []
+    with subscription.handle:
+        while (message := subscription.handle.take_message(subscription.msg_type, True)) is not None:
+            found.append(message[0])
+    return found
+
+
+def main() -> int:
+    """Run ``friction_monitor [--allow-changes] [--port N]``; prints the address of the page."""
+    parser = argparse.ArgumentParser(prog='friction_monitor', description=__doc__.split('\n', maxsplit=1)[0])
+    parser.add_argument('--allow-changes', action='store_true', help='let the page change the feed-forward')
+    parser.add_argument('--port', type=int, default=0, help='port on 127.0.0.1; 0: any free one')
+    parser.add_argument('--json', action='store_true', help='print the address as JSON')
+    arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    os.nice(NICENESS)
+    servers: list[MonitorServer] = []
+
+    def start(node: FrictionMonitor) -> bool:
+        try:
+            server = MonitorServer(node.view, arguments.port)
+        except ValueError as error:
+            print(f'friction_monitor: {error}', file=sys.stderr)
+            return False
+        servers.append(server)
+        server.start()
+        print(server.told(as_json=arguments.json), flush=True)
+        return True
+
+    def stop(_node: FrictionMonitor) -> None:
+        for server in servers:
+            server.stop()
+
+    return run(lambda: FrictionMonitor(arguments.allow_changes), start, stop)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,402 @@
+"""Live node for a machine of several actuators with messages of any type, see `core.machine`."""
+
+import sys
+import time
+from collections.abc import Collection, Mapping
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.event_handler import PublisherEventCallbacks
+
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    OUTPUTS,
+    TICK_TYPE,
+    Output,
+    encode,
+    encode_text,
+    type_of,
+)
+from seal_friction_ros.core.estimation.node_options import (
+    ADAPTATION_PREFIX,
+    FEEDFORWARD_PREFIX,
+    MACHINE_ESTIMATOR_PARAMETERS,
+    MachineOptions,
+)
+from seal_friction_ros.core.estimation.records import WatchdogTick
+from seal_friction_ros.core.foundation.parameters import ParameterGroup
+from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
+from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
+from seal_friction_ros.core.machine.machine import (
+    Machine,
+    MachineState,
+    due,
+    init,
+    make_machine,
+    missing,
+    receive,
+    receive_tick,
+)
+from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile
+from seal_friction_ros.core.machine.machine_snapshot import machine_text
+from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition
+from seal_friction_ros.core.machine.outputs import Command, due_commands
+from seal_friction_ros.files import load_configuration, read_machine, read_machine_document
+from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
+from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STOP_PERIOD, EstimatorNode
+from seal_friction_ros.nodes.executor import run
+from seal_friction_ros.nodes.friction_estimator import SWITCH_INTERVAL
+from seal_friction_ros.nodes.graph_watch import GraphWatch
+from seal_friction_ros.nodes.managed_node import message_class
+from seal_friction_ros.offline.bags.bag import message_definition
+
+_TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
+
+
+class MachineEstimator(EstimatorNode):
+    """Lifecycle node around `core.machine.machine`.
+
+    Raises:
+        ValueError: A parameter has the wrong type or is out of bounds, or the mapping file is not valid.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        self._sent: list[NamedAnswer] = []
+        self._together = b''
+        self._newest: dict[str, bytes] = {}
+        super().__init__('machine_estimator', MACHINE_ESTIMATOR_PARAMETERS, **kwargs)
+
+    def more_groups(self) -> tuple[ParameterGroup, ...]:
+        """Read the mapping file; the parameters of each actuator begin with its name."""
+        name = self.settings(MachineOptions).machine
+        if not name:
+            raise ValueError('machine is not set: give the mapping file, -p machine:=robot.yaml')
+        self._document: Mapping[str, Any] = read_machine_document(name)
+        self._file: MachineFile = read_machine(name)
+        return tuple(group for actuator in self._file.actuators for group in _groups(actuator))
+
+    # --- lifecycle ---
+
+    def make(self) -> None:
+        """Read the seal files; create publishers and subscriptions."""
+        self._definitions: dict[str, Definition] = {
+            kind: parse_definition(kind, message_definition(full_name(kind))[0]) for kind in self._file.topics.values()
+        }
+        self._machine = self._made()
+        if any(actuator.configuration.has_placeholder for actuator in self._machine.actuators):
+            self.get_logger().warning(PLACEHOLDER_WARNING)
+        self._types = {topic: full_name(self._file.topics[topic]) for topic in self._machine.plans}
+        self._new_statistics()
+        answers = {('', MACHINE_TYPE): '~/friction'}
+        if not self._file.together:
+            answers = {
+                (actuator.name, kind): f'{actuator.name}/{topic}'
+                for actuator in self._file.actuators
+                for topic, kind in OUTPUTS.items()
+            }
+        types = {key: key[1] for key in answers}
+        self._watch = GraphWatch(self, self._inputs, self._types, self._outputs, types, self.subscribe)
+        for key, topic in answers.items():
+            self._publish_on(key, topic, key[1])
+        for topic, kind in {a.output.topic: a.output.type_name for a in self._file.actuators if a.output}.items():
+            self._publish_on(('', topic), topic, full_name(kind))
+        self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
+            message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
+        )
+        self._topics = {key: publisher.topic_name for key, publisher in self._outputs.items()}
+        self._ticks = [self.resolve_topic_name(f'{actuator.name}/watchdog_tick') for actuator in self._file.actuators]
+        for topic in self._types:
+            self.subscribe(topic, qos.STREAM)
+        self.create_timers()
+
+    def _publish_on(self, key: tuple[str, str], topic: str, type_name: str) -> None:
+        incompatible = PublisherEventCallbacks(incompatible_qos=partial(self._watch.on_incompatible_subscriber, key))
+        self._outputs[key] = self.create_lifecycle_publisher(
+            message_class(type_name),
+            topic,
+            qos.STREAM,
+            qos_overriding_options=qos.overridable(),
+            event_callbacks=incompatible,
+        )
+
+    def _made(self) -> Machine:
+        """Machine with the present parameters."""
+        configurations = {actuator.name: self._configuration(actuator) for actuator in self._file.actuators}
+        return make_machine(self._file, configurations, self._definitions)
+
+    def _configuration(self, actuator: Actuator) -> Configuration:
+        try:
+            return load_configuration(
+                actuator.selection, *(self.settings(group.record_type, group.prefix) for group in _groups(actuator))
+            )
+        except ValueError as error:
+            raise ValueError(f'{actuator.name}: {error}') from None
+
+    def _new_statistics(self) -> None:
+        """Count anew."""
+        listens: dict[str, list[str]] = {actuator.name: [] for actuator in self._file.actuators}
+        for topic, plan in self._machine.plans.items():
+            for number, _ in plan.taken:
+                listens[self._file.actuators[number].name].append(topic)
+        self._statistics = {name: EstimatorDiagnostics(topics) for name, topics in listens.items()}
+        self._lowest = [Lowest() for _ in self._file.actuators]
+        self._pressures_on: dict[str, list[int]] = {}
+        for number, actuator in enumerate(self._file.actuators):
+            for topic in {s.topic for name, s in actuator.signals().items() if name in ('pressure_a', 'pressure_b')}:
+                self._pressures_on.setdefault(topic, []).append(number)
+        self._listeners = {
+            topic: [self._file.actuators[number].name for number, _ in plan.taken]
+            for topic, plan in self._machine.plans.items()
+        }
+
+    def start(self) -> None:
+        """Start to estimate from the initial state, and to record if ``record`` is set."""
+        self._state = _with(init(self._machine), refused=self.is_refused(self._watch.duplicate_publishers()))
+        self._new_statistics()
+        self._newest.clear()
+        self.begin()
+
+    # --- the live path ---
+
+    def on_input(self, name: str, data: bytes) -> None:
+        """Take one message of a topic."""
+        taken = time.perf_counter_ns()
+        if not self.active:
+            return
+        received, before = self._now(), self._state
+        self._sent.clear()
+        try:
+            self._state = receive(self._machine, self._state, name, data, received, self._send)
+        except ValueError as error:
+            for listener in self._listeners[name]:
+                self._statistics[listener].on_malformed(name)
+            self.get_logger().error(f'{name}: {error}', throttle_duration_sec=1.0)
+            return
+        self._send_together()
+        made = self._command(received)
+        done = time.perf_counter_ns()
+
+        # Nobody waits for what follows.
+        self._recording.record(name, self._types[name], received, data)  # by its name in the mapping file
+        self._newest[name] = data
+        for listener in self._listeners[name]:
+            self._statistics[listener].on_received(name)
+        for number in self._pressures_on.get(name, ()):
+            self._lowest[number] = self._lowest[number].after(self._state.actuators[number].pipeline.pressure)
+        if self._sent:
+            self._record_answers(made, done - taken)
+            self._follow_adaptation(before)
+            self._recording.flush_if_idle()
+
+    def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
+        """Publish an answer at once, if it is a message of its own; the rest waits until all answers are out."""
+        data = frame_id
+        if not self._file.together:
+            data = encode(answer, frame_id)
+            self._outputs[name, type_of(answer)].publish(data)
+        self._sent.append(NamedAnswer(name, answer, data))
+
+    def _send_together(self) -> None:
+        """Publish the answers to a message as one, if they are no messages of their own."""
+        self._together = b''
+        if self._file.together and self._sent:
+            self._together = encode_together(self._sent)
+            self._outputs['', MACHINE_TYPE].publish(self._together)
+
+    def _command(self, received: int) -> list[Command]:
+        """Publish what the controllers take after a message."""
+        guided = any(type_of(answer) == FEEDFORWARD_TYPE for _, answer, _ in self._sent)
+        made = due_commands(self._machine, self._state, guided, received)
+        for command in made:
+            self._outputs['', command.topic].publish(command.data)
+        return made
+
+    def _record_answers(self, made: list[Command], latency: int = 0) -> None:
+        """Record and count what was sent, ``latency`` [ns] after its input was taken."""
+        for name, answer, data in self._sent:
+            kind, statistics = type_of(answer), self._statistics[name]
+            if not self._together:
+                self._recording.record(self._topics[name, kind], kind, self._now(), data)
+            if kind == ESTIMATE_TYPE:
+                statistics.on_estimate(answer, latency)
+            else:
+                statistics.on_feedforward(answer)
+        if self._together:
+            self._recording.record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, self._now(), self._together)
+        for command in made:
+            self._recording.record(command.topic, full_name(command.type_name), self._now(), command.data)
+
+    def _follow_adaptation(self, before: MachineState) -> None:
+        states = zip(self._machine.actuators, before.actuators, self._state.actuators, strict=True)
+        for actuator, known, newest in states:
+            parameters = actuator.pipeline.estimator
+            if parameters.adapts and newest is not known:
+                last, state = known.pipeline.estimator, newest.pipeline.estimator
+                self._statistics[actuator.name].on_adaptation(parameters, last, state, newest.pipeline.temperature)
+
+    def on_watchdog(self) -> None:
+        """Renew each feed-forward that no velocity sample renews, so that it fades out."""
+        if self.active:
+            for number in due(self._state, self._now()):
+                self._tick(number, self._now())  # a bag holds each message at a time of its own
+
+    def _tick(self, number: int, received: int) -> None:
+        made = self._state.actuators[number].pipeline.feedforward.received
+        tick = WatchdogTick(received + self.clock_offset, (received - made) * 1e-9)
+        self._sent.clear()
+        self._state = receive_tick(self._machine, self._state, number, tick, received, self._send)
+        self._send_together()
+        made = self._command(received)
+        self._recording.record(self._ticks[number], TICK_TYPE, received, encode(tick))
+        self._record_answers(made)
+
+    def fade_out(self) -> None:
+        """Fade every force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""
+        acting = [number for number, known in enumerate(self._state.actuators) if known.force != 0.0]
+        if not acting:
+            return
+        self._state = _with(self._state, refused=True)
+        self.publish_configuration()  # a replay fades from here on
+        began, start, left = time.monotonic(), self._now(), LAST_FORCES
+        while left:
+            time.sleep(STOP_PERIOD)
+            for number in acting:
+                self._tick(number, start + int((time.monotonic() - began) * 1e9))
+            self.publish_newest()
+            left -= all(known.pipeline.feedforward.fade == 0.0 for known in self._at(acting))
+
+    def _at(self, numbers: list[int]) -> list[Any]:
+        return [self._state.actuators[number] for number in numbers]
+
+    # --- parameters and state ---
+
+    def input_type(self, name: str) -> str:
+        """Message type of a topic."""
+        return self._types[name]
+
+    @property
+    def needed_inputs(self) -> Collection[str]:
+        """Topics of the mapping file."""
+        return tuple(self._types)
+
+    def received(self) -> Mapping[str, int]:
+        """Messages of each topic since activation."""
+        return {topic: count for one in self._statistics.values() for topic, count in one.received.items()}
+
+    @property
+    def clock_offset(self) -> int:
+        """What the clock of the stamps shows after the clock of receipt [ns]."""
+        return self._state.actuators[0].pipeline.clock_offset
+
+    def set_clock_offset(self, offset: int) -> None:
+        """Use another offset [ns] from now on."""
+        self._state = _with(self._state, clock_offset=offset)
+
+    def on_change(self) -> None:
+        """Apply changed settings, between two messages."""
+        self._refuse_inputs(self._watch.duplicate_publishers())
+        changed = self._made()
+        if [a.configuration for a in changed.actuators] == [a.configuration for a in self._machine.actuators]:
+            return
+        self._machine = changed
+        if self.active:
+            self.publish_configuration()
+
+    def publish_configuration(self) -> None:
+        """Publish and record all that the next answer depends on."""
+        text = machine_text(self._document, self._machine, self._state)
+        self.publish_recorded(CONFIGURATION_TYPE, CONFIGURATION_TYPE, encode_text(text))
+
+    def reset_adaptation(self) -> None:
+        """Forget what the adaptation of every actuator has learnt."""
+        states = [
+            known._replace(
+                pipeline=known.pipeline._replace(estimator=known.pipeline.estimator._replace(adaptation=NOT_ADAPTED))
+            )
+            for known in self._state.actuators
+        ]
+        self._state = MachineState(tuple(states))
+
+    # --- diagnostics ---
+
+    def diagnostics(self) -> dict[str, DiagnosticStatus]:
+        """Status of each actuator, of the inputs and outputs, and of the recorder."""
+        silent = {topic for statistics in self._statistics.values() for topic in statistics.silent_inputs}
+        graph = self._watch.findings(sorted(silent), retry=self.active)
+        self._refuse_inputs(graph.duplicates)
+        parts = {}
+        for number, actuator in enumerate(self._machine.actuators):
+            name, active = actuator.name, self.active
+            adapting = actuator.pipeline.estimator if active and actuator.pipeline.estimator.adapts else None
+            refused = active and self._state.actuators[number].pipeline.refused
+            status = self._statistics[name].report(active, refused, graph, adapting)
+            said = self._unanswered(number) if active else []
+            if said:
+                status.level = max(status.level, DiagnosticStatus.WARN)
+                status.message = '; '.join([*said, status.message])
+            parts[name] = status
+        return {**parts, 'recorder': self.report_graph(graph)}
+
+    def _unanswered(self, number: int) -> list[str]:
+        """What is wrong with the messages of an actuator: not taken, without its numbers, gauge or absolute."""
+        said = [self._state.actuators[number].fault] if self._state.actuators[number].fault else []
+        for topic, data in self._newest.items():
+            said += [f'{topic}: {text}' for text in missing(self._machine, number, topic, data)]
+        return said + pressure_remarks(self._file, self._file.actuators[number], self._lowest[number])
+
+    def health(self) -> dict[str, DiagnosticStatus]:
+        """Indicators of the seals of each actuator whose adaptation learns."""
+        return {
+            f'{actuator.name} seals': self._statistics[actuator.name].health(actuator.pipeline.estimator)
+            for actuator in self._machine.actuators
+            if self.active and actuator.pipeline.estimator.adapts
+        }
+
+    def newest_answers(self) -> list[NamedAnswer]:
+        """The newest answers of each actuator since the last call."""
+        return [answer for name, statistics in self._statistics.items() for answer in statistics.take_newest(name)]
+
+    def end_interval(self) -> None:
+        """Start a new interval of rates and latencies."""
+        for statistics in self._statistics.values():
+            statistics.start_interval()
+
+    def _refuse_inputs(self, duplicates: list[str]) -> None:
+        """Reject the inputs while ``refuse_second_publisher`` is set and topics have several publishers."""
+        refused = self.is_refused(duplicates)
+        if self.active and refused != self._state.actuators[0].pipeline.refused:
+            self._state = _with(self._state, refused=refused)
+            self.publish_configuration()  # a replay rejects the inputs from the same message on
+
+
+def _groups(actuator: Actuator) -> tuple[ParameterGroup, ...]:
+    """Parameters of an actuator, which change while the node runs; their defaults are those of the mapping file."""
+    name = f'{actuator.name}.'
+    return (
+        ParameterGroup(EstimatorSettings, name, defaults=actuator.settings),
+        ParameterGroup(FeedForwardSettings, name + FEEDFORWARD_PREFIX, defaults=actuator.feedforward),
+        ParameterGroup(AdaptationSettings, name + ADAPTATION_PREFIX, defaults=actuator.adaptation),
+    )
+
+
+def _with(state: MachineState, **changed: Any) -> MachineState:
+    """State with fields of the pipeline of every actuator changed."""
+    return MachineState(tuple(k._replace(pipeline=k.pipeline._replace(**changed)) for k in state.actuators))
+
+
+def main() -> int:
+    """Run the node: ``machine_estimator --ros-args -p machine:=robot.yaml``."""
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    return run(MachineEstimator, MachineEstimator.autostart, MachineEstimator.finish)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,97 @@
+"""Records the topics of some types for some seconds: a look at a running machine, without ``ros2 bag record``."""
+
+import argparse
+import sys
+import time
+from collections.abc import Collection
+from functools import partial
+from pathlib import Path
+
+import rclpy
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+
+from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.discovery import set_up_discovery
+from seal_friction_ros.nodes.managed_node import message_class
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter
+
+LONGEST_WAIT = 15.0  # [s] for the first topic: discovery over a network takes seconds; our choice
+
+
+class TopicRecorder(Node):
+    """Subscribes, with best effort, to every topic of the given types that appears, and keeps its messages.
+
+    Args:
+        types: ``package/msg/Name`` of each type.
+    """
+
+    def __init__(self, types: Collection[str]) -> None:
+        super().__init__('topic_recorder')
+        self.messages: list[tuple[str, str, int, bytes]] = []
+        """topic, type, time of receipt [ns] and bytes of each message"""
+        self._types = types
+        self._topics: set[str] = set()
+
+    def subscribe_to_new_topics(self) -> None:
+        """Subscribe to the topics that have appeared since the last call."""
+        for topic, (kind, *_) in self.get_topic_names_and_types():
+            if kind in self._types and topic not in self._topics:
+                self._topics.add(topic)
+                self.create_subscription(
+                    message_class(kind), topic, partial(self._take, topic, kind), qos.best_effort(qos.STREAM), raw=True
+                )
+
+    def _take(self, topic: str, kind: str, data: bytes) -> None:
+        self.messages.append((topic, kind, time.time_ns(), data))
+
+
+def record(node: TopicRecorder, seconds: float, out: Path) -> None:
+    """Record for ``seconds`` [s], from the first message on.
+
+    Raises:
+        BagError: No topic of the types has a message, or the bag cannot be written.
+    """
+    end = time.monotonic() + LONGEST_WAIT
+    is_begun = False
+    while time.monotonic() < end:
+        node.subscribe_to_new_topics()
+        rclpy.spin_once(node, timeout_sec=0.05)
+        if node.messages and not is_begun:
+            is_begun, end = True, time.monotonic() + seconds
+    if not node.messages:
+        heard = ', '.join(f'{topic} ({", ".join(kinds)})' for topic, kinds in node.get_topic_names_and_types())
+        raise BagError(
+            f'no message of a known type within {LONGEST_WAIT:g} s: start the drivers, check ROS_DOMAIN_ID; '
+            f'topics: {heard or "none"}'
+        )
+    with BagWriter(out) as writer:
+        for message in node.messages:
+            writer.write(*message)
+
+
+def main() -> int:
+    """Run ``topic_recorder --seconds S --out BAG TYPE ...``."""
+    parser = argparse.ArgumentParser(prog='topic_recorder', description=__doc__)
+    parser.add_argument('types', nargs='+', metavar='TYPE', help='message type, package/msg/Name')
+    parser.add_argument('--seconds', type=float, default=5.0, help='duration from the first message on [s]')
+    parser.add_argument('--out', type=Path, required=True, help='bag to write')
+    arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    set_up_discovery()
+    rclpy.init()
+    node = TopicRecorder(arguments.types)
+    try:
+        record(node, arguments.seconds, arguments.out)
+    except BagError as error:
+        print(f'topic_recorder: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,326 @@
+"""What ``seal_friction topics`` does: lists topics, measures rates, prints messages, sets parameters, calls services.
+
+ros2cli is not on the package registry, and its Python packages need a sourced distribution: hence these few functions.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from itertools import pairwise
+from typing import Any
+
+import rclpy
+import yaml
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from seal_friction_ros.core.foundation.parameters import meant
+from seal_friction_ros.nodes.discovery import set_up_discovery
+from seal_friction_ros.nodes.graph_watch import full_name
+from seal_friction_ros.nodes.managed_node import message_class
+
+SUCCESS, REFUSED, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+_DISCOVERY = 1.5  # [s] for all names of the graph
+_LONGEST_WAIT = 10.0  # [s] for one name, or for an answer
+_NAME = 'seal_friction_topics'
+_LONGEST_ARRAY = 20  # numbers of a field that are printed
+
+
+class NotThereError(ValueError):
+    """A name is not on the graph; one line that says which, and what there is."""
+
+
+class Tool:
+    """A node that looks at the graph.
+
+    Args:
+        node: The node.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+
+    def spin(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
+        """Spin for some seconds [s], or until a condition holds; whether it does."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and not until():
+            rclpy.spin_once(self.node, timeout_sec=min(0.05, max(end - time.monotonic(), 0.0)))
+        return until()
+
+    def found(self, name: str, known: Callable[[], Iterable[str]], what: str) -> str:
+        """Full name of a topic, service or node, which may take a while to appear.
+
+        Raises:
+            NotThereError: It does not appear.
+        """
+        full = name if name.startswith('/') else f'/{name}'
+        if self.spin(_LONGEST_WAIT, lambda: full in known()):
+            return full
+        names = [one for one in known() if _NAME not in one]
+        raise NotThereError(f'no {what} {full} within {_LONGEST_WAIT:g} s: {meant(full, names)}; check ROS_DOMAIN_ID')
+
+    # -- topics --
+
+    def topics(self) -> dict[str, str]:
+        """Type of each topic."""
+        return {topic: kinds[0] for topic, kinds in self.node.get_topic_names_and_types()}
+
+    def endpoints(self) -> dict[str, dict[str, Any]]:
+        """Type, publishers and subscribers of each topic."""
+        self.spin(_DISCOVERY)
+        publishers, subscribers = self.node.get_publishers_info_by_topic, self.node.get_subscriptions_info_by_topic
+        return {
+            topic: {
+                'type': kind,
+                'publishers': sorted(full_name(end) for end in publishers(topic) if end.node_name != _NAME),
+                'subscribers': sorted(full_name(end) for end in subscribers(topic) if end.node_name != _NAME),
+            }
+            for topic, kind in sorted(self.topics().items())
+        }
+
+    def listen(self, name: str, take: Callable[[Any], None], *, raw: bool = False) -> str:
+        """Subscribe to a topic as its publishers offer it; returns its full name."""
+        topic = self.found(name, self.topics, 'topic')
+        self.spin(_LONGEST_WAIT, lambda: bool(self.node.get_publishers_info_by_topic(topic)))
+        offers = [end.qos_profile for end in self.node.get_publishers_info_by_topic(topic)]
+        best_effort = any(offer.reliability == ReliabilityPolicy.BEST_EFFORT for offer in offers)
+        latched = bool(offers) and all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+        profile = QoSProfile(
+            depth=1000,
+            reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        )
+        self.node.create_subscription(message_class(self.topics()[topic]), topic, take, profile, raw=raw)
+        return topic
+
+    def rate(self, name: str, seconds: float) -> dict[str, Any]:
+        """Messages of a topic in so many seconds from the first one on: rate, and gaps between them."""
+        times: list[float] = []
+        size = 0
+
+        def take(data: bytes) -> None:
+            nonlocal size
+            times.append(time.perf_counter())
+            size += len(data)
+
+        topic = self.listen(name, take, raw=True)
+        self.spin(_LONGEST_WAIT, lambda: bool(times))
+        self.spin(seconds)
+        gaps = [after - before for before, after in pairwise(times)]
+        span = times[-1] - times[0] if gaps else 0.0
+        return {
+            'topic': topic,
+            'messages': len(times),
+            'rate_Hz': len(gaps) / span if span else None,
+            'mean_gap_s': span / len(gaps) if gaps else None,
+            'shortest_gap_s': min(gaps, default=None),
+            'longest_gap_s': max(gaps, default=None),
+            'bytes_per_s': size / span if span else None,
+        }
+
+    def echo(self, name: str, show: Callable[[Any], None], count: int | None, seconds: float | None) -> int:
+        """Show the messages of a topic as they come; returns how many came."""
+        shown = 0
+
+        def take(message: Any) -> None:
+            nonlocal shown
+            if count is None or shown < count:
+                shown += 1
+                show(plain(message))
+
+        self.listen(name, take)
+        self.spin(seconds or float('inf'), lambda: count is not None and shown >= count)
+        return shown
+
+    # -- parameters and services --
+
+    def parameters(self, name: str) -> AsyncParameterClient:
+        """Client for the parameters of a node."""
+        nodes = self.node.get_node_names_and_namespaces
+        names = lambda: [f'{space}/{node}'.replace('//', '/') for node, space in nodes()]  # noqa: E731
+        client = AsyncParameterClient(self.node, self.found(name, names, 'node'))
+        if not self.spin(_LONGEST_WAIT, client.services_are_ready):
+            raise NotThereError(f'{name} has no parameter services')
+        return client
+
+    def answer(self, future: Any, who: str) -> Any:
+        """Result of a call.
+
+        Raises:
+            NotThereError: There is none.
+        """
+        if not self.spin(_LONGEST_WAIT, future.done):
+            raise NotThereError(f'{who} gives no answer within {_LONGEST_WAIT:g} s')
+        return future.result()
+
+    def values(self, client: AsyncParameterClient, who: str, names: list[str]) -> dict[str, Any]:
+        """Parameters by name."""
+        values = self.answer(client.get_parameters(names), who).values
+        return {name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)}
+
+    def known_parameters(self, client: AsyncParameterClient, who: str) -> list[str]:
+        """Names of all parameters of a node."""
+        return sorted(self.answer(client.list_parameters(), who).result.names)
+
+    def call(self, name: str, request: Mapping[str, Any]) -> Any:
+        """Response of a service."""
+        services = lambda: dict(self.node.get_service_names_and_types())  # noqa: E731
+        service = self.found(name, services, 'service')
+        package, _, kind = services()[service][0].partition('/srv/')
+        service_class = getattr(import_module(f'{package}.srv'), kind)
+        client = self.node.create_client(service_class, service)
+        if not self.spin(_LONGEST_WAIT, client.service_is_ready):
+            raise NotThereError(f'{service}: its server does not answer')
+        return self.answer(client.call_async(filled(service_class.Request(), request)), service)
+
+
+def filled(message: Any, values: Mapping[str, Any]) -> Any:
+    """A message with some fields set.
+
+    Raises:
+        ValueError: There is no such field, or a value has another type.
+    """
+    fields = message.get_fields_and_field_types()
+    for name, value in values.items():
+        if name not in fields:
+            raise ValueError(f'{type(message).__name__} has no field {name}: {meant(name, fields)}')
+        old = getattr(message, name)
+        if isinstance(value, Mapping):
+            filled(old, value)
+            continue
+        if isinstance(old, float) and type(value) is int:
+            value = float(value)  # noqa: PLW2901
+        if isinstance(old, bool | int | float | str) and type(value) is not type(old):
+            raise ValueError(f'{name}: {value!r} is no {fields[name]}')
+        setattr(message, name, value)
+    return message
+
+
+def plain(value: Any) -> Any:
+    """A message as plain values; of a long array its beginning."""
+    if hasattr(value, 'get_fields_and_field_types'):
+        return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, bytes):
+        return list(value[:_LONGEST_ARRAY])
+    if isinstance(value, str | bool | int | float):
+        return value
+    items = list(value)
+    shown = [plain(item) for item in items[:_LONGEST_ARRAY]]
+    return [*shown, f'... {len(items) - _LONGEST_ARRAY} more'] if len(items) > _LONGEST_ARRAY else shown
+
+
+def _yaml(value: Any) -> str:
+    text: str = yaml.safe_dump(value, sort_keys=False, allow_unicode=True, default_flow_style=None)
+    return text.removesuffix('...\n').rstrip()
+
+
+def _listed(found: Mapping[str, Mapping[str, Any]]) -> str:
+    lines = []
+    for topic, one in found.items():
+        ends = [
+            f'{what} {", ".join(one[key])}' for what, key in (('from', 'publishers'), ('to', 'subscribers')) if one[key]
+        ]
+        lines.append(f'{topic}  {one["type"]}\n    {"; ".join(ends) or "no endpoint"}')
+    return '\n'.join(lines) or 'no topic'
+
+
+def _rate_text(found: Mapping[str, Any]) -> str:
+    if found['rate_Hz'] is None:
+        return f'{found["topic"]}: {found["messages"]} messages: too few for a rate'
+    return (
+        f'{found["topic"]}: {found["rate_Hz"]:.1f} Hz, {found["messages"]} messages, '
+        f'gaps {1e3 * found["shortest_gap_s"]:.2f} to '
+        f'{1e3 * found["longest_gap_s"]:.2f} ms, {found["bytes_per_s"] / 1e3:.1f} kB/s'
+    )
+
+
+def run_task(tool: Tool, task: Mapping[str, Any]) -> int:
+    """Run one task, print its result, return the exit code.
+
+    Args:
+        tool: The node.
+        task: ``action`` (list, hz, echo, param or call), and its arguments.
+
+    Raises:
+        ValueError: A name is not there, or a value is not valid.
+    """
+    as_json = bool(task.get('json'))
+
+    def show(value: Any, text: str | None = None) -> None:
+        print(json.dumps(value) if as_json else _yaml(value) if text is None else text, flush=True)
+
+    action = task['action']
+    if action == 'list':
+        found = tool.endpoints()
+        show(found, _listed(found))
+        return SUCCESS
+    if action == 'hz':
+        rate = tool.rate(task['topic'], task['seconds'])
+        show(rate, _rate_text(rate))
+        return SUCCESS if rate['rate_Hz'] is not None else REFUSED
+    if action == 'echo':
+        each = show if as_json else lambda value: show(value, f'{_yaml(value)}\n---')
+        return SUCCESS if tool.echo(task['topic'], each, task.get('count'), task.get('seconds')) else REFUSED
+    if action == 'call':
+        response = plain(tool.call(task['service'], _mapping(task['request'])))
+        show(response)
+        return REFUSED if response.get('success') is False else SUCCESS
+    return _param(tool, task, show)
+
+
+def _mapping(text: str) -> Mapping[str, Any]:
+    value = yaml.safe_load(text)
+    if not isinstance(value, Mapping):
+        raise ValueError(f'{text}: give the fields as in YAML, for example "{{data: true}}"')
+    return value
+
+
+def _param(tool: Tool, task: Mapping[str, Any], show: Callable[..., None]) -> int:
+    """List, get or set parameters."""
+    who, name = task['node'], task.get('name')
+    client = tool.parameters(who)
+    known = tool.known_parameters(client, who)
+    if name is None:
+        show(tool.values(client, who, known))
+        return SUCCESS
+    if name not in known:
+        raise NotThereError(f'{who} has no parameter {name}: {meant(name, known)}')
+    if 'value' not in task:
+        show(tool.values(client, who, [name]))
+        return SUCCESS
+    (old,) = tool.values(client, who, [name]).values()
+    value = yaml.safe_load(task['value'])
+    if isinstance(old, float) and isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    (result,) = tool.answer(client.set_parameters([Parameter(name, value=value)]), who).results
+    now = tool.values(client, who, [name])
+    reason = '' if result.successful else f'refused: {result.reason}'
+    show({**now, 'successful': result.successful, 'reason': result.reason}, f'{_yaml(now)}{reason and f"  {reason}"}')
+    return SUCCESS if result.successful else REFUSED
+
+
+def main() -> int:
+    """Run ``python -m seal_friction_ros.nodes.topic_tool TASK``, a task of `run_task` as JSON."""
+    task = json.loads(sys.argv[1])
+    set_up_discovery()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C is a KeyboardInterrupt
+    node = Node(_NAME, start_parameter_services=False, enable_rosout=False)
+    try:
+        return run_task(Tool(node), task)
+    except (ValueError, yaml.YAMLError) as error:
+        print(f'seal_friction topics: {" ".join(str(error).split())}', file=sys.stderr)
+        return UNUSABLE
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

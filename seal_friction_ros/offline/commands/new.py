@@ -1,0 +1,56 @@
+"""``seal_friction new``: write a first file of a kind."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.targets import MAPPING_FILE
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    description = 'write a first mapping file for a machine'
+    kinds = cli.add_group(commands, 'new', 'KIND', description, 'new robot --from-topics --out robot.yaml')
+    robot = cli.add_command(
+        kinds, 'robot', run_robot, 'write a mapping file with what a bag or the topics show, and what is missing',
+        'new robot --from-bag RUN --out robot.yaml',
+        'new robot --from-topics --out robot.yaml',
+    )  # fmt: skip
+    source = robot.add_mutually_exclusive_group(required=True)
+    source.add_argument('--from-bag', type=Path, metavar='BAG', help='rosbag2 bag with its messages')
+    source.add_argument(
+        '--from-topics',
+        type=cli.positive,
+        nargs='?',
+        const=5.0,
+        metavar='SECONDS',
+        help='listen to the topics of the running machine, 5 s unless given; needs ROS 2',
+    )
+    cli.add_target(robot, '--out', MAPPING_FILE, required=True, metavar='FILE.yaml', help='mapping file to write')
+
+
+def run_robot(arguments: argparse.Namespace) -> int:
+    """Write a mapping file from a bag, or from topics."""
+    from seal_friction_ros.files import read_machine
+    from seal_friction_ros.offline.bags.new_machine import new_machine, recorded_topics
+    from seal_friction_ros.offline.work.atomic_file import write_whole
+
+    if arguments.from_bag:
+        text = new_machine(arguments.from_bag)
+    else:
+        with recorded_topics(arguments.from_topics) as bag:
+            text = new_machine(bag)
+    write_whole(arguments.out, text.encode())
+    open_points = [line.strip() for line in text.splitlines()[2:] if 'missing' in line or 'guess' in line]
+    numbers = {'file': arguments.out, 'open': open_points, 'actuators': _actuators(arguments.out, read_machine)}
+    summary = '\n'.join([f'{len(open_points)} points are open:', *open_points])
+    return cli.print_result(arguments, numbers, summary)
+
+
+def _actuators(path: Path, read: Any) -> list[str] | str:
+    """Names of the actuators; why the file does not load yet, if it does not."""
+    try:
+        return [actuator.name for actuator in read(str(path)).actuators]
+    except ValueError as error:
+        return str(error)

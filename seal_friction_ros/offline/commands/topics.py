@@ -1,0 +1,59 @@
+"""``seal_friction topics``: look at the topics of running nodes, set their parameters, call their services."""
+
+import argparse
+import json
+import subprocess
+import sys
+from importlib.util import find_spec
+from typing import Any
+
+from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.status import show_status
+
+_ARGUMENTS = ('topic', 'seconds', 'count', 'node', 'name', 'value', 'service', 'request', 'json')
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    description = 'look at the topics of running nodes, set parameters, call services: where there is no ros2 command'
+    examples = ('topics list', 'topics hz rod_velocity', 'topics param friction_estimator feedforward.scale 0.0')
+    steps = cli.add_group(commands, 'topics', 'COMMAND', description, *examples)
+    listed = cli.add_command(steps, 'list', run, 'list topics with type, publishers and subscribers', 'topics list')
+    rate = cli.add_command(
+        steps, 'hz', run, 'measure the rate of a topic and the gaps between its messages', 'topics hz rod_velocity'
+    )
+    shown = cli.add_command(
+        steps, 'echo', run, 'print the messages of a topic', 'topics echo friction_estimate --count 1'
+    )
+    parameter = cli.add_command(
+        steps, 'param', run, 'list, get or set parameters of a node',
+        'topics param friction_estimator',
+        'topics param friction_estimator feedforward.scale',
+        'topics param friction_estimator feedforward.scale 0.0',
+    )  # fmt: skip
+    call = cli.add_command(
+        steps, 'call', run, 'call a service', 'topics call friction_estimator/start_recording'
+    )  # fmt: skip
+    for step in (rate, shown):
+        step.add_argument('topic', help='name of the topic')
+        text = 'time to listen, 5 s unless given' if step is rate else 'time to listen at most; default: until Ctrl-C'
+        step.add_argument('--seconds', type=cli.positive, default=5.0 if step is rate else None, help=text)
+    shown.add_argument('--count', type=cli.at_least_one, metavar='N', help='end after so many messages')
+    parameter.add_argument('node', help='name of the node')
+    parameter.add_argument('name', nargs='?', help='parameter; default: list all')
+    parameter.add_argument('value', nargs='?', help='value to set, as in YAML')
+    call.add_argument('service', help='name of the service')
+    call.add_argument('request', nargs='?', default='{}', help='fields of the request, as in YAML; default: empty')
+    for step, action in ((listed, 'list'), (rate, 'hz'), (shown, 'echo'), (parameter, 'param'), (call, 'call')):
+        step.set_defaults(action=action)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the tool in a process of its own, so that this one needs no ROS."""
+    if find_spec('rclpy') is None:
+        raise ValueError('topics needs ROS 2: source your distribution, or run make setup')
+    values = {name: value for name, value in vars(arguments).items() if name in _ARGUMENTS and value is not None}
+    task = json.dumps({'action': arguments.action, **values})
+    show_status('')
+    command = [sys.executable, '-m', 'seal_friction_ros.nodes.topic_tool', task]
+    return subprocess.run(command, check=False).returncode

@@ -1,0 +1,372 @@
+"""What a person sees of one actuator: messages in, a row of numbers for the curves and the situation in words out.
+
+``held = take(held, record, received)`` for every message, then at the pace of the view ``row(known, held, time)`` and
+``situation(known, held, now)``. The same functions serve the live view and that of a bag.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
+from seal_friction_ros.core.estimation.records import (
+    NEVER,
+    NO_ESTIMATE,
+    Force,
+    FrictionEstimate,
+    Position,
+    Pressure,
+    ServoReference,
+    Status,
+    Temperature,
+    Velocity,
+)
+from seal_friction_ros.core.friction.force_sum_correction import (
+    NO_CORRECTION,
+    ForceSumCorrection,
+    corrected_force_sum,
+)
+from seal_friction_ros.core.friction.states import FrictionState
+
+BAR = 1e5  # [Pa]
+MICROMETRE = 1e-6  # [m]
+BAND = 1.96  # [-] standard deviations on either side that hold 95 % of the readings
+OFF = 'off'  # mode of the adaptation
+PAIRED = 0.03  # [s] our choice, as reference_timeout: longest time between the stamps of a reference and a position
+RECENT = 0.5  # [s] our choice: a lamp stays lit for this time
+TOO_OLD = 0.5  # [s] our choice: an estimate or an input without a message for this time is called missing
+_MOST_FRAME = 80  # characters of a frame name that are shown
+
+COLUMNS = (
+    'time',  # [s]
+    'measured',  # [N] friction by the force sum; with adaptation while sliding less inertia and offset
+    'estimate',  # [N] friction that acts now
+    'low',  # [N] band of 95 % about the estimate
+    'high',  # [N]
+    'feedforward',  # [N]
+    'limit',  # [N] force_limit
+    'below',  # [N] minus force_limit
+    'error',  # [um] reference less position
+    'pressure_a',  # [bar, gauge]
+    'pressure_b',  # [bar, gauge]
+    'scale',  # [-] adaptation
+    'scale_low',  # [-] band of 95 %
+    'scale_high',  # [-]
+    'residual',  # [N]
+    'status',  # bits of every estimate since the row before
+    'limited',  # bits of every feed-forward since the row before
+)
+"""Numbers of a row; None where there is none."""
+Row = tuple[Any, ...]
+
+INPUT_NAMES: dict[type, str] = {
+    Velocity: 'velocity',
+    Pressure: 'pressures',
+    Force: 'force sum',
+    ServoReference: 'reference',
+    Position: 'position',
+    Temperature: 'temperature',
+}
+"""Record of an input -> its name in words, in the order in which they are listed."""
+NEEDED = (Velocity, Pressure)
+"""Inputs without which there is no estimate."""
+
+STATE_WORDS = {
+    (FrictionState.SLIDING, 1): 'sliding out',
+    (FrictionState.SLIDING, -1): 'sliding in',
+    (FrictionState.SLIDING, 0): 'sliding',
+    (FrictionState.BREAKAWAY, 1): 'breaking away, outwards',
+    (FrictionState.BREAKAWAY, -1): 'breaking away, inwards',
+    (FrictionState.STUCK, 1): 'at rest: the seals hold it against an outward force',
+    (FrictionState.STUCK, -1): 'at rest: the seals hold it against an inward force',
+    (FrictionState.STUCK, 0): 'at rest',
+}
+"""State and direction -> words; others are unknown."""
+
+STATUS_WORDS = {
+    Status.PRESSURE_MISSING: 'no valid pressure yet: all forces are 0',
+    Status.FORCE_MISSING: 'no valid force sum yet: friction at rest is not known',
+    Status.PRESSURE_STALE: 'the pressure is old',
+    Status.FORCE_STALE: 'the force sum is old',
+    Status.PRESSURE_NOT_FINITE: 'the pressure is not a finite number',
+    Status.FORCE_NOT_FINITE: 'the force sum is not a finite number',
+    Status.VELOCITY_NOT_FINITE: 'the velocity is not a finite number',
+    Status.PRESSURE_OUT_OF_RANGE: 'the pressure is outside pressure_min to pressure_max',
+    Status.FORCE_OUT_OF_RANGE: 'the force sum is beyond force_max',
+    Status.VELOCITY_OUT_OF_RANGE: 'the velocity is beyond velocity_max',
+    Status.OUTSIDE_IDENTIFIED_RANGE: 'a pressure is outside the identified range: the law is extrapolated',
+    Status.STAMP_NOT_INCREASING: 'stamps of the velocity do not increase',
+    Status.PRESSURE_LEAP: 'the pressure jumps',
+    Status.FORCE_LEAP: 'the force sum jumps',
+    Status.VELOCITY_LEAP: 'the velocity jumps',
+    Status.INPUT_REFUSED: 'an input has a second publisher: rejected',
+    Status.STAMP_AGE: 'stamp and receipt of the velocity are too far apart: is a clock wrong?',
+    Status.MOTION_UNCERTAIN: 'the velocity does not tell rest from motion',
+    Status.FASTER_THAN_IDENTIFIED: 'faster than the seals were identified: extrapolated',
+    Status.SLOWER_THAN_IDENTIFIED: 'slower than the seals were identified: extrapolated',
+    Status.DIRECTION_NOT_IDENTIFIED: 'a direction in which a seal was not identified: extrapolated',
+    Status.FORCE_CONTAINS_LOAD: 'the force sum holds an unknown load: friction at rest is not known',
+    Status.MODEL_DISAGREES: 'the force sum shows another friction than the seal files',
+    Status.TEMPERATURE_MISSING: 'no valid temperature of the seals',
+    Status.OUTSIDE_IDENTIFIED_TEMPERATURE: 'outside the identified temperatures: extrapolated',
+}
+"""Bit of the status -> what it means for a person who looks on; FrictionEstimate.msg has the definition."""
+
+USUAL = Status.MOTION_UNCERTAIN | Status.SLOWER_THAN_IDENTIFIED
+"""Bits that every reversal has."""
+
+
+class Known(NamedTuple):
+    """What the configuration tells of an actuator."""
+
+    seals: tuple[str, ...] = ()  # NAME@CHAMBER
+    scale: float = math.nan  # [-] feedforward.scale
+    lead_time: float = math.nan  # [s]
+    force_limit: float = math.nan  # [N]
+    pressure_low: float = -math.inf  # [Pa] identified by every seal
+    pressure_high: float = math.inf  # [Pa]
+    adaptation: str = OFF
+    correction: ForceSumCorrection = NO_CORRECTION
+
+
+UNKNOWN_CONFIGURATION = Known()
+
+
+class Held(NamedTuple):
+    """Newest record of each kind."""
+
+    records: Mapping[type, Any] = {}
+    receipts: Mapping[type, int] = {}  # [ns] when each was received
+    status: int = 0  # bits of every estimate since the last row
+    limited: int = 0  # bits of every feed-forward since the last row
+
+    @property
+    def estimate(self) -> FrictionEstimate:
+        """The newest estimate, or `NO_ESTIMATE`."""
+        found: FrictionEstimate = self.records.get(FrictionEstimate, NO_ESTIMATE)
+        return found
+
+
+NOTHING_HELD = Held()
+
+
+def known_of(configuration: Configuration) -> Known:
+    """What a view needs of a configuration."""
+    estimator, feedforward = configuration.parameters()
+    selection = configuration.selection
+    seals = [mounted.seal for mounted in estimator.seals]
+    return Known(
+        tuple(f'{name}@{chamber}' for name, chamber in zip(selection.seals, selection.seal_chambers, strict=True)),
+        feedforward.scale,
+        feedforward.lead_time,
+        feedforward.force_limit,
+        max(seal.pressure_min for seal in seals),
+        min(seal.pressure_max for seal in seals),
+        configuration.adaptation.mode,
+        estimator.force_sum_correction,
+    )
+
+
+def take(held: Held, record: Any, received: int) -> Held:
+    """Held records after one more, received at ``received`` [ns]."""
+    kind = type(record)
+    status, limited = held.status, held.limited
+    if kind is FrictionEstimate:
+        status |= record.status
+    elif kind is FeedForward:
+        limited |= record.limited
+    return Held({**held.records, kind: record}, {**held.receipts, kind: received}, status, limited)
+
+
+def next_interval(held: Held) -> Held:
+    """Held records after a row was made of them: the bits are those of the newest answers again."""
+    newest = held.records.get(FeedForward)
+    return held._replace(status=held.estimate.status, limited=newest.limited if newest else 0)
+
+
+def row(known: Known, held: Held, time: float) -> Row:
+    """Numbers of one moment.
+
+    The band is that of the next reading while the rod slides: friction force plus and minus `BAND` standard deviations.
+
+    Args:
+        known: Configuration of the actuator.
+        held: Newest records.
+        time: [s] on the axis of the view.
+    """
+    records, estimate = held.records, held.estimate
+    pressure, feedforward = records.get(Pressure), records.get(FeedForward)
+    friction = low = high = scale = spread = residual = None
+    if estimate.stamp != NEVER:
+        friction = estimate.friction_force
+        if estimate.state == FrictionState.SLIDING:
+            half = BAND * estimate.coulomb_friction_std
+            low, high = friction - half, friction + half
+        if known.adaptation != OFF:
+            scale, spread, residual = estimate.adaptation_scale, BAND * estimate.adaptation_scale_std, estimate.residual
+    values = (
+        measured_friction(known, held),
+        friction,
+        low,
+        high,
+        None if feedforward is None else feedforward.force,
+        known.force_limit,
+        -known.force_limit,
+        tracking_error(held),
+        None if pressure is None else pressure.chamber_a / BAR,
+        None if pressure is None else pressure.chamber_b / BAR,
+        scale,
+        None if scale is None or spread is None else scale - spread,
+        None if scale is None or spread is None else scale + spread,
+        residual,
+    )
+    return (round(time, 3), *(finite(value) for value in values), held.status, held.limited)
+
+
+def finite(value: float | None, digits: int = 6) -> float | None:
+    """A number with at most ``digits`` digits for a page; None instead of NaN and infinity."""
+    if value is None or not math.isfinite(value):
+        return None
+    return float(f'{value:.{digits}g}')
+
+
+def tracking_error(held: Held) -> float | None:
+    """Reference less position [um] at the stamp of the position; None if their stamps are further apart than `PAIRED`.
+
+    The newest reference and the newest position are some milliseconds apart, in which a fast rod moves by more than its
+    error: the reference is taken along by its velocity.
+    """
+    position, reference = held.records.get(Position), held.records.get(ServoReference)
+    if position is None or reference is None:
+        return None
+    apart = (position.stamp - reference.stamp) * 1e-9
+    if not abs(apart) <= PAIRED:
+        return None
+    velocity = reference.velocity if math.isfinite(reference.velocity) else 0.0
+    return float(reference.position + velocity * apart - position.position) / MICROMETRE
+
+
+def measured_friction(known: Known, held: Held) -> float | None:
+    """Friction [N] that the measurements show: the force sum, which is the friction while the speed is even.
+
+    With adaptation, inertia and offset are known while the rod slides, so that the friction is estimate plus residual.
+    """
+    estimate, force = held.estimate, held.records.get(Force)
+    if known.adaptation != OFF and estimate.state == FrictionState.SLIDING and estimate.residual != 0.0:
+        return estimate.friction_force + estimate.residual
+    if force is None:
+        return None
+    pressure = held.records.get(Pressure)
+    if known.correction == NO_CORRECTION or pressure is None:
+        return float(force.force)
+    return float(corrected_force_sum(known.correction, force.force, pressure.chamber_a, pressure.chamber_b))
+
+
+class Said(NamedTuple):
+    """Worst status of the diagnostics of a node that concerns an actuator."""
+
+    level: int  # of diagnostic_msgs/DiagnosticStatus: 0 OK, 1 WARN, 2 ERROR, 3 STALE
+    message: str
+
+
+WARN = 1
+NOTHING_SAID = Said(0, '')
+
+
+class Bits(NamedTuple):
+    """Bits of all answers of the last `RECENT` seconds."""
+
+    status: int = 0
+    limited: int = 0
+
+
+def recent_bits(rows: Iterable[Row], until: float) -> Bits:
+    """Bits of the rows of the last `RECENT` seconds before ``until`` [s]; ``rows`` from the newest on."""
+    status = limited = 0
+    for one in rows:
+        if one[0] <= until - RECENT:
+            break
+        status |= one[-2]
+        limited |= one[-1]
+    return Bits(status, limited)
+
+
+def situation(known: Known, held: Held, bits: Bits, now: int, said: Said = NOTHING_SAID) -> dict[str, Any]:
+    """The situation in words and numbers, ready for JSON.
+
+    Args:
+        known: Configuration of the actuator.
+        held: Newest records.
+        bits: Of the last answers.
+        now: [ns] on the clock of receipt.
+        said: What the diagnostics of the node say of the actuator.
+    """
+    estimate, feedforward = held.estimate, held.records.get(FeedForward)
+    verdict, reason = _verdict(held, bits.status, now, said)
+    frame = getattr(held.records.get(Velocity), 'frame_id', b'')
+    return {
+        'verdict': verdict,
+        'reason': reason,
+        'state': STATE_WORDS.get((FrictionState(estimate.state), estimate.direction), 'unknown'),
+        'faults': [
+            words + (' (usual at a reversal)' if USUAL & bit else '')
+            for bit, words in STATUS_WORDS.items()
+            if bits.status & bit
+        ],
+        'friction': finite(estimate.friction_force),
+        'coulomb': finite(estimate.coulomb_friction),
+        'band': finite(BAND * estimate.coulomb_friction_std),
+        'measured': finite(measured_friction(known, held)),
+        'breakaway': finite(estimate.breakaway_force),
+        'feedforward': None if feedforward is None else finite(feedforward.force),
+        'lamps': {bit.name: bool(bits.limited & bit) for bit in Limited},
+        'ages': {
+            name: _age(held, kind, now) for kind, name in INPUT_NAMES.items() if kind in held.records or kind in NEEDED
+        },
+        'answer_age': _age(held, FrictionEstimate, now),
+        'frame': frame.decode(errors='replace')[:_MOST_FRAME],
+        'adaptation': known.adaptation,
+        'adaptation_scale': finite(estimate.adaptation_scale),
+        'adaptation_scale_std': finite(estimate.adaptation_scale_std),
+        'residual': finite(estimate.residual),
+        'offset': finite(estimate.adaptation_offset),
+        'seals': list(known.seals),
+        'range': [finite(known.pressure_low / BAR), finite(known.pressure_high / BAR)],
+        'settings': {
+            'scale': finite(known.scale),
+            'lead_time': finite(known.lead_time),
+            'force_limit': finite(known.force_limit),
+        },
+    }
+
+
+def _age(held: Held, kind: type, now: int) -> float | None:
+    """Time since the last record of a kind [s]; None if there was none."""
+    received = held.receipts.get(kind)
+    return None if received is None else round(max(now - received, 0) * 1e-9, 3)
+
+
+def _verdict(held: Held, status: int, now: int, said: Said) -> tuple[str, str]:
+    """good, look or bad, and why."""
+    age = _age(held, FrictionEstimate, now)
+    if age is None:
+        missing = [INPUT_NAMES[kind] for kind in NEEDED if kind not in held.records]
+        return 'bad', 'no estimate yet' + (f': no {" and no ".join(missing)} came' if missing else '')
+    if age > TOO_OLD:
+        return 'bad', f'no estimate for {age:.1f} s: everything shown is old'
+    if said.level > WARN:
+        return 'bad', f'the node says: {said.message}'
+    serious = [words for bit, words in STATUS_WORDS.items() if status & bit and not USUAL & bit]
+    if serious:
+        return 'look', serious[0] + (f', and {len(serious) - 1} more' if serious[1:] else '')
+    old = [
+        f'{INPUT_NAMES[kind]} for {age:.1f} s'
+        for kind in INPUT_NAMES
+        if (age := _age(held, kind, now)) is not None and age > TOO_OLD and kind is not Temperature
+    ]
+    if old:
+        return 'look', f'no {", no ".join(old)}'
+    if said.level == WARN:
+        return 'look', f'the node says: {said.message}'
+    return 'good', 'estimating, no fault'

@@ -1,0 +1,145 @@
+"""The view of running estimators: what their nodes say now, and the last half minute of every actuator."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, Row, next_interval, recent_bits, row, situation
+from seal_friction_ros.offline.monitor.node_view import NodeView
+
+RATE = 100.0  # [Hz] of the rows: 20 points of a motion at 5 Hz, 5 new ones a frame (our choice)
+KEPT = 30.0  # [s] of rows that are kept
+CHANGEABLE = {'scale': '1', 'lead_time': 's', 'force_limit': 'N'}
+"""Parameter of the feed-forward that the page may change -> its unit."""
+
+Wanted = dict[str, dict[str, float]]
+"""Name of a node -> values by ROS name of the parameter."""
+Change = Callable[[Wanted], 'list[Answer]']
+"""Sets parameters, of each node all or none, of all nodes at once; one answer a node."""
+
+
+class Answer(NamedTuple):
+    """What came of a change of parameters."""
+
+    confirmed: bool  # whether the node said yes and reads back what was asked for
+    text: str  # for a person
+
+
+def no_changes(wanted: Wanted) -> list[Answer]:
+    """`Change` of a view that only reads."""
+    return [Answer(False, f'{node}: read only: start the monitor with --allow-changes') for node in wanted]
+
+
+class LiveView:
+    """All estimators of a graph. The node that listens writes, the threads of the page read.
+
+    Args:
+        start: [ns] on the clock of receipt, 0 of the time axis.
+        change: Sets parameters; None: read only.
+    """
+
+    def __init__(self, start: int, change: Change | None = None) -> None:
+        self._start, self._now = start, start
+        self._change = change
+        self._nodes: dict[str, NodeView] = {}
+        self._rows: dict[tuple[str, str], deque[Row]] = {}
+        self._lock = threading.Lock()
+
+    @property
+    def lock(self) -> threading.Lock:
+        """To hold while a `NodeView` is written."""
+        return self._lock
+
+    def add(self, view: NodeView) -> None:
+        """Show another estimator."""
+        with self._lock:
+            self._nodes[view.node] = view
+
+    def sample(self, now: int) -> None:
+        """Add a row of every actuator at ``now`` [ns]."""
+        with self._lock:
+            self._now = now
+            time = (now - self._start) * 1e-9
+            for view in self._nodes.values():
+                for actuator, known in view.known.items():
+                    rows = self._rows.setdefault((view.node, actuator), deque(maxlen=round(KEPT * RATE)))
+                    rows.append(row(known, view.held[actuator], time))
+                    view.held[actuator] = next_interval(view.held[actuator])
+
+    # --- for the page ---
+
+    def describe(self) -> dict[str, Any]:
+        """What does not change from frame to frame."""
+        return {'mode': 'live', 'name': '', 'columns': COLUMNS, 'can_change': self._change is not None}
+
+    def view(self, label: str, since: float, until: float | None = None) -> dict[str, Any]:
+        """Rows of an actuator after ``since`` [s], and the situation of all.
+
+        Args:
+            label: Of the actuator; the first one if there is no such.
+            since: Time of the last row that the page has.
+            until: Not used: a live view ends now.
+        """
+        del until
+        with self._lock:
+            found = {view.label(name): (view, name) for view in self._nodes.values() for name in view.known}
+            if not found:
+                return {'label': '', 'rows': [], 'actuators': [], 'diagnostics': []}
+            label = label if label in found else next(iter(found))
+            shown, actuator = found[label]
+            every = {name: self._situation(view, key) for name, (view, key) in found.items()}
+            rows = newer(self._rows.get((shown.node, actuator), ()), since)
+            diagnostics = [{'part': part, **status} for part, status in shown.diagnostics.items()]
+        return {
+            'label': label,
+            'time': round((self._now - self._start) * 1e-9, 3),
+            'rows': rows,
+            'now': every[label],
+            'node': shown.node,
+            'actuators': [
+                {'label': name, 'verdict': one['verdict'], 'feedforward': one['feedforward']}
+                for name, one in every.items()
+            ],
+            'diagnostics': diagnostics,
+        }
+
+    def _situation(self, view: NodeView, actuator: str) -> dict[str, Any]:
+        rows, time = self._rows.get((view.node, actuator), ()), (self._now - self._start) * 1e-9
+        bits = recent_bits(reversed(rows), time)
+        return situation(view.known[actuator], view.held[actuator], bits, self._now, view.said(actuator))
+
+    def change(self, label: str, parameter: str, value: float) -> list[Answer]:
+        """Set a parameter of the feed-forward of one actuator.
+
+        Raises:
+            ValueError: There is no such actuator or parameter.
+        """
+        if parameter not in CHANGEABLE:
+            raise ValueError(f'parameter {parameter!r}: one of {", ".join(CHANGEABLE)}')
+        with self._lock:
+            found = {view.label(name): (view, name) for view in self._nodes.values() for name in view.known}
+        if label not in found:
+            raise ValueError(f'no actuator {label!r}')
+        view, actuator = found[label]
+        return (self._change or no_changes)({view.node: {view.parameter(actuator, parameter): value}})
+
+    def off(self) -> list[Answer]:
+        """Set the scale of every feed-forward to 0; one answer a node."""
+        with self._lock:
+            wanted: Wanted = {
+                view.node: {view.parameter(name, 'scale'): 0.0 for name in view.known} for view in self._nodes.values()
+            }
+        if not wanted:
+            return [Answer(False, 'NOT OFF: no estimator is known')]
+        return (self._change or no_changes)(wanted)
+
+
+def newer(rows: Any, since: float) -> list[Row]:
+    """Rows after a time [s], in order."""
+    found: list[Row] = []
+    for one in reversed(rows):
+        if one[0] <= since:
+            break
+        found.append(one)
+    return found[::-1]

@@ -1,0 +1,139 @@
+"""One estimator as a view sees it: its configuration, its actuators, and the newest of every message."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from seal_friction_ros.core.estimation.configuration import parse_snapshot
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    DECODERS,
+    decode_text,
+)
+from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
+from seal_friction_ros.core.machine.machine import Machine, Memory, first_memory, records_of
+from seal_friction_ros.core.machine.machine_snapshot import is_machine_text, machine_of_text, parse_machine_text
+from seal_friction_ros.core.machine.message_fields import Definition
+from seal_friction_ros.offline.monitor.actuator_view import (
+    NOTHING_HELD,
+    NOTHING_SAID,
+    UNKNOWN_CONFIGURATION,
+    Held,
+    Known,
+    Said,
+    known_of,
+    take,
+)
+
+DefinitionsOf = Callable[[Iterable[str]], Mapping[str, Definition]]
+"""Definition of each message type."""
+
+
+class NodeView:
+    """Follows the messages of one ``friction_estimator`` or ``machine_estimator``.
+
+    Args:
+        node: Its name with its namespace.
+        definitions_of: Looks up the definitions of the messages of a machine.
+    """
+
+    def __init__(self, node: str, definitions_of: DefinitionsOf) -> None:
+        self.node = node
+        self.known: dict[str, Known] = {}
+        """configuration of each actuator"""
+        self.held: dict[str, Held] = {}
+        """newest records of each actuator"""
+        self.diagnostics: dict[str, dict[str, Any]] = {}
+        """newest status of each part: level, message, values"""
+        self.malformed = 0
+        """messages that could not be read"""
+        self._definitions_of = definitions_of
+        self._machine: Machine | None = None
+        self._memories: list[Memory] = []
+
+    @property
+    def machine(self) -> Machine | None:
+        """The machine of a ``machine_estimator``."""
+        return self._machine
+
+    @property
+    def input_topics(self) -> dict[str, str]:
+        """Topics of a machine that its mapping file names, and their types; empty for one actuator."""
+        return dict(self._machine.file.topics) if self._machine else {}
+
+    def label(self, actuator: str) -> str:
+        """Name of an actuator on the page: unique as long as node names and actuators are."""
+        if self._machine is not None:
+            return f'{actuator} ({self.node})'
+        return self.node
+
+    def parameter(self, actuator: str, name: str) -> str:
+        """ROS name of a parameter of the feed-forward of an actuator."""
+        return f'{actuator}.feedforward.{name}' if self._machine is not None else f'feedforward.{name}'
+
+    def part(self, actuator: str) -> str:
+        """Part of the diagnostics that tells of an actuator."""
+        return actuator if self._machine is not None else 'estimate'
+
+    def said(self, actuator: str) -> Said:
+        """Worst of the diagnostics that concern an actuator."""
+        parts = (self.part(actuator), 'recorder')
+        every = [Said(one['level'], one['message']) for part in parts if (one := self.diagnostics.get(part))]
+        return max(every, default=NOTHING_SAID, key=lambda one: one.level)
+
+    def configure(self, text: str) -> None:
+        """Take a configuration, the first one or a changed one.
+
+        Raises:
+            ValueError: It is not valid.
+        """
+        if is_machine_text(text):
+            definitions = self._definitions_of(machine_of_text(text).topics.values())
+            machine, _ = parse_machine_text(text, definitions)
+            if self._machine is None or machine.file != self._machine.file:
+                self._memories = [first_memory(actuator) for actuator in machine.actuators]
+            self._machine = machine
+            self.known = {actuator.name: known_of(actuator.configuration) for actuator in machine.actuators}
+        else:
+            self._machine, self.known = None, {'': known_of(parse_snapshot(text).configuration)}
+        self.held = {name: self.held.get(name, NOTHING_HELD) for name in self.known}
+
+    def without_configuration(self) -> None:
+        """Show the answers of an estimator whose configuration is not known."""
+        if not self.known:
+            self.known, self.held = {'': UNKNOWN_CONFIGURATION}, {'': NOTHING_HELD}
+
+    def take(self, topic: str, type_name: str, data: bytes, received: int) -> None:
+        """Take one message, received at ``received`` [ns]; one that cannot be read is counted."""
+        try:
+            self._take(topic, type_name, data, received)
+        except (ValueError, LookupError):
+            self.malformed += 1
+
+    def _take(self, topic: str, type_name: str, data: bytes, received: int) -> None:
+        if type_name == CONFIGURATION_TYPE:
+            self.configure(decode_text(data))
+        elif type_name == MACHINE_TYPE:
+            for answer in decode_together(data):
+                self._hold(answer.actuator, answer.record, received)
+        elif self._machine is not None and topic in self._machine.plans:
+            self._take_of_machine(self._machine, topic, data, received)
+        elif type_name in DECODERS:
+            actuator = topic.split('/')[-2] if self._machine is not None else ''
+            self._hold(actuator, DECODERS[type_name](data), received)
+
+    def _take_of_machine(self, machine: Machine, topic: str, data: bytes, received: int) -> None:
+        """Records that a message of a machine makes, as its estimator makes them."""
+        plan = machine.plans[topic]
+        reading = plan.reader.read(data)
+        stamp = received if reading.stamp is None else reading.stamp
+        for number, taken in plan.taken:
+            actuator = machine.actuators[number]
+            memory = self._memories[number]
+            memory, records = records_of(actuator, memory, taken, reading.numbers, stamp, reading.frame_id)
+            self._memories[number] = memory
+            for record in records:
+                self._hold(actuator.name, record, received)
+
+    def _hold(self, actuator: str, record: Any, received: int) -> None:
+        if actuator in self.held:
+            self.held[actuator] = take(self.held[actuator], record, received)

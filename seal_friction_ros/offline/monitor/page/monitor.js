@@ -1,0 +1,556 @@
+'use strict';
+// The page of `seal_friction monitor`. Values reach it as JSON only and are written as text only, never as HTML.
+
+const token = new URLSearchParams(location.search).get('token') || '';
+const byId = (id) => document.getElementById(id);
+const address = (path, values = {}) => `${path}?${new URLSearchParams({...values, token})}`;
+
+const GREY = '#7f7f7f', BLUE = '#0072b2', SKY = '#56b4e9', ORANGE = '#e69f00', VERMILLION = '#d55e00', GREEN = '#009e73',
+  PURPLE = '#cc79a7', RED = '#b3261e';
+const LOST_AFTER = 1500;  // [ms] without a frame
+const WORDS_PERIOD = 250;  // [ms] numbers that change faster cannot be read
+const KEPT = 30;  // [s] of rows in the page while it follows; while it holds, up to MOST_ROWS
+const MOST_ROWS = 12000;
+const LEVELS = ['good', 'look', 'bad', 'bad'];
+const LEVEL_WORDS = ['OK', 'WARN', 'ERROR', 'STALE'];
+const LAMPS = {
+  CLAMP: ['clamp', 'the force is cut by force_limit'],
+  SLEW: ['slew', 'the force changes at slew_limit: usual for a moment at each reversal'],
+  FADE: ['fade', 'the force fades: an input or the reference is not usable, or was until a moment ago'],
+};
+const SETTINGS = {
+  scale: {words: 'Scale: share of the friction that is compensated', unit: '', factor: 1, max: 2, step: 0.05},
+  lead_time: {words: 'Lead time', unit: 'ms', factor: 1e3, max: 20, step: 0.5},
+  force_limit: {words: 'Limit: largest force', unit: 'N', factor: 1, max: 0, step: 1},
+};
+// A curve: column, name, colour, and how it is drawn. A band lies between its two columns.
+const PLOTS = [
+  {id: 'friction', title: 'Friction', unit: 'N', band: ['high', 'low', SKY, '95 % of readings'],
+    curves: [['measured', 'measured', GREY], ['estimate', 'estimated', BLUE]], empty: 'no estimate'},
+  {id: 'feedforward', title: 'Feed-forward', unit: 'N',
+    curves: [['feedforward', 'force', VERMILLION], ['limit', 'limit', GREY, 'dashed'], ['below', '', GREY, 'dashed']],
+    empty: 'no feed-forward: it needs a reference'},
+  {id: 'error', title: 'Tracking error', note: 'reference less position', unit: 'µm',
+    curves: [['error', 'error', PURPLE]], empty: 'no reference or no position'},
+  {id: 'pressure', title: 'Chamber pressures', unit: 'bar', shade: true,
+    curves: [['pressure_a', 'a', BLUE], ['pressure_b', 'b', VERMILLION]], empty: 'no pressure'},
+  {id: 'scale', title: 'Adaptation: friction over that of the seal files', unit: '', band: ['scale_high', 'scale_low', GREEN, '95 %'],
+    curves: [['scale', 'scale', GREEN]], adaptation: true, empty: 'nothing learnt'},
+  {id: 'residual', title: 'Residual: what the estimate leaves', unit: 'N',
+    curves: [['residual', 'residual', GREY]], adaptation: true, empty: 'no residual'},
+];
+
+let about = null;  // of the server: mode, columns, whether changes are allowed
+let label = '';  // actuator that is shown
+let columns = {};  // name -> array, one entry a row
+let now = null;  // situation of the actuator
+let end = 0;  // [s] right end of the time axis
+let span = 5;  // [s]
+let zoomed = null;  // [s, s] or null: follow
+let held = false;  // whether the time axis stands still
+let lastWords = 0;  // [ms] when the numbers were written
+let lastFrame = 0;  // [ms] when a frame came
+let drawing = false;
+let charts = [];
+let stream = null;
+
+// -- small helpers ------------------------------------------------------------------------------------------------
+
+function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+function element(tag, text = '', className = '') {
+  const made = document.createElement(tag);
+  if (text) made.textContent = text;
+  if (className) made.className = className;
+  return made;
+}
+
+function replaceIfChanged(node, key, make) {
+  const told = JSON.stringify(key);
+  if (node.dataset.told === told) return;
+  node.dataset.told = told;
+  node.replaceChildren(...make());
+}
+
+function number(value, unit = '', digits = 3) {
+  if (value === null || value === undefined) return 'none';
+  let text = Math.abs(value) >= 1000 ? value.toFixed(0) : value.toPrecision(digits);
+  if (text.includes('e')) text = value === 0 ? '0' : value.toFixed(Math.min(digits + 2, 6));
+  if (Number(text) === 0) text = '0';
+  return unit ? `${text} ${unit}` : text;
+}
+
+const line = (...cells) => {
+  const made = element('tr');
+  made.append(...cells.map((cell) => element('td', cell)));
+  return made;
+};
+
+// -- plots --------------------------------------------------------------------------------------------------------
+
+function range() {
+  if (zoomed) return zoomed;
+  return about.mode === 'bag' && end < span ? [0, span] : [end - span, end];
+}
+
+function series(plot) {
+  const [high, low, shade] = plot.band || [];
+  const bands = plot.band ? [{label: high, stroke: 'transparent', width: 0}, {label: low, stroke: 'transparent', width: 0}] : [];
+  const curves = plot.curves.map(([column, , colour, style]) => (
+    {label: column, stroke: colour, width: column === 'estimate' ? 2 : 1.5, dash: style === 'dashed' ? [6, 4] : undefined,
+      points: {show: false}, spanGaps: false}));
+  return {list: [{label: 'time'}, ...bands, ...curves], bands: plot.band ? [{series: [1, 2], fill: `${shade}55`}] : undefined};
+}
+
+function shadeRange(chart) {
+  if (!now || now.range[0] === null || now.range[1] === null) return;
+  const {ctx, bbox} = chart;
+  const [high, low] = [now.range[1], now.range[0]].map((value) => (
+    Math.min(Math.max(chart.valToPos(value, 'y', true), bbox.top), bbox.top + bbox.height)));
+  ctx.save();
+  ctx.fillStyle = '#d0342c1c';
+  ctx.fillRect(bbox.left, bbox.top, bbox.width, high - bbox.top);
+  ctx.fillRect(bbox.left, low, bbox.width, bbox.top + bbox.height - low);
+  ctx.fillStyle = '#009e7314';
+  ctx.fillRect(bbox.left, high, bbox.width, low - high);
+  ctx.restore();
+}
+
+// Range of the values, but for spikes (of a faulty sensor): those leave the plot, so that the rest can be seen.
+function paddedRange(chart, low, high) {
+  if (low === null || high === null) return [0, 1];
+  const [first, last] = range(), times = columns.time, values = [];
+  const stride = Math.ceil(times.length / 500);
+  for (let place = 0; place < times.length; place += stride) {
+    if (times[place] < first || times[place] > last) continue;
+    for (let curve = 1; curve < chart.data.length; curve += 1) {
+      const value = chart.data[curve][place];
+      if (value !== null && value !== undefined) values.push(value);
+    }
+  }
+  values.sort((one, other) => one - other);
+  const share = (part) => values[Math.min(Math.floor(part * values.length), values.length - 1)];
+  const [few, most] = [share(0.02), share(0.98)];
+  const width = Math.max(most - few, Math.abs(most) * 1e-3);
+  if (values.length > 20 && high - low > 20 * width) [low, high] = [Math.max(low, few - 0.5 * width), Math.min(high, most + 0.5 * width)];
+  const pad = Math.max((high - low) * 0.08, Math.abs(high) * 1e-3, 1e-6);
+  return [low - pad, high + pad];
+}
+
+function makeCharts() {
+  for (const chart of charts) chart.plot.destroy();
+  byId('plots').replaceChildren();
+  charts = PLOTS.filter((plot) => !plot.adaptation || (now && now.adaptation !== 'off')).map((plot) => {
+    const figure = element('figure');
+    figure.id = `plot-${plot.id}`;
+    const title = element('h2', plot.title);
+    const unit = [plot.unit && `[${plot.unit}]`, plot.note].filter(Boolean).join(' ');
+    if (unit) title.append(' ', element('small', unit));
+    const legend = element('div', '', 'legend');
+    const values = plot.curves.filter(([, name]) => name).map(([column, name, colour, style]) => {
+      const entry = element('span', '', style || '');
+      entry.style.borderColor = colour;
+      const value = element('b');
+      entry.append(`${name} `, value);
+      legend.append(entry);
+      return {column, value};
+    });
+    if (plot.band) {
+      const entry = element('span', plot.band[3], 'area');
+      entry.style.borderColor = `${plot.band[2]}88`;
+      legend.append(entry);
+    }
+    if (plot.shade) {
+      const entry = element('span', 'identified range', 'area');
+      entry.style.borderColor = '#009e7344';
+      legend.append(entry);
+    }
+    const empty = element('div', plot.empty, 'empty');
+    figure.append(title, legend, empty);
+    byId('plots').append(figure);
+    const {list, bands} = series(plot);
+    const font = '12px system-ui, "DejaVu Sans", sans-serif';
+    const chart = new uPlot({
+      width: Math.max(figure.clientWidth - 26, 200), height: 190, series: list, bands, legend: {show: false},
+      scales: {x: {time: false, range: () => range()}, y: {range: paddedRange}},
+      axes: [{font, stroke: '#444', grid: {stroke: '#ececec'}, size: 30, values: (_, ticks) => ticks.map((tick) => `${+tick.toFixed(3)} s`), space: 64},
+        {font, stroke: '#444', grid: {stroke: '#ececec'}, size: 58, space: 28,
+          values: (_, ticks) => ticks.map((tick) => (Math.abs(tick) >= 1e5 ? tick.toExponential(0) : String(+tick.toPrecision(4))))}],
+      cursor: {sync: {key: 'time'}, drag: {x: true, y: false, setScale: false}, points: {size: 6}},
+      hooks: {
+        drawClear: plot.shade ? [shadeRange] : [],
+        setSelect: [(chart) => {
+          const {left, width} = chart.select;
+          if (width > 6) zoom([chart.posToVal(left, 'x'), chart.posToVal(left + width, 'x')]);
+        }],
+        setCursor: [() => writeLegends()],
+      },
+    }, dataOf(list), figure);
+    chart.over.addEventListener('dblclick', () => zoom(null));
+    return {plot: chart, list, values, empty, curves: plot.curves, unit: plot.unit};
+  });
+}
+
+const dataOf = (list) => list.map(({label: column}) => columns[column] || []);
+
+function zoom(wanted) {
+  zoomed = wanted;
+  for (const {plot} of charts) plot.setSelect({left: 0, width: 0, top: 0, height: 0}, false);
+  drawSoon();
+}
+
+function writeLegends() {
+  for (const {plot, values} of charts) {
+    const index = plot.cursor.idx;
+    for (const {column, value} of values) {
+      const list = columns[column] || [];
+      const given = list[index === null || index === undefined ? list.length - 1 : index];
+      setText(value, given === null || given === undefined ? '-' : number(given));
+    }
+  }
+}
+
+function drawSoon() {
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(() => {
+    drawing = false;
+    for (const {plot, list, empty, curves} of charts) {
+      plot.setData(dataOf(list));
+      const first = columns[curves[0][0]] || [];
+      empty.hidden = first.some((value) => value !== null);
+    }
+    writeLegends();
+  });
+}
+
+// -- frames -------------------------------------------------------------------------------------------------------
+
+function clearRows() {
+  columns = Object.fromEntries(about.columns.map((name) => [name, []]));
+}
+
+function takeFrame(frame) {
+  lastFrame = performance.now();
+  if (!frame.label) {
+    verdict('waiting', 'waiting', 'for an estimator: start friction_estimator or machine_estimator, check ROS_DOMAIN_ID');
+    return;
+  }
+  const hadAdaptation = now && now.adaptation !== 'off', isOther = frame.label !== label;
+  if (isOther) {
+    clearRows();
+    lastWords = 0;
+  }
+  label = frame.label;
+  now = frame.now;
+  if (isOther || !charts.length || hadAdaptation !== (now.adaptation !== 'off')) makeCharts();
+  for (const row of frame.rows) about.columns.forEach((name, place) => columns[name].push(row[place]));
+  const rows = columns.time.length;
+  const oldest = columns.time.findIndex((time) => time > frame.time - KEPT);
+  const surplus = zoomed || held || about.mode === 'bag' ? Math.max(rows - MOST_ROWS, 0) : oldest < 0 ? rows : oldest;
+  if (surplus > 0) for (const name of about.columns) columns[name].splice(0, surplus);
+  if (!held) end = frame.time;
+  writeWords(frame);
+  drawSoon();
+}
+
+function verdict(kind, word, reason) {
+  byId('verdict').className = kind;
+  setText(byId('verdict-word'), word);
+  setText(byId('reason'), reason);
+}
+
+function writeWords(frame) {
+  verdict(now.verdict, now.verdict, now.reason);
+  writeLamps();
+  writeTabs(frame.actuators);
+  if (frame.diagnostics) writeDiagnostics(frame.diagnostics);
+  writeSliders();
+  const moment = performance.now();
+  if (about.mode === 'live' && moment - lastWords < WORDS_PERIOD) return;
+  lastWords = moment;
+  setText(byId('state'), now.state);
+  setText(byId('friction'), `${number(now.coulomb)} ± ${number(now.band, 'N', 2)}`);
+  setText(byId('friction-more'), `acts now ${number(now.friction, 'N')}, measured ${number(now.measured, 'N')}`);
+  setText(byId('feedforward'), now.feedforward === null ? 'none' : number(now.feedforward, 'N'));
+  const {scale, force_limit: limit} = now.settings;
+  setText(byId('feedforward-more'), scale === 0 ? 'OFF: scale is 0' : scale === null ? '' : `scale ${number(scale)}, at most ${number(limit, 'N')}`);
+  writeTracking();
+  const isOff = now.adaptation === 'off';
+  setText(byId('adaptation'), isOff ? 'off' : number(now.adaptation_scale));
+  setText(byId('adaptation-more'), isOff ? '' : `${now.adaptation === 'on' ? 'in use' : 'observed only'}, std ${number(now.adaptation_scale_std, '', 2)}, offset ${number(now.offset, 'N', 2)}`);
+  replaceIfChanged(byId('faults'), now.faults, () => (now.faults.length ? now.faults.map((text) => element('li', text)) : [element('li', 'none')]));
+  replaceIfChanged(byId('ages'), [now.ages, now.answer_age].map((one) => JSON.stringify(one)), () => (
+    [...Object.entries(now.ages), ['estimate', now.answer_age]].map(([name, age]) => {
+      const made = line(name, age === null ? 'never came' : `${age.toFixed(2)} s`);
+      if (age === null || age > 0.5) made.className = 'old';
+      return made;
+    })));
+  replaceIfChanged(byId('seals'), now.seals, () => now.seals.map((name) => element('li', name)));
+  setText(byId('range'), now.range[1] === null ? '' : `identified from ${number(now.range[0])} to ${number(now.range[1], 'bar')}`);
+  const source = [['node', frame.node], ['frame', now.frame || 'none']];
+  replaceIfChanged(byId('source'), source, () => source.map(([name, text]) => line(name, text)));
+}
+
+function writeLamps() {
+  const lamps = byId('lamps');
+  if (!lamps.children.length) {
+    for (const [name, [word, title]] of Object.entries(LAMPS)) {
+      const lamp = element('div', '', 'lamp');
+      lamp.id = `lamp-${name}`;
+      lamp.title = title;
+      lamp.append(element('i'), word);
+      lamps.append(lamp);
+    }
+  }
+  for (const name of Object.keys(LAMPS)) byId(`lamp-${name}`).classList.toggle('lit', now.feedforward !== null && now.lamps[name]);
+}
+
+function writeTracking() {
+  const recent = (columns.error || []).slice(-300).filter((value) => value !== null);
+  setText(byId('error'), recent.length ? number(recent[recent.length - 1], 'µm') : 'none');
+  const rms = Math.sqrt(recent.reduce((sum, value) => sum + value * value, 0) / Math.max(recent.length, 1));
+  setText(byId('error-more'), recent.length ? `RMS of 3 s: ${number(rms, 'µm')}` : 'no reference or position');
+}
+
+function writeTabs(actuators) {
+  const tabs = byId('tabs');
+  replaceIfChanged(tabs, actuators.map((one) => one.label), () => actuators.map((one) => {
+    const tab = element('button');
+    tab.type = 'button';
+    tab.append(element('i', '', 'dot'), element('span', one.label));
+    tab.addEventListener('click', () => choose(one.label));
+    return tab;
+  }));
+  actuators.forEach((one, place) => {
+    tabs.children[place].setAttribute('aria-pressed', String(one.label === label));
+    tabs.children[place].firstChild.className = `dot ${one.verdict}`;
+  });
+  tabs.hidden = actuators.length < 2;
+}
+
+function writeDiagnostics(list) {
+  const open = new Set([...byId('diagnostics').querySelectorAll('details[open]')].map((node) => node.dataset.part));
+  byId('diagnostics').replaceChildren(...(list.length ? list.map((one) => {
+    const made = element('div', '', `status ${LEVELS[one.level] || 'bad'}`);
+    made.append(element('b', `${one.part}: ${LEVEL_WORDS[one.level] || one.level}`), element('div', one.message));
+    const more = element('details');
+    more.dataset.part = one.part;
+    more.open = open.has(one.part);
+    const table = element('table');
+    table.append(...Object.entries(one.values).map(([name, value]) => line(name, value)));
+    more.append(element('summary', `${Object.keys(one.values).length} values`), table);
+    made.append(more);
+    return made;
+  }) : [element('p', 'none received')]));
+}
+
+// -- changes ------------------------------------------------------------------------------------------------------
+
+async function post(path, document, output) {
+  output.hidden = false;
+  output.className = 'waiting';
+  output.textContent = 'sent, waiting for the answer of the node';
+  try {
+    const response = await fetch(address(path), {
+      method: 'POST', headers: {'Content-Type': 'application/json'}, body: JSON.stringify(document),
+      signal: AbortSignal.timeout(8000),
+    });
+    if (!response.ok) throw new Error(await response.text());
+    const answers = await response.json();
+    output.className = answers.every((answer) => answer.confirmed) ? 'yes' : 'no';
+    output.textContent = answers.map((answer) => answer.text).join('; ');
+  } catch (error) {
+    output.className = 'no';
+    output.textContent = `NOT CONFIRMED: ${error.message || error}`;
+  }
+}
+
+function writeSliders() {
+  const box = byId('sliders');
+  if (about.mode !== 'live' || !now.seals.length) return;
+  byId('settings').hidden = false;
+  replaceIfChanged(box, label, () => Object.entries(SETTINGS).map(([name, {words, unit, factor, max, step}]) => {
+    const made = element('div', '', 'slider');
+    const value = (now.settings[name] || 0) * factor;
+    const title = element('label', words);
+    if (unit) title.append(' ', element('small', `[${unit}]`));
+    const slide = element('input'), field = element('input');
+    slide.type = 'range';
+    field.type = 'number';
+    slide.id = `slide-${name}`;
+    field.id = `field-${name}`;
+    title.htmlFor = slide.id;
+    field.setAttribute('aria-label', words);
+    for (const input of [slide, field]) {
+      input.min = 0;
+      input.step = step;
+      input.disabled = !about.can_change;
+      input.addEventListener('change', () => {
+        const asked = {actuator: label, parameter: name, value: Number(input.value) / factor};
+        if (input.value !== '') post('/change', asked, byId('change-answer'));
+      });
+    }
+    field.step = 'any';
+    slide.max = max || Math.max(Math.ceil(value * 2), 10);
+    made.append(title, slide, field);
+    return made;
+  }));
+  for (const [name, {factor}] of Object.entries(SETTINGS)) {  // what the node has, unless somebody is changing it
+    const value = now.settings[name];
+    for (const input of [byId(`slide-${name}`), byId(`field-${name}`)]) {
+      const shown = value === null ? '' : String(+(value * factor).toPrecision(6));
+      if (input !== document.activeElement && input.dataset.shown !== shown) input.value = input.dataset.shown = shown;
+    }
+  }
+}
+
+// -- live and recorded --------------------------------------------------------------------------------------------
+
+function choose(wanted) {
+  label = '';
+  zoomed = null;
+  if (about.mode === 'live') connect(wanted);
+  else showBag(wanted);
+}
+
+function connect(wanted = '', since = -1) {
+  if (stream) stream.close();
+  stream = new EventSource(address('/stream', {actuator: wanted, since}));
+  const mine = stream;
+  stream.onmessage = (event) => {
+    mode('live', 'LIVE');
+    takeFrame(JSON.parse(event.data));
+  };
+  stream.onerror = () => {
+    mine.close();
+    if (mine !== stream) return;
+    lost();
+    setTimeout(() => mine === stream && connect(label || wanted, columns.time && columns.time.length ? columns.time.at(-1) : -1), 1000);
+  };
+}
+
+function mode(kind, text) {
+  byId('mode').className = `badge ${kind}`;
+  setText(byId('mode'), text);
+  document.body.classList.toggle('lost', kind === 'lost');
+}
+
+function lost() {
+  mode('lost', 'NO CONNECTION');
+  verdict('lost', 'old', 'what is shown is old: the monitor does not answer. Is it still running, and the tunnel?');
+}
+
+let busy = false, again = null, playing = null;
+
+async function showBag(wanted = label) {
+  if (busy) {
+    again = wanted;
+    return;
+  }
+  busy = true;
+  try {
+    const until = Number(byId('time').value);
+    const response = await fetch(address('/view', {actuator: wanted, since: until - span, until}));
+    if (!response.ok) throw new Error(await response.text());
+    const frame = await response.json();
+    if (columns.time) clearRows();
+    takeFrame(frame);
+    setText(byId('clock'), `${until.toFixed(1)} of ${about.duration.toFixed(1)} s`);
+    mode('bag', `RECORDING ${about.name}`);
+  } catch (error) {
+    lost();
+  }
+  busy = false;
+  if (again !== null) {
+    const next = again;
+    again = null;
+    showBag(next);
+  }
+}
+
+function play() {
+  if (playing) {
+    clearInterval(playing);
+    playing = null;
+  } else {
+    let before = performance.now();
+    const slider = byId('time');
+    if (Number(slider.value) >= about.duration) slider.value = Math.min(span, about.duration);
+    let place = Number(slider.value);
+    playing = setInterval(() => {
+      const moment = performance.now();
+      place += (moment - before) / 1000;
+      before = moment;
+      slider.value = place;
+      showBag();
+      if (place >= about.duration) play();
+    }, 50);
+  }
+  setText(byId('play'), playing ? 'Pause' : 'Play');
+}
+
+function makeSpans(choices) {
+  byId('spans').replaceChildren(...choices.map((seconds) => {
+    const button = element('button', `${seconds} s`);
+    button.type = 'button';
+    button.setAttribute('aria-pressed', String(seconds === span));
+    button.addEventListener('click', () => {
+      span = seconds;
+      zoomed = null;
+      makeSpans(choices);
+      if (about.mode === 'bag') showBag();
+      else drawSoon();
+    });
+    return button;
+  }));
+}
+
+async function begin() {
+  let response;
+  try {
+    response = await fetch(address('/describe'));
+  } catch (error) {
+    lost();
+    return;
+  }
+  if (!response.ok) {
+    verdict('lost', 'refused', await response.text());
+    return;
+  }
+  about = await response.json();
+  clearRows();
+  const isLive = about.mode === 'live';
+  makeSpans(isLive ? [2, 5, 10, 30] : [2, 5, 10, 60]);
+  byId('hold').hidden = !isLive;
+  byId('player').hidden = isLive;
+  byId('diagnostics-card').hidden = !isLive;
+  byId('off').hidden = !isLive;
+  byId('off').disabled = !about.can_change;
+  byId('off').append(element('small', about.can_change ? 'all feed-forwards' : 'read only'));
+  byId('off').title = about.can_change ? 'sets the scale of every feed-forward to 0' : 'start the monitor with --allow-changes';
+  byId('off').addEventListener('click', () => post('/off', {}, byId('off-answer')));
+  byId('hold').addEventListener('click', () => {
+    held = !held;
+    byId('hold').setAttribute('aria-pressed', String(held));
+    setText(byId('hold'), held ? 'Follow' : 'Hold');
+  });
+  if (isLive) {
+    connect();
+    setInterval(() => performance.now() - lastFrame > LOST_AFTER && lastFrame && lost(), 500);
+  } else {
+    document.title = `Seal friction: ${about.name}`;
+    byId('time').max = about.duration;
+    byId('time').value = Math.min(span, about.duration);
+    byId('time').addEventListener('input', () => showBag());
+    byId('play').addEventListener('click', play);
+    showBag('');
+  }
+}
+
+addEventListener('resize', () => {
+  for (const {plot} of charts) plot.setSize({width: Math.max(plot.root.parentNode.clientWidth - 26, 200), height: 190});
+});
+begin();

@@ -1,0 +1,210 @@
+"""The view of a bag: the same rows and words as live, at any moment of the recording."""
+
+import math
+from array import array
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
+from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage, TopicInfo, bag_topics, read_messages
+from seal_friction_ros.offline.bags.definitions import read_definitions
+from seal_friction_ros.offline.bags.topics import RECORDED
+from seal_friction_ros.offline.monitor.actuator_view import (
+    COLUMNS,
+    Held,
+    Known,
+    Row,
+    next_interval,
+    recent_bits,
+    row,
+    situation,
+)
+from seal_friction_ros.offline.monitor.live_view import CHANGEABLE, RATE, Answer
+from seal_friction_ros.offline.monitor.node_view import NodeView
+from seal_friction_ros.offline.work.progress import progress
+
+MOST_ROWS = 120_000  # of an actuator, 20 minutes at full pace; a longer bag has rows further apart (our choice)
+_ROWS_A_MOMENT = 10  # rows from one moment whose words are kept to the next
+_MOST_ROWS_AT_ONCE = 12_000  # in one answer to the page
+_CONFIGURATION = '/configuration'
+
+
+class _Track:
+    """What is kept of one actuator.
+
+    Args:
+        start: Number of its first row: the actuator may appear in the middle of a bag.
+    """
+
+    def __init__(self, start: int) -> None:
+        self._start = start
+        self.rows = array('d')  # flat, NaN for None
+        self.moments: list[tuple[Known, Held]] = []
+
+    def add(self, known: Known, held: Held, time: float) -> None:
+        """Add a row, and after some of them a moment."""
+        if len(self.rows) // len(COLUMNS) % _ROWS_A_MOMENT == 0:
+            self.moments.append((known, held))
+        self.rows.extend(math.nan if value is None else value for value in row(known, held, time))
+
+    def slice(self, first: int, last: int) -> list[Row]:
+        """Rows ``first`` to ``last``."""
+        width = len(COLUMNS)
+        flat = self.rows[max(first - self._start, 0) * width : max(last + 1 - self._start, 0) * width]
+        return [_as_row(flat[i : i + width]) for i in range(0, len(flat), width)]
+
+    def moment(self, number: int) -> tuple[int, Known, Held]:
+        """The last moment that is kept up to a row: number of its row, configuration, records."""
+        place = min(max(number - self._start, 0) // _ROWS_A_MOMENT, len(self.moments) - 1)
+        return (self._start + place * _ROWS_A_MOMENT, *self.moments[place])
+
+
+def _as_row(values: 'array[float]') -> Row:
+    *numbers, status, limited = values
+    return (*(None if math.isnan(value) else value for value in numbers), int(status), int(limited))
+
+
+class RecordedView:
+    """A bag, sampled at the pace of the live view.
+
+    Args:
+        bag: The bag.
+
+    Raises:
+        BagError: The bag cannot be read, or has no estimates.
+    """
+
+    def __init__(self, bag: Path) -> None:
+        self._name = bag.resolve().name
+        known = bag_topics(bag)
+        types = {topic: info.type_name for topic, info in known.items() if info.message_count}
+        answers = (ESTIMATE_TYPE, MACHINE_TYPE)
+        if not any(kind in answers for kind in types.values()):
+            raise BagError(f'{bag}: no estimates in it: add them with seal_friction replay {bag} --out BAG')
+        self._nodes = _nodes(bag, types)
+        self._tracks: dict[str, _Track] = {}
+        total = sum(info.message_count for info in known.values())
+        first, last = _span(bag)
+        self._first, self._duration = first, max((last - first) * 1e-9, 0.0)
+        self._period = max(1.0 / RATE, self._duration / MOST_ROWS)
+        self._fill(bag, known, total)
+        if not self._tracks:
+            raise BagError(f'{bag}: the configuration of the estimator in it cannot be read')
+
+    def _fill(self, bag: Path, known: dict[str, TopicInfo], total: int) -> None:
+        step = round(self._period * 1e9)
+        due, acted = self._first + step, {topic for topic in known if topic.endswith(RECORDED)}
+        with progress(f'read {bag.name}', total) as advance:
+            for count, message in enumerate(read_messages(bag), start=1):
+                while message.log_time > due:
+                    self._sample(due)
+                    due += step
+                self._take(message, acted)
+                if count % 1000 == 0:
+                    advance(1000)
+        self._sample(due)
+
+    def _take(self, message: BagMessage, acted: set[str]) -> None:
+        """Take a message of a node; the feed-forward that acted counts, not that of a replay."""
+        topic = message.topic.removesuffix(RECORDED)
+        if topic + RECORDED in acted and topic == message.topic:
+            return
+        for view, topics in self._nodes:
+            if not topics or topic in topics:
+                view.take(topic, message.type_name, message.data, message.log_time)
+
+    def _sample(self, now: int) -> None:
+        time = (now - self._first) * 1e-9
+        number = round(time / self._period) - 1
+        for view, _ in self._nodes:
+            for actuator, known in view.known.items():
+                track = self._tracks.setdefault(view.label(actuator), _Track(number))
+                track.add(known, view.held[actuator], time)
+                view.held[actuator] = next_interval(view.held[actuator])
+
+    # --- for the page ---
+
+    def describe(self) -> dict[str, Any]:
+        """What does not change."""
+        about = {'mode': 'bag', 'name': self._name, 'columns': COLUMNS, 'can_change': False}
+        return {**about, 'duration': round(self._duration, 3)}
+
+    def view(self, label: str, since: float, until: float | None = None) -> dict[str, Any]:
+        """Rows of an actuator in ``since`` to ``until`` [s], and the situation of all at ``until``."""
+        label = label if label in self._tracks else next(iter(self._tracks))
+        end = self._duration if until is None else min(max(until, 0.0), self._duration)
+        last = round(end / self._period) - 1
+        first = max(math.floor(since / self._period), last - _MOST_ROWS_AT_ONCE)
+        every = {name: self._situation(track, last) for name, track in self._tracks.items()}
+        return {
+            'label': label,
+            'time': round(end, 3),
+            'rows': self._tracks[label].slice(first, max(last, 0)),
+            'now': every[label],
+            'node': self._name,
+            'actuators': [
+                {'label': name, 'verdict': one['verdict'], 'feedforward': one['feedforward']}
+                for name, one in every.items()
+            ],
+            'diagnostics': [],
+        }
+
+    def _situation(self, track: _Track, last: int) -> dict[str, Any]:
+        """Words of the moment at a row or up to `_ROWS_A_MOMENT` rows before."""
+        place, known, held = track.moment(last)
+        rows = track.slice(place - 100, place)
+        time = rows[-1][0]
+        return situation(known, held, recent_bits(reversed(rows), time), self._first + round(time * 1e9))
+
+    def change(self, _label: str, parameter: str, _value: float) -> list[Answer]:
+        """A bag cannot be changed.
+
+        Raises:
+            ValueError: There is no such parameter.
+        """
+        if parameter not in CHANGEABLE:
+            raise ValueError(f'parameter {parameter!r}: one of {", ".join(CHANGEABLE)}')
+        return [Answer(False, 'this is a recording: nothing is changed')]
+
+    def off(self) -> list[Answer]:
+        """Nothing in a bag can be switched off."""
+        return [Answer(False, 'this is a recording: nothing is switched off')]
+
+
+def _span(bag: Path) -> tuple[int, int]:
+    """Time of the first and the last message that has one [ns]."""
+    first = last = 0
+    for message in read_messages(bag):
+        first = first or message.log_time
+        last = max(last, message.log_time)
+    return first, last
+
+
+def _nodes(bag: Path, types: dict[str, str]) -> list[tuple[NodeView, set[str]]]:
+    """Estimators of a bag, and the topics of each; no topics: all of them.
+
+    An estimator is known by its configuration; without one every topic of estimates is one. Topics belong to the
+    estimator in whose namespace they are; if there is only one, to that.
+    """
+
+    def definitions(kinds: Iterable[str]) -> Any:
+        return read_definitions(bag, kinds)
+
+    configured = [topic for topic, kind in types.items() if kind == CONFIGURATION_TYPE]
+    names = {topic.removesuffix(_CONFIGURATION): topic.removesuffix(_CONFIGURATION) for topic in configured}
+    if not names:
+        names = {topic: topic for topic, kind in types.items() if kind == ESTIMATE_TYPE}
+    views = [NodeView(name, definitions) for name in names]
+    if not configured:
+        for view in views:
+            view.without_configuration()
+    if len(views) == 1:
+        return [(views[0], set())]
+    return [(view, _below(view.node.rpartition('/')[0], types)) for view in views]
+
+
+def _below(namespace: str, types: dict[str, str]) -> set[str]:
+    """Topics of this package in a namespace, the configuration of its node among them."""
+    return {topic for topic, kind in types.items() if topic.startswith(f'{namespace}/') and kind in DECODERS}

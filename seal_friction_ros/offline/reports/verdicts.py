@@ -1,0 +1,325 @@
+"""The verdict of each page: one line with its reason, and what to do next. Every limit here is our choice.
+
+GOOD: the result can be used. LOOK: it can be used once the reason has been looked at. BAD: not as it is.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from seal_friction_ros.core.foundation.units import BAR, UM
+from seal_friction_ros.offline.reports.formatting import length_text
+from seal_friction_ros.offline.reports.page import BAD, GOOD, LOOK, Verdict
+
+MOST_IN_BAND, FEWEST_IN_BAND = 0.9, 0.5  # [-] of the strokes or readings in the 95 % band: GOOD from, BAD below
+MOST_FLAGGED, FAR_TOO_MANY_FLAGGED = 0.01, 0.1  # [-] of the estimates with a status bit: GOOD up to, BAD above
+SMALL_ERROR, LARGE_ERROR = 0.1, 0.3  # [-] of friction on data left out: GOOD up to, BAD above
+SMALL_NUMERICS, LARGE_NUMERICS = 0.05, 0.15  # [-] change of friction with a coarser step or grid: likewise
+SMALL_CHANGE = 0.1  # [-] between two runs or seals: LOOK above, if the bands tell them apart
+WIDE_BAND = 0.15  # [-] standard deviation of a seal file: LOOK above
+NAME_SEALS = 'name the seal files of your machine (parameter seals); seal_friction seals lists those that there are'
+
+
+def _worst(levels: Sequence[str]) -> str:
+    return max(levels, key=(GOOD, LOOK, BAD).index, default=GOOD)
+
+
+def _between(value: float, good: float, bad: float) -> str:
+    """Level of a number that should be small."""
+    return GOOD if value <= good else BAD if value > bad or not math.isfinite(value) else LOOK
+
+
+def _percent(share: float) -> str:
+    return f'{100.0 * share:.3g} %'
+
+
+class BagNumbers(NamedTuple):
+    """What the verdict on a bag depends on."""
+
+    bag: str
+    strokes: int
+    in_band: int
+    flagged: float  # [-] share of the estimates
+    has_placeholder: bool
+    has_reference: bool
+    tracking: str  # result of the tracking as a sentence, empty without
+    tracking_change: float | None  # [%] of the tracking error with feed-forward
+
+
+def of_bag(numbers: BagNumbers) -> Verdict:
+    """Verdict on the estimates of a bag, and on its loop if it has one."""
+    share = numbers.in_band / numbers.strokes if numbers.strokes else None
+    inside = LOOK if share is None else GOOD if share >= MOST_IN_BAND else BAD if share < FEWEST_IN_BAND else LOOK
+    flags = _between(numbers.flagged, MOST_FLAGGED, FAR_TOO_MANY_FLAGGED)
+    loop = BAD if (numbers.tracking_change or 0.0) > 0.0 else GOOD
+    seals = BAD if numbers.has_placeholder else GOOD
+    friction = (
+        'no steady sliding, so the estimate cannot be compared with a measurement'
+        if share is None
+        else f'{numbers.in_band} of {numbers.strokes} measured strokes lie in the 95 % band of the estimate'
+    )
+    parts = [(seals, 'the estimate used the placeholder seal')] if numbers.has_placeholder else []
+    parts += [(loop, numbers.tracking)] if numbers.tracking else []
+    parts += [(inside, friction)]
+    parts += [(flags, f'{_percent(numbers.flagged)} of the estimates carry a status bit')] if flags != GOOD else []
+    text = '; '.join(part for level in (BAD, LOOK, GOOD) for at, part in parts if at == level)
+    return Verdict(
+        _worst([inside, flags, loop, seals]), f'{text[0].upper()}{text[1:]}.', _after_bag(numbers, inside, flags, loop)
+    )
+
+
+def _after_bag(numbers: BagNumbers, inside: str, flags: str, loop: str) -> str:
+    if numbers.has_placeholder:
+        return f'{NAME_SEALS}.'
+    if loop == BAD:
+        return 'set feedforward.scale to 0, then tune again: seal_friction tune --bag BAG --out feedforward.yaml.'
+    if flags != GOOD:
+        return 'look at the status bits below; docs/degradation.md says what each one means.'
+    if not numbers.strokes:
+        return 'record strokes at even speed in both directions.'
+    if inside != GOOD:
+        command = f'seal_friction identify {numbers.bag} --out my_seal.yaml --report my_seal.html'
+        return f'fit the friction of this machine: {command}.'
+    if numbers.has_reference and numbers.tracking_change is None:
+        return f'tune the feed-forward: seal_friction tune --bag {numbers.bag} --out feedforward.yaml.'
+    return 'nothing: the estimate agrees with the measurement.'
+
+
+class IdentificationNumbers(NamedTuple):
+    """What the verdict on an identification depends on."""
+
+    law: str
+    error: float  # [-] mean over single readings left out
+    worst: float  # [-] of the mean at a pressure left out
+    coverage: float  # [-] of readings left out in the 95 % band
+    unsound: str  # why the parameters are not determined; empty if they are
+    outlier: bool
+    changed: bool  # whether friction differs between the runs
+    drifted: bool  # whether friction changed during a run
+
+
+def of_identification(found: IdentificationNumbers) -> Verdict:
+    """Verdict on an identified law."""
+    error = _between(found.error, SMALL_ERROR, LARGE_ERROR)
+    band = GOOD if found.coverage >= MOST_IN_BAND else BAD if found.coverage < FEWEST_IN_BAND else LOOK
+    level = _worst(
+        [error, band, BAD if found.unsound else GOOD, LOOK if found.outlier or found.changed or found.drifted else GOOD]
+    )
+    text = (
+        f'{found.law}, on readings that the fit did not see: single ones are off by {_percent(found.error)} on '
+        f'average, the mean at a pressure by {_percent(found.worst)} at most; {_percent(found.coverage)} lie in the '
+        '95 % band'
+    )
+    reasons = [f'the parameters are not determined ({found.unsound})'] if found.unsound else []
+    reasons += ['one pressure is an outlier and was left out'] if found.outlier else []
+    reasons += ['friction differs between the runs'] if found.changed else []
+    reasons += ['friction drifted during the runs'] if found.drifted else []
+    after = 'replay a bag with the seal file and compare: seal_friction replay BAG --seal SEAL.yaml --out NEW.'
+    if level != GOOD:
+        after = 'read the remarks below, then measure what --next proposes: seal_friction identify ... --next next.csv.'
+    return Verdict(level, '; '.join([text, *reasons]) + '.', after)
+
+
+def of_seal(
+    name: str, friction: float, pressure: float, std: float, *, is_placeholder: bool, off: float | None
+) -> Verdict:
+    """Verdict on a seal file.
+
+    Args:
+        name: Its name.
+        friction: Coulomb friction [N] at the highest identified pressure.
+        pressure: That pressure [Pa].
+        std: Standard deviation there, relative [-].
+        is_placeholder: Whether it is the placeholder.
+        off: Largest deviation from the mean of the tests [-]; None without tests.
+    """
+    if is_placeholder:
+        return Verdict(BAD, 'Placeholder: its numbers are those of another seal.', f'{NAME_SEALS}.')
+    tested = '' if off is None else f', within {_percent(off)} of the mean of the tests'
+    level = LOOK if std > WIDE_BAND else GOOD
+    text = (
+        f'{friction:.3g} N of Coulomb friction at {pressure / BAR:.3g} bar, standard deviation {_percent(std)}{tested}.'
+    )
+    after = 'the band is wide: fit it to readings of your machine (docs/identification.md).' if level == LOOK else ''
+    return Verdict(level, text, after or f'use it: seals: [{name}].')
+
+
+def of_health(alarms: Sequence[str], changes: int, reversals: int) -> Verdict:
+    """Verdict on the seals over some bags."""
+    if alarms:
+        return Verdict(BAD, f'Alarm: {"; ".join(alarms)}.', 'inspect seals, oil and sensors; after a repair fit again.')
+    if not reversals:
+        return Verdict(LOOK, 'No reversal to learn from.', 'record motion in both directions, with a force sum.')
+    if changes:
+        times = 'once' if changes == 1 else f'{changes} times'
+        return Verdict(LOOK, f'The friction has changed {times}.', 'find out what was done then; see the dashed lines.')
+    return Verdict(GOOD, 'No alarm, and the friction has not changed.', 'nothing; look again after the next runs.')
+
+
+def of_tuning(
+    summary: str, *, is_better: bool, has_placeholder: bool, mass: float | None, fitted: bool, bag: bool
+) -> Verdict:
+    """Verdict on a tuned feed-forward.
+
+    Args:
+        summary: Result as a sentence.
+        is_better: Whether it is better than none in every case.
+        has_placeholder: Whether a seal is the placeholder.
+        mass: Moving mass [kg]; None for the simulated servo.
+        fitted: Whether the mass was fitted.
+        bag: Whether it was tuned on a recorded axis.
+    """
+    if mass is not None and mass <= 0.0:
+        given = 'fitted' if fitted else 'given'
+        return Verdict(
+            BAD,
+            f'The {given} moving mass is {mass:.3g} kg, which no machine has: the force sum lacks the inertia, or '
+            'has another sign or delay. Friction and feed-forward are wrong near reversals.',
+            'give the mass (--mass) and check sign and delay of the force sum.',
+        )
+    if not is_better:
+        return Verdict(BAD, summary, 'do not use the file; see the robustness cases, and check seal file and delay.')
+    if has_placeholder:
+        return Verdict(BAD, summary, f'{NAME_SEALS}, then tune again.')
+    if bag:
+        after = 'start with half of feedforward.scale on the machine: docs/tuning.md says how.'
+        return Verdict(LOOK, f'{summary} A bag cannot show limit cycles.', after)
+    return Verdict(
+        GOOD, summary, 'tune on a bag of the machine too (--bag), then start with half of feedforward.scale.'
+    )
+
+
+def of_oring(
+    normal: Sequence[float], pressures: Sequence[float], balance: float, volume_lost: float, friction: bool
+) -> Verdict:
+    """Verdict on a computed O-ring.
+
+    Args:
+        normal: Normal force of one seal [N] at each pressure.
+        pressures: Pressures [Pa].
+        balance: Largest deviation of the axial force from pressure times area [-].
+        volume_lost: Largest loss of volume [-].
+        friction: Whether the case has a coefficient of friction.
+    """
+    level = _worst([_between(balance, 0.02, 0.1), _between(volume_lost, 0.01, 0.03)])
+    ends = f'{normal[0]:.3g} N at {pressures[0] / BAR:.3g} bar'
+    if len(normal) > 1:
+        ends += f' to {normal[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
+    text = f'Normal force {ends}; forces balance within {_percent(balance)}, volume within {_percent(volume_lost)}.'
+    if level != GOOD:
+        return Verdict(level, text, 'compute with more lines (numerics.lines of the case) and compare.')
+    after = (
+        'measure a few readings and compare: the modulus decides.'
+        if friction
+        else 'add a coefficient of friction to the case for friction.'
+    )
+    return Verdict(level, text, after)
+
+
+def of_lubrication(friction: float, solid_share: float, change: float) -> Verdict:
+    """Verdict on a run: friction [N], its solid share [-], its largest relative change with a coarser step or grid."""
+    level = _between(change, SMALL_NUMERICS, LARGE_NUMERICS)
+    text = (
+        f'Friction {friction:.3g} N about the middle of the stroke, {_percent(solid_share)} of it solid; half the '
+        f'cells or twice the step change it by {_percent(change)} at most.'
+    )
+    after = (
+        'compare with a measurement (--bag).'
+        if level == GOOD
+        else 'compute with more cells and a smaller step (numerics of the case).'
+    )
+    return Verdict(level, text, after)
+
+
+def of_comparison_with_bag(measured: float, computed: float, correlation: float) -> Verdict:
+    """Verdict on computed against measured friction, mean magnitudes [N]."""
+    off = abs(computed / measured - 1.0) if measured else math.inf
+    level = _worst([_between(off, SMALL_ERROR, LARGE_ERROR), _between(1.0 - correlation, 0.1, 0.3)])
+    text = (
+        f'Computed {computed:.3g} N, measured {measured:.3g} N: off by {_percent(off)}; correlation {correlation:.2f}.'
+    )
+    after = (
+        'use the map of this case (ehl map).' if level == GOOD else 'check the solid shear stress first (ehl study).'
+    )
+    return Verdict(level, text, after)
+
+
+def of_study(deviation: float) -> Verdict:
+    """Verdict on a study: largest deviation of friction over solid shear stress from its mean [-]."""
+    level = _between(deviation, SMALL_ERROR, LARGE_ERROR)
+    text = f'Friction is proportional to the solid shear stress within {_percent(deviation)}.'
+    after = (
+        'fit the shear stress to one measured force.'
+        if level == GOOD
+        else 'fit the shear stress at the speed that matters.'
+    )
+    return Verdict(level, text, after)
+
+
+def of_map(lowest: float, highest: float, seal_file: bool) -> Verdict:
+    """Verdict on a friction map with frictions [N] from ``lowest`` to ``highest``."""
+    after = (
+        'use the seal file; its band is not from measurements.'
+        if seal_file
+        else 'write a seal file for the node: --seal-file.'
+    )
+    return Verdict(LOOK, f'Friction {lowest:.3g} to {highest:.3g} N over the map; computed, not measured.', after)
+
+
+def of_spool(largest: float) -> Verdict:
+    """Verdict on the computed friction of a spool [N]."""
+    return Verdict(
+        LOOK,
+        f'Friction up to {largest:.3g} N in the last cycle; computed, not measured.',
+        'compare with a measured force.',
+    )
+
+
+def of_spool_measurement(reference: float, resonance: float | None) -> Verdict:
+    """Verdict on an evaluated rig: reference force [N], resonance of the measuring chain [Hz] if one was found."""
+    if resonance is None:
+        text = (
+            f'Reference force {reference:.4g} N; no resonance of the measuring chain stands out, so none was removed.'
+        )
+        return Verdict(LOOK, text, 'look for ringing after the reversals.')
+    text = f'Reference force {reference:.4g} N; the resonance of the measuring chain at {resonance:.0f} Hz is removed.'
+    return Verdict(GOOD, text, 'compare it with another ring: --reference.')
+
+
+def of_servo(dwell: float, share: float, with_friction: float, without: float) -> Verdict:
+    """Verdict on the simulated servo: rest [s] and share of a period [-] per reversal, tracking errors RMS [m]."""
+    if not dwell:
+        return Verdict(GOOD, 'The rod reverses without a rest.', 'nothing: friction does not flatten the peaks.')
+    text = (
+        f'Friction flattens the peaks: a rest of {1e3 * dwell:.1f} ms at each reversal, {_percent(share)} of a period; '
+        f'the tracking error is {length_text(with_friction)} RMS with friction, {length_text(without)} without.'
+    )
+    level = LOOK if with_friction > without + 0.1 * UM else GOOD
+    return Verdict(level, text, 'compensate it: seal_friction tune --out feedforward.yaml.')
+
+
+def of_runs(changes: Sequence[tuple[str, float, float]], names: tuple[str, str]) -> Verdict:
+    """Verdict on two runs or seals.
+
+    Args:
+        changes: Name of a quantity, its relative change [-], and the change that is noise [-].
+        names: Of both.
+    """
+    if not changes:
+        return Verdict(
+            LOOK, f'{names[0]} and {names[1]} have no pressure in common to compare at.', 'record the same pressures.'
+        )
+    text = '; '.join(f'{what} {100.0 * change:+.1f} % (noise {100.0 * noise:.1f} %)' for what, change, noise in changes)
+    told = [abs(change) > noise for _, change, noise in changes]
+    if not any(told) and any(noise > LARGE_ERROR for _, _, noise in changes):
+        reason = f'{names[1]} against {names[0]}: {text}: too uncertain to tell a change'
+        return Verdict(LOOK, f'{reason}.', 'measure both over several strokes at the same pressures.')
+    if not any(told):
+        return Verdict(GOOD, f'No change beyond the noise from {names[0]} to {names[1]}: {text}.', 'nothing.')
+    large = any(abs(change) > max(noise, SMALL_CHANGE) for _, change, noise in changes)
+    after = (
+        'find out what changed: seals, oil, temperature, load; fit again if it stays.'
+        if large
+        else 'nothing yet; compare the next run.'
+    )
+    return Verdict(LOOK, f'{names[1]} against {names[0]}: {text}.', after)

@@ -1,0 +1,81 @@
+"""Command of a controller in a bag, and the gain from force to command (`core.tuning.output_gain`)."""
+
+import math
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seal_friction_ros.core.estimation import messages
+from seal_friction_ros.core.estimation.records import Position, Pressure, Velocity
+from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
+from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
+from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
+from seal_friction_ros.offline.bags.topics import find_topics
+
+NUMBER, NUMBERS = 'std_msgs/msg/Float64', 'std_msgs/msg/Float64MultiArray'
+_HEADER = b'\x00\x01'  # CDR, little endian
+
+
+def first_number(type_name: str, data: bytes) -> float:
+    """Value of a `std_msgs/Float64`, or the first value of a `std_msgs/Float64MultiArray` without a layout.
+
+    Raises:
+        ValueError: The message is malformed, empty, or has a layout.
+    """
+    try:
+        if data[:2] != _HEADER:
+            raise ValueError('not little-endian CDR')
+        if type_name == NUMBER:
+            return float(struct.unpack_from('<d', data, 4)[0])
+        dimensions, _offset, length = struct.unpack_from('<III', data, 4)
+        if dimensions or not length:
+            raise ValueError('the array is empty or has a layout')
+        return float(struct.unpack_from('<d', data, 4 + 16)[0])  # aligned to 8 bytes after the header
+    except struct.error as error:
+        raise ValueError(f'malformed: {error}') from None
+
+
+def read_output_gain(bag: Path, topic: str, known: RecordedAxisSettings, namespace: str = '') -> OutputGain:
+    """Gain from force to the command on a topic.
+
+    Each velocity sample takes the newest command, pressures and position.
+
+    Args:
+        bag: Command, pressures, velocity and, if measured, position.
+        topic: Topic of the command, a `std_msgs/Float64` or `Float64MultiArray`.
+        known: Areas of both chambers.
+        namespace: As of `find_topics`.
+
+    Raises:
+        BagError: The bag lacks something, or cannot tell the gain.
+    """
+    if not (known.area_a and known.area_b):
+        raise BagError(f'{topic}: give --area-a and --area-b [m2]: the gain needs the force of the pressures')
+    found = bag_topics(bag).get(topic)
+    if found is None or found.type_name not in (NUMBER, NUMBERS):
+        what = 'is not in it' if found is None else f'is {found.type_name}'
+        raise BagError(f'{bag}: the command {topic} {what}: it has to be {NUMBER} or {NUMBERS}')
+    topics = find_topics(bag, namespace)
+    held: dict[str, Any] = {}
+    command, rows = math.nan, []
+    for message in read_messages(bag):
+        if message.topic == topic:
+            try:
+                command = first_number(message.type_name, message.data)
+            except ValueError as error:
+                raise BagError(f'{bag}: {topic}: {error}') from None
+        elif message.topic in topics:
+            sample = messages.DECODERS[message.type_name](message.data)
+            held[type(sample).__name__] = sample
+            pressure: Pressure | None = held.get('Pressure')
+            position: Position | None = held.get('Position')
+            if isinstance(sample, Velocity) and pressure is not None and math.isfinite(command):
+                force = known.area_a * pressure.chamber_a - known.area_b * pressure.chamber_b
+                place = position.position if position is not None else math.nan
+                rows.append((sample.stamp * 1e-9, command, force, place, sample.velocity))
+    try:
+        return output_gain(CommandRecord(*np.array(rows).reshape(-1, 5).T))
+    except ValueError as error:
+        raise BagError(f'{bag}: {topic}: {error}') from None

@@ -1,0 +1,119 @@
+"""The scale over temperature is found where temperature varied by itself, and refused elsewhere."""
+
+import math
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.friction.temperature import scale_at
+from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
+from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.temperature import at_reference, fit_temperature
+
+BAR = 1e5
+
+
+def exponential(temperature):
+    return np.exp(-0.012 * (temperature - 300.0))
+
+
+def arrhenius_and_boundary(temperature):
+    """Another seal: a third of the friction is dry and does not change, the rest follows Arrhenius' law."""
+    return (1.0 + 2.0 * np.exp(2500.0 * (1.0 / temperature - 1.0 / 300.0))) / 3.0
+
+
+def readings(temperatures, *, seed=0, scale=exponential, run_to_run=0.0, noise=0.02, strokes=8, offset=5.0, run_in=0.0):
+    """Runs at three pressures, to and fro; ``temperatures``: of each run a number, or a function of its progress."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for source, temperature in enumerate(temperatures):
+        day = math.exp(run_to_run * rng.standard_normal())
+        for level in range(3):
+            for stroke in range(strokes):
+                progress = (level * strokes + stroke) / (3 * strokes)
+                kelvin = temperature(progress) if callable(temperature) else temperature
+                side = 1.0 if stroke % 2 == 0 else -1.0
+                settling = 1.0 + run_in * math.exp(-4.0 * progress)
+                friction = (20.0 + 10.0 * level) * day * settling * float(scale(np.float64(kelvin)))
+                force = offset + side * friction * (1.0 + noise * rng.standard_normal())
+                rows.append((source, level, side, kelvin, force, progress))
+    source, level, side, kelvin, force, progress = np.array(rows).T
+    pressure = (1.0 + 2.0 * level)[:, np.newaxis] * BAR
+    return FrictionReadings(
+        OperatingConditions(pressure, None, 0.02 * side, side),
+        force,
+        source.astype(int),
+        source.astype(int),
+        level.astype(int),
+        tuple(f'run {i}' for i in range(len(temperatures))),
+        'file',
+        are_samples=False,
+        travel=10.0 * progress,
+        temperature=kelvin,
+    )
+
+
+RUNS = (285.0, 310.0, 295.0, 320.0, 300.0, 330.0)
+
+
+def test_the_coefficient_of_runs_at_several_temperatures_is_found():
+    found = fit_temperature(readings(RUNS))
+    assert found.why_not == ''
+    assert found.coefficient == pytest.approx(0.012, abs=3.0 * found.error)
+    assert found.error < 0.001
+    assert (found.lowest, found.highest) == (285.0, 330.0)
+
+
+def test_the_stated_error_holds_the_coefficient_in_95_percent_of_draws_with_run_to_run_variation():
+    inside = []
+    for seed in range(300):
+        found = fit_temperature(readings(RUNS, seed=seed, run_to_run=0.05, strokes=4))
+        inside.append(abs(found.coefficient - 0.012) < 1.96 * found.error or bool(found.why_not))
+    assert 0.90 <= np.mean(inside) <= 0.99
+
+
+def test_one_run_that_warms_up_and_cools_is_enough():
+    found = fit_temperature(readings([lambda progress: 300.0 + 15.0 * math.sin(20.0 * progress)], strokes=24))
+    assert found.why_not == ''
+    assert found.coefficient == pytest.approx(0.012, abs=3.0 * found.error)
+
+
+def test_a_seal_that_follows_another_law_is_predicted_at_a_temperature_that_was_left_out():
+    found = fit_temperature(readings((290.0, 300.0, 320.0, 330.0, 295.0, 325.0), scale=arrhenius_and_boundary))
+    truth = float(arrhenius_and_boundary(np.float64(310.0)) / arrhenius_and_boundary(np.float64(found.reference)))
+    assert scale_at(found.scale, 310.0) == pytest.approx(truth, rel=0.04)
+
+
+def test_readings_at_the_reference_have_no_temperature_left_in_them():
+    warm = readings(RUNS)
+    found = fit_temperature(warm)
+    cold = at_reference(warm, found)
+    assert abs(fit_temperature(cold).coefficient) < 1e-4
+    same = fit_temperature(warm).reference
+    expected = readings([same] * len(RUNS)).force
+    np.testing.assert_allclose(cold.force, expected, rtol=0.02)
+
+
+@pytest.mark.parametrize('law', [0.0, 0.012])
+def test_without_an_effect_none_is_claimed_and_with_one_it_is(law):
+    found = fit_temperature(readings(RUNS, scale=lambda kelvin: np.exp(-law * (kelvin - 300.0))))
+    assert (abs(found.coefficient) > 3.0 * found.error) == (law > 0.0)
+
+
+@pytest.mark.parametrize(
+    ('name', 'made'),
+    [
+        ('varied by 2 K', lambda: readings((299.0, 300.0, 301.0, 300.0))),
+        ('went with', lambda: readings([lambda progress: 300.0 + 20.0 * progress], run_in=0.2)),
+        ('went with', lambda: readings((290.0, 330.0))),
+        ('repeat more runs', lambda: readings((290.0, 300.0, 305.0, 310.0), run_to_run=0.4)),
+        ('have no temperature', lambda: readings((290.0, math.nan, 310.0, 320.0))),
+    ],
+)
+def test_what_does_not_identify_it_is_refused(name, made):
+    assert name in fit_temperature(made()).why_not
+
+
+def test_readings_without_temperature_have_no_fit():
+    plain = readings(RUNS)
+    assert fit_temperature(plain.taken(np.arange(0))) is None

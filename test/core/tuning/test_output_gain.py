@@ -1,0 +1,111 @@
+"""Gain from force to command: of simulated servos, whose gain is known, and of data that cannot tell it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.servo.controller import ServoController
+from seal_friction_ros.core.servo.cylinder import Cylinder, pressure_force
+from seal_friction_ros.core.servo.motions import Setpoint, Sine
+from seal_friction_ros.core.servo.plant import Load
+from seal_friction_ros.core.servo.pneumatics import PneumaticValve
+from seal_friction_ros.core.servo.position_servo import ServoParameters, init, simulate
+from seal_friction_ros.core.tuning.output_gain import CommandRecord, output_gain
+from seal_friction_ros.files import default_configuration
+
+SEALS = default_configuration().parameters().estimator.seals
+PERIOD = 1e-3  # [s]
+HYDRAULIC = ServoParameters(seals=SEALS, control_period=PERIOD)
+PNEUMATIC = ServoParameters(
+    valve=PneumaticValve(),
+    cylinder=Cylinder(type='single_rod', bore_diameter=0.032, rod_diameter=0.012, stroke=0.2, dead_volume=2e-5),
+    load=Load(mass=3.0, viscous_damping=10.0),
+    controller=ServoController(position_gain=8e3, velocity_gain=150.0, force_bandwidth=100.0, reference_speed_max=0.8),
+    seals=SEALS,
+    control_period=PERIOD,
+)
+
+
+def position_servo(servo, amplitude, frequency, seconds=12.0):
+    """A servo that takes positions only: its command, with encoder counts, noisy pressures and velocity."""
+    wave, count = Sine(amplitude, frequency), round(seconds / PERIOD)
+    commands = np.array([wave.at(i * PERIOD).position for i in range(count)])
+    _, track = simulate(servo, init(servo), [Setpoint(command, 0.0, 0.0) for command in commands])
+    noise = np.random.default_rng(1).normal(size=(count, 3))
+    pressures = track.pressure_a + 500.0 * noise[:, 0], track.pressure_b + 500.0 * noise[:, 1]
+    force = np.array([pressure_force(servo.cylinder, a, b) for a, b in zip(*pressures, strict=True)])
+    position = 1e-6 * np.round(track.position / 1e-6)
+    return CommandRecord(np.arange(count) * PERIOD, commands, force, position, track.velocity + 2e-4 * noise[:, 2])
+
+
+@pytest.fixture(scope='module')
+def hydraulic():
+    return position_servo(HYDRAULIC, 0.002, 0.5)
+
+
+@pytest.mark.parametrize(('servo', 'amplitude', 'frequency'), [(HYDRAULIC, 0.002, 0.5), (PNEUMATIC, 0.02, 0.25)])
+def test_gain_of_a_position_servo_is_one_over_its_stiffness(servo, amplitude, frequency):
+    found = output_gain(position_servo(servo, amplitude, frequency))
+    stiffness = servo.controller.position_gain
+    assert found.gain == pytest.approx(1.0 / stiffness, rel=0.1)
+    assert found.standard_error < 0.05 * found.gain
+    assert found.position_share == pytest.approx(1.0, abs=0.02)
+
+
+def test_outliers_do_not_move_the_gain(hydraulic):
+    command = hydraulic.command.copy()
+    command[np.random.default_rng(2).choice(len(command), len(command) // 200, replace=False)] += 0.05
+    found, clean = output_gain(hydraulic._replace(command=command)), output_gain(hydraulic)
+    assert found.gain == pytest.approx(clean.gain, rel=0.1)
+
+
+def test_standard_error_covers_the_spread_of_the_gain_over_noise():
+    rng = np.random.default_rng(3)
+    n, gains, errors = 4000, [], []
+    for _ in range(40):
+        force = np.cumsum(rng.normal(size=n))
+        velocity = np.cumsum(rng.normal(size=n)) * 1e-3
+        rough = np.convolve(rng.normal(size=n + 100), np.ones(101) / 101, mode='valid')  # correlated noise
+        command = 2e-5 * force + 0.3 * velocity + 2e-4 * rough
+        found = output_gain(CommandRecord(np.arange(n) * 1e-3, command, force, np.full(n, np.nan), velocity))
+        gains.append(found.gain)
+        errors.append(found.standard_error)
+    assert np.mean(gains) == pytest.approx(2e-5, rel=0.01)
+    assert 0.5 < np.std(gains) / np.sqrt(np.mean(np.square(errors))) < 2.0
+
+
+@pytest.mark.parametrize(
+    ('change', 'reason'),
+    [
+        (lambda r: r._replace(command=np.full_like(r.command, 0.001)), 'does not change'),
+        (lambda r: CommandRecord(*(values[:100] for values in r)), '100 usable samples'),
+        (lambda r: r._replace(force=-r.force), 'check the sign'),
+        (lambda r: r._replace(velocity=np.zeros_like(r.velocity)), 'do not change independently'),
+        (
+            lambda r: r._replace(force=np.random.default_rng(4).normal(size=len(r.force))),
+            'standard error of .* record',
+        ),
+    ],
+)
+def test_data_that_cannot_tell_the_gain_are_rejected_with_what_to_record(hydraulic, change, reason):
+    with pytest.raises(ValueError, match=reason):
+        output_gain(change(hydraulic))
+
+
+def test_gain_times_a_force_added_to_the_command_is_that_force_on_the_rod(hydraulic):
+    """Closed loop: the friction of the seals, fed through the gain, makes a position servo follow."""
+    gain = output_gain(hydraulic).gain
+    wave, count = Sine(0.002, 0.5), 4000
+    stronger = dataclasses.replace(HYDRAULIC, load=Load(viscous_damping=0.0))
+    errors = []
+    for scale in (0.0, 0.9):
+        added = []
+        for i in range(count):
+            position, velocity, _ = wave.at(i * PERIOD)
+            friction = 35.0 * np.tanh(velocity / 1e-4)  # [N]
+            added.append(Setpoint(position + scale * gain * friction, velocity, 0.0))
+        _, track = simulate(stronger, init(stronger), added)
+        reference = np.array([wave.at((i + 1) * PERIOD).position for i in range(count)])
+        errors.append(float(np.sqrt(np.mean((track.position - reference)[1000:] ** 2))))
+    assert errors[1] < 0.5 * errors[0]

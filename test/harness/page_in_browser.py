@@ -1,0 +1,74 @@
+"""A report page in a headless browser, at the width of a desk and of a phone."""
+
+import atexit
+from contextlib import ExitStack
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from harness.browser import Page, browser, chromium
+
+WIDTHS = (1400, 420)  # [px]
+SMALLEST_TEXT = 11  # [px]
+LARGEST = 5 << 20  # [bytes] of a page
+
+CUT = """(() => {
+  const cut = [], width = document.documentElement.clientWidth;
+  for (const e of document.querySelectorAll('body *')) {
+    if (e.closest('.scroll, defs, [clip-path], noscript, script')) continue;
+    const box = e.getBoundingClientRect();
+    if (!box.width) continue;
+    if (box.right > width + 1 || box.left < -1) cut.push(`${e.tagName} ${e.textContent.slice(0, 40)}: beyond the page`);
+    const hides = getComputedStyle(e).overflowX !== 'visible';
+    if (hides && e.scrollWidth > e.clientWidth + 1) cut.push(`${e.tagName} ${e.textContent.slice(0, 40)}: cut`);
+    if (e.tagName !== 'text') continue;
+    const svg = e.closest('svg').getBoundingClientRect();
+    const inside = box.left > svg.left - 1 && box.right < svg.right + 1;
+    const above = box.top < svg.top - 2 || box.bottom > svg.bottom + 2;
+    if (!inside || above) cut.push(`${e.textContent}: beyond its figure`);
+  }
+  return cut;
+})()"""
+LETTERS = """[...document.querySelectorAll('td, th')].filter(e => e.textContent.trim().length > 8 && e.clientWidth < 40)
+  .map(e => e.textContent)"""
+SMALL = f"""[...document.querySelectorAll('.plot text, .plot div, .plot button, .plot h4')]
+  .filter(e => e.textContent && parseFloat(getComputedStyle(e).fontSize) < {SMALLEST_TEXT}).map(e => e.textContent)"""
+UNDRAWN = """[...document.querySelectorAll('figure[id]')].filter(f => !f.querySelector('.panels svg')).map(f => f.id)"""
+CHECKS = {'cut': CUT, 'letter by letter': LETTERS, 'too small': SMALL, 'not drawn': UNDRAWN}
+
+
+@cache
+def shared_page() -> Page | None:
+    """A tab that all pages of this process are opened in; None without a browser."""
+    if not chromium():
+        return None
+    stack = ExitStack()
+    folder = stack.enter_context(TemporaryDirectory(ignore_cleanup_errors=True))
+    page = stack.enter_context(browser(Path(folder)))
+    atexit.register(stack.close)
+    return page
+
+
+def opened(path: Path, width: int) -> Page:
+    """A page at a width [px]; there is a browser."""
+    tab = shared_page()
+    assert tab is not None
+    tab.size(width, 900)
+    tab.requests.clear()
+    tab.complaints.clear()
+    tab.open(path.resolve().as_uri())
+    return tab
+
+
+def check_in_browser(path: Path) -> None:
+    """Nothing overflows, is cut, too small or undrawn; no complaint on the console; nothing is loaded."""
+    assert path.stat().st_size < LARGEST
+    if shared_page() is None:
+        return
+    for width in WIDTHS:
+        tab = opened(path, width)
+        found = {'overflow': tab.overflow, 'complaints': tab.complaints}
+        found |= {name: tab.value(script) for name, script in CHECKS.items()}
+        found['requests'] = [url for url in tab.requests if not url.startswith('data:')][1:]
+        wrong = {name: value for name, value in found.items() if value}
+        assert not wrong, f'{path} at {width} px: {wrong}'

@@ -1,0 +1,341 @@
+"""The live view, from the graph to what a browser shows, and back to the node."""
+
+import http.client
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from statistics import median
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from harness.browser import Page, browser, chromium
+from harness.live_graph import Probe
+from harness.moving_machine import FRICTION, LAG, NAMES, machine
+from harness.processes import STOP_TIMEOUT, free_domain, graph_environment, node_process
+from harness.spin_nodes import SpunNodes, ros_context
+from paths import ROOT
+from rclpy.parameter import Parameter
+from seal_friction_msgs.msg import RodVelocity
+
+from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.friction_monitor import ANSWER_TIMEOUT, FrictionMonitor
+from seal_friction_ros.offline.monitor.actuator_view import COLUMNS
+from seal_friction_ros.offline.monitor.recorded_view import RecordedView
+
+WIDTHS = (1400, 420)  # [px]
+SCRIPT = '<script>window.broken = 1</script><img src=x onerror="window.broken = 1">'
+NO_BROWSER = pytest.mark.skipif(not chromium(), reason='chromium is not installed: apt-get install chromium')
+
+
+class Monitor:
+    """The command, running.
+
+    Args:
+        url: That it printed.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        parts = urlsplit(url)
+        self.port = parts.port
+        self.token = parse_qs(parts.query)['token'][0]
+
+    def ask(self, path: str, body: Any = None) -> Any:
+        """Answer to a request of the page."""
+        connection = http.client.HTTPConnection('127.0.0.1', self.port, timeout=STOP_TIMEOUT)
+        headers = {'Content-Type': 'application/json'} if body is not None else {}
+        method, data = ('GET', None) if body is None else ('POST', json.dumps(body))
+        connection.request(method, f'{path}?token={self.token}', data, headers)
+        found = json.loads(connection.getresponse().read())
+        connection.close()
+        return found
+
+    def wait_for(self, condition) -> Any:
+        """First view that fulfils a condition."""
+        end = time.monotonic() + STOP_TIMEOUT
+        while not condition(view := self.ask('/view')):
+            assert time.monotonic() < end, view
+            time.sleep(0.1)
+        return view
+
+
+@contextmanager
+def monitor(domain: int, *options: str) -> Iterator[Monitor]:
+    """The command on a domain; SIGINT has to end it with exit code 0."""
+    command = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main', 'monitor', *options]
+    process = subprocess.Popen(command, env=graph_environment(domain), stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    try:
+        yield Monitor(process.stdout.readline().split()[1])
+    finally:
+        process.send_signal(2)
+        assert process.wait(STOP_TIMEOUT) == 0
+        process.stdout.close()
+
+
+@pytest.fixture(scope='module')
+def axis(tmp_path_factory) -> Iterator[int]:
+    """Domain of a simulated axis with its estimator."""
+    domain, log = free_domain(), tmp_path_factory.mktemp('axis') / 'log'
+    simulator = ROOT / 'config' / 'servo_simulator.yaml'
+    with (
+        node_process('servo_simulator', domain, {}, log, parameter_file=simulator),
+        node_process('friction_estimator', domain, {'adaptation.mode': 'observe'}, log),
+    ):
+        end = time.monotonic() + 2 * STOP_TIMEOUT
+        while 'simulating' not in log.read_text():
+            assert time.monotonic() < end, log.read_text()
+            time.sleep(0.1)
+        yield domain
+
+
+@contextmanager
+def shown(url: str, folder: Path, width: int) -> Iterator[Page]:
+    with browser(folder) as page:
+        page.size(width, 900)
+        page.open(url)
+        yield page
+
+
+def check_page(page: Page, port: int) -> None:
+    """No part is beyond the window, the console is empty, and nothing was asked of another server."""
+    assert page.overflow == 0
+    assert page.complaints == []
+    assert {urlsplit(url).netloc for url in page.requests if not url.startswith('data:')} == {f'127.0.0.1:{port}'}
+
+
+@NO_BROWSER
+@pytest.mark.parametrize('width', WIDTHS)
+def test_the_curves_of_a_running_axis_move_and_off_takes_the_force_out(axis: int, width: int, tmp_path: Path):
+    with monitor(axis, '--allow-changes') as running, shown(running.url, tmp_path, width) as page:
+        running.wait_for(lambda view: view['label'])
+        running.ask('/change', {'actuator': '/friction_estimator', 'parameter': 'scale', 'value': 0.9})
+        page.wait_for('columns.feedforward && columns.feedforward.some((force) => force > 20)')
+        page.wait_for('columns.estimate.some((force) => force > 20) && columns.estimate.some((force) => force < -20)')
+        drawn = page.value('document.querySelector("#plot-friction canvas").toDataURL()')
+        page.wait_for(f'document.querySelector("#plot-friction canvas").toDataURL() !== {json.dumps(drawn)}')
+        check_page(page, running.port)
+        while page.value('byId("off-answer").className') != 'yes':  # a busy node may not answer in time: press again
+            page.click('#off')
+            page.wait_for('["yes", "no"].includes(byId("off-answer").className)')
+        text = page.value('byId("off-answer").textContent')
+        assert 'OFF: confirmed by /friction_estimator' in text
+        assert 'feedforward.scale = 0' in text
+        page.wait_for('byId("feedforward").textContent === "0 N"')
+        page.wait_for('columns.feedforward.slice(-50).every((force) => force === 0)')
+        assert 'OFF' in page.value('byId("feedforward-more").textContent')
+        check_page(page, running.port)
+
+
+@NO_BROWSER
+def test_a_slider_sets_the_parameter_and_shows_the_answer_of_the_node(axis: int, tmp_path: Path):
+    with monitor(axis, '--allow-changes') as running, shown(running.url, tmp_path, 1400) as page:
+        page.wait_for('document.getElementById("field-scale")')
+        for value, word in (('0.4', 'yes'), ('7', 'no')):
+            page.value(f'byId("field-scale").value = "{value}"')
+            page.value('byId("field-scale").dispatchEvent(new Event("change"))')
+            page.wait_for(f'byId("change-answer").className === "{word}"')
+        said = page.value('byId("change-answer").textContent')
+        assert said.startswith('REJECTED by /friction_estimator')
+        assert running.wait_for(lambda view: view['now']['settings']['scale'] == 0.4)
+
+
+@NO_BROWSER
+def test_a_machine_of_three_shows_each_actuator_and_off_takes_out_all_forces(tmp_path: Path):
+    domain, recording = free_domain(), {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    with (
+        machine(tmp_path, domain, 200.0, **recording),
+        monitor(domain, '--allow-changes') as running,
+        shown(running.url, tmp_path, 1400) as page,
+    ):
+        running.wait_for(lambda view: len(view['actuators']) == len(NAMES) and view['now']['feedforward'])
+        for place, name in enumerate(NAMES):
+            page.wait_for(f'byId("tabs").children.length === {len(NAMES)}')
+            page.click(f'#tabs button:nth-child({place + 1})')
+            page.wait_for(f'label === "{name} (/machine_estimator)" && columns.measured.length > 100')
+            sliding = page.value(
+                'columns.measured.filter((force, at) => columns.low[at] !== null && Math.abs(columns.estimate[at]) > 0)'
+            )
+            off = sorted(abs(abs(force) - FRICTION) for force in sliding)  # parts of it are taken a moment apart
+            assert off[len(off) // 2] < 0.1 * FRICTION
+            errors = page.value('columns.error.filter((value) => value !== null)')
+            assert 0.0 < median(map(abs, errors)) < 1.5e6 * LAG * 0.0628  # [um] lag times the largest speed
+        while page.value('byId("off-answer").className') != 'yes':
+            page.click('#off')
+            page.wait_for('["yes", "no"].includes(byId("off-answer").className)')
+        answer = page.value('byId("off-answer").textContent')
+        assert all(f'{name}.feedforward.scale = 0' in answer for name in NAMES)
+        assert running.wait_for(lambda view: all(one['feedforward'] == 0.0 for one in view['actuators']))
+        check_page(page, running.port)
+    recorded = RecordedView(tmp_path / 'bag')
+    frame = recorded.view('', -1.0)
+    assert [one['label'] for one in frame['actuators']] == [f'{name} (/machine_estimator)' for name in NAMES]
+    assert all(one['feedforward'] == 0.0 for one in frame['actuators'])
+    for one in frame['actuators']:
+        rows = recorded.view(one['label'], -1.0)['rows']
+        measured, low = (COLUMNS.index(name) for name in ('measured', 'low'))
+        off = sorted(abs(abs(row[measured]) - FRICTION) for row in rows if row[low] is not None)
+        assert off[len(off) // 2] < 0.1 * FRICTION
+
+
+def test_read_only_is_the_default_and_nothing_changes(axis: int):
+    with monitor(axis) as running:
+        before = running.wait_for(lambda view: view.get('now', {}).get('feedforward') is not None)['now']['settings']
+        (answer,) = running.ask('/off', {})
+        assert (answer['confirmed'], '--allow-changes' in answer['text']) == (False, True)
+        time.sleep(0.3)
+        assert running.ask('/view')['now']['settings'] == before
+
+
+@contextmanager
+def in_process(*nodes: tuple[type, dict[str, Any]]) -> Iterator[tuple[FrictionMonitor, SpunNodes, list[Any]]]:
+    """Nodes and a monitor that may change them in this process."""
+    with ros_context() as context, ExitStack() as stack:
+        made = [kind(context=context, **arguments) for kind, arguments in nodes]
+        watching = FrictionMonitor(allow_changes=True, context=context)
+        for node in (*made, watching):
+            stack.callback(node.destroy_node)
+        for node in made:
+            if hasattr(node, 'autostart'):
+                assert node.autostart()
+                stack.callback(node.finish)
+        yield watching, SpunNodes(context, *made, watching), made
+
+
+def overrides(**values: Any) -> list[Parameter]:
+    return [Parameter(name, value=value) for name, value in {'stamp_age_max': 0.0, **values}.items()]
+
+
+def test_the_monitor_publishes_nothing_but_what_every_node_does():
+    with in_process() as (watching, spun, _):
+        spun.spin(0.1)
+        for name in ('friction_monitor', 'friction_monitor_listener'):
+            published = {topic for topic, _ in watching.get_publisher_names_and_types_by_node(name, '/')}
+            assert published <= {'/parameter_events'}
+
+
+def test_remapped_topics_in_a_namespace_are_found_by_their_types():
+    remapped = ['--ros-args', '-r', '__ns:=/left', '-r', 'rod_velocity:=/piston/speed']
+    estimator = FrictionEstimator, {'parameter_overrides': overrides(), 'cli_args': remapped}
+    with in_process(estimator, (Probe, {'namespace': '/left'})) as (watching, spun, (_, probe)):
+        speed = probe.create_publisher(RodVelocity, '/piston/speed', 10)
+
+        def is_shown() -> bool:
+            stamp = time.time_ns()
+            probe.send_pressure(stamp, 1e6)
+            probe.send_force(stamp, 5.0)
+            message = RodVelocity(velocity=0.05)
+            message.header.frame_id = SCRIPT
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+            speed.publish(message)
+            spun.spin(0.02)
+            now = watching.view.view('', -1.0).get('now')
+            return bool(now) and now['ages'].get('velocity') is not None and now['friction'] != 0.0
+
+        assert spun.spin_until(is_shown)
+        view = watching.view.view('', -1.0)
+        assert view['label'] == '/left/friction_estimator'
+        assert view['now']['frame'] == SCRIPT[:80]
+        assert set(view['now']['ages']) >= {'velocity', 'pressures', 'force sum'}
+
+
+def test_a_node_that_does_not_answer_is_not_confirmed():
+    with in_process() as (watching, spun, _):
+        asked: list[Any] = []
+        thread = threading.Thread(target=lambda: asked.extend(watching._change({'/gone': {'feedforward.scale': 0.0}})))
+        thread.start()
+        assert spun.spin_until(lambda: asked)
+        thread.join()
+    (answer,) = asked
+    assert not answer.confirmed
+    assert answer.text == f'NOT CONFIRMED: no answer from /gone within {ANSWER_TIMEOUT:g} s'
+
+
+@NO_BROWSER
+@pytest.mark.parametrize('width', WIDTHS)
+def test_a_script_in_the_name_of_a_frame_does_not_run(width: int, tmp_path: Path):
+    domain = free_domain()
+    with (
+        node_process('friction_estimator', domain, {'stamp_age_max': 0.0}, tmp_path / 'log'),
+        monitor(domain) as running,
+        ros_context(domain) as context,
+        shown(running.url, tmp_path, width) as page,
+    ):
+        probe = Probe(context=context)
+        spun = SpunNodes(context, probe)
+
+        def has_script() -> bool:
+            stamp = time.time_ns()
+            probe.send_pressure(stamp, 1e6)
+            message = RodVelocity(velocity=0.05)
+            message.header.frame_id = SCRIPT
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+            probe.velocity.publish(message)
+            spun.spin(0.02)
+            return page.value('byId("source").textContent').endswith(SCRIPT[:80])
+
+        assert spun.spin_until(has_script)
+        assert page.value('window.broken') is None
+        assert page.value('document.querySelectorAll("img, #source script").length') == 0
+        check_page(page, running.port)
+        probe.destroy_node()
+
+
+@NO_BROWSER
+@pytest.mark.parametrize('width', WIDTHS)
+def test_a_bag_is_shown_at_any_moment_and_plays(width: int, tmp_path: Path):
+    command = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main', 'monitor', 'bags/faults']
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    url = process.stdout.readline().split()[1]
+    try:
+        with shown(url, tmp_path, width) as page:
+            page.wait_for('columns.estimate && columns.estimate.some((force) => force !== null)')
+            page.value('byId("time").value = 1; byId("time").dispatchEvent(new Event("input"))')
+            page.wait_for('Math.abs(columns.time.at(-1) - 1) < 0.02')
+            page.click('#play')
+            page.wait_for('columns.time.at(-1) > 1.5')
+            assert page.value('byId("off").hidden')
+            check_page(page, urlsplit(url).port)
+    finally:
+        process.send_signal(2)
+        assert process.wait(STOP_TIMEOUT) == 0
+        process.stdout.close()
+
+
+@NO_BROWSER
+def test_the_page_says_when_the_monitor_is_gone_and_that_off_was_not_confirmed(axis: int, tmp_path: Path):
+    with browser(tmp_path) as page:
+        page.size(1400, 900)
+        with monitor(axis, '--allow-changes') as running:
+            page.open(running.url)
+            page.wait_for('columns.time && columns.time.length > 20')
+        page.wait_for('byId("mode").textContent === "NO CONNECTION"')
+        page.click('#off')
+        page.wait_for('byId("off-answer").className === "no"')
+        assert page.value('byId("off-answer").textContent').startswith('NOT CONFIRMED')
+
+
+def test_the_estimator_sends_to_one_slow_reader_alone_and_the_drivers_to_best_effort(axis: int):
+    with monitor(axis) as running, ros_context(axis) as context:
+        running.wait_for(lambda view: view.get('now', {}).get('feedforward') is not None)
+        probe = Probe(context=context)
+        spun = SpunNodes(context, probe)
+        heard: dict[str, Any] = {}
+
+        def is_found() -> bool:
+            for topic in ('/friction_estimator/monitor', '/rod_velocity', '/cylinder_pressure', '/friction_estimate'):
+                for info in probe.get_subscriptions_info_by_topic(topic):
+                    if info.node_name == 'friction_monitor_listener':
+                        heard[topic] = info.qos_profile.reliability.name
+            return len(heard) >= 3
+
+        assert spun.spin_until(is_found)
+        assert heard == dict.fromkeys(
+            ('/friction_estimator/monitor', '/rod_velocity', '/cylinder_pressure'), 'BEST_EFFORT'
+        )
+        probe.destroy_node()

@@ -1,0 +1,74 @@
+"""A mapping file from the topics of a running machine."""
+
+import subprocess
+import sys
+
+import pytest
+import yaml
+from harness.processes import free_domain, graph_environment
+from harness.spin_nodes import SpunNodes, ros_context
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import FluidPressure, JointState
+
+from seal_friction_ros.files import read_machine
+
+
+def new_robot(out, domain, *options):
+    command = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main', 'new', 'robot', '--from-topics']
+    return subprocess.Popen(
+        [*command, *options, '--out', str(out)],
+        env=graph_environment(domain),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.fixture
+def drivers():
+    """A machine on a domain of its own, whose joint slides; pressures are gauge, against the definition of the type."""
+    domain = free_domain()
+    with ros_context(domain) as context:
+        node = Node('drivers', context=context)
+        senders = {
+            topic: node.create_publisher(kind, topic, qos_profile_sensor_data)
+            for topic, kind in (('/joint_states', JointState), ('/ram/p_a', FluidPressure), ('/ram/p_b', FluidPressure))
+        }
+        position = 0.0
+
+        def send():
+            nonlocal position
+            position += 1e-4
+            senders['/joint_states'].publish(JointState(name=['ram'], position=[position], velocity=[0.05]))
+            for chamber, pressure in (('a', 2.0e6), ('b', 0.0)):
+                senders[f'/ram/p_{chamber}'].publish(FluidPressure(fluid_pressure=pressure))
+
+        node.create_timer(0.002, send)
+        yield domain, SpunNodes(context, node)
+        node.destroy_node()
+
+
+def test_the_mapping_file_of_a_running_machine_loads_and_names_gauge_pressures(tmp_path, drivers):
+    domain, nodes = drivers
+    process = new_robot(tmp_path / 'robot.yaml', domain, '1')
+    assert nodes.spin_until(lambda: process.poll() is not None)
+    said, errors = process.communicate()
+    assert process.returncode == 0, errors
+    text = (tmp_path / 'robot.yaml').read_text()
+    (ram,) = read_machine(str(tmp_path / 'robot.yaml')).actuators
+    assert ram.name == 'ram'
+    assert set(ram.inputs) == {'position', 'velocity', 'pressure_a', 'pressure_b'}
+    assert text.count('absolute: false}') == 2
+    assert yaml.safe_load(text)['topics']['/ram/p_a'] == 'sensor_msgs/msg/FluidPressure'
+    assert 'gauge' in said
+    assert 'bore' in said
+
+
+def test_a_graph_without_a_machine_is_one_line(tmp_path):
+    process = new_robot(tmp_path / 'robot.yaml', free_domain())
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 2
+    assert 'no message of a known type' in said
+    assert len(said.strip().splitlines()) == 1
+    assert not (tmp_path / 'robot.yaml').exists()

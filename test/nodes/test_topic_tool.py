@@ -1,0 +1,129 @@
+"""``seal_friction topics``: topics, rates, messages, parameters and services of a running estimator."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from harness.pages import blocks_of
+from harness.processes import free_domain, graph_environment, node_process
+from paths import ROOT
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool
+
+from seal_friction_ros.nodes.topic_tool import filled, plain
+from seal_friction_ros.offline.commands import topics
+from seal_friction_ros.offline.commands.main import main
+
+
+@pytest.fixture(scope='module')
+def domain(tmp_path_factory):
+    """A domain with an estimator and a simulated servo."""
+    domain, folder = free_domain(), tmp_path_factory.mktemp('topics')
+    log, recording = folder / 'nodes.log', {'record_directory': str(folder)}
+    simulator = ROOT / 'config' / 'servo_simulator.yaml'
+    with (
+        node_process('friction_estimator', domain, recording, log),
+        node_process('servo_simulator', domain, {}, log, parameter_file=simulator),
+    ):
+        code, said = run(domain, 'echo', 'friction_estimate', '--count', '1', '--seconds', '120')
+        while code == 2 and 'friction_estimate within' in said:  # the nodes are still loading
+            code, said = run(domain, 'echo', 'friction_estimate', '--count', '1', '--seconds', '120')
+        assert code == 0, log.read_text() + said
+        yield domain
+
+
+def run(domain: int, *arguments: str) -> tuple[int, str]:
+    """Exit code, and what was printed."""
+    command = [sys.executable, '-m', 'seal_friction_ros', 'topics', *arguments]
+    result = subprocess.run(
+        command, cwd=ROOT, env=graph_environment(domain), capture_output=True, text=True, check=False
+    )
+    return result.returncode, result.stdout or result.stderr
+
+
+def test_list_names_type_publisher_and_subscriber_of_each_topic(domain):
+    code, said = run(domain, 'list', '--json')
+    listed = json.loads(said)
+    assert code == 0
+    assert listed['/rod_velocity'] == {
+        'type': 'seal_friction_msgs/msg/RodVelocity',
+        'publishers': ['/servo_simulator'],
+        'subscribers': ['/friction_estimator'],
+    }
+    assert not any('seal_friction_topics' in str(one) for one in listed.values())
+
+
+def test_hz_counts_the_messages_of_the_simulator(domain):
+    code, said = run(domain, 'hz', 'rod_velocity', '--seconds', '2', '--json')
+    rate = json.loads(said)
+    assert code == 0
+    assert rate['messages'] > 100
+    assert rate['shortest_gap_s'] <= rate['mean_gap_s'] <= rate['longest_gap_s']
+    assert rate['rate_Hz'] == pytest.approx(1.0 / rate['mean_gap_s'])
+
+
+def test_echo_prints_every_field_of_a_message(domain):
+    code, said = run(domain, 'echo', '/friction_estimate', '--count', '2', '--json')
+    messages = [json.loads(line) for line in said.splitlines()]
+    assert (code, len(messages)) == (0, 2)
+    assert {'header', 'coulomb_friction', 'state', 'status'} <= set(messages[0])
+
+
+def test_a_topic_that_is_not_there_is_one_line_with_what_there_is(domain):
+    code, said = run(domain, 'hz', 'rod_velocty')
+    assert code == 2
+    assert said.count('\n') == 1
+    assert 'did you mean /rod_velocity?' in said
+
+
+def test_param_sets_what_the_node_accepts_and_says_why_it_refuses(domain):
+    name = 'feedforward.scale'
+    assert run(domain, 'param', 'friction_estimator', name, '0.25') == (0, f'{{{name}: 0.25}}\n')
+    assert json.loads(run(domain, 'param', 'friction_estimator', '--json')[1])[name] == 0.25
+    code, said = run(domain, 'param', 'friction_estimator', name, '-1')
+    assert code == 1
+    assert '0.25' in said
+    assert 'refused: ' in said
+    code, said = run(domain, 'param', 'friction_estimator', 'feedforward.scal')
+    assert code == 2
+    assert f'did you mean {name}?' in said
+
+
+def test_call_finds_the_type_of_a_service_and_a_refusal_is_exit_code_1(domain):
+    code, said = run(domain, 'call', 'friction_estimator/stop_recording', '--json')
+    assert code == 1
+    assert json.loads(said) == {'success': False, 'message': 'not recording'}
+    code, said = run(domain, 'call', 'friction_estimator/stop_recording', '{data: true}')
+    assert code == 2
+    assert 'has no field data' in said
+
+
+def test_every_command_of_the_docs_runs(domain):
+    (block,) = (b for b in blocks_of(ROOT / 'docs' / 'interfaces.md') if b.kind == 'topics')
+    for line in block.text.splitlines():
+        code, said = run(domain, *line.removeprefix('seal_friction topics ').split())
+        assert code == 0, f'{line}: {said}'
+    assert 'success: true' in said
+
+
+def test_fields_are_set_by_name_and_of_their_type():
+    assert filled(SetBool.Request(), {'data': True}).data is True
+    with pytest.raises(ValueError, match='has no field date: did you mean data'):
+        filled(SetBool.Request(), {'date': True})
+    with pytest.raises(ValueError, match="data: 'yes' is no boolean"):
+        filled(SetBool.Request(), {'data': 'yes'})
+    assert plain(filled(SetBool.Request(), {'data': True})) == {'data': True}
+
+
+def test_of_a_long_array_the_beginning_is_shown():
+    message = Parameter('numbers', value=[0.0] * 50).to_parameter_msg()
+    shown = plain(message)['value']['double_array_value']
+    assert shown[-1] == '... 30 more'
+    assert len(shown) == 21
+
+
+def test_without_ros_one_line_says_what_to_do(monkeypatch, capsys):
+    monkeypatch.setattr(topics, 'find_spec', lambda _: None)
+    assert main(['topics', 'list']) == 2
+    assert capsys.readouterr().err == 'seal_friction: topics needs ROS 2: source your distribution, or run make setup\n'

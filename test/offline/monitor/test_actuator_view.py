@@ -1,0 +1,189 @@
+"""What a person sees of an actuator: rows for the curves, and the situation in words."""
+
+import dataclasses
+import math
+
+import pytest
+
+from seal_friction_ros.core.estimation.adaptation import MODES
+from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
+from seal_friction_ros.core.estimation.records import (
+    Force,
+    FrictionEstimate,
+    Position,
+    Pressure,
+    ServoReference,
+    Status,
+    Velocity,
+)
+from seal_friction_ros.core.friction.states import SLIDING, STUCK, FrictionState
+from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.monitor.actuator_view import (
+    BAND,
+    COLUMNS,
+    NOTHING_HELD,
+    NOTHING_SAID,
+    OFF,
+    STATUS_WORDS,
+    TOO_OLD,
+    Bits,
+    Known,
+    Said,
+    known_of,
+    next_interval,
+    recent_bits,
+    row,
+    situation,
+    take,
+)
+
+KNOWN = known_of(default_configuration())
+SECOND = 10**9
+NO_BITS = Bits()
+ESTIMATE = FrictionEstimate(SECOND, 40.0, 3.0, 45.0, -40.0, SLIDING, -1, 0, 0.001)
+RECORDS = (
+    Pressure(SECOND, 2e6, 1e6),
+    Force(SECOND, -37.0),
+    Velocity(SECOND, -0.01, b'rod'),
+    Position(SECOND, 0.010),
+    ServoReference(SECOND, 0.012, 0.0, 0.0),
+    ESTIMATE,
+    FeedForward(SECOND, -36.0, 0.9, int(Limited.SLEW)),
+)
+
+
+def held_of(*records, received: int = SECOND):
+    held = NOTHING_HELD
+    for record in records:
+        held = take(held, record, received)
+    return held
+
+
+def as_mapping(values) -> dict:
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def words(held, *, bits: Bits = NO_BITS, now: int = SECOND, said: Said = NOTHING_SAID, known: Known = KNOWN) -> dict:
+    return situation(known, held, bits, now, said)
+
+
+def test_a_row_has_the_newest_numbers_in_the_units_of_the_page():
+    shown = as_mapping(row(KNOWN, held_of(*RECORDS), 12.3456))
+    assert shown['time'] == 12.346
+    assert (shown['measured'], shown['estimate']) == (-37.0, -40.0)
+    assert shown['low'] == pytest.approx(-40.0 - BAND * 3.0)
+    assert shown['high'] == pytest.approx(-40.0 + BAND * 3.0)
+    assert (shown['feedforward'], shown['limit'], shown['below']) == (-36.0, 150.0, -150.0)
+    assert shown['error'] == pytest.approx(2000.0)  # [um]
+    assert (shown['pressure_a'], shown['pressure_b']) == (20.0, 10.0)  # [bar]
+    assert shown['scale'] is shown['residual'] is None  # nothing is learnt with the default settings
+    assert shown['limited'] == Limited.SLEW
+
+
+def test_what_never_came_is_a_gap_and_no_zero():
+    shown = as_mapping(row(KNOWN, NOTHING_HELD, 0.0))
+    assert {name for name, value in shown.items() if value is not None} == {
+        'time',
+        'limit',
+        'below',
+        'status',
+        'limited',
+    }
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
+def test_no_number_of_a_row_or_of_the_words_is_other_than_finite(value: float):
+    held = held_of(Pressure(1, value, value), Force(1, value), Position(1, value), ServoReference(1, value, 0.0, 0.0))
+    given = (*row(KNOWN, held, 1.0), *words(held).values())
+    assert all(math.isfinite(number) for number in given if isinstance(number, float))
+
+
+def test_the_tracking_error_of_a_fast_rod_is_that_of_one_moment():
+    """1 m/s, the reference 3 ms older than the position: it has moved by 3 mm since."""
+    position, reference = Position(SECOND, 0.5), ServoReference(SECOND - 3_000_000, 0.4971, 1.0, 0.0)
+    shown = as_mapping(row(KNOWN, held_of(position, reference), 0.0))
+    assert shown['error'] == pytest.approx(100.0)  # [um]
+    old = as_mapping(row(KNOWN, held_of(position, reference._replace(stamp=SECOND // 2)), 0.0))
+    assert old['error'] is None
+
+
+def test_at_rest_there_is_no_band():
+    shown = as_mapping(row(KNOWN, held_of(ESTIMATE._replace(state=STUCK)), 0.0))
+    assert shown['low'] is shown['high'] is None
+
+
+def test_with_adaptation_what_is_measured_is_estimate_plus_residual_while_the_rod_slides():
+    """A rod of 100 kg that brakes: the force sum is far from the friction, the residual knows the inertia."""
+    configuration = default_configuration()
+    adapting = dataclasses.replace(
+        configuration, adaptation=dataclasses.replace(configuration.adaptation, mode='observe')
+    )
+    estimate = ESTIMATE._replace(residual=-2.0, adaptation_scale=1.05, adaptation_scale_std=0.01)
+    shown = as_mapping(row(known_of(adapting), held_of(Force(SECOND, 400.0), estimate), 0.0))
+    assert shown['measured'] == -42.0
+    assert (shown['scale'], shown['residual']) == (1.05, -2.0)
+    assert shown['scale_high'] - shown['scale_low'] == pytest.approx(2 * BAND * 0.01)
+    at_rest = as_mapping(row(known_of(adapting), held_of(Force(SECOND, 20.0), estimate._replace(state=STUCK)), 0.0))
+    assert at_rest['measured'] == 20.0
+
+
+def test_a_bit_that_one_answer_had_is_seen_whatever_comes_after_it():
+    clamped, free = (FeedForward(SECOND, 1.0, 0.9, bits) for bits in (int(Limited.CLAMP), 0))
+    held = held_of(clamped, *[free] * 9)
+    assert as_mapping(row(KNOWN, held, 0.0))['limited'] == Limited.CLAMP
+    assert as_mapping(row(KNOWN, next_interval(held), 0.0))['limited'] == 0
+
+
+def test_a_lamp_is_lit_for_half_a_second():
+    held = held_of(FeedForward(SECOND, 1.0, 0.9, int(Limited.CLAMP)))
+    rows = [row(KNOWN, held, 0.0), *(row(KNOWN, NOTHING_HELD, 0.1 * i) for i in range(1, 10))]
+    assert recent_bits(reversed(rows[:5]), 0.4).limited == Limited.CLAMP
+    assert recent_bits(reversed(rows), 0.9).limited == 0
+
+
+def test_every_bit_of_the_status_has_words():
+    assert set(STATUS_WORDS) == set(Status)
+    assert len(set(STATUS_WORDS.values())) == len(Status)
+
+
+@pytest.mark.parametrize('bit', Status)
+def test_the_words_name_the_fault_and_only_that(bit: Status):
+    (named,) = words(held_of(*RECORDS), bits=Bits(int(bit), 0))['faults']
+    assert named.startswith(STATUS_WORDS[bit])
+
+
+@pytest.mark.parametrize('state', FrictionState)
+@pytest.mark.parametrize('direction', [-1, 0, 1])
+def test_every_state_has_words(state: FrictionState, direction: int):
+    said = words(held_of(ESTIMATE._replace(state=int(state), direction=direction)))['state']
+    assert (said == 'unknown') == (state == FrictionState.UNKNOWN or (state, direction) == (FrictionState.BREAKAWAY, 0))
+
+
+def test_the_verdict_is_good_only_if_nothing_is_wrong():
+    held = held_of(*RECORDS)
+    late = SECOND + round((TOO_OLD + 0.1) * SECOND)
+    assert words(held)['verdict'] == 'good'
+    assert words(NOTHING_HELD)['verdict'] == 'bad'
+    assert words(held, now=late)['verdict'] == 'bad'
+    assert words(held, said=Said(2, 'broken'))['verdict'] == 'bad'
+    assert words(held, said=Said(1, 'tired'))['verdict'] == 'look'
+    assert 'tired' in words(held, said=Said(1, 'tired'))['reason']
+    assert words(held, bits=Bits(int(Status.OUTSIDE_IDENTIFIED_RANGE), 0))['verdict'] == 'look'
+    assert words(held, bits=Bits(int(Status.MOTION_UNCERTAIN), 0))['verdict'] == 'good'  # each reversal has it
+    without_reference = take(held_of(*RECORDS), ESTIMATE, late)
+    assert words(without_reference, now=late)['verdict'] == 'look'
+
+
+def test_no_estimate_says_which_input_never_came():
+    assert 'pressures' in words(held_of(Velocity(SECOND, 0.1)))['reason']
+
+
+def test_off_is_a_mode_of_the_adaptation():
+    assert OFF in MODES
+    assert KNOWN.adaptation == OFF
+
+
+def test_the_range_is_that_which_every_seal_was_identified_in():
+    low, high = words(held_of(*RECORDS))['range']
+    (seal, *_) = default_configuration().parameters().estimator.seals
+    assert (low, high) == (seal.seal.pressure_min / 1e5, pytest.approx(seal.seal.pressure_max / 1e5, rel=1e-5))

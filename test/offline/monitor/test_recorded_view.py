@@ -1,0 +1,100 @@
+"""The view of a bag shows at each moment what had come until then."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from harness.closed_loop_bags import write_closed_loop
+from harness.example_bags import write_inputs, write_recorded
+from paths import ROOT
+
+from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.recorded_run import read_run
+from seal_friction_ros.offline.monitor.actuator_view import COLUMNS
+from seal_friction_ros.offline.monitor.recorded_view import RecordedView
+
+
+@pytest.fixture(scope='module')
+def loop(tmp_path_factory) -> Path:
+    return write_closed_loop(tmp_path_factory.mktemp('bags') / 'loop', seconds=1.0)
+
+
+def column(view: RecordedView, name: str, since: float = -1.0, until: float = 1e9) -> np.ndarray:
+    rows = view.view('', since, until)['rows']
+    return np.array([np.nan if one[COLUMNS.index(name)] is None else one[COLUMNS.index(name)] for one in rows])
+
+
+@pytest.mark.parametrize(
+    ('name', 'attribute', 'unit'),
+    [
+        ('estimate', 'friction_force', 1.0),
+        ('feedforward', 'feedforward_force', 1.0),
+        ('pressure_a', 'pressure_a', 1e5),
+        ('pressure_b', 'pressure_b', 1e5),
+        ('measured', 'force_sum', 1.0),
+    ],
+)
+def test_a_curve_is_what_another_reader_finds_in_the_bag(loop: Path, name: str, attribute: str, unit: float):
+    """Each row has the newest number that had come: those of the bag come every millisecond, the rows every ten."""
+    run, view = read_run(loop), RecordedView(loop)
+    times, values = column(view, 'time'), column(view, name)
+    given = np.asarray(getattr(run, attribute)) / unit
+    newest = np.searchsorted(run.time, times - 1e-6, side='right') - 1
+    near = np.stack([given[np.clip(newest + shift, 0, len(given) - 1)] for shift in (-1, 0, 1)])
+    off = np.min(np.abs(near - values), axis=0)
+    assert len(times) == pytest.approx(200, abs=2)
+    assert np.nanmax(off) <= 1e-5 * np.nanmax(np.abs(given)) + 1e-9
+    assert np.ptp(values) > 0.0
+
+
+def test_the_tracking_error_is_reference_less_position(loop: Path):
+    run, view = read_run(loop), RecordedView(loop)
+    assert np.nanmax(np.abs(column(view, 'error'))) == pytest.approx(
+        1e6 * np.max(np.abs(run.reference - run.position)), rel=0.05
+    )
+
+
+def test_a_window_has_the_rows_in_it_and_the_words_of_its_end(loop: Path):
+    view = RecordedView(loop)
+    frame = view.view('', 0.4, 0.9)
+    times = [one[0] for one in frame['rows']]
+    assert times[0] == pytest.approx(0.4, abs=0.011)
+    assert times[-1] == pytest.approx(0.9)
+    assert frame['now']['settings']['scale'] == 0.0
+    assert view.view('', 1.0, 1.9)['now']['settings']['scale'] == 0.9  # changed live, after a second
+
+
+def test_faults_are_named_when_they_are_there_and_not_later():
+    view = RecordedView(ROOT / 'bags' / 'faults')
+    duration = view.describe()['duration']
+    words = [view.view('', at, at)['now']['faults'] for at in np.arange(0.1, duration, 0.1)]
+    named = {fault for moment in words for fault in moment}
+    assert any('pressure is not a finite number' in fault for fault in named)
+    assert any('force sum jumps' in fault or 'force sum is beyond' in fault for fault in named)
+    assert any(not [fault for fault in moment if 'usual' not in fault] for moment in words)
+
+
+def test_what_is_before_the_start_and_after_the_end_is_the_nearest_moment(loop: Path):
+    view = RecordedView(loop)
+    assert view.view('', -5.0, -1.0)['rows']
+    assert view.view('', 1e6, 1e6)['time'] == view.describe()['duration']
+
+
+def test_a_long_bag_has_no_more_rows_than_fit(loop: Path, monkeypatch):
+    monkeypatch.setattr('seal_friction_ros.offline.monitor.recorded_view.MOST_ROWS', 50)
+    view = RecordedView(loop)
+    assert 45 <= len(column(view, 'time')) <= 52
+    assert column(view, 'time')[-1] == pytest.approx(view.describe()['duration'], abs=0.05)
+
+
+def test_a_bag_without_estimates_is_refused_with_what_to_do(tmp_path: Path):
+    with pytest.raises(BagError, match='seal_friction replay'):
+        RecordedView(write_inputs(tmp_path / 'inputs', 20))
+
+
+def test_a_bag_cannot_be_changed(tmp_path: Path):
+    view = RecordedView(write_recorded(tmp_path))
+    assert not view.off()[0].confirmed
+    assert not view.change('', 'scale', 0.0)[0].confirmed
+    with pytest.raises(ValueError, match='parameter'):
+        view.change('', 'seals', 0.0)

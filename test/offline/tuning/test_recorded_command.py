@@ -1,0 +1,105 @@
+"""The gain from force to command from a bag: the command as one number or as an array, and bags that cannot tell."""
+
+import json
+import struct
+from pathlib import Path
+
+import pytest
+import yaml
+
+from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    FORCE_TYPE,
+    POSITION_TYPE,
+    PRESSURE_TYPE,
+    REFERENCE_TYPE,
+    VELOCITY_TYPE,
+    encode,
+    encode_text,
+)
+from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.foundation.parameters import meanings
+from seal_friction_ros.core.servo import position_servo as servo
+from seal_friction_ros.core.servo.motions import Setpoint, Sine
+from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.tuning.recorded_command import NUMBER, NUMBERS, first_number
+
+CONFIGURATION = default_configuration()
+PLANT = servo.ServoParameters(seals=CONFIGURATION.parameters().estimator.seals, control_period=1e-3)
+ENCODERS = {
+    NUMBER: lambda value: struct.pack('<4xd', value).replace(b'\0\0\0\0', b'\0\1\0\0', 1),
+    NUMBERS: lambda value: b'\0\1\0\0' + struct.pack('<IIIId', 0, 0, 1, 0, value),
+}
+
+
+def write_axis(path: Path, type_name: str, moves: bool = True) -> Path:
+    """Bag of a servo that takes positions only, on /command, and has no other reference in its loop."""
+    wave = Sine(0.002, 0.5)
+    state = servo.init(PLANT)
+    out = servo.outputs(PLANT, state.plant)
+    with b.BagWriter(path) as writer:
+        text = snapshot_text(first_snapshot(CONFIGURATION))
+        writer.write(b.CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, encode_text(text))
+        for i in range(6000):
+            stamp, reference = i * 1_000_000, wave.at(i * 1e-3)
+            command = reference.position if moves else 1e-4
+            for topic, kind, data in (
+                ('/command', type_name, ENCODERS[type_name](command)),
+                (b.PRESSURE_TOPIC, PRESSURE_TYPE, encode(Pressure(stamp, out.pressure_a, out.pressure_b))),
+                (b.FORCE_TOPIC, FORCE_TYPE, encode(Force(stamp, out.force_sum))),
+                (b.REFERENCE_TOPIC, REFERENCE_TYPE, encode(ServoReference(stamp, *reference))),
+                (b.POSITION_TOPIC, POSITION_TYPE, encode(Position(stamp, out.position))),
+                (b.VELOCITY_TOPIC, VELOCITY_TYPE, encode(Velocity(stamp, out.velocity, b'rod'))),
+            ):
+                writer.write(topic, kind, stamp, data)
+            state, out = servo.step(PLANT, state, Setpoint(reference.position, 0.0, 0.0))
+    return path
+
+
+AREAS = ['--area-a', str(PLANT.cylinder.area_a), '--area-b', str(PLANT.cylinder.area_b)]
+
+
+@pytest.mark.parametrize('type_name', [NUMBER, NUMBERS])
+def test_tune_says_the_gain_of_the_recorded_command(type_name, tmp_path, capsys):
+    bag, out = write_axis(tmp_path / 'bag', type_name), tmp_path / 'f.yaml'
+    arguments = ['tune', '--bag', str(bag), '--out', str(out), '--command-topic', '/command', *AREAS, '--json']
+    assert main(arguments) in (0, 1)
+    numbers = json.loads(capsys.readouterr().out)
+    assert numbers['output_gain'] == pytest.approx(1.0 / PLANT.controller.position_gain, rel=0.1)
+    assert 0.0 < numbers['output_gain_standard_error'] < 0.1 * numbers['output_gain']
+
+
+def test_tune_prints_the_line_of_the_mapping_file_and_writes_for_an_actuator_of_a_machine(tmp_path, capsys):
+    bag, out = write_axis(tmp_path / 'bag', NUMBER), tmp_path / 'f.yaml'
+    arguments = ['--command-topic', '/command', *AREAS, '--actuator', 'boom']
+    assert main(['tune', '--bag', str(bag), '--out', str(out), *arguments]) in (0, 1)
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith('gain: '))
+    assert yaml.safe_load(line)['gain'] == pytest.approx(1.0 / PLANT.controller.position_gain, rel=0.1)
+    parameters = yaml.safe_load(out.read_text())['/**/machine_estimator']['ros__parameters']
+    assert set(parameters) == {'boom.feedforward'}
+    assert parameters['boom.feedforward'].keys() == meanings(FeedForwardSettings).keys()
+
+
+@pytest.mark.parametrize(
+    ('options', 'reason'),
+    [
+        (['--command-topic', '/command'], '--area-a'),
+        (['--command-topic', '/elsewhere', *AREAS], 'is not in it'),
+        (['--command-topic', '/command', *AREAS], 'the command does not change'),
+    ],
+)
+def test_bag_that_cannot_tell_the_gain_is_rejected_and_nothing_is_written(options, reason, tmp_path, capsys):
+    bag, out = write_axis(tmp_path / 'bag', NUMBER, moves=False), tmp_path / 'f.yaml'
+    assert main(['tune', '--bag', str(bag), '--out', str(out), *options]) == 2
+    assert reason in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize('data', [b'', b'\0\1\0\0', b'\0\0\0\0' + bytes(8), b'\0\1\0\0' + struct.pack('<III', 0, 0, 0)])
+def test_malformed_command_is_an_error(data):
+    with pytest.raises(ValueError, match=r'malformed|CDR|empty'):
+        first_number(NUMBERS, data)

@@ -1,0 +1,135 @@
+"""Two machines with standard messages, from raw topics to a feed-forward that makes them track, by files and commands.
+
+The test bench runs the page `docs/first_hour.md` as it stands. The pneumatic axis has no force sensor and no velocity.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from harness.pages import Terminals, blocks_of
+from paths import ROOT
+from test_docs import link_tree
+
+from seal_friction_ros.core.estimation.messages import decode
+from seal_friction_ros.core.estimation.records import Position, ServoReference
+from seal_friction_ros.files import read_machine
+from seal_friction_ros.offline.bags.bag import read_messages
+from seal_friction_ros.offline.replay.replay import replay
+
+PAGE = ROOT / 'docs' / 'first_hour.md'
+SECONDS = {'strokes': 20.0}  # as the page says; the sines are shorter here
+SINE_SECONDS = 6.0
+MOST_LINES = 25  # of a mapping file
+LARGEST_SHARE = 0.4  # of the tracking error that may be left
+
+PNEUMATIC = """name: pneumatic
+topics:
+  /joint_states: sensor_msgs/msg/JointState
+  /joint_reference: sensor_msgs/msg/JointState
+  /pressure_a: sensor_msgs/msg/FluidPressure
+  /pressure_b: sensor_msgs/msg/FluidPressure
+actuators:
+  axis:
+    seals: [placeholder@a, placeholder@b]
+    bore: 32 mm
+    rod: 12 mm
+    inputs:
+      position: /joint_states position[rod]
+      pressure_a: /pressure_a
+      pressure_b: /pressure_b
+      reference_position: /joint_reference position[rod]
+      reference_velocity: /joint_reference velocity[rod]
+    velocity_from_position: {step: 10 um, rate: 500 Hz, noise: 1 mm/s}
+    force_sum: {pressures: true, load: none}
+    output: {topic: /effort_commands, type: std_msgs/msg/Float64MultiArray}
+"""
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """The tree as a reader has it, in a folder of its own."""
+    link_tree(tmp_path)
+    (tmp_path / 'build').mkdir()
+    return tmp_path
+
+
+def tracking_error(bag: Path) -> float:
+    """RMS of measured minus wanted position [m] of a typical second, which is a whole number of periods.
+
+    The first seconds have the fade-in, and a busy machine may stall in one of them.
+    """
+    found: dict[type, list[tuple[float, float]]] = {ServoReference: [], Position: []}
+    for message in read_messages(bag):
+        if message.topic in ('/servo_reference', '/rod_position'):
+            record = decode(message.type_name, message.data)
+            found[type(record)].append((record.stamp * 1e-9, record.position))
+    wanted, measured = (np.array(found[kind]) for kind in (ServoReference, Position))
+    error = measured[:, 1] - np.interp(measured[:, 0], wanted[:, 0], wanted[:, 1])
+    second = np.floor(measured[:, 0] - measured[0, 0])
+    return float(np.median([np.sqrt(np.mean(error[second == k] ** 2)) for k in range(int(second[-1]))]))
+
+
+def check_result(folder: Path, terminals: Terminals) -> None:
+    """The mapping is short, the loop tracks, and every recording replays to the byte."""
+    lines = (folder / 'build' / 'robot.yaml').read_text().splitlines()
+    assert len([line for line in lines if not line.startswith('#')]) <= MOST_LINES
+    terminals.run('.venv/bin/seal_friction import bag build/with --mapping build/robot.yaml --out build/again')
+    without, compensated = (tracking_error(folder / 'build' / bag) for bag in ('run_without', 'again'))
+    assert compensated < LARGEST_SHARE * without
+    for bag in ('without', 'with'):
+        result = replay(folder / 'build' / bag)
+        assert result.identical, result.first_difference
+        assert result.recorded_feedforwards > 500
+
+
+def test_the_test_bench_tracks_after_the_first_hour(checkout: Path):
+    terminals = Terminals(checkout)
+    try:
+        for language, kind, text in blocks_of(PAGE):
+            if language == 'yaml':
+                made = read_machine(str(checkout / 'build' / 'robot.yaml'))  # by `new robot`: it loads as it is
+                assert [actuator.name for actuator in made.actuators] == ['boom']
+                written = yaml.safe_load(text)
+                found = yaml.safe_load((checkout / 'build' / 'robot.yaml').read_text())
+                assert found['topics'] == written['topics']
+                assert found['actuators']['boom']['inputs'] == written['actuators']['boom']['inputs']
+                (checkout / 'build' / 'robot.yaml').write_text(text)
+            elif kind == 'machine':
+                terminals.start_machine(text.strip())
+            elif kind == 'node':
+                name = text.strip().rpartition('record_name:=')[2]
+                terminals.run_node(text.strip(), SECONDS.get(name, SINE_SECONDS))
+            else:
+                for command in text.splitlines():
+                    terminals.run(command)
+    finally:
+        terminals.stop_machine()
+    check_result(checkout, terminals)
+
+
+def test_a_pneumatic_axis_without_force_sensor_and_velocity_tracks(checkout: Path):
+    (checkout / 'build' / 'robot.yaml').write_text(PNEUMATIC)
+    plant = '.venv/bin/servo_simulator --ros-args --params-file config/simulated_machines/pneumatic_axis.yaml'
+    strokes = '-p wave:=trapezoid -p trapezoid.distance:=0.08 -p trapezoid.speed:=0.05 -p trapezoid.frequency:=0.2'
+    node = '.venv/bin/machine_estimator --ros-args -p machine:=build/robot.yaml -p record:=true'
+    off = '-p axis.feedforward.scale:=0.0 -p record_directory:=build'
+    tool = '.venv/bin/seal_friction'
+    terminals = Terminals(checkout)
+    try:
+        terminals.start_machine(f'{plant} {strokes} -p trapezoid.acceleration:=0.5')
+        terminals.run_node(f'{node} {off} -p record_name:=strokes', 16.0)
+        terminals.run(f'{tool} import bag build/strokes --mapping build/robot.yaml --out build/run')
+        terminals.run(f'{tool} identify build/run --seal-chambers a,b --out build/seal.yaml')
+        terminals.run("sed -i 's|seals: .*|seals: [build/seal.yaml]|' build/robot.yaml")
+        terminals.start_machine(plant)
+        terminals.run_node(f'{node} {off} -p record_name:=without', SINE_SECONDS)
+        terminals.run(f'{tool} import bag build/without --mapping build/robot.yaml --out build/run_without')
+        terminals.run(f'{tool} tune --bag build/run_without --actuator axis --out build/feedforward.yaml')
+        terminals.run_node(
+            f'{node} -p record_directory:=build --params-file build/feedforward.yaml -p record_name:=with', SINE_SECONDS
+        )
+    finally:
+        terminals.stop_machine()
+    check_result(checkout, terminals)
