@@ -1,15 +1,17 @@
 # make demo    set up, then play real friction readings through the live node, verify, report
 # make test    set up, then lint, types and tests
+# make test-long    the tests that take minutes, which `make test` leaves out
 # make test-lowest  core and offline with the lowest versions of all packages
 # make setup   only set up .venv
 # make bench   figures of speed
 # make figures the figures in docs/figures
 
-.PHONY: demo test test-lowest setup bench figures clean
+.PHONY: demo test test-long test-lowest setup bench figures clean
 .DEFAULT_GOAL := demo
 
 python := .venv/bin/python
 unexport PYTHONDONTWRITEBYTECODE  # tests start hundreds of processes, and each would compile every module anew
+unexport CI BUILD_NUMBER  # with these, pytest shows the whole difference of two pages that differ, which takes hours
 ifdef ROS_DISTRO
 export LD_LIBRARY_PATH := $(CURDIR)/.venv/lib:$(LD_LIBRARY_PATH)
 endif
@@ -27,6 +29,10 @@ test:
 	$(python) -m mypy
 	$(python) -m pytest --numprocesses auto --dist loadfile test/core test/offline
 	$(python) -m pytest --numprocesses auto --dist loadfile --ignore test/core --ignore test/offline
+
+test-long:
+	@tools/setup.sh dev
+	$(python) -m pytest -m long
 
 test-lowest: setup
 	@tools/test_lowest.sh

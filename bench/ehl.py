@@ -25,7 +25,7 @@ from seal_friction_ros.offline.contact.lubrication_runs import single_case
 
 CELLS = (226, 452, 1000)
 STEPS = (1e-3, 5e-4, 2.5e-4)  # [s]
-CALLS = 5_000
+CALLS = 5_000  # of a function in one timing
 
 
 def one_cycle(case: LubricationCase, cells: int, time_step: float) -> float:
@@ -40,7 +40,7 @@ def one_cycle(case: LubricationCase, cells: int, time_step: float) -> float:
     return min(times)
 
 
-def times(case: LubricationCase, cells: Sequence[int], steps: Sequence[float]) -> dict[str, float]:
+def times(case: LubricationCase, cells: Sequence[int], steps: Sequence[float], calls: int) -> dict[str, float]:
     """All times [s], and the exponents of the time in cells and in steps."""
     one_cycle(case, 64, 5e-3)  # compiles
     by_cells = [one_cycle(case, count, steps[len(steps) // 2]) for count in cells]
@@ -55,8 +55,8 @@ def times(case: LubricationCase, cells: Sequence[int], steps: Sequence[float]) -
         **{f'cycle, step {step} s [s]': value for step, value in zip(steps, by_steps, strict=True)},
         'exponent in steps': _exponent(by_steps, [1.0 / step for step in steps]),
         f'map, {len(law.speeds)} x {len(law.pressures)} [s]': map_time,
-        'look-up in the map [us]': 1e6 * _fastest(lambda: law.sliding_friction(3e4, 0.034)),
-        **{f'estimator step, {name} [us]': value for name, value in estimator_steps(law).items()},
+        'look-up in the map [us]': 1e6 * _fastest(lambda: law.sliding_friction(3e4, 0.034), calls),
+        **{f'estimator step, {name} [us]': value for name, value in estimator_steps(law, calls).items()},
     }
 
 
@@ -64,7 +64,7 @@ def _exponent(times: Sequence[float], sizes: Sequence[float]) -> float:
     return math.log(times[-1] / times[0]) / math.log(sizes[-1] / sizes[0])
 
 
-def estimator_steps(law: FrictionMap) -> dict[str, float]:
+def estimator_steps(law: FrictionMap, calls: int) -> dict[str, float]:
     """Time of one step of the estimator with two seals [us]: without and with a friction map."""
     thesis = default_configuration().parameters().estimator
     limit = law.pressures[-1]
@@ -74,13 +74,13 @@ def estimator_steps(law: FrictionMap) -> dict[str, float]:
     times: dict[str, list[float]] = {name: [] for name in laws}
     for _ in range(9):  # alternately, so that a slow moment of the machine affects both
         for name, parameters in laws.items():
-            times[name].append(_fastest(partial(step, parameters, init(parameters), sample), 3))
+            times[name].append(_fastest(partial(step, parameters, init(parameters), sample), calls, 3))
     return {name: 1e6 * min(values) for name, values in times.items()}
 
 
-def _fastest(function: Callable[[], object], repeat: int = 9) -> float:
+def _fastest(function: Callable[[], object], calls: int, repeat: int = 9) -> float:
     """Time of one call [s]."""
-    return min(timeit.repeat(function, number=CALLS, repeat=repeat)) / CALLS
+    return min(timeit.repeat(function, number=calls, repeat=repeat)) / calls
 
 
 def main() -> None:
@@ -90,8 +90,9 @@ def main() -> None:
     parser.add_argument('--case', default='inner_seal', help='name or path of the case file')
     parser.add_argument('--cells', type=int, nargs='+', default=CELLS, help='cells of the grids')
     parser.add_argument('--steps', type=float, nargs='+', default=STEPS, help='time steps [s]')
+    parser.add_argument('--calls', type=int, default=CALLS, help='of a short function in one timing')
     arguments = parser.parse_args()
-    figures = times(single_case(arguments.case, 'bench'), arguments.cells, arguments.steps)
+    figures = times(single_case(arguments.case, 'bench'), arguments.cells, arguments.steps, arguments.calls)
     if arguments.json:
         print(json.dumps(figures))
         return

@@ -30,9 +30,15 @@ from harness.processes import free_domain, node_process
 from harness.spin_nodes import SpunNodes, ros_context
 from paths import ROOT
 
-WARM_UP = 3.0  # [s] of a round, not counted: discovery, compilation of the page
 CASES = ('one actuator', 'machine of three')
 P99, RATE = 'latency p99 [us]', 'estimate rate [Hz]'
+
+
+class Times(NamedTuple):
+    """Durations of a round [s]."""
+
+    counted: float
+    warm_up: float
 
 
 class Round(NamedTuple):
@@ -79,13 +85,13 @@ def estimator(case: str, folder: Path, domain: int) -> Iterator[int]:
         yield process.pid
 
 
-def measure(pid: int, seconds: float, spun: SpunNodes, listener: Listener, watching: int) -> Round:
+def measure(pid: int, times: Times, spun: SpunNodes, listener: Listener, watching: int) -> Round:
     """One round."""
-    spun.spin(WARM_UP)
+    spun.spin(times.warm_up)
     listener.p99.clear()
     listener.rates.clear()
     began, own, other = time.monotonic(), cpu(pid), cpu(watching) if watching else 0.0
-    spun.spin(seconds)
+    spun.spin(times.counted)
     if not spun.spin_until(lambda: listener.p99):
         raise RuntimeError('the estimator does not estimate any more')
     taken = time.monotonic() - began
@@ -94,7 +100,7 @@ def measure(pid: int, seconds: float, spun: SpunNodes, listener: Listener, watch
     return Round((cpu(pid) - own) / estimates * 1e6, median(listener.p99), used)
 
 
-def run(case: str, seconds: float, rounds: int, *, with_browser: bool) -> dict[bool, list[Round]]:
+def run(case: str, times: Times, rounds: int, *, with_browser: bool) -> dict[bool, list[Round]]:
     """Rounds without and with the monitor, in turn."""
     found: dict[bool, list[Round]] = {False: [], True: []}
     domain = free_domain()
@@ -108,13 +114,13 @@ def run(case: str, seconds: float, rounds: int, *, with_browser: bool) -> dict[b
         if not spun.spin_until(lambda: listener.p99, 120.0):
             raise RuntimeError(f'no estimates: {(folder / "log").read_text()}')
         for _ in range(rounds):
-            found[False].append(measure(pid, seconds, spun, listener, 0))
+            found[False].append(measure(pid, times, spun, listener, 0))
             with ExitStack() as page, monitor(domain) as (watching, url):
                 if with_browser:
                     page.enter_context(browser(folder)).open(url)
                 else:
                     Reader(url)
-                found[True].append(measure(pid, seconds, spun, listener, watching))
+                found[True].append(measure(pid, times, spun, listener, watching))
     return found
 
 
@@ -122,6 +128,9 @@ def main() -> int:
     """Measure; print a table or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--seconds', type=float, default=10.0, help='of a round')
+    parser.add_argument(
+        '--warm-up', type=float, default=3.0, help='of a round, not counted: discovery, compilation of the page'
+    )
     parser.add_argument('--rounds', type=int, default=5)
     parser.add_argument('--cases', nargs='+', choices=CASES, default=list(CASES))
     parser.add_argument('--browser', action='store_true', help='open the page in a headless Chromium on this machine')
@@ -131,7 +140,7 @@ def main() -> int:
         parser.error('chromium is not installed: apt-get install chromium')
     figures = {}
     for case in arguments.cases:
-        found = run(case, arguments.seconds, arguments.rounds, with_browser=arguments.browser)
+        found = run(case, Times(arguments.seconds, arguments.warm_up), arguments.rounds, with_browser=arguments.browser)
         pairs = list(zip(found[False], found[True], strict=True))
         figures[case] = {
             'processor per estimate, without [us]': round(median(one.cpu for one in found[False]), 1),

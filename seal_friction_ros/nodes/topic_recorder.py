@@ -16,8 +16,6 @@ from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import BagError, BagWriter
 
-LONGEST_WAIT = 15.0  # [s] for the first topic: discovery over a network takes seconds; our choice
-
 
 class TopicRecorder(Node):
     """Subscribes, with best effort, to every topic of the given types that appears, and keeps its messages.
@@ -46,13 +44,13 @@ class TopicRecorder(Node):
         self.messages.append((topic, kind, time.time_ns(), data))
 
 
-def record(node: TopicRecorder, seconds: float, out: Path) -> None:
-    """Record for ``seconds`` [s], from the first message on.
+def record(node: TopicRecorder, seconds: float, wait: float, out: Path) -> None:
+    """Record for ``seconds`` [s], from the first message on, for which it waits ``wait`` [s] at most.
 
     Raises:
         BagError: No topic of the types has a message, or the bag cannot be written.
     """
-    end = time.monotonic() + LONGEST_WAIT
+    end = time.monotonic() + wait
     is_begun = False
     while time.monotonic() < end:
         node.subscribe_to_new_topics()
@@ -62,7 +60,7 @@ def record(node: TopicRecorder, seconds: float, out: Path) -> None:
     if not node.messages:
         heard = ', '.join(f'{topic} ({", ".join(kinds)})' for topic, kinds in node.get_topic_names_and_types())
         raise BagError(
-            f'no message of a known type within {LONGEST_WAIT:g} s: start the drivers, check ROS_DOMAIN_ID; '
+            f'no message of a known type within {wait:g} s: start the drivers, check ROS_DOMAIN_ID; '
             f'topics: {heard or "none"}'
         )
     with BagWriter(out) as writer:
@@ -75,13 +73,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog='topic_recorder', description=__doc__)
     parser.add_argument('types', nargs='+', metavar='TYPE', help='message type, package/msg/Name')
     parser.add_argument('--seconds', type=float, default=5.0, help='duration from the first message on [s]')
+    parser.add_argument('--wait', type=float, required=True, help='for the first message [s]')
     parser.add_argument('--out', type=Path, required=True, help='bag to write')
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
     set_up_discovery()
     rclpy.init()
     node = TopicRecorder(arguments.types)
     try:
-        record(node, arguments.seconds, arguments.out)
+        record(node, arguments.seconds, arguments.wait, arguments.out)
     except BagError as error:
         print(f'topic_recorder: {error}', file=sys.stderr)
         return 2

@@ -25,8 +25,6 @@ from seal_friction_ros.nodes.graph_watch import full_name
 from seal_friction_ros.nodes.managed_node import message_class
 
 SUCCESS, REFUSED, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
-_DISCOVERY = 1.5  # [s] for all names of the graph
-_LONGEST_WAIT = 10.0  # [s] for one name, or for an answer
 _NAME = 'seal_friction_topics'
 _LONGEST_ARRAY = 20  # numbers of a field that are printed
 
@@ -40,10 +38,11 @@ class Tool:
 
     Args:
         node: The node.
+        wait: Wait [s] for all names of the graph; longest wait for one name, or for an answer.
     """
 
-    def __init__(self, node: Node) -> None:
-        self.node = node
+    def __init__(self, node: Node, wait: float) -> None:
+        self.node, self._wait = node, wait
 
     def spin(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Spin for some seconds [s], or until a condition holds; whether it does."""
@@ -59,10 +58,10 @@ class Tool:
             NotThereError: It does not appear.
         """
         full = name if name.startswith('/') else f'/{name}'
-        if self.spin(_LONGEST_WAIT, lambda: full in known()):
+        if self.spin(self._wait, lambda: full in known()):
             return full
         names = [one for one in known() if _NAME not in one]
-        raise NotThereError(f'no {what} {full} within {_LONGEST_WAIT:g} s: {meant(full, names)}; check ROS_DOMAIN_ID')
+        raise NotThereError(f'no {what} {full} within {self._wait:g} s: {meant(full, names)}; check ROS_DOMAIN_ID')
 
     # -- topics --
 
@@ -72,7 +71,7 @@ class Tool:
 
     def endpoints(self) -> dict[str, dict[str, Any]]:
         """Type, publishers and subscribers of each topic."""
-        self.spin(_DISCOVERY)
+        self.spin(self._wait)
         publishers, subscribers = self.node.get_publishers_info_by_topic, self.node.get_subscriptions_info_by_topic
         return {
             topic: {
@@ -86,7 +85,7 @@ class Tool:
     def listen(self, name: str, take: Callable[[Any], None], *, raw: bool = False) -> str:
         """Subscribe to a topic as its publishers offer it; returns its full name."""
         topic = self.found(name, self.topics, 'topic')
-        self.spin(_LONGEST_WAIT, lambda: bool(self.node.get_publishers_info_by_topic(topic)))
+        self.spin(self._wait, lambda: bool(self.node.get_publishers_info_by_topic(topic)))
         offers = [end.qos_profile for end in self.node.get_publishers_info_by_topic(topic)]
         best_effort = any(offer.reliability == ReliabilityPolicy.BEST_EFFORT for offer in offers)
         latched = bool(offers) and all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
@@ -109,7 +108,7 @@ class Tool:
             size += len(data)
 
         topic = self.listen(name, take, raw=True)
-        self.spin(_LONGEST_WAIT, lambda: bool(times))
+        self.spin(self._wait, lambda: bool(times))
         self.spin(seconds)
         gaps = [after - before for before, after in pairwise(times)]
         span = times[-1] - times[0] if gaps else 0.0
@@ -144,7 +143,7 @@ class Tool:
         nodes = self.node.get_node_names_and_namespaces
         names = lambda: [f'{space}/{node}'.replace('//', '/') for node, space in nodes()]  # noqa: E731
         client = AsyncParameterClient(self.node, self.found(name, names, 'node'))
-        if not self.spin(_LONGEST_WAIT, client.services_are_ready):
+        if not self.spin(self._wait, client.services_are_ready):
             raise NotThereError(f'{name} has no parameter services')
         return client
 
@@ -154,8 +153,8 @@ class Tool:
         Raises:
             NotThereError: There is none.
         """
-        if not self.spin(_LONGEST_WAIT, future.done):
-            raise NotThereError(f'{who} gives no answer within {_LONGEST_WAIT:g} s')
+        if not self.spin(self._wait, future.done):
+            raise NotThereError(f'{who} gives no answer within {self._wait:g} s')
         return future.result()
 
     def values(self, client: AsyncParameterClient, who: str, names: list[str]) -> dict[str, Any]:
@@ -174,7 +173,7 @@ class Tool:
         package, _, kind = services()[service][0].partition('/srv/')
         service_class = getattr(import_module(f'{package}.srv'), kind)
         client = self.node.create_client(service_class, service)
-        if not self.spin(_LONGEST_WAIT, client.service_is_ready):
+        if not self.spin(self._wait, client.service_is_ready):
             raise NotThereError(f'{service}: its server does not answer')
         return self.answer(client.call_async(filled(service_class.Request(), request)), service)
 
@@ -311,7 +310,7 @@ def main() -> int:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # Ctrl-C is a KeyboardInterrupt
     node = Node(_NAME, start_parameter_services=False, enable_rosout=False)
     try:
-        return run_task(Tool(node), task)
+        return run_task(Tool(node, task['wait']), task)
     except (ValueError, yaml.YAMLError) as error:
         print(f'seal_friction topics: {" ".join(str(error).split())}', file=sys.stderr)
         return UNUSABLE

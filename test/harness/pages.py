@@ -11,7 +11,7 @@ from typing import NamedTuple
 from harness.processes import free_domain, graph_environment
 
 TIMEOUT = 300.0  # [s] ends a command that hangs
-PACE = 0.5  # [-] simulated over real time, so that a busy machine changes nothing
+PACE = 0.5  # [-] simulated over real time: a busy machine loses no messages
 
 
 class Block(NamedTuple):
@@ -30,7 +30,7 @@ def blocks_of(page: Path) -> list[Block]:
 class Terminals:
     """Two terminals beside each other: one where the machine runs, one for nodes and commands.
 
-    Machine and nodes follow the clock of the simulation, which runs at `PACE`.
+    Machine and nodes follow the clock of the simulation.
 
     Args:
         folder: Where the commands run.
@@ -39,13 +39,15 @@ class Terminals:
     def __init__(self, folder: Path) -> None:
         self._folder, self._environment = folder, graph_environment(free_domain())
         self._machine: subprocess.Popen[bytes] | None = None
+        self._pace = PACE
         self.said: list[str] = []
         """what each command printed"""
 
-    def start_machine(self, command: str) -> None:
+    def start_machine(self, command: str, pace: float = PACE) -> None:
         """Start the machine in place of the present one, and wait until it moves."""
         self.stop_machine()
-        self._machine, log = self._started(f'{command} {_ros_arguments(publish_clock=True, time_factor=PACE)}')
+        self._pace = pace
+        self._machine, log = self._started(f'{command} {_ros_arguments(publish_clock=True, time_factor=pace)}')
         self._wait_for('simulating', log, self._machine)
 
     def stop_machine(self) -> None:
@@ -59,7 +61,7 @@ class Terminals:
         node, log = self._started(f'{command} {_ros_arguments(use_sim_time=True)}')
         try:
             self._wait_for('estimating', log, node)
-            time.sleep(seconds / PACE)
+            time.sleep(seconds / self._pace)
         finally:
             _stop(node)
         assert node.returncode == 0, log.read_text()

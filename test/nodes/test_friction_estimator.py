@@ -157,7 +157,7 @@ def test_lifecycle_services_start_and_stop_it():
 def test_a_timer_that_was_due_before_a_cleanup_does_nothing_after_it():
     with graph() as g:
         due = [timer.callback for timer in g.estimator.timers]
-        assert len(due) == 4  # diagnostics, graph, watchdog, health
+        assert len(due) == 5  # diagnostics, graph, watchdog, health, monitor
         g.estimator.trigger_deactivate()
         g.estimator.trigger_cleanup()
         for callback in due:

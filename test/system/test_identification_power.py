@@ -1,9 +1,9 @@
-"""The campaign of known seals, with two draws a case."""
+"""The campaign of known seals, with one draw a case."""
 
 from system.identification_power import campaign
 
 
 def test_no_flat_law_where_friction_rises_by_four_standard_errors():
-    rows = campaign(2, workers=2)
+    rows = campaign(1, workers=2)
     assert len(rows) == 54
     assert not any(wrong for _, wrong in rows)

@@ -4,7 +4,7 @@ from harness.commands import run_json
 
 
 def test_a_short_soak_leaves_nothing_behind_and_loses_nothing_unreported():
-    found = run_json('test/system/soak.py', '--minutes', '0.05', '--look', '0.5')
+    found = run_json('test/system/soak.py', '--minutes', '0.03', '--look', '0.3')
     assert found['received'] > 500
     assert found['lost'] == found['reported missing']
     assert {value for name, value in found.items() if name.endswith(' more')} == {0}

@@ -134,6 +134,8 @@ def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
         return slope
     # A value that is not finite makes its whole window not finite.
     slope[half:-half] = savgol_filter(velocity, ACCELERATION_WINDOW, 2, deriv=1, delta=period)[half:-half]
+    rounding = 1e-9 * np.abs(velocity[np.isfinite(velocity)]).max(initial=0.0) / period
+    slope[np.abs(slope) < rounding] = 0.0  # a steady velocity has none on any machine
     for place in np.flatnonzero(~(np.abs(steps - period) <= MOST_UNEVEN * period)):
         slope[max(place + 1 - half, 0) : place + 1 + half] = math.nan
     return slope

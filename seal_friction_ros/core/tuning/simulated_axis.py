@@ -277,6 +277,8 @@ def _compass(point: SearchPoint, merit_at: Callable[[SearchPoint], float], strid
 def _gentlest(point: SearchPoint, merit_at: Callable[[SearchPoint], float]) -> SearchPoint:
     """Widest smoothing, then lowest slew limit, with a J that is nearly as good."""
     most = NEARLY_AS_GOOD * merit_at(point)
+    if most == math.inf:  # every point is rejected
+        return point
     for name, sign in (('smoothing', 1), ('slew', -1)):
         for stride in STRIDES:
             while merit_at(gentler := point._replace(**{name: getattr(point, name) + sign * stride})) <= most:

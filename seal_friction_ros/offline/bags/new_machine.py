@@ -105,10 +105,10 @@ def new_machine(bag: Path) -> str:
 
 
 @contextmanager
-def recorded_topics(seconds: float) -> Iterator[Path]:
+def recorded_topics(seconds: float, wait: float) -> Iterator[Path]:
     """Bag with what the topics of the running machine show for ``seconds`` [s]; it is gone after the ``with`` block.
 
-    Another process listens, so that this one needs no ROS.
+    Another process listens, so that this one needs no ROS. It waits ``wait`` [s] at most for the first message.
 
     Raises:
         BagError: ROS 2 is not installed, or no topic of a known type has a message.
@@ -119,7 +119,7 @@ def recorded_topics(seconds: float) -> Iterator[Path]:
     with TemporaryDirectory() as folder:
         bag = Path(folder) / 'robot'
         command = [sys.executable, '-m', 'seal_friction_ros.nodes.topic_recorder', *types]
-        command += ['--seconds', str(seconds), '--out', str(bag)]
+        command += ['--seconds', str(seconds), '--wait', str(wait), '--out', str(bag)]
         recorder = subprocess.run(command, capture_output=True, text=True, check=False)
         if recorder.returncode:
             said = recorder.stderr.strip().splitlines() or ['the process that listens ended early']

@@ -27,6 +27,13 @@ def add_parser(commands: Any) -> None:
         metavar='SECONDS',
         help='listen to the topics of the running machine, 5 s unless given; needs ROS 2',
     )
+    robot.add_argument(
+        '--wait',
+        type=cli.positive,
+        default=15.0,  # discovery over a network takes seconds; our choice
+        metavar='SECONDS',
+        help='with --from-topics: wait for the first message, 15 s unless given',
+    )
     cli.add_target(robot, '--out', MAPPING_FILE, required=True, metavar='FILE.yaml', help='mapping file to write')
 
 
@@ -39,7 +46,7 @@ def run_robot(arguments: argparse.Namespace) -> int:
     if arguments.from_bag:
         text = new_machine(arguments.from_bag)
     else:
-        with recorded_topics(arguments.from_topics) as bag:
+        with recorded_topics(arguments.from_topics, arguments.wait) as bag:
             text = new_machine(bag)
     write_whole(arguments.out, text.encode())
     open_points = [line.strip() for line in text.splitlines()[2:] if 'missing' in line or 'guess' in line]

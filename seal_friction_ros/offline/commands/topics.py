@@ -10,7 +10,7 @@ from typing import Any
 from seal_friction_ros.offline.commands import command_line as cli
 from seal_friction_ros.offline.work.status import show_status
 
-_ARGUMENTS = ('topic', 'seconds', 'count', 'node', 'name', 'value', 'service', 'request', 'json')
+_ARGUMENTS = ('topic', 'seconds', 'count', 'node', 'name', 'value', 'service', 'request', 'wait', 'json')
 
 
 def add_parser(commands: Any) -> None:
@@ -45,6 +45,9 @@ def add_parser(commands: Any) -> None:
     call.add_argument('service', help='name of the service')
     call.add_argument('request', nargs='?', default='{}', help='fields of the request, as in YAML; default: empty')
     for step, action in ((listed, 'list'), (rate, 'hz'), (shown, 'echo'), (parameter, 'param'), (call, 'call')):
+        wait, what = (1.5, 'the names on the graph') if step is listed else (10.0, 'a name on the graph or an answer')
+        text = f'wait for {what}, {wait:g} s unless given'
+        step.add_argument('--wait', type=cli.positive, default=wait, metavar='SECONDS', help=text)
         step.set_defaults(action=action)
 
 

@@ -68,16 +68,16 @@ def parameters(seal=WARM, mode='off', **settings) -> EstimatorParameters:
 
 
 def warming(time: float) -> float:
-    """Temperature of the seals [K]: from 15 to 55 degC, half of it in six minutes."""
-    return 328.15 - 40.0 * math.exp(-time / 500.0)
+    """Temperature of the seals [K]: from 15 to 55 degC, half of it in two minutes."""
+    return 328.15 - 40.0 * math.exp(-time / 170.0)
 
 
 def a_day(known: EstimatorParameters, *, with_sensor: bool):
-    """Estimates of 20 minutes, and the true Coulomb friction [N] at each; the sensor shows 0.5 K steps at 1 Hz."""
+    """Estimates of 400 s, and the true Coulomb friction [N] at each; the sensor shows 0.5 K steps at 1 Hz."""
     day = Day(FRICTION, lambda time: float(arrhenius(warming(time))), pressure=DAY_PRESSURE)
     rng = np.random.default_rng(3)
     state, newest, found, true = init(known), NO_TEMPERATURE, [], []
-    for number, sample in enumerate(samples(day, 1200.0, seed=5)):
+    for number, sample in enumerate(samples(day, 400.0, seed=5)):
         time = (sample.stamp - START) / SECOND
         if with_sensor and number % 100 == 0:
             newest = SealTemperature(sample.stamp, round(2.0 * (warming(time) + 0.3 * rng.standard_normal())) / 2.0)

@@ -219,6 +219,7 @@ def test_friction_is_of_nearly_second_order_in_the_time_step():
     assert coarse < 1e-4  # [N] of 0.65 N
 
 
+@pytest.mark.long
 def test_the_error_of_the_peak_at_the_control_edge_holds_a_finer_one():
     def with_step(step):
         return dataclasses.replace(EDGE, numerics=LubricationNumerics(cells=64, time_step=step))

@@ -25,6 +25,7 @@ from seal_friction_ros.core.servo.closed_loop import (
 )
 from seal_friction_ros.core.servo.motions import Setpoint, Sine
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, simulate
+from seal_friction_ros.core.tuning import simulated_axis
 from seal_friction_ros.core.tuning.settings import RobustnessCase, TuningSettings
 from seal_friction_ros.core.tuning.simulated_axis import (
     MOST_CANDIDATES,
@@ -45,8 +46,10 @@ SERVO = ServoParameters(seals=SEALS, control_period=PERIOD, inner_step=1e-4)
 PIPELINE = PipelineParameters(EstimatorParameters(EstimatorSettings(), SEALS), FeedForwardSettings())
 AXIS = Axis(SERVO, PIPELINE)
 DEFAULT = TuningProblem(AXIS, TuningSettings(hold_time=0.2))
+SLOW_PERIOD = 2e-3  # [s]
 # Small and fast: a whole search takes seconds. Without feed-forward the rod does not move.
-QUICK = TuningProblem(AXIS, TuningSettings(amplitude=5e-4, frequency=10.0, delay_error=0.0, hold_time=0.1))
+SLOW_AXIS = AXIS._replace(servo=dataclasses.replace(SERVO, control_period=SLOW_PERIOD))
+QUICK = TuningProblem(SLOW_AXIS, TuningSettings(amplitude=5e-4, frequency=10.0, delay_error=0.0, hold_time=0.1))
 
 
 @cache
@@ -216,6 +219,12 @@ def test_the_result_keeps_the_overshoot_and_does_not_limit_cycle():
     assert all(c.outcome.limit_cycle_reversals == 0 for c in found().cases)
 
 
+def test_a_search_in_which_every_point_is_rejected_ends(monkeypatch):
+    monkeypatch.setattr(simulated_axis, 'merit', lambda *_: math.inf)
+    monkeypatch.setattr(simulated_axis, 'MOST_CANDIDATES', 2)
+    assert tune(QUICK).merit == math.inf
+
+
 def test_cases_are_all_combinations_in_order():
     errors = [case[:2] for case in found().cases]
     assert errors == [(-0.3, 0.0), (0.0, 0.0), (0.3, 0.0)]
@@ -224,9 +233,9 @@ def test_cases_are_all_combinations_in_order():
 
 
 def test_force_is_no_sharper_than_it_must_be():
-    sharpest = 0.5 * (2.0 * math.pi * 10.0) ** 2 * 5e-4 * PERIOD
+    sharpest = 0.5 * (2.0 * math.pi * 10.0) ** 2 * 5e-4 * SLOW_PERIOD
     assert found().feedforward.smoothing_velocity > sharpest
-    assert found().feedforward.slew_limit < 2.0 * found().feedforward.force_limit / PERIOD
+    assert found().feedforward.slew_limit < 2.0 * found().feedforward.force_limit / SLOW_PERIOD
 
 
 def test_other_settings_are_unchanged():

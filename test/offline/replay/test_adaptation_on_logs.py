@@ -69,8 +69,12 @@ def ring(folder):
     return seal
 
 
-@pytest.mark.parametrize('run', ['O-ring257', 'O-ring257_run2'])
-@pytest.mark.parametrize('pressure', [1, 3, 5, 7])
+@pytest.mark.parametrize(
+    ('run', 'pressure'),
+    [('O-ring257', 1), ('O-ring257', 7), ('O-ring257_run2', 3), ('O-ring257_run2', 7)]
+    + [pytest.param(*rest, marks=pytest.mark.long)
+       for rest in (('O-ring257', 3), ('O-ring257', 5), ('O-ring257_run2', 1), ('O-ring257_run2', 5))],
+)  # fmt: skip
 def test_a_law_that_is_off_by_a_factor_ends_at_the_same_friction(folder, ring, run, pressure):
     bag = imported(folder, SHARED_DATA / 'delft' / f'{run}_{pressure}bar.csv', 'delft')
     frictions = {}

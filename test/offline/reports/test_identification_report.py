@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 import pytest
+from harness.identify_run import THESIS, few_of_the_thesis
 from harness.report_page import checked_page
-from paths import ROOT
 
 from seal_friction_ros.offline.bags.import_log import Samples, write_samples
 from seal_friction_ros.offline.commands.main import main
@@ -19,7 +19,6 @@ from seal_friction_ros.offline.reports.identification_report import (
     write_identification_report,
 )
 
-THESIS = ROOT / 'data' / 'thesis' / 'friction_tests.csv'
 ALL = {'fig24_model_over_pressure', 'measured_against_model', 'calibration', 'residuals', 'ladder',
        'fig16_static_and_dynamic', 'fig17_prior_art_and_tests', 'fig18_coefficient_of_friction',
        'fig19_normal_force'}  # fmt: skip
@@ -53,7 +52,7 @@ def test_the_page_tells_the_check_values_of_the_thesis(thesis):
 
 def test_without_geometry_or_starts_the_page_says_which_figures_are_missing(tmp_path):
     dynamic_only = tmp_path / 'dynamic.csv'
-    lines = THESIS.read_text().splitlines()
+    lines = few_of_the_thesis(tmp_path).read_text().splitlines()
     dynamic_only.write_text('\n'.join([lines[0], *(line for line in lines if ',dynamic,' in line)]))
     found = identify([dynamic_only], IdentifyOptions(), 'bare')
     write_identification_report(found, tmp_path / 'page.html')
@@ -67,7 +66,7 @@ def test_without_geometry_or_starts_the_page_says_which_figures_are_missing(tmp_
 def test_the_same_sources_give_the_same_page(tmp_path):
     pages = []
     for name in ('one', 'two'):
-        found = identify([THESIS], IdentifyOptions(seal='ms28775_114'), 'same')
+        found = identify([few_of_the_thesis(tmp_path)], IdentifyOptions(seal='ms28775_114'), 'same')
         folder = tmp_path / name
         folder.mkdir()
         figures = write_identification_report(found, folder / 'page.html')
@@ -77,7 +76,7 @@ def test_the_same_sources_give_the_same_page(tmp_path):
 
 def test_what_a_file_name_says_is_escaped(tmp_path):
     evil = tmp_path / '<script>x.csv'
-    evil.write_text(THESIS.read_text())
+    evil.write_text(few_of_the_thesis(tmp_path).read_text())
     found = identify([evil], IdentifyOptions(), 'same')
     write_identification_report(found, tmp_path / 'page.html')
     page = checked_page(tmp_path / 'page.html')
@@ -128,7 +127,8 @@ def test_labels_of_the_ladder_neither_overlap_nor_leave_the_figure(tmp_path):
 def test_nothing_is_left_of_a_report_that_cannot_be_written(tmp_path, capsys):
     blocked = tmp_path / 'file'
     blocked.write_text('')
-    arguments = ['identify', str(THESIS), '--out', str(tmp_path / 's.yaml'), '--report', str(blocked / 'page.html')]
+    few = str(few_of_the_thesis(tmp_path))
+    arguments = ['identify', few, '--out', str(tmp_path / 's.yaml'), '--report', str(blocked / 'page.html')]
     assert main(arguments) == 2
     assert not (tmp_path / 's.yaml').exists()
     assert 'cannot write' in capsys.readouterr().err
