@@ -4,6 +4,7 @@ Every call runs in a forked process of its own, which inherits what the parent h
 crashes (out of memory, signal) therefore costs its own result only.
 """
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -124,6 +125,7 @@ class _Worker:
 
 def _work(call: Callable[[], Any], connection: Connection, inherited: Sequence[Connection]) -> None:
     """Body of a worker process."""
+    gc.freeze()  # what the parent had is the parent's: to collect a node of a graph here would end this process
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # ends silently: the parent writes the message
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     for other in inherited:
