@@ -58,6 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
         DEFAULT_MACHINE,
         load_machine,
         page_of,
+        told,
         tune_bag,
         tune_simulator,
         write_parameters,
@@ -78,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     page = page_of(arguments.out)
     numbers = {**tuning.numbers, 'file': arguments.out, 'page': page, 'figures': write_tuning_page(tuning, page)}
     write_parameters(arguments.out, tuning, arguments.actuator)
-    text = tuning.summary
+    text = told(tuning)
     if gain is not None:
         numbers['output_gain'], numbers['output_gain_standard_error'] = gain.gain, gain.standard_error
         text += (

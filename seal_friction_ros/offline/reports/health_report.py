@@ -144,11 +144,11 @@ def alarms_of(day: Day, limits: Limits) -> list[str]:
 
 
 INDICATORS = {
-    'scale': ('friction over that of the file', '-'),
-    'offset': ('offset of the force sum', 'N'),
-    'breakaway': ('start after a rest over Coulomb friction', '-'),
+    'scale': ('friction / file', '-'),
+    'offset': ('offset of force', 'N'),
+    'breakaway': ('start / Coulomb', '-'),
     'asymmetry': ('asymmetry', '-'),
-    'break_in': ('friction at the beginning over the end, less 1', '-'),
+    'break_in': ('run-in', '-'),
     'noise': ('residual', 'N'),
 }
 

@@ -97,7 +97,6 @@ def _axis(ax: Axes, name: str, shown: list[Axes]) -> dict[str, Any]:
     label = own or next((text for one in siblings if (text := getattr(one, f'{name}axis').get_label_text())), '')
     quantity = next((text for one in siblings if (text := getattr(one, f'{name}_quantity', ''))), label)
     low, high = (float(f'{limit:.7g}') for limit in getattr(ax, f'get_{name}lim')())
-    parameters = axis.get_tick_params()
     locator, ticks = axis.get_major_locator(), None
     if isinstance(locator, FixedLocator | NullLocator):
         places = [float(place) for place in getattr(locator, 'locs', ())]
@@ -108,7 +107,7 @@ def _axis(ax: Axes, name: str, shown: list[Axes]) -> dict[str, Any]:
         'label': own,
         'quantity': quantity,
         'ticks': ticks,
-        'labelled': bool(parameters.get('labelbottom' if name == 'x' else 'labelleft', True)) and ticks != [],
+        'labelled': axis.get_major_ticks(1)[0].label1.get_visible() and ticks != [],
         'group': shown.index(siblings[0]),
     }
 
@@ -169,7 +168,11 @@ def _swatch(handle: Any) -> dict[str, Any]:
     if isinstance(handle, Line2D):
         is_line = handle.get_linestyle() not in ('None', '', ' ')
         look = {'kind': 'line' if is_line else 'dots', 'dash': _DASHES.get(str(handle.get_linestyle()), '')}
-        return {'colour': to_hex(handle.get_color()), 'opacity': 1.0, **look}
+        return {
+            'colour': to_hex(handle.get_color()),
+            'opacity': _opacity(handle) if look['kind'] == 'dots' else 1.0,
+            **look,
+        }
     colour = handle.get_facecolor() if isinstance(handle, Patch) else _first_colour(handle)
     kind = 'dots' if isinstance(handle, PathCollection) else 'area'
     return {'colour': to_hex(colour), 'kind': kind, 'dash': '', 'opacity': _opacity(handle)}

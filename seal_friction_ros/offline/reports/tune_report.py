@@ -36,7 +36,7 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
     tables = {'parameter_table': _parameter_table(tuning), 'case_table': _case_table(tuning)}
     law = None if isinstance(tuning, SimulatorTuning) else tuning.found.law
     verdict = verdicts.of_tuning(
-        tuning.summary,
+        tuning.result,
         is_better=found.better_in_every_case and bool(found.feedforward.scale),
         has_placeholder=tuning.task.has_placeholder,
         mass=None if law is None else law.mass,
@@ -47,6 +47,7 @@ def write_tuning_page(tuning: SimulatorTuning | BagTuning, out: Path) -> tuple[P
     head = head_of('tune', source, tuning.task.seals)
     shared: dict[str, Any] = {
         'verdict': verdict,
+        'warnings': tuning.remarks if tuning.result in verdict.text else (tuning.result, *tuning.remarks),
         'head': head,
         'tuning': tuning,
         'found': found,

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from seal_friction_ros.core.estimation.friction_change import REFERENCE_REVERSALS
 from seal_friction_ros.core.foundation.units import BAR, UM
 from seal_friction_ros.offline.reports.formatting import length_text
 from seal_friction_ros.offline.reports.page import BAD, GOOD, LOOK, Verdict
@@ -148,8 +149,13 @@ def of_health(alarms: Sequence[str], changes: int, reversals: int) -> Verdict:
     """Verdict on the seals over some bags."""
     if alarms:
         return Verdict(BAD, f'Alarm: {"; ".join(alarms)}.', 'inspect seals, oil and sensors; after a repair fit again.')
-    if not reversals:
-        return Verdict(LOOK, 'No reversal to learn from.', 'record motion in both directions, with a force sum.')
+    if reversals < REFERENCE_REVERSALS and not changes:
+        seen = f'{reversals or "No"} reversal{"" if reversals == 1 else "s"} to learn from'
+        return Verdict(
+            LOOK,
+            f'{seen}: a change is told from {REFERENCE_REVERSALS} on.',
+            'record more motion in both directions, with a force sum.',
+        )
     if changes:
         times = 'once' if changes == 1 else f'{changes} times'
         return Verdict(LOOK, f'The friction has changed {times}.', 'find out what was done then; see the dashed lines.')
@@ -180,7 +186,8 @@ def of_tuning(
     if not is_better:
         return Verdict(BAD, summary, 'do not use the file; see the robustness cases, and check seal file and delay.')
     if has_placeholder:
-        return Verdict(BAD, summary, f'{NAME_SEALS}, then tune again.')
+        text = 'The seals are the placeholder of the default configuration, not those of your machine.'
+        return Verdict(BAD, text, f'{NAME_SEALS}, then tune again.')
     if bag:
         after = 'start with half of feedforward.scale on the machine: docs/tuning.md says how.'
         return Verdict(LOOK, f'{summary} A bag cannot show limit cycles.', after)

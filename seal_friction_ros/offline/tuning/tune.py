@@ -79,11 +79,11 @@ class TuningTask(NamedTuple):
     tuned: tuple[str, ...]  # names of the tuned parameters; the others are unchanged
     has_placeholder: bool  # whether a seal is the placeholder of the default configuration
 
-    def remarks(self, found: TunedFeedForward[Any]) -> str:
+    def remarks(self, found: TunedFeedForward[Any]) -> tuple[str, ...]:
         """Sentences on the force limit and on placeholder seals."""
         now, was = found.feedforward.force_limit, self.before.force_limit
-        limit = f' force_limit: {now:g} N (was {was:g} N): {FORCE_MARGIN:g} times the largest friction found.'
-        return f'{limit} Warning: {PLACEHOLDER_WARNING}.' if self.has_placeholder else limit
+        limit = f'force_limit: {now:g} N (was {was:g} N): {FORCE_MARGIN:g} times the largest friction found.'
+        return (limit, f'Warning: {PLACEHOLDER_WARNING}.') if self.has_placeholder else (limit,)
 
 
 class RecordedTrack(NamedTuple):
@@ -100,6 +100,11 @@ class RecordedTrack(NamedTuple):
         return {name: error(*pair) if known.any() else None for name, error in errors.items()}
 
 
+def told(tuning: 'SimulatorTuning | BagTuning') -> str:
+    """Result and remarks in one line."""
+    return ' '.join((tuning.result, *tuning.remarks))
+
+
 @dataclass(frozen=True)
 class SimulatorTuning:
     """Result of a tuning on the simulated servo."""
@@ -110,11 +115,11 @@ class SimulatorTuning:
     plants: tuple[PlantOutcome, ...] = ()  # rigid, elastic, LuGre; empty if the seal files have no presliding
 
     @property
-    def summary(self) -> str:
+    def result(self) -> str:
         """Result as a sentence."""
         was, now = self.found.without, self.found.nominal
         if not self.found.feedforward.scale:
-            return f'No feed-forward is better than none on this plant.{self.task.remarks(self.found)}'
+            return 'No feed-forward is better than none on this plant.'
         worst, better, end = self.found.cases[-1], 'better than none, and at rest,', '.'
         if not self.found.better_in_every_case:
             better, end = 'NOT better than none, or not at rest,', ': see the robustness cases.'
@@ -122,16 +127,18 @@ class SimulatorTuning:
             f'Tracking RMS {was.tracking_rms / MM:.3g} to {now.tracking_rms / MM:.3g} mm, '
             f'dwell per reversal {was.dwell / MS:.3g} to {now.dwell / MS:.3g} ms; '
             f'{better} in every case with a model error up to {100.0 * worst.friction_error:.3g} % and a delay error '
-            f'up to {100.0 * worst.delay_error:.3g} %{end}{self._on_plants()}{self.task.remarks(self.found)}'
+            f'up to {100.0 * worst.delay_error:.3g} %{end}'
         )
 
-    def _on_plants(self) -> str:
-        """Sentences on the other plants."""
-        return ''.join(
-            f' With {plant} seals: tracking RMS {was.tracking_rms / UM:.3g} to {now.tracking_rms / UM:.3g} um, near '
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on the other plants, the force limit and placeholder seals."""
+        on_plants = (
+            f'With {plant} seals: tracking RMS {was.tracking_rms / UM:.3g} to {now.tracking_rms / UM:.3g} um, near '
             f'reversals {was.reversal_rms / UM:.3g} to {now.reversal_rms / UM:.3g} um.'
             for plant, was, now in self.plants
         )
+        return (*on_plants, *self.task.remarks(self.found))
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -172,9 +179,9 @@ class BagTuning:
     found: RecordedTuning
 
     @property
-    def summary(self) -> str:
+    def result(self) -> str:
         """Result as a sentence."""
-        found, was, now = self.found, self.found.without, self.found.nominal
+        was, now = self.found.without, self.found.nominal
         text = (
             f'RMS friction left to the controller while sliding {was.sliding:.3g} to {now.sliding:.3g} N, '
             f'near reversals {was.reversal:.3g} to {now.reversal:.3g} N'
@@ -183,7 +190,12 @@ class BagTuning:
             text += f'; not identifiable from the bag and unchanged: {", ".join(unchanged)}'
         if not self.found.better_in_every_case:
             text += '; NOT better than none in every case: see the robustness cases'
-        return f'{text}.{self.task.remarks(found)}'
+        return f'{text}.'
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on the force limit and placeholder seals."""
+        return self.task.remarks(self.found)
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -404,7 +416,7 @@ def parameter_text(tuning: SimulatorTuning | BagTuning, actuator: str = '') -> s
         actuator: Of ``machine_estimator``, by its name in the mapping file; empty: for ``friction_estimator``.
     """
     task, settings = tuning.task, tuning.found.feedforward
-    comment = f'# Tuned on {task.source}: {task.motion}; seals: {task.seals}. {tuning.summary}'
+    comment = f'# Tuned on {task.source}: {task.motion}; seals: {task.seals}. {told(tuning)}'
     comment = ''.join(letter if letter.isprintable() else '?' for letter in comment)  # names come from outside
     lines = [
         MADE_FOR_MACHINE if actuator else MADE_BY,

@@ -63,6 +63,7 @@ def test_an_alarm_is_worse_than_a_change_and_that_than_none():
     assert verdicts.of_health(['monday: friction'], 1, 50).level == BAD
     assert verdicts.of_health([], 1, 50).level == LOOK
     assert verdicts.of_health([], 0, 0).level == LOOK
+    assert verdicts.of_health([], 0, 3).level == LOOK  # too few to tell
     assert verdicts.of_health([], 0, 50).level == GOOD
 
 

@@ -163,7 +163,7 @@
       this.width = Math.max(all - left - 12, 40);
       this.top = data.second ? 20 : 6;
       const fixed = data.x.ticks && data.x.ticks.length;
-      this.bottom = showX ? 20 : 4;
+      this.bottom = showX ? 20 : 8; // half a label of the other axis
       this.height = this.tallness();
       if (this.rows) this.height = Math.max(this.height, 17 * this.wrapped(all).flat().length);
       if (data.equal) {
@@ -531,7 +531,7 @@
         button.appendChild(swatch);
         const paint = { stroke: entry.colour, 'stroke-width': 2, 'stroke-dasharray': entry.dash };
         if (entry.kind === 'line') make('line', { x1: 1, x2: 21, y1: 6, y2: 6, ...paint }, swatch);
-        else if (entry.kind === 'dots') make('circle', { cx: 11, cy: 6, r: 4, fill: entry.colour }, swatch);
+        else if (entry.kind === 'dots') make('circle', { cx: 11, cy: 6, r: entry.opacity < 1 ? 3 : 4, fill: entry.colour, 'fill-opacity': entry.opacity }, swatch);
         else make('rect', { x: 3, y: 1, width: 16, height: 10, fill: entry.colour, 'fill-opacity': Math.max(entry.opacity, 0.3) }, swatch);
         button.append(entry.name);
         button.setAttribute('aria-pressed', 'true');
