@@ -47,9 +47,11 @@ def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]
         return
     show_status('')
     console = Console(stderr=True)
+    if not console.is_terminal:  # a bar that is only disabled still ends in an empty line before rich 14
+        yield lambda _: None
+        return
     columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    shown = console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=not shown, auto_refresh=False) as bar:
+    with Progress(*columns, console=console, transient=True, auto_refresh=False) as bar:
         task = bar.add_task(label, total=total)
         refreshed = time.monotonic()
 
@@ -57,7 +59,7 @@ def progress(label: str, total: int | None) -> Iterator[Callable[[float], None]]
             """Move the bar on."""
             nonlocal refreshed
             bar.advance(task, steps)
-            if shown and time.monotonic() > refreshed + _REFRESH_PERIOD:
+            if time.monotonic() > refreshed + _REFRESH_PERIOD:
                 bar.refresh()
                 refreshed = time.monotonic()
 
