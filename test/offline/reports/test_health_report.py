@@ -29,4 +29,6 @@ def test_the_page_begins_with_the_alarm_or_says_that_there_is_none(tmp_path: Pat
 
 def test_a_bag_without_a_reversal_still_makes_a_page(tmp_path: Path):
     report = write_health_report(['mon'], [day(0.0, 1.0, 0)], tmp_path / 'page.html', Limits())
-    assert checked_page(report.page).texts['p.said'] == ['Look: No reversals to learn from: a change is told from 20 on.']
+    assert checked_page(report.page).texts['p.said'] == [
+        'Look: No reversals to learn from: a change is told from 20 on.'
+    ]
