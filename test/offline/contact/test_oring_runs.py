@@ -8,7 +8,6 @@ import oring_accuracy
 import pytest
 import yaml
 from paths import ROOT
-from rich.progress import Progress
 
 from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.friction.seal_file import parse_seal
@@ -114,10 +113,10 @@ def test_every_case_that_comes_with_the_package_is_one_and_says_where_it_is_from
 
 
 def test_progress_is_one_step_a_pressure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    steps = []
-    monkeypatch.setattr(Progress, 'advance', lambda _, __, step: steps.append(step))
+    shares = []
+    monkeypatch.setattr('seal_friction_ros.offline.work.progress._report_share', shares.append)
     compute_case(written(tmp_path, document()))
-    assert steps == [1, 1]
+    assert shares == [0.5, 0.5]
 
 
 @pytest.mark.parametrize(
