@@ -30,10 +30,11 @@ def film_of_gap(
     gap: FloatArray,
     cell_width: float,
     mean_velocity: float,
-    viscosity: float,
+    viscosity: float | FloatArray,
     ends: FilmEnds = OPEN,
     old_thickness: FloatArray | None = None,
     time_step: float | None = None,
+    density: float | FloatArray = 1.0,
 ) -> Film:
     """Film of a Newtonian fluid in a given smooth gap, steady or one implicit Euler step in time.
 
@@ -41,19 +42,20 @@ def film_of_gap(
         gap: h at the centres of the cells [m], shape (n,).
         cell_width: [m]
         mean_velocity: Half the sum of the velocities of the walls [m/s].
-        viscosity: [Pa s]
+        viscosity: [Pa s], of each cell if shape (n,).
         ends: What is beyond both ends.
         old_thickness: theta h before the step [m], shape (n,); not needed for the steady film.
         time_step: [s]; None for the steady film.
+        density: Over that at ambient pressure, of each cell if shape (n,); the flow is that of mass over the latter.
 
     Raises:
         NotConvergedError: Newton's method did not converge.
     """
     h = np.asarray(gap, dtype=float)
     n = len(h)
-    properties = np.array([h**3 / (12.0 * viscosity), np.zeros(n), h, np.zeros(n)])
+    properties = np.array([density * h**3 / (12.0 * viscosity), np.zeros(n), density * h, np.zeros(n)])
     scale = max(
-        12.0 * viscosity * abs(mean_velocity) * n * cell_width / float(h.min()) ** 2,
+        12.0 * float(np.max(viscosity)) * abs(mean_velocity) * n * cell_width / float(h.min()) ** 2,
         ends.pressure_left,
         ends.pressure_right,
         1.0,
