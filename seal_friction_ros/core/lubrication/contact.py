@@ -28,6 +28,7 @@ from seal_friction_ros.core.lubrication.flow_factors import (
     flow_factor_coefficients,
     pressure_flow_factor,
     shear_flow_factor,
+    shear_stress_coefficients,
 )
 from seal_friction_ros.core.lubrication.grease import Grease, apparent_viscosity
 from seal_friction_ros.core.lubrication.krylov import StalledError, gmres
@@ -43,7 +44,8 @@ _ROUNDING = 2e-15  # relative
 _LEAST_FLOW = 1e-25  # [m^2/s] lower limit of the reference flow: a dry contact has none
 _COMPLEMENTARITY_TOLERANCE = 1e-13
 _PRESSURE_SCALE = 1e5  # [Pa] p_s of the complementarity
-_THINNEST = 1e-9  # [m] a gap below this flows like this
+THINNEST = 1e-9
+"""[m] a gap below this flows like this"""
 
 
 class ContactState(NamedTuple):
@@ -77,6 +79,12 @@ class LubricatedContact:
         return t.rms_height, 2.0 * t.wall_share - 1.0, flow_factor_coefficients(t.peklenik_number)
 
     @property
+    def stress_roughness(self) -> tuple[float, tuple[float, ...]]:
+        """Rms height [m] and coefficients of the shear-stress factors; height 0: without them."""
+        t = self.topography
+        return t.rms_height if t.shear_stress_factors else 0.0, shear_stress_coefficients(t.peklenik_number)
+
+    @property
     def asperities(self) -> tuple[float, float]:
         """Contact pressure at no separation [Pa] and the separation over which it falls by a factor e [m]."""
         return self.topography.contact_stiffness(self.half_plane.modulus), self.topography.separation_length
@@ -99,7 +107,7 @@ def film_properties(
     rms, asymmetry, coefficients = rough
     yield_stress, consistency, index, _base, floor = grease
     for i in range(n):
-        h = max(gap[i], _THINNEST)
+        h = max(gap[i], THINNEST)
         ratio = h / rms
         phi, phi_slope = pressure_flow_factor(coefficients, ratio)
         shear_rate = sliding_speed / h
@@ -109,7 +117,7 @@ def film_properties(
         viscosity_slope = -by_rate * shear_rate * shear_rate / (h * rate)
         mobility = phi * h * h * h / (12.0 * viscosity)
         shear, shear_slope = shear_flow_factor(coefficients, ratio)
-        inside = 1.0 if gap[i] > _THINNEST else 0.0
+        inside = 1.0 if gap[i] > THINNEST else 0.0
         properties[0, i] = mobility
         properties[1, i] = inside * mobility * (phi_slope / (phi * rms) + 3.0 / h - viscosity_slope / viscosity)
         properties[2, i] = h + rms * asymmetry * shear

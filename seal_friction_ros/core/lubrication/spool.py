@@ -38,6 +38,33 @@ class SpoolResult(NamedTuple):
     last_cycle: BoolArray  # whether each step is in the last cycle
 
 
+class SpoolStroke(NamedTuple):
+    """Friction of a spool on its last stroke in one direction, magnitudes."""
+
+    peak: float  # largest [N]
+    level: float  # median while the spool is within 1 % of its highest speed [N]
+    peak_position: float  # of the spool [m]
+
+
+def stroke_friction(result: SpoolResult, direction: float) -> SpoolStroke:
+    """Peak and level of the friction of a spool while it moves in a ``direction``, 1.0 or -1.0.
+
+    The paper compares its peaks with the friction before and after them (section 6.4); the median over the stroke is
+    that level, since the peaks are short (our choice).
+
+    Raises:
+        ValueError: The spool does not move in that direction.
+    """
+    speed = direction * np.gradient(result.position, result.time)
+    moving = np.flatnonzero(result.last_cycle & (speed > 0.0))
+    if not len(moving):
+        raise ValueError(f'stroke_friction: the spool does not move in direction {direction:g}')
+    friction = np.abs(result.friction)
+    fast = moving[speed[moving] >= 0.99 * speed[moving].max()]
+    at_peak = moving[friction[moving].argmax()]
+    return SpoolStroke(float(friction[at_peak]), float(np.median(friction[fast])), float(result.position[at_peak]))
+
+
 def superposed(members: Sequence[SpoolSeal], runs: Sequence[TransientResult]) -> SpoolResult:
     """Sum of the frictions of the seals of a spool, from the run of each with its `SpoolSealMotion`.
 

@@ -46,6 +46,11 @@ class Topography(CheckedParameters):
     peklenik_number: float = parameter(
         1.0, unit='1', lower=1.0, upper=9.0, description='Length of the roughness along over across the motion.'
     )
+    shear_stress_factors: bool = parameter(
+        False,
+        unit='1',
+        description='Whether roughness raises the shear of the film; the equation (1) of the paper is without.',
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

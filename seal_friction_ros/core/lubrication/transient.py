@@ -278,7 +278,8 @@ def _edge_force(model: LubricationModel, moment: TransientState) -> float:
 def fluid_force(model: LubricationModel, state: ContactState, velocity: float) -> float:
     """Fluid friction [N] at a sliding ``velocity`` [m/s]."""
     numbers, width = model.case.grease.numbers, model.contact.half_plane.cell_width
-    return -model.circumference * float(fluid_shear(*state, -velocity, numbers, width, model.ends()))
+    roughness = model.contact.stress_roughness
+    return -model.circumference * float(fluid_shear(*state, -velocity, numbers, width, model.ends(), roughness))
 
 
 def solid_limit(model: LubricationModel, state: ContactState) -> float:

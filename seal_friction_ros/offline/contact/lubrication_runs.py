@@ -27,7 +27,7 @@ from seal_friction_ros.core.lubrication.friction_map import (
 )
 from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, Spool, parse_lubrication_case
-from seal_friction_ros.core.lubrication.spool import SpoolResult, SpoolSealMotion, superposed
+from seal_friction_ros.core.lubrication.spool import SpoolResult, SpoolSealMotion, stroke_friction, superposed
 from seal_friction_ros.core.lubrication.study import StudyTable, study_table
 from seal_friction_ros.core.lubrication.transient import (
     LubricationModel,
@@ -165,18 +165,29 @@ class SpoolRun(NamedTuple):
         return [f'{member.case}{", mirrored" if member.mirrored else ""}' for member in self.spool.members]
 
     def numbers(self) -> dict[str, Any]:
-        """Numbers for JSON."""
+        """Numbers for JSON: of both directions, the peak over the level of the stroke beside both."""
         largest = float(np.abs(self.result.friction[self.result.last_cycle]).max())
-        return {'spool': self.spool.name, 'seals': self.labels, 'largest_friction_N': largest}
+        numbers = {'spool': self.spool.name, 'seals': self.labels, 'largest_friction_N': largest}
+        for name, direction in (('positive', 1.0), ('negative', -1.0)):
+            stroke = stroke_friction(self.result, direction)
+            numbers[f'{name}_peak_N'] = stroke.peak
+            numbers[f'{name}_level_N'] = stroke.level
+            numbers[f'{name}_peak_over_level'] = stroke.peak / stroke.level
+            numbers[f'{name}_peak_position_m'] = stroke.peak_position
+        return numbers
 
     def summary(self) -> str:
         """One line for a person."""
         numbers = self.numbers()
-        return f'{self.spool.name}: {len(self.labels)} seals, largest friction {numbers["largest_friction_N"]:.3g} N'
+        return (
+            f'{self.spool.name}: {len(self.labels)} seals, largest friction {numbers["largest_friction_N"]:.3g} N, '
+            f'{numbers["positive_peak_over_level"]:.3g} and {numbers["negative_peak_over_level"]:.3g} times that '
+            'around it in the positive and the negative direction'
+        )
 
 
 def run_spool(spool: Spool, case_file: str, workers: int) -> SpoolRun:
-    """Run every distinct seal of a spool once and add the forces of all seals.
+    """Run every distinct seal of a spool once and add the forces of all seals, all in the shortest of their time steps.
 
     Args:
         spool: The spool.
@@ -188,11 +199,15 @@ def run_spool(spool: Spool, case_file: str, workers: int) -> SpoolRun:
     """
     beside = config_path('ehl', case_file).parent
     distinct = list(dict.fromkeys(spool.members))
-    calls = []
+    cases = []
     for member in distinct:
         local = beside / f'{member.case}.yaml'
-        case = single_case(str(local) if local.is_file() else member.case, 'spool in it')
-        moved = replace(case, motion=replace(spool.motion, centre=member.shift))
+        cases.append(single_case(str(local) if local.is_file() else member.case, 'spool in it'))
+    shortest = min(case.numerics.time_step for case in cases)
+    calls = []
+    for case, member in zip(cases, distinct, strict=True):
+        numerics, motion = replace(case.numerics, time_step=shortest), replace(spool.motion, centre=member.shift)
+        moved = replace(case, motion=motion, numerics=numerics)
         calls.append(partial(run_with_progress, moved, SpoolSealMotion(spool.motion, member)))
     compile_for(calls[0].args[0])
     results = dict(zip(distinct, run_all(spool.name, calls, workers), strict=True))

@@ -22,6 +22,7 @@ from seal_friction_ros.core.lubrication.contact import (
     film_properties,
 )
 from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.flow_factors import shear_stress_coefficients, shear_stress_factors
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
 from seal_friction_ros.core.lubrication.shear import fluid_shear, real_area_share, solid_shear
@@ -68,7 +69,8 @@ class Shear(NamedTuple):
 def shear(
     contact: LubricatedContact, state: ContactState, wall_velocity: float, solid_shear_stress: float, ends: FilmEnds
 ):
-    fluid = fluid_shear(*state, wall_velocity, contact.grease.numbers, contact.half_plane.cell_width, ends)
+    width = contact.half_plane.cell_width
+    fluid = fluid_shear(*state, wall_velocity, contact.grease.numbers, width, ends, contact.stress_roughness)
     return Shear(solid_shear(contact, state.gap, solid_shear_stress), float(fluid))
 
 
@@ -110,8 +112,20 @@ def test_full_film_between_plates_shears_like_newton():
     n = 50
     state = ContactState(np.full(n, 3e-6), np.full(n, 1e5), np.ones(n))
     ends = FilmEnds(1e5, 1e5)
-    force = fluid_shear(*state, -0.2, OIL.numbers, LENGTH / n, ends)
+    smooth = (0.0, shear_stress_coefficients(1.0))
+    force = fluid_shear(*state, -0.2, OIL.numbers, LENGTH / n, ends, smooth)
     assert force == pytest.approx(-0.5 * 0.2 / 3e-6 * LENGTH, rel=1e-13)
+
+
+def test_roughness_raises_the_shear_between_plates_by_its_factor():
+    n, coefficients = 50, shear_stress_coefficients(1.0)
+    state = ContactState(np.full(n, 3e-6), np.full(n, 1e5), np.ones(n))
+    smooth, rough = (
+        fluid_shear(*state, -0.2, OIL.numbers, LENGTH / n, FilmEnds(1e5, 1e5), (height, coefficients))
+        for height in (0.0, 2e-6)
+    )
+    assert rough == pytest.approx(shear_stress_factors(coefficients, 1.5)[0] * smooth, rel=1e-13)
+    assert rough / smooth > 2.0
 
 
 def test_full_film_limit_of_the_soft_contact_is_newtonian_shear_alone():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import trapezoid
 
 from seal_friction_ros.core.lubrication.contact import film_properties
 from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane
@@ -14,6 +15,8 @@ from seal_friction_ros.core.lubrication.flow_factors import (
     flow_factor_coefficients,
     pressure_flow_factor,
     shear_flow_factor,
+    shear_stress_coefficients,
+    shear_stress_factors,
 )
 from seal_friction_ros.core.lubrication.grease import Grease, apparent_viscosity
 from seal_friction_ros.core.lubrication.groove import GrooveSpring
@@ -56,6 +59,26 @@ def test_isotropic_flow_factors_are_those_of_patir_and_cheng():
     coefficients = flow_factor_coefficients(1.0)
     assert pressure_flow_factor(coefficients, 3.0)[0] == pytest.approx(1.0 - 0.9 * math.exp(-1.68))
     assert shear_flow_factor(coefficients, 2.0)[0] == pytest.approx(1.899 * 2.0**0.98 * math.exp(-1.84 + 0.2))
+
+
+@pytest.mark.parametrize('ratio', [0.7, 1.0, 2.0, 2.9, 3.1, 5.0, 12.0, 29.0])
+def test_shear_factor_is_the_mean_of_one_over_the_gap(ratio):
+    """Of heights d with the density 35 / 96 (1 - (d / 3)^2)^3, as far as the gap is above 3 / 300; all over the rms."""
+    heights = np.linspace(max(-3.0, 0.01 - ratio), 3.0, 400_001)
+    density = 35.0 / 96.0 * (1.0 - (heights / 3.0) ** 2) ** 3
+    mean = trapezoid(density / (ratio + heights), heights) * ratio
+    a_3, alpha_4, alpha_5, alpha_6, *_ = coefficients = shear_stress_coefficients(1.0)
+    dragged = a_3 * ratio**alpha_4 * math.exp(-alpha_5 * ratio + alpha_6 * ratio**2) if ratio <= 7.0 else 0.0
+    assert shear_stress_factors(coefficients, ratio)[0] - dragged == pytest.approx(mean, rel=0.01)
+
+
+@pytest.mark.parametrize('number', PEKLENIK_NUMBERS)
+def test_shear_stress_factors_tend_to_one_in_thick_films(number):
+    coefficients = shear_stress_coefficients(number)
+    assert shear_stress_factors(coefficients, 29.9)[0] == pytest.approx(1.0, abs=2e-3)
+    assert shear_stress_factors(coefficients, 30.1) == pytest.approx((1.0, 1.0), abs=1e-3)
+    below, above = (shear_stress_factors(coefficients, 3.0 + x)[0] for x in (-1e-9, 1e-9))
+    assert below == pytest.approx(above, rel=1e-6)
 
 
 def test_roughness_that_has_no_flow_factors_is_refused():

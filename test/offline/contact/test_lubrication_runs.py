@@ -184,6 +184,19 @@ def test_spool_adds_up_its_seals(small, tmp_path, capsys):
     single = np.abs(run_transient(load_case(small)).friction).max()
     assert found['largest_friction_N'] == pytest.approx(3.0 * single, rel=0.01)
     assert found['seals'] == ['small', 'small', 'small, mirrored']
+    for direction in ('positive', 'negative'):
+        level, peak = found[f'{direction}_level_N'], found[f'{direction}_peak_N']
+        assert 0.0 < level < peak <= found['largest_friction_N']
+        assert found[f'{direction}_peak_over_level'] == pytest.approx(peak / level)
+
+
+def test_seals_of_a_spool_with_different_time_steps_all_take_the_shortest(small, tmp_path, capsys):
+    coarser = SMALL.replace('name: small', 'name: coarser').replace('time_step: 2.0e-3', 'time_step: 3.0e-3')
+    (tmp_path / 'coarser.yaml').write_text(coarser)
+    spool = tmp_path / 'spool.yaml'
+    spool.write_text('name: pair\nmotion: {cycles: 1}\nseals: [{case: small}, {case: coarser}]\n')
+    single = np.abs(run_transient(load_case(small)).friction).max()
+    assert answer(capsys, 'run', str(spool))['largest_friction_N'] == pytest.approx(2.0 * single, rel=0.05)
 
 
 def measured_bag(folder: Path, with_position: bool, seal: Path | None = None) -> Path:
