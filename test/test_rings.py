@@ -25,7 +25,8 @@ ROOMS = {  # in order; rooms on one line do not import from each other
     'core': (
         ('foundation',),
         ('friction',),
-        ('estimation', 'identification', 'oring_contact', 'lubrication'),
+        ('estimation', 'identification', 'oring_contact'),
+        ('lubrication',),
         ('servo', 'machine'),
         ('tuning',),
     ),

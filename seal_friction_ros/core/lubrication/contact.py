@@ -23,7 +23,7 @@ import numpy as np
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.core.foundation.errors import NotConvergedError
-from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.elasticity import ElasticBody
 from seal_friction_ros.core.lubrication.flow_factors import (
     flow_factor_coefficients,
     pressure_flow_factor,
@@ -68,7 +68,7 @@ class ContactStep(NamedTuple):
 class LubricatedContact:
     """Elastic body, roughness and lubricant of a contact."""
 
-    half_plane: HalfPlane
+    body: ElasticBody
     topography: Topography
     grease: Grease
 
@@ -85,9 +85,10 @@ class LubricatedContact:
         return t.rms_height if t.shear_stress_factors else 0.0, shear_stress_coefficients(t.peklenik_number)
 
     @property
-    def asperities(self) -> tuple[float, float]:
-        """Contact pressure at no separation [Pa] and the separation over which it falls by a factor e [m]."""
-        return self.topography.contact_stiffness(self.half_plane.modulus), self.topography.separation_length
+    def asperities(self) -> tuple[float, float, bool]:
+        """Arguments of `topography.contact_pressure` before the separation."""
+        t = self.topography
+        return t.contact_stiffness(self.body.modulus), t.separation_length, t.filling
 
 
 @compiled
@@ -126,12 +127,12 @@ def film_properties(
 
 
 @compiled
-def asperity_pressure(gap: FloatArray, asperities: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+def asperity_pressure(gap: FloatArray, asperities: tuple[float, float, bool]) -> tuple[FloatArray, FloatArray]:
     """Contact pressure [Pa] and its derivative [Pa/m] in each cell."""
     n = gap.shape[0]
     pressure, slope = np.empty(n), np.empty(n)
     for i in range(n):
-        pressure[i], slope[i] = contact_pressure(asperities[0], asperities[1], gap[i])
+        pressure[i], slope[i] = contact_pressure(asperities[0], asperities[1], asperities[2], gap[i])
     return pressure, slope
 
 
@@ -216,13 +217,13 @@ def _newton_change(
     Raises:
         NotConvergedError: GMRES did not converge.
     """
-    stiffness = contact.half_plane.stiffness_band / compliance_factor
+    stiffness = contact.body.stiffness_band / compliance_factor
     kernel = np.concatenate((stiffness[:0:-1], stiffness))  # of the product with the banded stiffness
     band = _factored_band(rows, kept, slope, stiffness)
     none = np.zeros_like(elastic)
 
     def deflected(gap: FloatArray, pressure: FloatArray) -> FloatArray:
-        return gap - compliance_factor * contact.half_plane.deflection(pressure)
+        return gap - compliance_factor * contact.body.deflection(pressure)
 
     def solved(y: FloatArray, flow: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Changes of gap, unknown and total pressure for a right-hand side y [m] of the banded elastic equation."""
@@ -271,7 +272,7 @@ def contact_step(
     Raises:
         NotConvergedError: Newton's method or GMRES did not converge, or the surfaces would overlap.
     """
-    plane, rough, numbers = contact.half_plane, contact.rough, contact.grease.numbers
+    plane, rough, numbers = contact.body, contact.rough, contact.grease.numbers
     rate = 1.0 / time_step
     gap, pressure, saturation = (np.array(values) for values in guess)
     speed = abs(wall_velocity)
@@ -309,15 +310,15 @@ def contact_step(
     )
 
 
-def dry_contact(contact: LubricatedContact, rigid_gap: FloatArray) -> FloatArray:
-    """Gap of the dry rough contact [m], shape (n,): h = g + K p_c(h).
+def dry_contact(contact: LubricatedContact, rigid_gap: FloatArray, guess: FloatArray | None = None) -> FloatArray:
+    """Gap of the dry rough contact [m], shape (n,): h = g + K p_c(h); Newton's method begins at ``guess``, or at g.
 
     Raises:
         NotConvergedError: Newton's method did not converge.
     """
-    plane = contact.half_plane
+    plane = contact.body
     matrix = plane.matrix()
-    gap = np.array(rigid_gap)
+    gap = np.array(rigid_gap if guess is None else guess)
     identity: Any = np.eye(plane.cells)
     for _iteration in range(_ITERATIONS):
         solid, slope = asperity_pressure(gap, contact.asperities)

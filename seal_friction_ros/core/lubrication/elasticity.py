@@ -1,7 +1,8 @@
-"""Deflection of the seal surface under pressure: a half-plane fixed at a depth, or a layer bonded to a rigid base."""
+"""Deflection of the seal surface under pressure: a half-plane, a layer bonded to a rigid base, or finite elements."""
 
 import math
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,32 @@ from scipy.linalg import toeplitz
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 
 _HALF_BAND = 6  # of the approximate inverse; 4 to 10 run alike
+
+
+class ElasticBody(Protocol):
+    """What the contact needs of the body under the film, on cells of one width."""
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+
+    @property
+    def cell_width(self) -> float:
+        """Width of a cell [m]."""
+
+    @property
+    def modulus(self) -> float:
+        """Plane-strain modulus E* [Pa], of the asperities, too."""
+
+    @property
+    def stiffness_band(self) -> FloatArray:
+        """Banded approximate inverse of the matrix: stiffness against a cell r away [Pa/m], shape (7,)."""
+
+    def deflection(self, pressure: FloatArray) -> FloatArray:
+        """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,)."""
+
+    def matrix(self) -> FloatArray:
+        """Full influence matrix [m/Pa], shape (cells, cells)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +117,65 @@ class BondedLayer(HalfPlane):
         smooth = _of_layer(np.asarray(distance * (self.cell_width / self.depth), dtype=np.float64))
         deep = _influence(distance, self.cell_width, self.modulus, self.depth)
         return np.asarray(deep + 2.0 * self.cell_width / (math.pi * self.modulus) * smooth)
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedBody:
+    r"""Finite-element body on the cells of a film; `condensed_body` makes it."""
+
+    cells: int
+    cell_width: float  # [m]
+    modulus: float  # plane-strain modulus E* of the surface [Pa]
+    compliance: FloatArray  # deflection of a cell by a pressure in another [m/Pa], shape (cells, cells)
+    stiffness_band: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        plane = HalfPlane(self.cells, self.cell_width, self.modulus, 2.0 * self.cells * self.cell_width)
+        object.__setattr__(self, 'stiffness_band', plane.stiffness_band)
+
+    def deflection(self, pressure: FloatArray) -> FloatArray:
+        """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,)."""
+        deflected: FloatArray = self.compliance @ pressure
+        return deflected
+
+    def matrix(self) -> FloatArray:
+        """Full influence matrix [m/Pa], shape (cells, cells)."""
+        return self.compliance
+
+
+def hat_functions(places: FloatArray, nodes: FloatArray) -> FloatArray:
+    """Value of the hat function of each of ``nodes`` (increasing) at each of ``places``, shape (places, nodes)."""
+    return np.stack([np.interp(places, nodes, unit) for unit in np.eye(len(nodes))], axis=1)
+
+
+def condensed_body(
+    places: FloatArray, nodes: FloatArray, compliance: FloatArray, modulus: float, circumference: float
+) -> CondensedBody:
+    r"""Body on the cells of a film from the compliance of the nodes of its surface.
+
+    .. math:: K = N C N^T + A - \Pi A \Pi,\quad \Pi = N (N^T N)^{-1} N^T
+
+    with the compliance C of the nodes, their hat functions N in the cells, and the influence matrix A of the
+    half-plane, which answers to what is shorter than the elements (the split is our choice). Where C is that of a
+    half-plane, K is A, whatever the mesh. A pressure that follows the surface makes C slightly unsymmetric; K is made
+    symmetric, and nowhere stiffer than A at its stiffest, which keeps it positive (our choice).
+
+    Args:
+        places: Centres of the cells [m], in equal steps, within the nodes, shape (n,).
+        nodes: Places of the nodes [m], increasing, shape (m,).
+        compliance: Displacement by a force on a node, all round [m/N], shape (m, m).
+        modulus: Plane-strain modulus E* [Pa].
+        circumference: Length that a force acts on [m]; 1 m for plane strain.
+    """
+    width = float(places[1] - places[0])
+    hats = hat_functions(places, nodes)
+    deep = HalfPlane(len(places), width, modulus, 2.0 * len(places) * width).matrix()
+    seen = hats @ np.linalg.pinv(hats)  # what the nodes can follow
+    coarse = circumference * width * hats @ compliance @ hats.T
+    whole = coarse + deep - seen @ deep @ seen
+    values, shapes = np.linalg.eigh(0.5 * (whole + whole.T))
+    least = float(np.linalg.eigvalsh(deep)[0])
+    return CondensedBody(len(places), width, modulus, (shapes * np.maximum(values, least)) @ shapes.T)
 
 
 BODIES = {'half_plane': HalfPlane, 'bonded_layer': BondedLayer}

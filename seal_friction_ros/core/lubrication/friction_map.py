@@ -13,7 +13,14 @@ from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.contact import ContactState, contact_step
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
-from seal_friction_ros.core.lubrication.transient import LubricationModel, fluid_force, initial_state, solid_limit
+from seal_friction_ros.core.lubrication.oring_film import oring_film
+from seal_friction_ros.core.lubrication.transient import (
+    LubricationModel,
+    fluid_force,
+    initial_state,
+    lubrication_model,
+    solid_limit,
+)
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
 _MOST_RETRIES = 20
@@ -28,6 +35,7 @@ class SteadyFriction(NamedTuple):
     friction: FloatArray  # [N] mean of both directions
     solid: FloatArray  # [N] mean of both directions
     direction_difference: FloatArray  # [N] friction towards the pressure less that away from it
+    stiffness: float  # [N/m] of seal and groove against axial motion of the contact
     retried_steps: int
 
 
@@ -52,6 +60,20 @@ def _flooded_elastic_case(case: LubricationCase, pressure: float) -> Lubrication
     """The case on a plain flooded wall, elastic, with ``pressure`` [Pa] on its left."""
     air = dataclasses.replace(case.air, pressure_left=pressure, pressure_right=0.0)
     return dataclasses.replace(case, air=air, control_edge=None, film_supply=None, viscoelasticity=None)
+
+
+class _AtRest(NamedTuple):
+    model: LubricationModel
+    start: ContactState
+    stiffness: float  # [N/m] axial
+
+
+def _at_rest(case: LubricationCase, pressure: float) -> _AtRest:
+    """The seal of a case at rest on a plain flooded wall, with ``pressure`` [Pa] on its left."""
+    if case.oring is not None:
+        return _AtRest(*oring_film(case, case.oring, pressure))
+    model = lubrication_model(_flooded_elastic_case(case, pressure))
+    return _AtRest(model, initial_state(model, 0.0).state, case.groove.stiffness)
 
 
 def _friction(model: LubricationModel, state: ContactState, velocity: float) -> tuple[float, float]:
@@ -113,10 +135,9 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
     Raises:
         NotConvergedError: A film did not converge; the message says at which speed and pressure.
     """
-    model = LubricationModel(_flooded_elastic_case(case, pressure))
+    model, begin, stiffness = _at_rest(case, pressure)
     speeds = map_speeds(case.map)
     values = np.empty((2, 2, len(speeds)))
-    begin = initial_state(model, 0.0).state
     retried = 0
     for k, direction in enumerate((1.0, -1.0)):
         state = begin
@@ -128,7 +149,7 @@ def steady_friction(case: LubricationCase, pressure: float) -> SteadyFriction:
             retried += more
             values[k, :, i] = _friction(model, state, direction * float(speed))
     friction, solid = values.mean(axis=0)
-    return SteadyFriction(pressure, friction, solid, values[1, 0] - values[0, 0], retried)
+    return SteadyFriction(pressure, friction, solid, values[1, 0] - values[0, 0], stiffness, retried)
 
 
 def memory_length(case: LubricationCase) -> MemoryLength:
@@ -140,11 +161,11 @@ def memory_length(case: LubricationCase) -> MemoryLength:
     Raises:
         NotConvergedError: A step did not converge.
     """
-    model = LubricationModel(_flooded_elastic_case(case, 0.0))
+    model, start, _ = _at_rest(case, 0.0)
     fast = case.motion.speed
-    slow, first = steady_state(model, initial_state(model, 0.0).state, 0.2 * fast)
+    slow, first = steady_state(model, start, 0.2 * fast)
     steady, second = steady_state(model, slow, fast)
-    step = 4.0 * case.numerics.film_width / fast / _MEMORY_STEPS
+    step = 4.0 * model.case.numerics.film_width / fast / _MEMORY_STEPS
     _, states, third = _slid(model, slow, fast, [step] * _MEMORY_STEPS)
     course = np.array([_friction(model, state, fast)[0] for state in (slow, *states)])
     end = _friction(model, steady, fast)[0]
@@ -155,6 +176,9 @@ def memory_length(case: LubricationCase) -> MemoryLength:
 def friction_map(case: LubricationCase, rows: list[SteadyFriction], memory: float) -> FrictionMap:
     """The law from its computed rows, one for each pressure of the grid, in any order.
 
+    The presliding length is friction over stiffness at 0 Pa. An O-ring that no pressure holds on its wall rolls, so its
+    length is that of the next pressure (our choice).
+
     Raises:
         ValueError: The rows are not those of the grid.
     """
@@ -162,11 +186,12 @@ def friction_map(case: LubricationCase, rows: list[SteadyFriction], memory: floa
     pressures = map_pressures(case.map)
     if len(ordered) != len(pressures) or not np.allclose([row.pressure for row in ordered], pressures):
         raise ValueError('friction_map: the rows are not those of the pressures of the grid')
+    held = ordered[1 if case.oring else 0]
     return FrictionMap(
         speeds=tuple(map_speeds(case.map).tolist()),
         pressures=tuple(pressures.tolist()),
         frictions=tuple(float(value) for row in ordered for value in row.friction),
         reference_speed=case.motion.speed,
         memory_length=memory,
-        presliding_length=float(ordered[0].friction[0]) / case.groove.stiffness,
+        presliding_length=float(held.friction[0]) / float(held.stiffness),
     )

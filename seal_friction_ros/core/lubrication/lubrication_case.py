@@ -7,10 +7,11 @@ Example; docs/ehl.md describes every field::
     seal: {interference: 36.0e-6}
     motion: {distance: 1.8e-3}
     control_edge: {position: 0.3e-3}     # optional, like film_supply and viscoelasticity
+    oring: ms28775_114_blind             # in the place of the profile of the seal: a case of config/oring
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,6 +28,7 @@ from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
+from seal_friction_ros.core.oring_contact.oring_case import OringCase
 
 
 @dataclass(frozen=True)
@@ -187,9 +189,11 @@ class LubricationCase:
     control_edge: ControlEdge | None = None
     film_supply: FilmSupply | None = None
     viscoelasticity: Viscoelasticity | None = None
+    oring: OringCase | None = None
+    """finite-element ring in the place of the profile of ``seal``; it has a friction map only"""
 
     def __post_init__(self) -> None:
-        if self.seal.section_height < self.numerics.film_width:
+        if self.oring is None and self.seal.section_height < self.numerics.film_width:
             raise ValueError(
                 f'case {self.name}: seal.section_height = {self.seal.section_height} m is less than '
                 f'numerics.film_width = {self.numerics.film_width} m: the half-plane needs more depth than width'
@@ -253,14 +257,24 @@ class Spool:
             raise ValueError(f'spool {self.name}: seals is empty')
 
 
-def parse_lubrication_case(document: Any) -> LubricationCase | Spool:
+def _no_oring(name: str) -> OringCase:
+    raise ValueError(f'oring = {name!r}: there are no O-ring cases here')
+
+
+def parse_lubrication_case(
+    document: Any, load_oring: Callable[[str], OringCase] = _no_oring
+) -> LubricationCase | Spool:
     """Parse the document of a case file: a spool if it has ``seals``, else a case.
+
+    Args:
+        document: Mapping of a YAML file.
+        load_oring: Gives the O-ring case of a name or path.
 
     Raises:
         ValueError: A value is invalid; the message names case, field, value and bound.
     """
     name, source = name_and_source(document, 'case')
-    known = ('name', 'source', *(('seals', 'motion') if 'seals' in document else _PARTS))
+    known = ('name', 'source', *(('seals', 'motion') if 'seals' in document else ('oring', *_PARTS)))
     check_names(document, sorted(known), f'case {name}')
     if 'seals' in document:
         return _parse_spool(document, name, source)
@@ -269,7 +283,20 @@ def parse_lubrication_case(document: Any) -> LubricationCase | Spool:
         for key, record in _PARTS.items()
         if key in document
     }
+    if 'oring' in document:
+        parts['oring'] = _oring(document, f'case {name}', load_oring)
     return LubricationCase(name=name, source=source, **parts)
+
+
+def _oring(document: Mapping[str, Any], where: str, load_oring: Callable[[str], OringCase]) -> OringCase:
+    """The ring of a case, which takes nothing of a profile, an air pressure or a motion over a control edge."""
+    if not isinstance(document['oring'], str):
+        raise ValueError(f'{where}: oring = {document["oring"]!r} is not the name or path of an O-ring case')
+    unused = [part for part in ('groove', 'air', *_OPTIONAL) if part in document]
+    unused += [f'seal.{key}' for key in document.get('seal') or () if key != 'solid_shear_stress']
+    if unused:
+        raise ValueError(f'{where}: {", ".join(unused)} has no meaning for an O-ring: leave it out')
+    return load_oring(document['oring'])
 
 
 def _parse_spool(document: Mapping[str, Any], name: str, source: str) -> Spool:

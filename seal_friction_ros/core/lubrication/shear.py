@@ -18,7 +18,7 @@ from seal_friction_ros.core.lubrication.reynolds import FilmEnds
 def real_area_share(contact: LubricatedContact, gap: FloatArray) -> FloatArray:
     """Local share A_real of the surface that touches, shape (n,), at a ``gap`` [m]; see `Topography`."""
     pressure, _ = asperity_pressure(gap, contact.asperities)
-    return np.asarray(erf(pressure / contact.topography.real_area_pressure(contact.half_plane.modulus)))
+    return np.asarray(erf(pressure / contact.topography.real_area_pressure(contact.body.modulus)))
 
 
 def solid_shear(contact: LubricatedContact, gap: FloatArray, solid_shear_stress: float) -> float:
@@ -26,7 +26,7 @@ def solid_shear(contact: LubricatedContact, gap: FloatArray, solid_shear_stress:
 
     Source: spool-valve paper, equation (2).
     """
-    return solid_shear_stress * float(real_area_share(contact, gap).sum()) * contact.half_plane.cell_width
+    return solid_shear_stress * float(real_area_share(contact, gap).sum()) * contact.body.cell_width
 
 
 @compiled

@@ -7,6 +7,8 @@ from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.lubrication.flow_factors import flow_factor_coefficients
 
+_LEAST_SHARE = 0.02  # of the separation length
+
 
 @dataclass(frozen=True)
 class Topography(CheckedParameters):
@@ -18,8 +20,12 @@ class Topography(CheckedParameters):
     .. math:: p_c = 0.375\,q_0 h_{rms} E^* e^{-h / (0.486\,h_{rms})},\quad
         A_{real} = \mathrm{erf}\big(\sqrt 2\,p_c / (E^* h'_{rms})\big)
 
-    with q_0 = 2 pi / ``roll_off_length`` and h'_rms the ``rms_slope``. Below zero separation the exponential goes on as
-    its tangent (our choice: a converged result is never there, but a Newton iteration may be).
+    with q_0 = 2 pi / ``roll_off_length`` and h'_rms the ``rms_slope``. The exponential is that of partial contact: its
+    pressure at h = 0 is finite. With ``filling`` it is :math:`e^{h / l} - 1` in the place of :math:`e^{h / l}`, which
+    is the same for small pressures and keeps the gap open at any pressure (our choice).
+
+    Below zero separation (with ``filling``, below 2 % of l) the law goes on as its tangent (our choice: a converged
+    result is never there, but a Newton iteration may be).
 
     Raises:
         ValueError: A value is out of bounds, there are no flow factors for the Peklenik number, or the slope is less
@@ -45,6 +51,12 @@ class Topography(CheckedParameters):
     )
     peklenik_number: float = parameter(
         1.0, unit='1', lower=1.0, upper=9.0, description='Length of the roughness along over across the motion.'
+    )
+    filling: bool = parameter(
+        False,
+        unit='',
+        description='Whether the seal fills the roughness: the contact pressure grows without bound as the gap closes. '
+        'For a soft seal under high pressure.',
     )
     shear_stress_factors: bool = parameter(
         False,
@@ -77,9 +89,11 @@ class Topography(CheckedParameters):
 
 
 @compiled
-def contact_pressure(stiffness: float, length: float, separation: float) -> tuple[float, float]:
+def contact_pressure(stiffness: float, length: float, filling: bool, separation: float) -> tuple[float, float]:
     """Pressure p_c [Pa] of the asperities and its derivative [Pa/m] at a mean ``separation`` [m]; see `Topography`."""
-    if separation < 0.0:
-        return stiffness * (1.0 - separation / length), -stiffness / length
-    pressure = stiffness * math.exp(-separation / length)
-    return pressure, -pressure / length
+    least = _LEAST_SHARE if filling else 0.0
+    ratio = max(separation / length, least)
+    less = 1.0 if filling else 0.0
+    share = 1.0 / (math.exp(ratio) - less)
+    slope = -stiffness * share * (1.0 + less * share) / length
+    return stiffness * share + slope * min(separation - least * length, 0.0), slope

@@ -11,7 +11,7 @@ choice). Forces are positive where they resist a motion to the right, so frictio
 import dataclasses
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -40,37 +40,15 @@ _LARGEST_RECORD = 100_000_000  # numbers along the seal that a run may keep, 0.8
 
 @dataclass(frozen=True, eq=False)
 class LubricationModel:
-    """A case with the quantities that are constant over a run.
-
-    The air acts on the seal from all sides, and rubber transmits its pressure like a fluid: only the pressure above
-    that of the air deflects the seal. The air pressure falls linearly over the middle half of the film (our choice).
-
-    Raises:
-        ValueError: The grid does not fit the seal.
-    """
+    """A case with the quantities that are constant over a run; `lubrication_model` makes it."""
 
     case: LubricationCase
-    contact: LubricatedContact = field(init=False)
-    place: FloatArray = field(init=False)  # cells along the seal from its crown [m], shape (n,)
-    ambient: FloatArray = field(init=False)  # pressure of the air along the seal [Pa], shape (n,)
-    profile: FloatArray = field(init=False)
-    """gap of the undeformed seal to a plain wall, less the deflection by the air [m], shape (n,)"""
-    circumference: float = field(init=False)  # [m]
-
-    def __post_init__(self) -> None:
-        case, numerics = self.case, self.case.numerics
-        width = numerics.film_width / numerics.cells
-        plane = BODIES[case.seal.body](numerics.cells, width, case.seal.modulus, case.seal.section_height)
-        place = (np.arange(numerics.cells) + 0.5) * width - 0.5 * numerics.film_width
-        radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
-        object.__setattr__(self, 'contact', LubricatedContact(plane, case.topography, case.grease))
-        object.__setattr__(self, 'place', place)
-        passed = np.clip(0.5 + 2.0 * place / numerics.film_width, 0.0, 1.0)
-        ambient = case.air.pressure_left + passed * (case.air.pressure_right - case.air.pressure_left)
-        profile = place**2 / (2.0 * radius) - case.interference - plane.deflection(ambient)
-        object.__setattr__(self, 'ambient', ambient)
-        object.__setattr__(self, 'profile', profile)
-        object.__setattr__(self, 'circumference', math.pi * case.seal.sealing_diameter)
+    contact: LubricatedContact
+    place: FloatArray  # cells along the seal from its crown [m], shape (n,)
+    ambient: FloatArray  # pressure of what is beside the seal, along it [Pa], shape (n,)
+    profile: FloatArray
+    """gap to a plain wall without film and asperities, less the deflection by what is beside it [m], shape (n,)"""
+    circumference: float  # [m]
 
     def rigid_gap(self, contact_place: float) -> FloatArray:
         """Gap of the undeformed seal [m] with its crown at ``contact_place`` along the wall [m]."""
@@ -80,6 +58,29 @@ class LubricationModel:
     def ends(self, left: float = 1.0, right: float = 1.0) -> FilmEnds:
         """Pressure beyond both ends of the film, and saturation of the inflow."""
         return FilmEnds(self.case.air.pressure_left, self.case.air.pressure_right, left, right)
+
+
+def lubrication_model(case: LubricationCase) -> LubricationModel:
+    """Model of a case of a profile on a half-plane or a layer.
+
+    The air acts on the seal from all sides, and rubber transmits its pressure like a fluid: only the pressure above
+    that of the air deflects the seal. The air pressure falls linearly over the middle half of the film (our choice).
+
+    Raises:
+        ValueError: The grid does not fit the seal, or the seal is an O-ring.
+    """
+    if case.oring is not None:
+        raise ValueError(f'case {case.name}: an O-ring has a friction map only: seal_friction ehl map')
+    numerics = case.numerics
+    width = numerics.film_width / numerics.cells
+    body = BODIES[case.seal.body](numerics.cells, width, case.seal.modulus, case.seal.section_height)
+    place: FloatArray = np.asarray((np.arange(numerics.cells) + 0.5) * width - 0.5 * numerics.film_width)
+    radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
+    passed = np.clip(0.5 + 2.0 * place / numerics.film_width, 0.0, 1.0)
+    ambient = case.air.pressure_left + passed * (case.air.pressure_right - case.air.pressure_left)
+    profile = place**2 / (2.0 * radius) - case.interference - body.deflection(ambient)
+    contact = LubricatedContact(body, case.topography, case.grease)
+    return LubricationModel(case, contact, place, ambient, profile, math.pi * case.seal.sealing_diameter)
 
 
 class StepBefore(NamedTuple):
@@ -158,18 +159,18 @@ def initial_state(model: LubricationModel, position: float) -> TransientState:
     case = model.case
     n = case.numerics.cells
     lag = -case.seated_groove.half_clearance
-    air_deflects = model.contact.half_plane.deflection(model.ambient)
+    air_deflects = model.contact.body.deflection(model.ambient)
     gap = dry_contact(model.contact, model.rigid_gap(position - lag) + air_deflects)
     pressure, _ = asperity_pressure(gap, model.contact.asperities)
     creep = np.zeros(n)
     if case.viscoelasticity:
         stiffening = case.viscoelasticity.stiffening
-        creep = stiffening / (1.0 + stiffening) * model.contact.half_plane.deflection(pressure + model.ambient)
+        creep = stiffening / (1.0 + stiffening) * model.contact.body.deflection(pressure + model.ambient)
     saturation, wall_film = np.ones(n), None
     if case.film_supply:
         film = case.film_supply.initial_film
         saturation = np.minimum(1.0, 2.0 * film / gap)
-        width = model.contact.half_plane.cell_width
+        width = model.contact.body.cell_width
         reach = case.motion.distance + 2.0 * case.numerics.film_width
         count = math.ceil(2.0 * reach / width)
         if count > _LONGEST_WALL:
@@ -194,7 +195,7 @@ def transient_step(
         NotConvergedError: The step did not converge; a smaller one may.
     """
     case, contact = model.case, model.contact
-    width = contact.half_plane.cell_width
+    width = contact.body.cell_width
     step = time - moment.time
     velocity, lag = _slide(model, moment, step, position)
     at_end = _velocity_at_end(moment, velocity, step)
@@ -221,7 +222,7 @@ def transient_step(
     solid_pressure, _ = asperity_pressure(state.gap, contact.asperities)
     creep = moment.creep
     if case.viscoelasticity:
-        creep = creep_kept + slow * relaxing / (1.0 + relaxing) * contact.half_plane.deflection(
+        creep = creep_kept + slow * relaxing / (1.0 + relaxing) * contact.body.deflection(
             state.pressure + solid_pressure
         )
     before = None if wall_film is not None else StepBefore(_thickness(moment), moment.creep, step, velocity)
@@ -271,13 +272,13 @@ def _edge_force(model: LubricationModel, moment: TransientState) -> float:
         return 0.0
     solid, _ = asperity_pressure(moment.state.gap, model.contact.asperities)
     _, slope = edge.fall(moment.contact_place + model.place)
-    axial = float(((moment.state.pressure + solid) * slope).sum()) * model.contact.half_plane.cell_width
+    axial = float(((moment.state.pressure + solid) * slope).sum()) * model.contact.body.cell_width
     return -model.circumference * axial
 
 
 def fluid_force(model: LubricationModel, state: ContactState, velocity: float) -> float:
     """Fluid friction [N] at a sliding ``velocity`` [m/s]."""
-    numbers, width = model.case.grease.numbers, model.contact.half_plane.cell_width
+    numbers, width = model.case.grease.numbers, model.contact.body.cell_width
     roughness = model.contact.stress_roughness
     return -model.circumference * float(fluid_shear(*state, -velocity, numbers, width, model.ends(), roughness))
 
@@ -376,7 +377,7 @@ def run_transient(
         ValueError: The result would not fit in memory.
     """
     moved = case.motion if motion is None else motion
-    model = LubricationModel(case)
+    model = lubrication_model(case)
     steps = max(1, math.ceil(moved.duration / case.numerics.time_step - 1e-9))
     if 4 * steps * case.numerics.cells > _LARGEST_RECORD:
         raise ValueError(

@@ -30,13 +30,15 @@ from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase,
 from seal_friction_ros.core.lubrication.spool import SpoolResult, SpoolSealMotion, stroke_friction, superposed
 from seal_friction_ros.core.lubrication.study import StudyTable, study_table
 from seal_friction_ros.core.lubrication.transient import (
-    LubricationModel,
     TransientResult,
     initial_state,
+    lubrication_model,
     run_transient,
     transient_step,
     with_solid_shear_stress,
 )
+from seal_friction_ros.core.oring_contact.oring_case import OringCase
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.work.executor import run_all
 from seal_friction_ros.offline.work.finished_parts import Part, part_key, run_parts
@@ -56,9 +58,24 @@ def load_case(name: str) -> LubricationCase | Spool:
     path = config_path('ehl', name)
     document = read_yaml(path)
     try:
-        return parse_lubrication_case(document)
+        return parse_lubrication_case(document, lambda oring: load_oring(oring, path.parent))
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
+
+
+def load_oring(name: str, beside: Path) -> OringCase:
+    """O-ring case of a file in the folder ``beside``, from a path, or of a name in config/oring.
+
+    Raises:
+        ValueError: The file cannot be read or a value is invalid; one line that names the file.
+    """
+    local = beside / f'{name}.yaml'
+    path = local if local.is_file() else config_path('oring', name)
+    try:
+        return parse_oring_case(read_yaml(path)).case
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(text if text.startswith(str(path)) else f'{path}: {text}') from None
 
 
 def single_case(name: str, purpose: str) -> LubricationCase:
@@ -75,7 +92,8 @@ def single_case(name: str, purpose: str) -> LubricationCase:
 
 def compile_for(case: LubricationCase) -> None:
     """Compile the code of a run in this process, so that worker processes inherit it."""
-    model = LubricationModel(case)
+    case = replace(case, oring=None)
+    model = lubrication_model(case)
     time = case.numerics.time_step
     with suppress(NotConvergedError):
         transient_step(model, initial_state(model, case.motion.position(0.0)), time, case.motion.position(time))

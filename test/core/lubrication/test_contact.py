@@ -69,13 +69,13 @@ class Shear(NamedTuple):
 def shear(
     contact: LubricatedContact, state: ContactState, wall_velocity: float, solid_shear_stress: float, ends: FilmEnds
 ):
-    width = contact.half_plane.cell_width
+    width = contact.body.cell_width
     fluid = fluid_shear(*state, wall_velocity, contact.grease.numbers, width, ends, contact.stress_roughness)
     return Shear(solid_shear(contact, state.gap, solid_shear_stress), float(fluid))
 
 
 def dry(contact: LubricatedContact) -> ContactState:
-    gap = dry_contact(contact, profile(contact.half_plane.cells))
+    gap = dry_contact(contact, profile(contact.body.cells))
     return ContactState(gap, np.zeros_like(gap), np.ones_like(gap))
 
 
@@ -173,7 +173,7 @@ def test_every_step_conserves_mass_and_keeps_film_and_void_apart():
         assert np.abs(state.pressure / 1e6 * (1.0 - state.saturation)).max() <= 1e-12
         assert state.pressure.min() >= -1e-6
         solid, _ = asperity_pressure(state.gap, contact.asperities)
-        elastic = state.gap - profile(226) - contact.half_plane.matrix() @ (state.pressure + solid)
+        elastic = state.gap - profile(226) - contact.body.matrix() @ (state.pressure + solid)
         assert np.abs(elastic).max() <= 2e-13
 
 

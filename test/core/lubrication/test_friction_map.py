@@ -5,8 +5,10 @@ import math
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
@@ -16,8 +18,13 @@ from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.core.lubrication import friction_map as module
 from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_friction
+from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, LubricationNumerics, MapGrid
-from seal_friction_ros.core.lubrication.transient import LubricationModel, initial_state
+from seal_friction_ros.core.lubrication.oring_film import oring_film
+from seal_friction_ros.core.lubrication.topography import Topography
+from seal_friction_ros.core.lubrication.transient import initial_state, lubrication_model
+from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 
 CASE = LubricationCase(
     name='inner',
@@ -57,6 +64,41 @@ def test_rows_that_are_not_of_the_grid_are_refused(rows):
         friction_map(CASE, rows[:1], 0.0)
 
 
+@pytest.fixture(scope='module')
+def ring_row():
+    text = (ROOT / 'config' / 'oring' / 'ms28775_114_blind.yaml').read_text()
+    ring = dataclasses.replace(parse_oring_case(yaml.safe_load(text)).case, numerics=OringNumerics(lines=13))
+    case = dataclasses.replace(
+        CASE,
+        oring=ring,
+        topography=Topography(rms_height=1e-6, rms_slope=0.3, filling=True),
+        grease=Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.017),
+    )
+    return case, [steady_friction(case, pressure) for pressure in (0.0, 3e5)]
+
+
+def test_friction_of_a_ring_from_its_drawing_falls_with_speed_and_rises_with_pressure(ring_row):
+    case, rows = ring_row
+    table = np.array([row.friction for row in rows])
+    assert (np.diff(table, axis=1) < 0.0).all()
+    assert (np.diff(table, axis=0) > 0.0).all()
+    assert rows[0].direction_difference == pytest.approx(np.zeros(5), abs=1e-3)  # the same both ways without fluid
+    law = friction_map(case, rows, 1e-4)
+    assert law.presliding_length == pytest.approx(rows[1].friction[0] / rows[1].stiffness)
+
+
+def test_solid_friction_of_a_ring_is_at_most_tau_c_on_the_contact(ring_row):
+    case, rows = ring_row
+    film = oring_film(case, case.oring, 3e5)
+    area = film.model.circumference * film.model.case.numerics.film_width
+    assert 0.0 < rows[1].solid[0] < case.seal.solid_shear_stress * area
+
+
+def test_a_ring_has_no_run_of_its_own(ring_row):
+    with pytest.raises(ValueError, match='an O-ring has a friction map only: seal_friction ehl map'):
+        lubrication_model(ring_row[0])
+
+
 def test_film_remembers_over_about_the_length_of_the_contact():
     found = memory_length(CASE)
     assert 0.05e-3 < found.length < 0.6e-3
@@ -72,7 +114,7 @@ def test_step_of_the_map_that_fails_is_taken_in_halves_and_counted(monkeypatch):
             raise NotConvergedError('told to')
         return really(*arguments)
 
-    model = LubricationModel(CASE)
+    model = lubrication_model(CASE)
     start = initial_state(model, 0.0).state
     smoothly, none = module.steady_state(model, start, 0.01)
     monkeypatch.setattr(module, 'contact_step', fails_at_first)

@@ -93,12 +93,18 @@ def test_roughness_cannot_be_flatter_than_its_longest_wave():
         Topography(rms_slope=0.1)
 
 
-@given(st.floats(-2e-6, 6e-6))
-def test_asperities_push_less_the_farther_apart_and_have_their_slope(gap):
-    pressure, slope = contact_pressure(1e6, 1e-6, gap)
-    nearer, farther = contact_pressure(1e6, 1e-6, gap - 1e-12)[0], contact_pressure(1e6, 1e-6, gap + 1e-12)[0]
+@given(st.floats(-2e-6, 6e-6), st.booleans())
+def test_asperities_push_less_the_farther_apart_and_have_their_slope(gap, filling):
+    pressure, slope = contact_pressure(1e6, 1e-6, filling, gap)
+    nearer, farther = (contact_pressure(1e6, 1e-6, filling, gap + away)[0] for away in (-1e-12, 1e-12))
     assert nearer > pressure > farther > 0.0
     assert slope == pytest.approx((farther - nearer) / 2e-12, rel=1e-3)
+
+
+def test_roughness_that_is_filled_is_partial_contact_at_small_pressures_and_never_closed():
+    light, same = (contact_pressure(1e6, 1e-6, filling, 8e-6)[0] for filling in (True, False))
+    assert light == pytest.approx(same, rel=1e-3)
+    assert contact_pressure(1e6, 1e-6, True, 0.1e-6)[0] > 9.0 * contact_pressure(1e6, 1e-6, False, 0.1e-6)[0]
 
 
 @pytest.mark.parametrize('wall_share', [0.0, 0.5, 1.0])

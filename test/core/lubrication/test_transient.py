@@ -25,10 +25,10 @@ from seal_friction_ros.core.lubrication.lubrication_case import (
 from seal_friction_ros.core.lubrication.spool import SpoolSealMotion, superposed
 from seal_friction_ros.core.lubrication.study import study_table
 from seal_friction_ros.core.lubrication.transient import (
-    LubricationModel,
     StepBefore,
     TransientResult,
     initial_state,
+    lubrication_model,
     run_transient,
     start_of_step,
     with_solid_shear_stress,
@@ -127,12 +127,12 @@ def test_starved_film_removes_the_rise_on_deceleration():
 
 def test_starved_film_is_neither_made_nor_lost():
     starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), motion=ConstantAcceleration(cycles=1))
-    model = transient.LubricationModel(starved)
+    model = transient.lubrication_model(starved)
     motion = starved.motion
     moment = initial_state(model, motion.position(0.0))
 
     def lubricant(moment) -> float:
-        width = model.contact.half_plane.cell_width
+        width = model.contact.body.cell_width
         return moment.wall_film.volume.sum() + (moment.state.gap * moment.state.saturation).sum() * width
 
     before = lubricant(moment)
@@ -194,7 +194,7 @@ def test_runs_are_the_same_to_the_bit():
 
 
 def test_the_formula_of_second_order_follows_a_parabola_over_steps_of_any_length():
-    start = initial_state(LubricationModel(INNER), 0.0)
+    start = initial_state(lubrication_model(INNER), 0.0)
 
     def at(time):
         return np.full(INNER.numerics.cells, 1e-6 + 1e-6 * time**2)

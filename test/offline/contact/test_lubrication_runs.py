@@ -174,6 +174,56 @@ def test_findings_and_influence_of_our_choices_come_as_numbers(small, monkeypatc
     assert down < 0.0 < up
 
 
+COARSE_RING = """name: ring
+oring: coarse
+numerics: {cells: 48}
+topography: {rms_height: 1.0e-6, rms_slope: 0.3, filling: true}
+map: {velocity_min: 1.0e-3, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+6, pressures: 2}
+"""
+
+
+@pytest.fixture
+def ring(tmp_path: Path) -> Path:
+    drawing = (ROOT / 'config' / 'oring' / 'ms28775_114_blind.yaml').read_text()
+    (tmp_path / 'coarse.yaml').write_text(drawing + 'numerics: {lines: 13}\n')
+    path = tmp_path / 'ring.yaml'
+    path.write_text(COARSE_RING)
+    return path
+
+
+def test_an_o_ring_becomes_a_seal_file_from_its_drawing_that_the_node_takes(ring, tmp_path, capsys):
+    written = tmp_path / 'from_drawing.yaml'
+    found = answer(capsys, 'map', str(ring), '--seal-file', str(written))
+    table = np.array(found['friction_N'])
+    assert (np.diff(table, axis=0) > 0.0).all()
+    seal = parse_seal(read_yaml(written))
+    assert seal.coulomb_law.sliding_friction(1e6, 1e-3) == pytest.approx(table[1, 0], rel=1e-3)
+    assert seal.presliding is not None
+    assert main(['charts', str(written), '--out', str(tmp_path / 'charts.html')]) == 0
+
+
+@pytest.mark.parametrize(
+    ('was', 'now', 'message'),
+    [
+        ('oring: coarse', 'oring: 5', 'oring = 5 is not the name or path of an O-ring case'),
+        ('oring: coarse', 'oring: nowhere', 'nowhere'),
+        ('numerics:', 'seal: {interference: 1.0e-5}\nnumerics:', 'seal.interference has no meaning for an O-ring'),
+        ('numerics:', 'control_edge: {}\nnumerics:', 'control_edge has no meaning for an O-ring'),
+    ],
+)
+def test_what_an_o_ring_cannot_be_is_one_line(ring, capsys, was, now, message):
+    ring.write_text(COARSE_RING.replace(was, now))
+    assert main(['ehl', 'map', str(ring)]) == 2
+    said = capsys.readouterr().err.strip()
+    assert message in said
+    assert len(said.splitlines()) == 1
+
+
+def test_a_run_of_an_o_ring_is_refused_in_one_line(ring, capsys):
+    assert main(['ehl', 'run', str(ring)]) == 2
+    assert 'an O-ring has a friction map only: seal_friction ehl map' in capsys.readouterr().err
+
+
 def test_spool_adds_up_its_seals(small, tmp_path, capsys):
     spool = tmp_path / 'spool.yaml'
     spool.write_text(
