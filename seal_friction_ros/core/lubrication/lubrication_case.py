@@ -101,7 +101,11 @@ class AirPressure(CheckedParameters):
 
 @dataclass(frozen=True)
 class Viscoelasticity(CheckedParameters):
-    """Seal that is stiffer when loaded fast: standard linear solid; the Mooney-Rivlin stiffness is the relaxed one.
+    r"""Seal that is stiffer when loaded fast; the Mooney-Rivlin stiffness is the relaxed one.
+
+    A generalised Kelvin solid: the compliance is at once :math:`1 / (1 + s)` of the relaxed one, and the rest creeps in
+    equal shares with the times :math:`\tau, 10 \tau, 100 \tau, \dots`. With ``decades`` 0 it is the standard linear
+    solid.
 
     Source: spool-valve paper, section 7.4, for the effect; model and numbers are our choice.
     """
@@ -110,8 +114,15 @@ class Viscoelasticity(CheckedParameters):
         1.0, unit='1', lower=0.0, upper=100.0, description='Instantaneous over relaxed modulus, less 1.'
     )
     relaxation_time: float = parameter(
-        0.3, unit='s', lower=1e-6, upper=1e6, description='Time constant of creep under constant pressure.'
+        0.3, unit='s', lower=1e-6, upper=1e6, description='Shortest time constant of creep under constant pressure.'
     )
+    decades: int = parameter(0, unit='1', lower=0, upper=8, description='Decades of time that the creep spans.')
+
+    @property
+    def creep(self) -> tuple[tuple[float, float], ...]:
+        """Share of the relaxed compliance and time constant [s] of each part that creeps."""
+        share = self.stiffening / (1.0 + self.stiffening) / (self.decades + 1)
+        return tuple((share, self.relaxation_time * 10.0**k) for k in range(self.decades + 1))
 
 
 @dataclass(frozen=True)

@@ -87,7 +87,7 @@ class StepBefore(NamedTuple):
     """What the formula of second order needs of the step before."""
 
     thickness: FloatArray  # theta h at its start [m], shape (n,)
-    creep: FloatArray  # at its start [m], shape (n,)
+    creep: FloatArray  # at its start [m], shape (parts, n)
     step: float  # [s]
     velocity: float  # of the contact, mean of the step [m/s]
 
@@ -100,7 +100,7 @@ class TransientState(NamedTuple):
     lag: float  # of the contact behind the spool [m]
     state: ContactState
     wall_film: WallFilm | None  # film on the wall outside the seal; None where it is flooded
-    creep: FloatArray  # viscoelastic part of the deflection [m], shape (n,); zeros for an elastic seal
+    creep: FloatArray  # viscoelastic parts of the deflection [m], shape (parts, n); none for an elastic seal
     before: StepBefore | None = None  # None: the next step is an implicit Euler step
 
     @property
@@ -162,10 +162,8 @@ def initial_state(model: LubricationModel, position: float) -> TransientState:
     air_deflects = model.contact.body.deflection(model.ambient)
     gap = dry_contact(model.contact, model.rigid_gap(position - lag) + air_deflects)
     pressure, _ = asperity_pressure(gap, model.contact.asperities)
-    creep = np.zeros(n)
-    if case.viscoelasticity:
-        stiffening = case.viscoelasticity.stiffening
-        creep = stiffening / (1.0 + stiffening) * model.contact.body.deflection(pressure + model.ambient)
+    shares, _ = _creep(case)
+    creep = np.outer(shares, model.contact.body.deflection(pressure + model.ambient))
     saturation, wall_film = np.ones(n), None
     if case.film_supply:
         film = case.film_supply.initial_film
@@ -203,13 +201,10 @@ def transient_step(
     way = contact_place - moment.contact_place
     ends, taken = _supply(model, moment, way, step)
     start = start_of_step(moment, step)
-    compliance, creep_kept = 1.0, np.zeros(1)
-    if case.viscoelasticity:
-        relaxing = start.step / case.viscoelasticity.relaxation_time
-        slow = case.viscoelasticity.stiffening / (1.0 + case.viscoelasticity.stiffening)
-        compliance = 1.0 - slow + slow * relaxing / (1.0 + relaxing)
-        creep_kept = start.creep / (1.0 + relaxing)
-    rigid = model.rigid_gap(contact_place) + creep_kept
+    shares, times = _creep(case)
+    kept = times / (times + start.step)  # of each creep after an implicit Euler step
+    compliance = 1.0 - float(shares @ kept)
+    rigid = model.rigid_gap(contact_place) + kept @ start.creep
     done = contact_step(contact, moment.state, rigid, -at_end, ends, start.thickness, start.step, compliance)
     state = done.state
 
@@ -220,14 +215,18 @@ def transient_step(
     if wall_film is not None:
         wall_film = _wall_film_after(model, moment, wall_film, taken, done.flow * step, contact_place)
     solid_pressure, _ = asperity_pressure(state.gap, contact.asperities)
-    creep = moment.creep
-    if case.viscoelasticity:
-        creep = creep_kept + slow * relaxing / (1.0 + relaxing) * contact.body.deflection(
-            state.pressure + solid_pressure
-        )
+    deflected = contact.body.deflection(state.pressure + solid_pressure)
+    creep = kept[:, None] * start.creep + np.outer(shares * (1.0 - kept), deflected)
     before = None if wall_film is not None else StepBefore(_thickness(moment), moment.creep, step, velocity)
     after = TransientState(time, position, lag, state, wall_film, creep, before)
     return after, _forces(model, after, at_end), done.iterations, defect
+
+
+def _creep(case: LubricationCase) -> tuple[FloatArray, FloatArray]:
+    """Shares of the compliance that creep, and their times [s]; both empty for an elastic seal."""
+    parts = case.viscoelasticity.creep if case.viscoelasticity else ()
+    shares, times = np.array(parts, dtype=np.float64).reshape(-1, 2).T
+    return shares, times
 
 
 def _thickness(moment: TransientState) -> FloatArray:

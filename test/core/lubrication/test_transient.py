@@ -143,6 +143,28 @@ def test_starved_film_is_neither_made_nor_lost():
         assert moment.wall_film.volume.min() >= -1e-20
 
 
+def test_creep_in_decades_has_the_whole_compliance_in_equal_shares():
+    parts = Viscoelasticity(stiffening=3.0, relaxation_time=0.01, decades=3).creep
+    assert [time for _, time in parts] == pytest.approx([0.01, 0.1, 1.0, 10.0])
+    assert {share for share, _ in parts} == {0.75 / 4}
+
+
+@pytest.mark.parametrize('decades', [0, 1, 2])
+def test_a_seal_that_creeps_at_once_is_the_elastic_one(decades):
+    fast = dataclasses.replace(INNER, viscoelasticity=Viscoelasticity(relaxation_time=1e-6, decades=decades))
+    assert findings(done(fast)).friction == pytest.approx(findings(done(INNER)).friction, rel=0.01)
+
+
+def test_slow_decades_of_creep_raise_the_friction_after_a_control_edge_more():
+    after = [
+        findings(
+            done(dataclasses.replace(EDGE, viscoelasticity=Viscoelasticity(relaxation_time=0.01, decades=d)))
+        ).after_edge
+        for d in (0, 2)
+    ]
+    assert after[0] < after[1]
+
+
 def test_viscoelastic_seal_rubs_more_after_a_control_edge_and_no_more_without_one():
     stiffer = Viscoelasticity(stiffening=1.0, relaxation_time=0.3)
     after_edge = [
