@@ -158,11 +158,24 @@ def _write_case_page(
     out: Path, template: str, plots: list[Plot], case: LubricationCase, **values: Any
 ) -> tuple[Path, ...]:
     """Write a page with the parameters of a case."""
-    parts = [(part.name, getattr(case, part.name)) for part in dataclasses.fields(case)]
-    rows = [row for name, part in parts if dataclasses.is_dataclass(part) for row in parameter_rows(part, f'{name}.')]
-    table = Table(PARAMETER_HEADS, rows, (0, 2, 3))
+    table = Table(PARAMETER_HEADS, _parameter_rows(case), (0, 2, 3))
     head = head_of(f'ehl run {case.name}', 'computed, no measured data')
     return write_page(out, template, plots, head=head, case=case, parameter_table=table, **values)
+
+
+_NOT_OF_A_RING = ('groove.', 'air.', 'numerics.film_width', 'numerics.time_step', 'study.')
+
+
+def _parameter_rows(case: LubricationCase) -> list[tuple[Any, ...]]:
+    """Rows of all parameters that act in a case; of a ring, its drawing in the place of a profile."""
+    parts = [(part.name, getattr(case, part.name)) for part in dataclasses.fields(case)]
+    rows = [row for name, part in parts if dataclasses.is_dataclass(part) for row in parameter_rows(part, f'{name}.')]
+    if case.oring is None:
+        return rows
+    acting = [row for row in rows if not row[0].startswith(_NOT_OF_A_RING)]
+    acting = [row for row in acting if not row[0].startswith('seal.') or row[0] == 'seal.solid_shear_stress']
+    drawn = ('geometry', 'groove', 'rubber', 'numerics')
+    return acting + [row for name in drawn for row in parameter_rows(getattr(case.oring, name), f'oring.{name}.')]
 
 
 # -- figures ----------------------------------------------------------------------------------------------------------

@@ -87,8 +87,16 @@ class ReportSummary:
 def parameter_rows(record: Any, prefix: str = '') -> list[tuple[Any, ...]]:
     """Name, value, unit and meaning of each described field of a record, for a `Table` with `PARAMETER_HEADS`."""
     values = {name: getattr(record, name) for name in meanings(record)}
-    shown = {name: f'{value:.10g}' if isinstance(value, float) else value for name, value in values.items()}
+    shown = {name: _shown(value) for name, value in values.items()}
     return [(prefix + name, shown[name], known.unit, known.description) for name, known in meanings(record).items()]
+
+
+def _shown(value: Any) -> Any:
+    if isinstance(value, float):
+        return f'{value:.10g}'
+    if isinstance(value, tuple) and len(value) > 3 and all(isinstance(number, float) for number in value):
+        return f'{len(value)} values, {min(value):g} to {max(value):g}'
+    return value
 
 
 @cache

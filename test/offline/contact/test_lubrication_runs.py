@@ -133,21 +133,26 @@ def test_map_does_not_overwrite_a_seal_file(small, tmp_path, capsys):
 
 
 @pytest.mark.renders
-def test_every_command_of_the_page_is_one(small, tmp_path, capsys, monkeypatch):
+def test_every_command_of_the_page_is_one(small, ring, tmp_path, capsys, monkeypatch):
     """With a small case instead of those of the page, so that it takes no longer than it must."""
     monkeypatch.chdir(tmp_path)
     Path('build').mkdir()
     Path('spool.yaml').write_text('name: spool\nmotion: {distance: 1.8e-3, cycles: 1}\nseals: [{case: small}]\n')
-    swapped = {'inner_seal': small, 'spool': 'spool.yaml', 'BAG': str(measured_bag(tmp_path, with_position=True))}
+    swapped = {
+        'oring_ms28775_114': str(ring),
+        'inner_seal': small,
+        'spool': 'spool.yaml',
+        'BAG': str(measured_bag(tmp_path, with_position=True)),
+    }
     blocks = re.findall(r'```bash\n(.*?)```', (ROOT / 'docs' / 'ehl.md').read_text(), re.DOTALL)
     lines = [line for block in blocks for line in block.splitlines()]
-    assert len(lines) == 5
+    assert len(lines) == 6
     for line in lines:
         program, *words = line.split()
         assert program == '.venv/bin/seal_friction'
         assert main([*(swapped.get(word, word) for word in words), '--jobs', '1']) == 0, line
     pages = {path.stem: path.read_text() for path in Path('build').glob('*.html')}
-    assert pages.keys() == {'inner_seal', 'spool', 'study', 'map', 'compared'}
+    assert pages.keys() == {'inner_seal', 'spool', 'study', 'map', 'compared', 'from_drawing'}
     assert 'Findings' in pages['inner_seal']
     assert 'grease.flow_index' in pages['inner_seal']
     assert 'simulation_against_measurement' in pages['compared']
@@ -159,7 +164,7 @@ def test_every_command_of_the_page_is_one(small, tmp_path, capsys, monkeypatch):
 
 def test_every_script_of_the_page_is_one():
     scripts = set(re.findall(r'`python ([^` ]*)', (ROOT / 'docs' / 'ehl.md').read_text()))
-    assert scripts == {'bench/ehl.py', 'test/system/lubrication_findings.py'}
+    assert scripts == {'bench/ehl.py', 'test/system/lubrication_findings.py', 'test/system/oring_map.py'}
     assert all((ROOT / script).is_file() for script in scripts)
 
 
@@ -193,7 +198,10 @@ def ring(tmp_path: Path) -> Path:
 
 def test_an_o_ring_becomes_a_seal_file_from_its_drawing_that_the_node_takes(ring, tmp_path, capsys):
     written = tmp_path / 'from_drawing.yaml'
-    found = answer(capsys, 'map', str(ring), '--seal-file', str(written))
+    page = tmp_path / 'map.html'
+    found = answer(capsys, 'map', str(ring), '--seal-file', str(written), '--out', str(page))
+    assert 'oring.geometry.section_diameter' in page.read_text()
+    assert 'seal.interference' not in page.read_text()
     table = np.array(found['friction_N'])
     assert (np.diff(table, axis=0) > 0.0).all()
     seal = parse_seal(read_yaml(written))
