@@ -10,7 +10,7 @@ away).
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import diags_array
+from scipy.sparse import dia_array
 from scipy.sparse.linalg import splu
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
@@ -99,7 +99,9 @@ def _displacement(
     if balance is None:
         raise NotConvergedError('sliding_face: an element is inverted')
     assembly = make_assembly(model)
-    matrix = stiffness_matrix(assembly, balance.entries) + diags_array(springs[assembly.free])
+    size = len(assembly.free)
+    held = dia_array((springs[None, assembly.free], np.zeros(1, int)), shape=(size, size))
+    matrix = stiffness_matrix(assembly, balance.entries) + held
     try:
         moved: FloatArray = splu(matrix.tocsc()).solve(loads[assembly.free])
     except RuntimeError as error:
