@@ -253,8 +253,14 @@ def at_least_one(text: str) -> int:
 # -- output -----------------------------------------------------------------------------------------------------------
 
 
-def print_result(arguments: argparse.Namespace, numbers: Any, summary: str, code: int = SUCCESS) -> int:
-    """Print the summary and what was written, or with ``--json`` the numbers and the rest on stderr; the exit code."""
+def print_result(
+    arguments: argparse.Namespace, numbers: Any, summary: str, code: int = SUCCESS, errors: Sequence[str] = ()
+) -> int:
+    """Print the summary and what was written, or with ``--json`` the numbers and the rest on stderr; then the errors.
+
+    Returns:
+        The exit code.
+    """
     values = vars(arguments)
     written = [text for name, kind in arguments.targets.items() if (text := written_text(values[name], kind))]
     summary = '\n'.join([*([summary] if summary else []), *written])
@@ -264,6 +270,8 @@ def print_result(arguments: argparse.Namespace, numbers: Any, summary: str, code
         print(summary, file=sys.stderr)
     else:
         print(summary)
+    for error in errors:
+        print_error(error)
     return code
 
 

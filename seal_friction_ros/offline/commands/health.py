@@ -28,8 +28,9 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Follow the bags in order of time."""
     from seal_friction_ros.offline.replay.bag_health import health_of_bags
+    from seal_friction_ros.offline.replay.health_indicators import Limits
     from seal_friction_ros.offline.replay.replay import chosen_configuration
-    from seal_friction_ros.offline.reports.health_report import Limits, write_health_report
+    from seal_friction_ros.offline.reports.health_report import write_health_report
 
     override = chosen_configuration(arguments.params, arguments.seal)
     workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
@@ -39,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     seen.sort(key=lambda pair: pair[0].time[0] if len(pair[0].time) else 0.0)
     limits = Limits(arguments.scale_low, arguments.scale_high, arguments.breakaway, arguments.noise)
     if not seen:
-        return _told(errors)
+        return cli.print_result(arguments, {'bags': [], 'errors': errors}, '', cli.UNUSABLE, errors)
     names = [str(bag) for _, bag in seen]
     summary = write_health_report(names, [one for one, _ in seen], arguments.out, limits)
     lines = []
@@ -55,12 +56,5 @@ def run(arguments: argparse.Namespace) -> int:
         f'change: from {change["scale_before"]:.3f} to {change["scale_then"]:.3f} at {change["time_s"]:.3f} s'
         for change in summary.numbers['changes']
     ]
-    cli.print_result(arguments, {**summary.numbers, 'errors': errors}, '\n'.join(lines))
-    return _told(errors)
-
-
-def _told(errors: list[str]) -> int:
-    """Print why bags could not be used; the exit code."""
-    for error in errors:
-        cli.print_error(error)
-    return cli.UNUSABLE if errors else cli.SUCCESS
+    code = cli.UNUSABLE if errors else cli.SUCCESS
+    return cli.print_result(arguments, {**summary.numbers, 'errors': errors}, '\n'.join(lines), code, errors)

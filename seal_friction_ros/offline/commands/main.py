@@ -16,6 +16,7 @@ from seal_friction_ros.offline.commands import (
     compare,
     doctor,
     ehl,
+    fleet,
     health,
     identify,
     import_data,
@@ -41,7 +42,7 @@ from seal_friction_ros.packages import as_missing, needed
 GROUPS = {
     'replay': (info, replay, compare, recover, report, import_data),
     'identify': (identify, sheet, spool, seals, charts),
-    'watch': (monitor, topics, health, adapt),
+    'watch': (monitor, topics, health, fleet, adapt),
     'tune': (tune, servo),
     'compute': (oring, ehl),
     'machine': (new, doctor),

@@ -52,7 +52,5 @@ def _run_many(arguments: argparse.Namespace, override: Any) -> int:
         lines += [f'{bag}: {result.summary(verified=arguments.verify)}'] if result else []
     errors = [outcome.error for outcome in outcomes if outcome.error]
     identical = all(outcome.result is not None and outcome.result.identical for outcome in outcomes)
-    cli.print_result(arguments, {'bags': bags, 'identical': identical}, '\n'.join(lines))
-    for error in errors:
-        cli.print_error(error)
-    return cli.UNUSABLE if errors else cli.DIFFERENT if arguments.verify and not identical else cli.SUCCESS
+    code = cli.UNUSABLE if errors else cli.DIFFERENT if arguments.verify and not identical else cli.SUCCESS
+    return cli.print_result(arguments, {'bags': bags, 'identical': identical}, '\n'.join(lines), code, errors)

@@ -5,14 +5,14 @@ with its length.
 """
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
-from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, UnsuitedError, receive_all
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, Messages, UnsuitedError, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, LAYOUTS
 from seal_friction_ros.core.estimation.pipeline import init
@@ -55,6 +55,7 @@ def bag_health(
     namespace: str = '',
     override: Configuration | None = None,
     learnt: AdaptationState | None = None,
+    on_block: Callable[[Messages, Answers, Any], None] = lambda *_: None,
 ) -> BagHealth:
     """Health from one bag.
 
@@ -63,6 +64,8 @@ def bag_health(
         namespace: Use only topics below it.
         override: Configuration instead of the recorded one; its mode counts as observe.
         learnt: What was learnt from the bags before; None: nothing.
+        on_block: Called with each block of messages, the answers to them, and the estimates among these as a structured
+            array with the fields of `FrictionEstimate`.
 
     Raises:
         BagError: The bag cannot be read, or not in blocks.
@@ -71,7 +74,7 @@ def bag_health(
     starts: list[float] = []
     end, follower = learnt, _Starts()
     try:
-        for estimates, known in _observed(bag, namespace, override, learnt):
+        for estimates, known in _observed(bag, namespace, override, learnt, on_block):
             end = known
             changed = np.flatnonzero(np.diff(estimates['adaptation_scale'], prepend=np.nan))
             changed = changed[estimates['adaptation_scale_std'][changed] > 0.0]
@@ -148,7 +151,11 @@ class _Starts:
 
 
 def _observed(
-    bag: Path, namespace: str, override: Configuration | None, learnt: AdaptationState | None
+    bag: Path,
+    namespace: str,
+    override: Configuration | None,
+    learnt: AdaptationState | None,
+    on_block: Callable[[Messages, Answers, Any], None],
 ) -> Iterator[tuple[Any, AdaptationState]]:
     """Estimates of each block, as a structured array, and the state of the adaptation after it."""
     configuration = _observing(override or default_configuration())
@@ -170,6 +177,7 @@ def _observed(
                     parameters = _observing(snapshot.configuration).parameters()
             state, answers = receive_all(parameters, state, messages)
             estimates = _estimates(answers)
+            on_block(messages, answers, estimates)
             if len(estimates):
                 yield estimates, state.estimator.adaptation
 

@@ -18,9 +18,9 @@ from paths import ROOT
 COMMAND = [sys.executable, '-m', 'seal_friction_ros']
 CASE = """name: tiny
 motion: {cycles: 1}
-numerics: {cells: 32, time_step: 16.0e-3}
+numerics: {cells: 32, time_step: 50.0e-3}
 study: {solid_shear_stresses: [1.0e+6, 2.0e+6]}
-map: {velocity_min: 1.0e-3, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+5, pressures: 2}
+map: {velocity_min: 2.0e-2, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+5, pressures: 2}
 """
 
 
