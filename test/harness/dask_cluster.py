@@ -14,8 +14,8 @@ from paths import ROOT
 
 PATIENCE = 60.0  # [s] for a process of Dask to start, beside busy ones
 ONE_THREAD = dict.fromkeys(('OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'OMP_NUM_THREADS'), '1')
-ENVIRONMENT = {**os.environ, **ONE_THREAD, 'NUMBA_DISABLE_JIT': '1', 'PYTHONPATH': str(ROOT / 'test')}
-"""of everything here: nothing is compiled, which would take longer than the work"""
+ENVIRONMENT = {**os.environ, **ONE_THREAD, 'PYTHONPATH': str(ROOT / 'test')}
+"""of everything here"""
 
 
 class DaskCluster(NamedTuple):

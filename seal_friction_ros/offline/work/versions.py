@@ -7,9 +7,9 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from seal_friction_ros import core, offline
 from seal_friction_ros.files import package_version
 
+_PACKAGE = Path(__file__).parents[2]
 _LIBRARIES = ('numpy', 'scipy', 'numba')
 
 
@@ -17,10 +17,8 @@ _LIBRARIES = ('numpy', 'scipy', 'numba')
 def versions() -> Mapping[str, str]:
     """Version by name; that of this package has a digest of its source, an absent library has the version ``none``."""
     digest = hashlib.sha256()
-    for ring in (core, offline):
-        folder = Path(str(ring.__file__)).parent
-        for source in sorted(folder.rglob('*.py')):
-            digest.update(f'{source.relative_to(folder)} '.encode() + source.read_bytes())
+    for source in sorted(one for ring in ('core', 'offline') for one in (_PACKAGE / ring).rglob('*.py')):
+        digest.update(f'{source.relative_to(_PACKAGE)} '.encode() + source.read_bytes())
     own = f'{package_version()} (source {digest.hexdigest()[:12]})'
     major, minor, _ = platform.python_version_tuple()
     return {'seal_friction_ros': own, 'Python': f'{major}.{minor}', **{name: _version(name) for name in _LIBRARIES}}

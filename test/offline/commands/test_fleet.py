@@ -15,7 +15,7 @@ from seal_friction_ros.offline.replay import bag_summary as module
 
 @pytest.fixture(scope='module')
 def fleet(tmp_path_factory) -> Path:
-    """A good bag, one without estimates, a garbage file, a cut bag, a folder that says it is a bag; some are unicode."""
+    """A good bag, one without estimates, a garbage file, a cut bag, a folder that says it is a bag."""
     folder = tmp_path_factory.mktemp('fleet') / 'bags'
     (folder / 'rig ä').mkdir(parents=True)
     recorded = write_recorded(folder.parent, default_configuration())

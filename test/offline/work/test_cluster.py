@@ -15,6 +15,7 @@ from harness.dask_cluster import ENVIRONMENT, DaskCluster, begun, dask_cluster, 
 from harness.example_bags import default_configuration, write_inputs, write_recorded
 from paths import ROOT
 
+pytest.importorskip('distributed')
 COMMAND = [sys.executable, '-m', 'seal_friction_ros']
 CASE = """name: tiny
 motion: {cycles: 1}
@@ -82,6 +83,30 @@ def test_bags_are_replayed_to_the_same_bytes_on_a_cluster_also_by_relative_paths
     assert here == done(*words, '--scheduler', cluster.address, folder=tmp_path)
     assert (here[0], here[2].count('nothing: not a rosbag2 bag')) == (2, 1)
     assert [bag.get('identical') for bag in json.loads(here[1])['bags']] == [False] * 5 + [True, None]
+
+
+def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
+    (tmp_path / 'bags').mkdir()
+    for number in range(2):
+        (tmp_path / f'{number}').mkdir()
+        bag = write_recorded(tmp_path / f'{number}', default_configuration())
+        shutil.copytree(bag, tmp_path / 'bags' / f'bag {number}')
+    (tmp_path / 'bags' / 'garbage.mcap').write_bytes(b'garbage')
+    health = ['health', 'bags/bag 0', 'bags/bag 1', 'bags/garbage.mcap', '--out', 'page.html']
+    fleet = ['fleet', 'bags', '--out', 'page.html', '--work', 'work']
+    for words in (health, fleet):
+        found = []
+        for workers in (['--scheduler', cluster.address], ['--workers', '1']):
+            said = done(*COMMAND, *words, '--json', *workers, folder=tmp_path)
+            page = (tmp_path / 'page.html').read_text()
+            assert ' '.join(workers) in page
+            found.append((said, page.replace(' '.join(workers), '')))
+            (tmp_path / 'page.html').unlink()
+            for made in ('work', 'page_figures'):
+                shutil.rmtree(tmp_path / made, ignore_errors=True)
+        assert found[0] == found[1]
+        assert found[0][0][0] == 2
+        assert found[0][0][2].count('seal_friction: bags/garbage.mcap: ') == 1
 
 
 def test_a_study_and_a_map_are_the_same_on_a_cluster(cluster, tmp_path):
