@@ -31,13 +31,15 @@ def find_bags(where: Path) -> list[Path]:
 
 
 def _below(folder: Path) -> Iterator[Path]:
-    """Every bag folder, and every bag file outside of one; links to folders are not followed."""
-    for place, folders, files in os.walk(folder):
+    """Every bag folder, every bag file outside of one, and every folder that cannot be read; no link to a folder."""
+    unreadable: list[OSError] = []
+    for place, folders, files in os.walk(folder, onerror=unreadable.append):
         if 'metadata.yaml' in files:
             folders.clear()
             yield Path(place)
         else:
             yield from (Path(place, file) for file in files if Path(file).suffix in _FILES)
+    yield from (Path(str(error.filename)) for error in unreadable)
 
 
 def _listed(file: Path) -> Iterator[Path]:

@@ -263,7 +263,7 @@ def print_result(
     """
     values = vars(arguments)
     written = [text for name, kind in arguments.targets.items() if (text := written_text(values[name], kind))]
-    summary = '\n'.join([*([summary] if summary else []), *written])
+    summary = '\n'.join([*([summary] if summary else []), *written]).encode(errors='backslashreplace').decode()
     show_status('')
     if arguments.json:
         print(json.dumps(json_value(numbers), allow_nan=False))

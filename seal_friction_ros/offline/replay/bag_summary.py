@@ -64,7 +64,7 @@ def bag_summary(bag: Path, namespace: str = '', override: Configuration | None =
     Raises:
         BagError: The bag cannot be read.
     """
-    result = verify(bag, override, namespace)
+    result = verify(bag, override, namespace, bulk_from=0)  # the health takes the compiled estimator, too
     replayed = IDENTICAL if result.identical else DIFFERENT if result.recorded_estimates else NOTHING_RECORDED
     levels, why = _Levels(), ''
     try:

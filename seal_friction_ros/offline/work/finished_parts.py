@@ -56,8 +56,11 @@ def input_digest(path: Path) -> str:
     """Digest of the content of a file, or of the files in a folder with their names.
 
     Raises:
+        ValueError: It is neither a file nor a folder.
         OSError: It cannot be read.
     """
+    if not path.is_dir() and not path.is_file():  # a device may have no end
+        raise ValueError(f'{path}: neither a file nor a folder')
     digest = hashlib.sha256()
     for file in sorted(one for one in path.iterdir() if one.is_file()) if path.is_dir() else [path]:
         with file.open('rb') as content:

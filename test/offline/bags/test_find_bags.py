@@ -1,5 +1,6 @@
 """The bags of a folder or of a list, each once; what is no list is one line."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,13 @@ def test_what_is_no_list_is_one_line(content, tmp_path):
         find_bags(tmp_path / 'list')
     assert '\n' not in str(caught.value)
     assert str(caught.value).isprintable()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason='root reads everything')
+def test_a_folder_that_cannot_be_read_is_not_left_out(fleet):
+    (fleet / 'b').chmod(0)
+    assert fleet / 'b' in find_bags(fleet)
+    (fleet / 'b').chmod(0o755)
 
 
 def test_an_empty_folder_is_one_line(tmp_path):

@@ -107,6 +107,21 @@ def test_the_table_has_a_row_for_each_bag_and_pressure_level(fleet, tmp_path, ca
     assert out.read_bytes()
 
 
+def test_names_that_are_no_text_and_devices_are_rows_like_others(tmp_path, capsys):
+    name = os.fsencode(tmp_path) + b'/bags/\xff\xfe.mcap'
+    (tmp_path / 'bags').mkdir()
+    Path(os.fsdecode(name)).write_bytes(b'garbage')
+    os.mkfifo(tmp_path / 'bags' / 'fifo.mcap')
+    (tmp_path / 'bags' / 'zero.mcap').symlink_to('/dev/zero')
+    code = main(['fleet', str(tmp_path / 'bags'), '--out', str(tmp_path / 'f.html'), '--work', str(tmp_path / 'work')])
+    said = capsys.readouterr()
+    assert code == 2
+    assert '3 bags: 0 good, 0 look, 3 bad' in said.out
+    assert (
+        checked_page(tmp_path / 'f.html').texts['p.said'][0].startswith('Bad: 3 of 3 bags are bad, 3 of them damaged')
+    )
+
+
 @pytest.mark.parametrize('content', [None, b'', b'\x00\xff\x89', b'# nothing\n'])
 def test_what_is_no_fleet_is_one_line_and_nothing_is_written(content, tmp_path, capsys):
     where = tmp_path / 'where'
