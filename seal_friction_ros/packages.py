@@ -15,8 +15,10 @@ OPTIONAL = {
     'lz4': 'python3-lz4',
     'rich': 'python3-rich',
     'argcomplete': 'python3-argcomplete',
+    'distributed': '',
+    'pyarrow': '',
 }
-"""Module, which is also its name on PyPI -> package of Debian and Ubuntu."""
+"""Module, which is also its name on PyPI -> package of Debian and Ubuntu; empty: there is none that we tested."""
 
 
 class MissingPackageError(ValueError):
@@ -40,5 +42,10 @@ def as_missing(error: ModuleNotFoundError) -> Exception:
     package = (error.name or '').partition('.')[0]
     if package not in OPTIONAL:
         return error
-    text = f'{package} is not installed: apt-get install {OPTIONAL[package]}, or pip install {package}'
-    return MissingPackageError(text)
+    return MissingPackageError(f'{package} is {how_to_install(package)}')
+
+
+def how_to_install(package: str) -> str:
+    """That an optional package is not installed, and how to install it."""
+    system = f'apt-get install {OPTIONAL[package]}, or ' if OPTIONAL[package] else ''
+    return f'not installed: {system}pip install {package}'

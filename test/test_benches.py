@@ -72,6 +72,14 @@ def test_the_lubricated_contact_is_timed_by_grid_and_step(tmp_path):
     assert found['estimator step, friction_map [us]'] > 0.0
 
 
+def test_a_fleet_is_timed_by_step_and_number_of_bags():
+    found = run_json('bench/scale.py', '--seconds', '2', '--bags', '2')
+    hour = found['an hour']
+    assert hour['bytes [MB/h]']['recorded'] > hour['bytes [MB/h]']['inputs'] > 100.0
+    assert min(step['time [s/h]'] for step in hour['steps'].values()) > 0.0
+    assert {len(rows) for rows in found['bags'].values()} == {1}
+
+
 def test_every_bench_is_run_here():
     benches = {path.name for path in (ROOT / 'bench').glob('*.py')} - {'one_core.py'}
     source = (ROOT / 'test' / 'test_benches.py').read_text()

@@ -15,6 +15,7 @@ class Page(HTMLParser):
 
     def __init__(self, path: Path):
         super().__init__()
+        self.is_sortable = False
         self.path, self.links, self.tags, self.figures, self.tables = path, [], [], [], []
         self.texts: dict[str, list[str]] = {}
         self._open: list[list[str]] = []
@@ -23,7 +24,9 @@ class Page(HTMLParser):
     def handle_starttag(self, tag, attrs):
         attributes = dict(attrs)
         self.tags.append(tag)
-        self.links += [value for name, value in attrs if name in LOADED]
+        if tag != 'a':  # a link that somebody follows loads nothing
+            self.links += [value for name, value in attrs if name in LOADED]
+        self.is_sortable |= attributes.get('class') == 'sortable'
         if tag == 'figure':
             self.figures.append(attributes['id'])
         if tag == 'table':
@@ -66,7 +69,7 @@ class Page(HTMLParser):
         assert self.links
         assert all(link.startswith('data:image/svg+xml;base64,') for link in self.links)
         assert set(self.tags).isdisjoint(FOREIGN - {'meta'})
-        assert self.tags.count('script') == len(self.figures) + bool(self.figures)
+        assert self.tags.count('script') == len(self.figures) + bool(self.figures) + self.is_sortable
         style = self.texts['style'][0]
         assert 'url(' not in style
         assert '@import' not in style

@@ -13,7 +13,7 @@ from harness.processes import STOP_TIMEOUT, free_domain, graph_environment
 from paths import ROOT
 
 from seal_friction_ros.offline.bags.bag import bag_topics
-from seal_friction_ros.packages import OPTIONAL
+from seal_friction_ros.packages import OPTIONAL, how_to_install
 
 WITHOUT = [sys.executable, str(ROOT / 'test' / 'harness' / 'without.py')]
 NOT_OF_A_DISTRIBUTION = ('mcap', 'rosbags')
@@ -69,13 +69,16 @@ def test_replay_compare_and_info_need_numpy_and_yaml_alone(tmp_path: Path):
         ('scipy', ['tune', '--out', '{}.yaml']),
         ('zstandard', ['info', 'test/corpus/mcap/zstd']),
         ('lz4', ['info', 'test/corpus/mcap/lz4']),
+        ('distributed', ['replay', PULL_TEST, '--scheduler', 'tcp://127.0.0.1:1']),
+        ('pyarrow', ['fleet', 'bags', '--out', '{}.html', '--parquet', '{}.parquet']),
     ],
 )
 def test_a_command_that_lacks_a_package_says_which_and_how_to_install_it(package, arguments, tmp_path: Path):
     result = command(package, *(argument.format(tmp_path / 'out') for argument in arguments))
     assert result.returncode == 2, result.stderr
     assert result.stderr.count('\n') == 1
-    assert f'{package} is not installed: apt-get install {OPTIONAL[package]}, or pip install {package}' in result.stderr
+    assert f'{package} is {how_to_install(package)}' in result.stderr
+    assert OPTIONAL[package] in result.stderr
     assert not list(tmp_path.iterdir())
 
 

@@ -8,12 +8,16 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from seal_friction_ros.core.foundation.parameters import meant
 from seal_friction_ros.offline.work.status import show_status
 from seal_friction_ros.offline.work.targets import PAGE, Kind, checked_targets
 from seal_friction_ros.packages import needed
+
+if TYPE_CHECKING:
+    from seal_friction_ros.offline.work.executor import Workers
+    from seal_friction_ros.offline.work.finished_parts import Kept
 
 _OF_A_PAGE = ('matplotlib', 'jinja2')
 SUCCESS, DIFFERENT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
@@ -147,16 +151,52 @@ def add_configuration(parser: argparse.ArgumentParser) -> None:
 
 
 def add_workers(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option for the number of worker processes; ``what`` each of them works on."""
+    """Add the options for who computes; ``what`` each of the workers works on."""
     text = f'{what} at a time, one process each; default: number of cores'
-    parser.add_argument('--workers', '--jobs', type=at_least_one, metavar='N', help=text)
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument('--workers', '--jobs', type=at_least_one, metavar='N', help=text)
+    group.add_argument('--scheduler', metavar='ADDRESS', help='compute on the Dask cluster with this scheduler')
+    parser.add_argument(
+        '--scheduler-tls', type=Path, nargs=3, metavar=('CA', 'CERT', 'KEY'), help='its certificates, PEM files'
+    )
 
 
-def number_of_workers(arguments: argparse.Namespace) -> int:
-    """Number of worker processes: as given, else the number of cores."""
+def workers_of(arguments: argparse.Namespace) -> 'Workers':
+    """Who computes: the cluster or the number of processes as given, else as many processes as there are cores.
+
+    Raises:
+        ValueError: The address of the cluster is none.
+    """
+    from seal_friction_ros.offline.work.cluster import Cluster
     from seal_friction_ros.offline.work.executor import available_cores
 
+    if arguments.scheduler is not None:
+        return Cluster(arguments.scheduler, tuple(arguments.scheduler_tls) if arguments.scheduler_tls else None)
+    if arguments.scheduler_tls:
+        raise ValueError('--scheduler-tls is only for a --scheduler')
     return arguments.workers or available_cores()
+
+
+def add_work(parser: argparse.ArgumentParser, *, has_failures: bool = True) -> None:
+    """Add the option for the folder of finished parts, and for those that failed if they are kept, too."""
+    help_text = 'keep finished parts in this folder, and resume from them'
+    parser.add_argument('--work', type=Path, metavar='FOLDER', help=help_text)
+    if has_failures:
+        help_text = 'with --work: try again what failed before'
+        parser.add_argument('--retry-failed', action='store_true', help=help_text)
+
+
+def kept_in(arguments: argparse.Namespace) -> 'Kept':
+    """Where finished parts are kept, as given.
+
+    Raises:
+        ValueError: An option is for a folder that is not given.
+    """
+    from seal_friction_ros.offline.work.finished_parts import Kept
+
+    if arguments.retry_failed and arguments.work is None:
+        raise ValueError('--retry-failed is only for a --work FOLDER')
+    return Kept(arguments.work, arguments.retry_failed)
 
 
 def checked(arguments: argparse.Namespace) -> AbstractContextManager[None]:
@@ -213,17 +253,25 @@ def at_least_one(text: str) -> int:
 # -- output -----------------------------------------------------------------------------------------------------------
 
 
-def print_result(arguments: argparse.Namespace, numbers: Any, summary: str, code: int = SUCCESS) -> int:
-    """Print the summary and what was written, or with ``--json`` the numbers and the rest on stderr; the exit code."""
+def print_result(
+    arguments: argparse.Namespace, numbers: Any, summary: str, code: int = SUCCESS, errors: Sequence[str] = ()
+) -> int:
+    """Print the summary and what was written, or with ``--json`` the numbers and the rest on stderr; then the errors.
+
+    Returns:
+        The exit code.
+    """
     values = vars(arguments)
     written = [text for name, kind in arguments.targets.items() if (text := written_text(values[name], kind))]
-    summary = '\n'.join([*([summary] if summary else []), *written])
+    summary = '\n'.join([*([summary] if summary else []), *written]).encode(errors='backslashreplace').decode()
     show_status('')
     if arguments.json:
         print(json.dumps(json_value(numbers), allow_nan=False))
         print(summary, file=sys.stderr)
     else:
         print(summary)
+    for error in errors:
+        print_error(error)
     return code
 
 

@@ -41,8 +41,7 @@ def add_parser(commands: Any) -> None:
         cli.add_workers(step, 'runs')
         cli.add_page(step, required=False)
     for step in (study, chart):
-        help_text = 'keep finished parts in this folder, and resume from them'
-        step.add_argument('--work', type=Path, metavar='FOLDER', help=help_text)
+        cli.add_work(step, has_failures=False)
 
 
 def run_case(arguments: argparse.Namespace) -> int:
@@ -59,7 +58,7 @@ def run_case(arguments: argparse.Namespace) -> int:
     if isinstance(case, Spool):
         if arguments.bag is not None:
             raise ValueError(f'{arguments.case}: a spool cannot be compared with a bag: take the case of one seal')
-        spool = runs.run_spool(case, arguments.case, cli.number_of_workers(arguments))
+        spool = runs.run_spool(case, arguments.case, cli.workers_of(arguments))
         return _finish(
             arguments, spool, lambda page: report.write_spool_page(case.name, spool.result, spool.labels, page)
         )
@@ -86,7 +85,7 @@ def run_study(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.reports.lubrication_report import write_study_page
 
     case = runs.single_case(arguments.case, 'study')
-    study = runs.run_study(case, cli.number_of_workers(arguments), arguments.work)
+    study = runs.run_study(case, cli.workers_of(arguments), arguments.work)
     return _finish(arguments, study, lambda page: write_study_page(case, study, page))
 
 
@@ -97,7 +96,7 @@ def run_map(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.work.seal_writer import write_seal
 
     case = runs.single_case(arguments.case, 'friction map')
-    computed = runs.run_map(case, cli.number_of_workers(arguments), arguments.work)
+    computed = runs.run_map(case, cli.workers_of(arguments), arguments.work)
     numbers, summary = _with_page(arguments, computed, lambda page: write_map_page(computed, page))
     if arguments.seal_file is not None:
         document = runs.seal_document(computed, arguments.seal_file.stem)

@@ -18,6 +18,7 @@ def add_parser(commands: Any) -> None:
     cli.add_namespace(parser)
     cli.add_page(parser, required=False)
     cli.add_workers(parser, 'bags')
+    cli.add_work(parser)
     parser.add_argument('--scale-low', type=cli.non_negative, default=0.6, help='alarm below this scale (0.6)')
     parser.add_argument('--scale-high', type=cli.non_negative, default=1.5, help='alarm above this scale (1.5)')
     parser.add_argument('--breakaway', type=cli.non_negative, default=2.5, help='alarm above this start (2.5)')
@@ -27,14 +28,19 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Follow the bags in order of time."""
     from seal_friction_ros.offline.replay.bag_health import health_of_bags
+    from seal_friction_ros.offline.replay.health_indicators import Limits
     from seal_friction_ros.offline.replay.replay import chosen_configuration
-    from seal_friction_ros.offline.reports.health_report import Limits, write_health_report
+    from seal_friction_ros.offline.reports.health_report import write_health_report
 
     override = chosen_configuration(arguments.params, arguments.seal)
-    found = health_of_bags(arguments.bags, arguments.namespace, override, cli.number_of_workers(arguments))
-    seen = list(zip(found, arguments.bags, strict=True))
+    workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
+    outcomes = health_of_bags(arguments.bags, arguments.namespace, override, workers, kept)
+    errors = [outcome.error for outcome in outcomes if outcome.error]
+    seen = [(outcome.result, bag) for outcome, bag in zip(outcomes, arguments.bags, strict=True) if outcome.result]
     seen.sort(key=lambda pair: pair[0].time[0] if len(pair[0].time) else 0.0)
     limits = Limits(arguments.scale_low, arguments.scale_high, arguments.breakaway, arguments.noise)
+    if not seen:
+        return cli.print_result(arguments, {'bags': [], 'errors': errors}, '', cli.UNUSABLE, errors)
     names = [str(bag) for _, bag in seen]
     summary = write_health_report(names, [one for one, _ in seen], arguments.out, limits)
     lines = []
@@ -50,4 +56,5 @@ def run(arguments: argparse.Namespace) -> int:
         f'change: from {change["scale_before"]:.3f} to {change["scale_then"]:.3f} at {change["time_s"]:.3f} s'
         for change in summary.numbers['changes']
     ]
-    return cli.print_result(arguments, summary.numbers, '\n'.join(lines))
+    code = cli.UNUSABLE if errors else cli.SUCCESS
+    return cli.print_result(arguments, {**summary.numbers, 'errors': errors}, '\n'.join(lines), code, errors)

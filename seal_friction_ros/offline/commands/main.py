@@ -16,6 +16,7 @@ from seal_friction_ros.offline.commands import (
     compare,
     doctor,
     ehl,
+    fleet,
     health,
     identify,
     import_data,
@@ -34,13 +35,14 @@ from seal_friction_ros.offline.commands import (
     tune,
 )
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.outcome import THREAD_VARIABLES, error_text
 from seal_friction_ros.offline.work.status import as_typed, show_status
 from seal_friction_ros.packages import as_missing, needed
 
 GROUPS = {
     'replay': (info, replay, compare, recover, report, import_data),
     'identify': (identify, sheet, spool, seals, charts),
-    'watch': (monitor, topics, health, adapt),
+    'watch': (monitor, topics, health, fleet, adapt),
     'tune': (tune, servo),
     'compute': (oring, ehl),
     'machine': (new, doctor),
@@ -48,8 +50,8 @@ GROUPS = {
 
 # Before numpy is loaded: the last bits of a sum depend on the number of threads, and the long, narrow matrices of a fit
 # take many times longer with several threads.
-for _library in ('OPENBLAS', 'MKL', 'OMP'):
-    os.environ.setdefault(f'{_library}_NUM_THREADS', '1')
+for _variable in THREAD_VARIABLES:
+    os.environ.setdefault(_variable, '1')
 
 
 class _Version(argparse.Action):
@@ -110,8 +112,6 @@ def main(arguments: list[str] | None = None) -> int:
         cli.print_error(str(missing))
         return cli.UNUSABLE
     except (ValueError, OSError) as error:
-        from seal_friction_ros.offline.work.executor import error_text
-
         cli.print_error(error_text(error))
         return cli.UNUSABLE
     except KeyboardInterrupt:

@@ -17,6 +17,7 @@ def add_parser(commands: Any) -> None:
     )  # fmt: skip
     parser.add_argument('bags', type=Path, nargs='+', metavar='BAG')
     cli.add_workers(parser, 'bags')
+    cli.add_work(parser)
     cli.add_configuration(parser)
     cli.add_target(parser, '--out', BAG, metavar='BAG', help='write inputs and new estimates to this bag')
     cli.add_namespace(parser)
@@ -29,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
     override = chosen_configuration(arguments.params, arguments.seal)
-    if len(arguments.bags) > 1:
+    if len(arguments.bags) > 1 or arguments.scheduler or arguments.work:
         return _run_many(arguments, override)
     bag, namespace = arguments.bags[0], arguments.namespace
     result = replay(bag, override, arguments.out, namespace) if arguments.out else verify(bag, override, namespace)
@@ -42,15 +43,14 @@ def _run_many(arguments: argparse.Namespace, override: Any) -> int:
     from seal_friction_ros.offline.replay.parallel_replay import replay_many
 
     if arguments.out:
-        raise ValueError('--out is for one bag: replay several bags one by one')
-    outcomes = replay_many(arguments.bags, override, arguments.namespace, cli.number_of_workers(arguments))
+        raise ValueError('--out is for one bag on this machine: replay several bags one by one, without --work')
+    workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
+    outcomes = replay_many(arguments.bags, override, arguments.namespace, workers, kept)
     bags, lines = [], []
     for bag, (result, error) in zip(arguments.bags, outcomes, strict=True):
         bags.append({'bag': bag, **(result.numbers() if result else {'error': error})})
         lines += [f'{bag}: {result.summary(verified=arguments.verify)}'] if result else []
     errors = [outcome.error for outcome in outcomes if outcome.error]
     identical = all(outcome.result is not None and outcome.result.identical for outcome in outcomes)
-    cli.print_result(arguments, {'bags': bags, 'identical': identical}, '\n'.join(lines))
-    for error in errors:
-        cli.print_error(error)
-    return cli.UNUSABLE if errors else cli.DIFFERENT if arguments.verify and not identical else cli.SUCCESS
+    code = cli.UNUSABLE if errors else cli.DIFFERENT if arguments.verify and not identical else cli.SUCCESS
+    return cli.print_result(arguments, {'bags': bags, 'identical': identical}, '\n'.join(lines), code, errors)

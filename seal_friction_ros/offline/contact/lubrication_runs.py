@@ -40,7 +40,7 @@ from seal_friction_ros.core.lubrication.transient import (
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.work.executor import run_all
+from seal_friction_ros.offline.work.executor import Workers, run_all
 from seal_friction_ros.offline.work.finished_parts import Part, part_key, run_parts
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
@@ -204,13 +204,13 @@ class SpoolRun(NamedTuple):
         )
 
 
-def run_spool(spool: Spool, case_file: str, workers: int) -> SpoolRun:
+def run_spool(spool: Spool, case_file: str, workers: Workers) -> SpoolRun:
     """Run every distinct seal of a spool once and add the forces of all seals, all in the shortest of their time steps.
 
     Args:
         spool: The spool.
         case_file: Path or name of its file: the cases of its seals are looked for beside it, then in config/ehl.
-        workers: Seals at a time.
+        workers: Seals at a time, or a cluster.
 
     Raises:
         ValueError: A case cannot be read, or a step did not converge.
@@ -227,8 +227,8 @@ def run_spool(spool: Spool, case_file: str, workers: int) -> SpoolRun:
         numerics, motion = replace(case.numerics, time_step=shortest), replace(spool.motion, centre=member.shift)
         moved = replace(case, motion=motion, numerics=numerics)
         calls.append(partial(run_with_progress, moved, SpoolSealMotion(spool.motion, member)))
-    compile_for(calls[0].args[0])
-    results = dict(zip(distinct, run_all(spool.name, calls, workers), strict=True))
+    found = run_all(spool.name, calls, workers, prepare=partial(compile_for, calls[0].args[0]))
+    results = dict(zip(distinct, found, strict=True))
     return SpoolRun(spool, superposed(spool.members, [results[member] for member in spool.members]))
 
 
@@ -262,12 +262,12 @@ class StudyRuns(NamedTuple):
         )
 
 
-def run_study(case: LubricationCase, workers: int, work: Path | None = None) -> StudyRuns:
+def run_study(case: LubricationCase, workers: Workers, work: Path | None = None) -> StudyRuns:
     """Run a case with each solid shear stress of its study.
 
     Args:
         case: The case.
-        workers: Runs at a time.
+        workers: Runs at a time, or a cluster.
         work: Folder that keeps finished runs, so that an interrupted study resumes; None keeps none.
 
     Raises:
@@ -317,7 +317,7 @@ class MapRuns(NamedTuple):
         return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N'
 
 
-def run_map(case: LubricationCase, workers: int, work: Path | None = None) -> MapRuns:
+def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -> MapRuns:
     """Compute the friction map of a case; arguments and errors as `run_study`."""
     pressures = map_pressures(case.map).tolist()
     settings = asdict(case)

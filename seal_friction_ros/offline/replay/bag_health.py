@@ -5,15 +5,14 @@ with its length.
 """
 
 import dataclasses
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
-from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, UnsuitedError, receive_all
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, Messages, UnsuitedError, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, LAYOUTS
 from seal_friction_ros.core.estimation.pipeline import init
@@ -25,8 +24,11 @@ from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.block_reader import read_in_bulk
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.replay.bag_parts import try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations, kinds_of_topics
-from seal_friction_ros.offline.work.executor import run_all
+from seal_friction_ros.offline.work.executor import Workers
+from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
+from seal_friction_ros.offline.work.outcome import Outcome
 
 REST = 0.5  # [s] our choice: after a rest of this length a start counts as a breakaway
 START = 0.1  # [s] our choice: the friction of a start is the largest within this time
@@ -42,7 +44,10 @@ class BagHealth(NamedTuple):
     friction: FloatArray  # [N] Coulomb friction by the seal file
     noise: float  # [N] standard deviation of the residual at even speed, at the end; NaN if none was seen
     starts: FloatArray  # [-] largest friction of each start after a rest, over the Coulomb friction then
-    learnt: AdaptationState | None  # at the end; None if the bag has no estimate
+    learnt: AdaptationState | None = None  # at the end; None if the bag has no estimate, or it was not asked for
+
+
+_NAMES = tuple(name for name in BagHealth._fields if name != 'learnt')
 
 
 def bag_health(
@@ -50,6 +55,7 @@ def bag_health(
     namespace: str = '',
     override: Configuration | None = None,
     learnt: AdaptationState | None = None,
+    on_block: Callable[[Messages, Answers, Any], None] = lambda *_: None,
 ) -> BagHealth:
     """Health from one bag.
 
@@ -58,6 +64,8 @@ def bag_health(
         namespace: Use only topics below it.
         override: Configuration instead of the recorded one; its mode counts as observe.
         learnt: What was learnt from the bags before; None: nothing.
+        on_block: Called with each block of messages, the answers to them, and the estimates among these as a structured
+            array with the fields of `FrictionEstimate`.
 
     Raises:
         BagError: The bag cannot be read, or not in blocks.
@@ -66,7 +74,7 @@ def bag_health(
     starts: list[float] = []
     end, follower = learnt, _Starts()
     try:
-        for estimates, known in _observed(bag, namespace, override, learnt):
+        for estimates, known in _observed(bag, namespace, override, learnt, on_block):
             end = known
             changed = np.flatnonzero(np.diff(estimates['adaptation_scale'], prepend=np.nan))
             changed = changed[estimates['adaptation_scale_std'][changed] > 0.0]
@@ -92,16 +100,29 @@ def bag_health(
 
 
 def health_of_bags(
-    bags: Sequence[Path], namespace: str = '', override: Configuration | None = None, workers: int = 1
-) -> list[BagHealth]:
-    """`bag_health` of bags, ``workers`` of them at a time; the estimator is compiled once, before they begin.
+    bags: Sequence[Path],
+    namespace: str = '',
+    override: Configuration | None = None,
+    workers: Workers = 1,
+    kept: Kept = NOWHERE,
+) -> list[Outcome[BagHealth]]:
+    """`bag_health` of bags without ``learnt``, ``workers`` of them at a time; outcomes in the order of the bags.
+
+    The estimator is compiled once before the worker processes begin; a cluster compiles once for each of its workers.
 
     Raises:
-        BagError: A bag cannot be read, or not in blocks: the first of them.
+        ValueError: The work folder or the cluster cannot be used.
     """
-    compile_now(first_configurations(bags, namespace, override))
-    calls = [partial(bag_health, bag, namespace, override) for bag in bags]
-    return run_all(f'health of {len(bags)} bags', calls, workers)
+    outcomes = try_bags(
+        'health', bags, _NAMES, _values, (namespace, override), workers, kept,
+        lambda: compile_now(first_configurations(bags, namespace, override)),
+    )  # fmt: skip
+    return [Outcome(BagHealth(**one.result) if one.result else None, one.error) for one in outcomes]
+
+
+def _values(bag: Path, namespace: str, override: Configuration | None) -> dict[str, Any]:
+    found = bag_health(bag, namespace, override)._asdict()
+    return {name: found[name] for name in _NAMES}
 
 
 class _Starts:
@@ -130,7 +151,11 @@ class _Starts:
 
 
 def _observed(
-    bag: Path, namespace: str, override: Configuration | None, learnt: AdaptationState | None
+    bag: Path,
+    namespace: str,
+    override: Configuration | None,
+    learnt: AdaptationState | None,
+    on_block: Callable[[Messages, Answers, Any], None],
 ) -> Iterator[tuple[Any, AdaptationState]]:
     """Estimates of each block, as a structured array, and the state of the adaptation after it."""
     configuration = _observing(override or default_configuration())
@@ -152,6 +177,7 @@ def _observed(
                     parameters = _observing(snapshot.configuration).parameters()
             state, answers = receive_all(parameters, state, messages)
             estimates = _estimates(answers)
+            on_block(messages, answers, estimates)
             if len(estimates):
                 yield estimates, state.estimator.adaptation
 

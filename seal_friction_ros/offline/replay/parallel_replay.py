@@ -1,17 +1,22 @@
 """Replay of long bags, compiled, and of several bags in parallel."""
 
 from collections.abc import Sequence
+from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.offline.bags.bag import bag_topics
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
+from seal_friction_ros.offline.replay.bag_parts import try_bags
 from seal_friction_ros.offline.replay.machine_replay import is_machine_bag
 from seal_friction_ros.offline.replay.replay import count_messages, replay
-from seal_friction_ros.offline.work.executor import Outcome, try_all
+from seal_friction_ros.offline.work.executor import Workers, nothing
+from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
+from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.progress import progress
 
 BULK_FROM = 500_000
@@ -43,29 +48,42 @@ def verify(
 
 
 def replay_many(
-    bags: Sequence[Path], override: Configuration | None = None, namespace: str = '', workers: int = 1
+    bags: Sequence[Path],
+    override: Configuration | None = None,
+    namespace: str = '',
+    workers: Workers = 1,
+    kept: Kept = NOWHERE,
 ) -> list[Outcome[ReplayResult]]:
     """`verify` bags, ``workers`` of them at a time; outcomes in the order of the bags.
 
     If the bags together are long, the estimator is compiled before the worker processes begin, so that all of them
-    inherit it.
+    inherit it. A cluster compiles once for each of its workers.
+
+    Raises:
+        ValueError: The work folder or the cluster cannot be used.
     """
-    bulk_from = BULK_FROM
+    bulk_from, prepare = BULK_FROM, nothing
     if sum(map(_size, bags)) > _INPUT_SIZE * BULK_FROM and has_compiler():
-        from seal_friction_ros.offline.replay.compiled_replay import (  # noqa: PLC0415  loads the compiler
-            compile_now,
-            first_configurations,
-        )
-
-        compile_now(first_configurations(bags, namespace, override))
-        bulk_from = 0
-    calls = [partial(verify, bag, override, namespace, bulk_from=bulk_from) for bag in bags]
-    outcomes = try_all(f'replay {len(bags)} bags', calls, workers)
-    return [o._replace(error=_naming(bag, o.error)) if o.error else o for bag, o in zip(bags, outcomes, strict=True)]
+        bulk_from, prepare = 0, partial(_compile, bags, namespace, override)
+    call = partial(_verified, bulk_from=bulk_from)
+    outcomes = try_bags('replay', bags, _NAMES, call, (namespace, override), workers, kept, prepare)
+    return [Outcome(ReplayResult(**one.result) if one.result else None, one.error) for one in outcomes]
 
 
-def _naming(bag: Path, error: str) -> str:
-    return error if str(bag) in error else f'{bag}: {error}'
+_NAMES = tuple(field.name for field in fields(ReplayResult))
+
+
+def _verified(bag: Path, namespace: str, override: Configuration | None, *, bulk_from: int) -> dict[str, Any]:
+    return asdict(verify(bag, override, namespace, bulk_from=bulk_from))
+
+
+def _compile(bags: Sequence[Path], namespace: str, override: Configuration | None) -> None:
+    from seal_friction_ros.offline.replay.compiled_replay import (  # noqa: PLC0415  loads the compiler
+        compile_now,
+        first_configurations,
+    )
+
+    compile_now(first_configurations(bags, namespace, override))
 
 
 def _size(bag: Path) -> int:

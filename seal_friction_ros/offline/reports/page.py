@@ -128,13 +128,14 @@ def render_page(template: str, pictures: dict[str, bytes], plots: dict[str, Any]
         jinja2.UndefinedError: The template names a value that is not in ``values``.
     """
     encoded = {name: b64encode(svg).decode() for name, svg in pictures.items()}
-    shared = {'script': _script(), 'version': package_version(), 'MOST_OPEN': MOST_OPEN}
+    shared = {'script': script('plots'), 'version': package_version(), 'MOST_OPEN': MOST_OPEN}
     return environment().get_template(f'{template}.html').render(pictures=encoded, plots=plots, **shared, **values)
 
 
 @cache
-def _script() -> Markup:
-    return Markup((TEMPLATES / 'plots.js').read_text(encoding='utf-8'))  # noqa: S704  our own, without a value in it
+def script(name: str) -> Markup:
+    """A script of ``templates/``, by name without suffix."""
+    return Markup((TEMPLATES / f'{name}.js').read_text(encoding='utf-8'))  # noqa: S704  our own, without a value in it
 
 
 def write_page(

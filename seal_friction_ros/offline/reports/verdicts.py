@@ -4,7 +4,7 @@ GOOD: the result can be used. LOOK: it can be used once the reason has been look
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.friction_change import REFERENCE_REVERSALS
@@ -160,6 +160,25 @@ def of_health(alarms: Sequence[str], changes: int, reversals: int) -> Verdict:
         times = 'once' if changes == 1 else f'{changes} times'
         return Verdict(LOOK, f'The friction has changed {times}.', 'find out what was done then; see the dashed lines.')
     return Verdict(GOOD, 'No alarm, and the friction has not changed.', 'nothing; look again after the next runs.')
+
+
+def of_fleet(counts: Mapping[str, int], damaged: int, name: str, why: str) -> Verdict:
+    """Verdict on a fleet.
+
+    Args:
+        counts: Number of bags by level.
+        damaged: Number of bags that cannot be read.
+        name: Of the first bag that is not good; empty if all are.
+        why: It is not good.
+    """
+    total = sum(counts.values())
+    if not name:
+        return Verdict(GOOD, f'All {total} bags are good.', 'nothing; look again after the next recordings.')
+    text = (
+        f'{counts[BAD]} of {total} bags are bad, {damaged} of them damaged; {counts[LOOK]} to look at. {name}: {why}.'
+    )
+    after = 'sort by what you look for; seal_friction report BAG --out PAGE.html shows a bag in full.'
+    return Verdict(BAD if counts[BAD] else LOOK, text, after)
 
 
 def of_tuning(

@@ -1,7 +1,8 @@
-"""Independent calls in parallel processes: the results do not depend on the number of processes.
+"""Independent calls in parallel processes: the results do not depend on the number of processes, or on their place.
 
 Every call runs in a forked process of its own, which inherits what the parent has loaded and compiled. A call that
-crashes (out of memory, signal) therefore costs its own result only.
+crashes (out of memory, signal) therefore costs its own result only. With a `Cluster` instead of a number of processes
+the calls run on its workers.
 """
 
 import gc
@@ -12,19 +13,19 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, Generic, NamedTuple, TypeVar, cast
+from typing import Any, TypeVar, cast
 
+from seal_friction_ros.offline.work.cluster import Cluster, completed_on
+from seal_friction_ros.offline.work.outcome import CRASHED, Outcome, outcome_of
 from seal_friction_ros.offline.work.progress import progress, report_shares_to
 
 Result = TypeVar('Result')
-_CRASHED = 'its process ended before it was done: is there enough memory?'
+Workers = int | Cluster
+"""number of processes of this machine, or a cluster"""
 
 
-class Outcome(NamedTuple, Generic[Result]):
-    """Outcome of one call."""
-
-    result: Result | None
-    error: str = ''  # one line; empty if there is a result
+def nothing() -> None:
+    """Prepare nothing."""
 
 
 def available_cores() -> int:
@@ -32,34 +33,42 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def error_text(error: ValueError | OSError) -> str:
-    """One line for an expected error."""
-    if isinstance(error, OSError) and error.strerror:
-        return f'{error.filename}: {error.strerror}' if error.filename else error.strerror
-    return str(error)
-
-
-def try_all(label: str, calls: Sequence[Callable[[], Result]], workers: int) -> list[Outcome[Result]]:
+def try_all(
+    label: str,
+    calls: Sequence[Callable[[], Result]],
+    workers: Workers,
+    on_outcome: Callable[[int, Outcome[Result]], None] = lambda *_: None,
+    prepare: Callable[[], None] = nothing,
+) -> list[Outcome[Result]]:
     """Run every call, whatever becomes of the others.
 
     Args:
         label: Of the progress bar.
         calls: Picklable functions without arguments that return picklable results. ``ValueError`` and ``OSError`` are
             the errors of a call; any other exception is a bug: its traceback goes to stderr, and the call has crashed.
-        workers: Calls at a time.
+        workers: Calls at a time, or a cluster.
+        on_outcome: Called in this process with the number of a call and its outcome, as soon as it is done.
+        prepare: Called before the processes of this machine begin; they inherit what it loads and compiles.
 
     Returns:
         Outcomes in the order of the calls.
+
+    Raises:
+        ValueError: The cluster cannot be used.
     """
-    outcomes = dict(_completed(label, calls, workers, stop_at_error=False))
+    outcomes: dict[int, Outcome[Result]] = {}
+    for number, outcome in _completed(label, calls, workers, prepare, stop_at_error=False):
+        outcomes[number] = outcome
+        on_outcome(number, outcome)
     return [outcomes[number] for number in range(len(calls))]
 
 
 def run_all(
     label: str,
     calls: Sequence[Callable[[], Result]],
-    workers: int,
+    workers: Workers,
     on_result: Callable[[int, Result], None] = lambda *_: None,
+    prepare: Callable[[], None] = nothing,
 ) -> list[Result]:
     """Run calls that are of use only together; arguments as `try_all`.
 
@@ -69,11 +78,12 @@ def run_all(
         Results in the order of the calls.
 
     Raises:
-        ValueError: A call failed: the first one, in the order of the calls. No further call is begun after an error.
+        ValueError: A call failed: the first one, in the order of the calls; or the cluster cannot be used. No further
+            call is begun after an error.
     """
     results: dict[int, Result] = {}
     errors: dict[int, str] = {}
-    for number, (result, error) in _completed(label, calls, workers, stop_at_error=True):
+    for number, (result, error) in _completed(label, calls, workers, prepare, stop_at_error=True):
         if error:
             errors[number] = error
         else:
@@ -81,7 +91,7 @@ def run_all(
             on_result(number, results[number])
     if errors:
         error = errors[min(errors)]
-        raise ValueError(f'{label}: {error}' if error == _CRASHED else error)
+        raise ValueError(f'{label}: {error}' if error == CRASHED else error)
     return [results[number] for number in range(len(calls))]
 
 
@@ -110,7 +120,7 @@ class _Worker:
         try:
             received: float | Outcome[Any] = self.connection.recv()
         except EOFError:
-            received = Outcome(None, _CRASHED)
+            received = Outcome(None, CRASHED)
         outcome = None if isinstance(received, float) else received
         share = 1.0 - self.done if isinstance(received, Outcome) else min(received, 1.0 - self.done)
         self.done += share
@@ -132,16 +142,7 @@ def _work(call: Callable[[], Any], connection: Connection, inherited: Sequence[C
         other.close()
     report_shares_to(connection.send)
     with suppress(BrokenPipeError):  # the parent has gone
-        connection.send(_outcome(call))
-
-
-def _outcome(call: Callable[[], Any]) -> Outcome[Any]:
-    try:
-        return Outcome(call())
-    except BrokenPipeError:
-        raise
-    except (ValueError, OSError) as error:
-        return Outcome(None, error_text(error))
+        connection.send(outcome_of(call))
 
 
 @contextmanager
@@ -156,28 +157,48 @@ def _sigint_delayed() -> Iterator[None]:
 
 
 def _completed(
-    label: str, calls: Sequence[Callable[[], Any]], workers: int, *, stop_at_error: bool
+    label: str,
+    calls: Sequence[Callable[[], Any]],
+    workers: Workers,
+    prepare: Callable[[], None],
+    *,
+    stop_at_error: bool,
 ) -> Iterator[tuple[int, Outcome[Any]]]:
     """Number and outcome of each call as it is done; calls begin in the order given."""
+    if isinstance(workers, int):
+        if calls:
+            prepare()
+        with progress(label, len(calls)) as advance:
+            yield from _completed_here(calls, workers, advance, stop_at_error=stop_at_error)
+    elif calls:
+        with progress(label, len(calls)) as advance:
+            for done in completed_on(workers, calls, stop_at_error=stop_at_error):
+                advance(1.0)
+                yield done
+
+
+def _completed_here(
+    calls: Sequence[Callable[[], Any]], workers: int, advance: Callable[[float], None], *, stop_at_error: bool
+) -> Iterator[tuple[int, Outcome[Any]]]:
+    """The same in processes of this machine; ``advance`` takes the share of a call done since the last time."""
     waiting = list(range(len(calls)))[::-1]
     running: dict[Connection, _Worker] = {}
-    with progress(label, len(calls)) as advance:
-        try:
-            while waiting or running:
-                while waiting and len(running) < max(workers, 1):
-                    number = waiting.pop()
-                    with _sigint_delayed():  # else a worker could begin and not be known
-                        worker = _Worker(number, calls[number], list(running))
-                        running[worker.connection] = worker
-                ready = wait(list(running))
-                for worker in [worker for connection, worker in running.items() if connection in ready]:
-                    share, outcome = worker.receive()
-                    advance(share)
-                    if outcome is not None:
-                        running.pop(worker.connection).end()
-                        if outcome.error and stop_at_error:
-                            waiting.clear()
-                        yield worker.number, outcome
-        finally:
-            for worker in running.values():
-                worker.end()
+    try:
+        while waiting or running:
+            while waiting and len(running) < max(workers, 1):
+                number = waiting.pop()
+                with _sigint_delayed():  # else a worker could begin and not be known
+                    worker = _Worker(number, calls[number], list(running))
+                    running[worker.connection] = worker
+            ready = wait(list(running))
+            for worker in [worker for connection, worker in running.items() if connection in ready]:
+                share, outcome = worker.receive()
+                advance(share)
+                if outcome is not None:
+                    running.pop(worker.connection).end()
+                    if outcome.error and stop_at_error:
+                        waiting.clear()
+                    yield worker.number, outcome
+    finally:
+        for worker in running.values():
+            worker.end()

@@ -1,22 +1,22 @@
 """Long work in parts: parts that an interrupted run has finished are not computed again.
 
 A part is kept under a key made from its inputs, its settings and the code that computes it, so a changed input or a new
-version of the package never finds an old result.
+version of the package never finds an old result. Where parts may fail one by one, a failure is kept, too.
 """
 
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from importlib.metadata import version
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros import core
 from seal_friction_ros.offline.work.atomic_file import write_whole
-from seal_friction_ros.offline.work.executor import run_all
+from seal_friction_ros.offline.work.executor import Workers, nothing, run_all, try_all
+from seal_friction_ros.offline.work.outcome import CRASHED, Outcome
+from seal_friction_ros.offline.work.versions import versions
 
 Values = Mapping[str, Any]
 """Result of a part: numbers, texts and arrays of at least one element, by name."""
@@ -31,6 +31,16 @@ class Part(NamedTuple):
     """picklable function that computes the part; returns `Values`, or a named tuple with these fields"""
 
 
+class Kept(NamedTuple):
+    """Where finished parts are kept."""
+
+    folder: Path | None = None  # None: nowhere
+    retry_failed: bool = False  # compute parts again that failed
+
+
+NOWHERE = Kept()
+
+
 def part_key(kind: str, inputs: Any) -> str:
     """Key of a part.
 
@@ -38,64 +48,122 @@ def part_key(kind: str, inputs: Any) -> str:
         kind: What the part computes.
         inputs: All inputs and settings that its result depends on, as JSON can hold them; a file by its digest.
     """
-    text = f'{kind} {json.dumps(inputs, sort_keys=True)} {_code_digest()}'
+    text = f'{kind} {json.dumps([inputs, dict(versions())], sort_keys=True)}'
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-@cache
-def _code_digest() -> str:
-    """Digest of the source of core and of the versions of the libraries that core computes with."""
-    digest = hashlib.sha256(' '.join(map(version, ('numpy', 'scipy', 'numba'))).encode())
-    for source in sorted(Path(str(core.__file__)).parent.rglob('*.py')):
-        digest.update(source.read_bytes())
+def input_digest(path: Path) -> str:
+    """Digest of the content of a file, or of the files in a folder with their names.
+
+    Raises:
+        ValueError: It is neither a file nor a folder.
+        OSError: It cannot be read.
+    """
+    if not path.is_dir() and not path.is_file():  # a device may have no end
+        raise ValueError(f'{path}: neither a file nor a folder')
+    digest = hashlib.sha256()
+    for file in sorted(one for one in path.iterdir() if one.is_file()) if path.is_dir() else [path]:
+        with file.open('rb') as content:
+            one = hashlib.file_digest(content, 'sha256').hexdigest()
+        digest.update(f'{file.name if path.is_dir() else ""} {one}\n'.encode(errors='surrogateescape'))
     return digest.hexdigest()
 
 
 def run_parts(
-    label: str, parts: Sequence[Part], workers: int, folder: Path | None, prepare: Callable[[], None] = lambda: None
+    label: str, parts: Sequence[Part], workers: Workers, folder: Path | None, prepare: Callable[[], None] = nothing
 ) -> list[Values]:
-    """Results of all parts, in their order; parts that are kept in ``folder`` are not computed.
+    """Results of parts that are of use only together; parts that are kept in ``folder`` are not computed.
 
     Args:
         label: Of the progress bar.
         parts: The parts.
-        workers: Parts at a time.
+        workers: Parts at a time, or a cluster.
         folder: Keeps every finished part as a JSON file, also when a later part fails; None keeps none.
-        prepare: Called before the processes begin, if a part is missing; they inherit what it loads and compiles.
+        prepare: As of `try_all`, if a part is missing.
+
+    Returns:
+        Results in the order of the parts.
 
     Raises:
-        ValueError: A part failed, or the folder cannot be used.
+        ValueError: A part failed, or the folder or the cluster cannot be used.
     """
-    if folder is not None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ValueError(f'{folder}: {error.strerror}') from None
-    results = {number: kept for number, part in enumerate(parts) if (kept := _kept(folder, part)) is not None}
-    missing = [number for number in range(len(parts)) if number not in results]
+    outcomes, missing = _found(parts, Kept(folder, retry_failed=True))
 
     def keep(place: int, result: Any) -> None:
-        """Take the result of a missing part, and write its file."""
-        number, values = missing[place], result._asdict() if hasattr(result, '_asdict') else result
-        results[number] = values
-        if folder is not None:
-            plain = {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values.items()}
-            write_whole(folder / f'{parts[number].key}.json', json.dumps(plain).encode())
+        _keep(folder, parts, outcomes, missing[place], Outcome(result))
 
-    if missing:
-        prepare()
-    run_all(label, [parts[number].call for number in missing], workers, keep)
-    return [results[number] for number in range(len(parts))]
+    run_all(label, [parts[number].call for number in missing], workers, keep, prepare)
+    return [outcomes[number].result or {} for number in range(len(parts))]
 
 
-def _kept(folder: Path | None, part: Part) -> Values | None:
-    """The kept result of a part; None if there is none that can be read."""
-    if folder is None:
+def try_parts(
+    label: str, parts: Sequence[Part], workers: Workers, kept: Kept, prepare: Callable[[], None] = nothing
+) -> list[Outcome[Values]]:
+    """Outcomes of parts that may fail one by one; other arguments as of `run_parts`.
+
+    An error of a part is kept like a result; that its process crashed is not.
+
+    Raises:
+        ValueError: The folder or the cluster cannot be used.
+    """
+    outcomes, missing = _found(parts, kept)
+
+    def keep(place: int, outcome: Outcome[Any]) -> None:
+        _keep(kept.folder, parts, outcomes, missing[place], outcome)
+
+    try_all(label, [parts[number].call for number in missing], workers, keep, prepare)
+    return [outcomes[number] for number in range(len(parts))]
+
+
+def input_digests(paths: Sequence[Path], workers: Workers) -> list[Outcome[str]]:
+    """`input_digest` of each path."""
+    return try_all(f'digests of {len(paths)} inputs', [partial(input_digest, path) for path in paths], workers)
+
+
+def _found(parts: Sequence[Part], kept: Kept) -> tuple[dict[int, Outcome[Values]], list[int]]:
+    """Outcomes that are kept, by number of the part, and the numbers of the others; makes the folder."""
+    if kept.folder is not None:
+        try:
+            kept.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ValueError(f'{kept.folder}: {error.strerror}') from None
+    known = ((number, _read(kept, part)) for number, part in enumerate(parts))
+    outcomes = {number: outcome for number, outcome in known if outcome is not None}
+    return outcomes, [number for number in range(len(parts)) if number not in outcomes]
+
+
+def _keep(
+    folder: Path | None, parts: Sequence[Part], outcomes: dict[int, Outcome[Values]], number: int, outcome: Outcome[Any]
+) -> None:
+    """Take the outcome of a part, and write its file."""
+    result: Any = outcome.result
+    values = result._asdict() if hasattr(result, '_asdict') else result
+    outcomes[number] = outcome._replace(result=values)
+    if folder is None or outcome.error == CRASHED:
+        return
+    plain = {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in (values or {}).items()}
+    content = {_ERROR: outcome.error} if outcome.error else plain
+    try:
+        write_whole(folder / f'{parts[number].key}.json', json.dumps(content).encode())
+    except OSError as error:
+        raise ValueError(f'{folder}: cannot keep a finished part: {error.strerror}') from None
+
+
+_ERROR = 'error: '  # the only name in the file of a part that failed; no name of a value is spelled like this
+
+
+def _read(kept: Kept, part: Part) -> Outcome[Values] | None:
+    """The kept outcome of a part; None if there is none that can be read, or one that is to be tried again."""
+    if kept.folder is None:
         return None
     try:
-        kept = json.loads((folder / f'{part.key}.json').read_text(encoding='utf-8'))
+        found = json.loads((kept.folder / f'{part.key}.json').read_text(encoding='utf-8'))
     except (OSError, ValueError):
         return None
-    if not isinstance(kept, dict) or kept.keys() != set(part.names):
+    if not isinstance(found, dict):
         return None
-    return {name: np.array(value) if isinstance(value, list) else value for name, value in kept.items()}
+    if found.keys() == {_ERROR}:
+        return None if kept.retry_failed else Outcome(None, str(found[_ERROR]))
+    if found.keys() != set(part.names):
+        return None
+    return Outcome({name: np.array(value) if isinstance(value, list) else value for name, value in found.items()})

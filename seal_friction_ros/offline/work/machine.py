@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from seal_friction_ros.packages import OPTIONAL
+from seal_friction_ros.packages import OPTIONAL, how_to_install
 
 PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
 _FIRST_PORT, _PORTS_OF_A_DOMAIN = 7410, 250  # UDP port of participant 0 of domain 0; RTPS 2.5, 9.6.2
@@ -59,11 +59,11 @@ def findings(environment: Mapping[str, str] = os.environ, udp: Path = Path('/pro
 def _versions() -> Iterator[Finding]:
     own = _version('seal_friction_ros') or 'not installed: run make setup, or source the colcon workspace'
     yield Finding(Level.OK, 'versions', f'seal_friction_ros {own}, Python {platform.python_version()}')
-    for module, package in OPTIONAL.items():
+    for module in OPTIONAL:
         if find_spec(module):
             yield Finding(Level.OK, module, _version(module) or 'version unknown')
         else:
-            yield Finding(Level.NOTE, module, f'not installed: apt-get install {package}, or pip install {module}')
+            yield Finding(Level.NOTE, module, how_to_install(module))
 
 
 def _version(package: str) -> str:

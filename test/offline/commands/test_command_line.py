@@ -13,8 +13,9 @@ from seal_friction_ros.offline.commands.command_line import (
     at_least_one,
     json_value,
     non_negative,
-    number_of_workers,
+    workers_of,
 )
+from seal_friction_ros.offline.work.cluster import Cluster
 
 
 class Pair(NamedTuple):
@@ -53,6 +54,9 @@ def test_only_whole_numbers_of_at_least_1_are_at_least_one(text):
 def test_workers_and_jobs_are_one_option_and_the_default_is_every_core():
     parser = argparse.ArgumentParser()
     add_workers(parser, 'bags')
-    assert number_of_workers(parser.parse_args(['--jobs', '3'])) == 3
-    assert number_of_workers(parser.parse_args(['--workers', '2'])) == 2
-    assert number_of_workers(parser.parse_args([])) >= 1
+    assert workers_of(parser.parse_args(['--jobs', '3'])) == 3
+    assert workers_of(parser.parse_args(['--workers', '2'])) == 2
+    assert workers_of(parser.parse_args([])) >= 1
+    assert workers_of(parser.parse_args(['--scheduler', 'tcp://a:1'])) == Cluster('tcp://a:1')
+    with pytest.raises(SystemExit):
+        parser.parse_args(['--scheduler', 'tcp://a:1', '--workers', '2'])

@@ -175,6 +175,17 @@ def test_help_loads_no_numerics_no_compiler_and_no_ros():
         loaded = set(json.loads(found.stdout.splitlines()[-1]))
         assert 'usage: seal_friction' in found.stdout
         assert not loaded & {'numpy', 'scipy', 'matplotlib', 'numba', 'rclpy', 'rosbags', 'mcap', 'rich', 'yaml'}
+        assert not loaded & {'dask', 'distributed', 'pyarrow'}
+
+
+def test_a_command_without_a_cluster_loads_no_dask():
+    program = (
+        'import sys\n'
+        'from seal_friction_ros.offline.commands.main import main\n'
+        "assert main(['replay', 'bags/pull_test', 'bags/faults', '--verify']) == 0\n"
+        "assert not {'dask', 'distributed', 'pyarrow'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, '-c', program], cwd=ROOT, check=True, capture_output=True)
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ COMMANDS = {
     ('spool',): ['ten_cycles.csv'],
     ('charts',): ['ms28775_114'],
     ('health',): [PULL_TEST],
+    ('fleet',): [PULL_TEST],
     ('adapt',): [PULL_TEST, '--seal', 'ms28775_114'],
     ('tune',): [],
     ('servo',): [],
@@ -47,7 +48,8 @@ def targets() -> list[tuple[tuple[str, ...], str, Kind]]:
 
 def command_line(command: tuple[str, ...], option: str, target: Path) -> list[str]:
     """Arguments of a command that writes ``target``, and what it needs besides."""
-    needed = [] if option == '--out' or command[0] in ('oring', 'ehl') else ['--out', str(target.with_name('o.yaml'))]
+    other = target.with_name('o.html' if command[0] == 'fleet' else 'o.yaml')
+    needed = [] if option == '--out' or command[0] in ('oring', 'ehl') else ['--out', str(other)]
     return [*command, *COMMANDS[command], *needed, option, str(target)]
 
 
@@ -69,7 +71,7 @@ def refused(arguments: list[str], folder: Path, capsys) -> str:
 def test_every_option_that_writes_is_known_as_a_target():
     assert {command for command, _, _ in targets()} == set(COMMANDS)
     for command, parser in parsers(make_parser()).items():
-        written = {'out', 'report', 'seal_file', 'next'} & {action.dest for action in parser._actions}
+        written = {'out', 'report', 'seal_file', 'next', 'parquet'} & {action.dest for action in parser._actions}
         assert written == set(parser.get_default('targets') or {}), command
 
 

@@ -6,7 +6,8 @@ import numpy as np
 from harness.report_page import checked_page
 
 from seal_friction_ros.offline.replay.bag_health import BagHealth
-from seal_friction_ros.offline.reports.health_report import Limits, write_health_report
+from seal_friction_ros.offline.replay.health_indicators import Limits
+from seal_friction_ros.offline.reports.health_report import write_health_report
 
 
 def day(start: float, scale: float, count: int) -> BagHealth:

@@ -12,7 +12,8 @@ import pytest
 from paths import ROOT
 
 from seal_friction_ros.offline.work import executor
-from seal_friction_ros.offline.work.executor import Outcome, run_all, try_all
+from seal_friction_ros.offline.work.executor import run_all, try_all
+from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.progress import progress
 
 

@@ -70,7 +70,7 @@ def test_a_file_that_is_no_finished_part_is_replaced(content, tmp_path):
 def test_the_key_follows_kind_inputs_and_code(monkeypatch):
     keys = [part_key('a', {'x': 1.0, 'y': [2.0]}), part_key('b', {'x': 1.0, 'y': [2.0]}), part_key('a', {'x': 1.5})]
     assert part_key('a', {'y': [2.0], 'x': 1.0}) == keys[0]
-    monkeypatch.setattr(finished_parts, '_code_digest', lambda: 'another version')
+    monkeypatch.setattr(finished_parts, 'versions', lambda: {'seal_friction_ros': 'another version'})
     keys.append(part_key('a', {'x': 1.0, 'y': [2.0]}))
     assert len(set(keys)) == len(keys)
 

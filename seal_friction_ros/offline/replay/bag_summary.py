@@ -1,0 +1,193 @@
+"""One bag in a row of numbers: what is in it, whether it replays, how its seals are, and friction at each pressure."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, Messages
+from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.estimation.messages import LAYOUTS, PRESSURE_TYPE
+from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.friction.states import SLIDING
+from seal_friction_ros.offline.bags.bag import BagError, bag_topics
+from seal_friction_ros.offline.replay.bag_health import bag_health
+from seal_friction_ros.offline.replay.bag_parts import try_bags
+from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
+from seal_friction_ros.offline.replay.health_indicators import Limits, alarms_of, day_of
+from seal_friction_ros.offline.replay.parallel_replay import verify
+from seal_friction_ros.offline.work.executor import Workers
+from seal_friction_ros.offline.work.finished_parts import Kept, Values
+from seal_friction_ros.offline.work.outcome import Outcome
+
+LEVEL = 1e6  # [Pa] width of a pressure level (our choice)
+_LARGEST_PRESSURE = 1e9  # [Pa] our choice: a larger one is no pressure
+IDENTICAL, DIFFERENT, NOTHING_RECORDED = 'identical', 'different', 'no estimates recorded'
+LEVEL_COLUMNS = ('pressure', 'samples', 'friction', 'coulomb_friction', 'residual', 'residual_rms', 'disagreeing')
+"""columns of the levels: middle [Pa] of the larger chamber pressure; sliding samples; means [N] of friction, of Coulomb
+friction and of the residual in the direction of motion; root mean square [N] of the residual; share of the samples with
+`Status.MODEL_DISAGREES`"""
+
+
+class BagSummary(NamedTuple):
+    """A bag; NaN where it does not tell."""
+
+    start: float  # [s] log time of the first message used
+    duration: float  # [s]
+    messages: int
+    replay: str  # `IDENTICAL`, `DIFFERENT` or `NOTHING_RECORDED`
+    difference: str  # the first one
+    reversals: int
+    scale: float  # [-] friction over that of the seal file
+    scale_std: float  # [-]
+    drift: float  # [-] scale of the last quarter of the bag over that of the first, less 1
+    drift_std: float  # [-]
+    offset: float  # [N] of the force sum
+    residual: float  # [-] root mean square of the residual while sliding, over the Coulomb friction
+    disagreeing: float  # [-] share of the sliding samples with `Status.MODEL_DISAGREES`
+    alarms: str  # of the health of its seals; empty if there is none
+    health: str  # why the health cannot be told; empty if it is
+    levels: FloatArray  # shape (n, len(LEVEL_COLUMNS)): a row a pressure level
+
+
+def bag_summary(bag: Path, namespace: str = '', override: Configuration | None = None) -> BagSummary:
+    """Replay a bag and follow its seals.
+
+    Args:
+        bag: The bag.
+        namespace: Use only topics below it.
+        override: Configuration instead of the recorded one.
+
+    Raises:
+        BagError: The bag cannot be read.
+    """
+    result = verify(bag, override, namespace, bulk_from=0)  # the health takes the compiled estimator, too
+    replayed = IDENTICAL if result.identical else DIFFERENT if result.recorded_estimates else NOTHING_RECORDED
+    levels, why = _Levels(), ''
+    try:
+        seen = bag_health(bag, namespace, override, on_block=levels.add)
+    except BagError as error:
+        seen, why = None, str(error)
+    day = None if seen is None else day_of(str(bag), seen)
+    scale, drift = (day.scale, day.break_in) if day else (None, None)
+    table = levels.table()
+    return BagSummary(
+        levels.first * 1e-9,
+        (levels.last - levels.first) * 1e-9,
+        sum(topic.message_count for topic in bag_topics(bag).values()),
+        replayed,
+        result.first_difference if replayed == DIFFERENT else '',
+        day.reversals if day else 0,
+        scale.value if scale else math.nan,
+        scale.std if scale else math.nan,
+        1.0 / (1.0 + drift.value) - 1.0 if drift else math.nan,
+        drift.std / (1.0 + drift.value) ** 2 if drift else math.nan,
+        day.offset.value if day else math.nan,
+        _relative_residual(table),
+        _mean(table, 'disagreeing'),
+        '; '.join(alarms_of(day, Limits())) if day else '',
+        why,
+        table,
+    )
+
+
+def _column(table: FloatArray, name: str) -> FloatArray:
+    column: FloatArray = table[:, LEVEL_COLUMNS.index(name)]
+    return column
+
+
+def _mean(table: FloatArray, name: str) -> float:
+    """Mean of a column over all samples; NaN if there is none."""
+    return float(np.average(_column(table, name), weights=_column(table, 'samples'))) if len(table) else math.nan
+
+
+def _relative_residual(table: FloatArray) -> float:
+    if not len(table):
+        return math.nan
+    square = np.average(_column(table, 'residual_rms') ** 2, weights=_column(table, 'samples'))
+    friction = _mean(table, 'coulomb_friction')
+    return math.sqrt(float(square)) / friction if friction > 0.0 else math.nan
+
+
+class _Levels:
+    """Sums over the sliding samples of each pressure level, block by block, and the times of the messages."""
+
+    def __init__(self) -> None:
+        self.first = self.last = math.nan  # [ns]
+        self._sums: dict[int, FloatArray] = {}
+        self._pressure = math.nan  # [Pa] larger chamber pressure of the newest message before the block
+
+    def add(self, messages: Messages, answers: Answers, estimates: Any) -> None:
+        """Take a block; arguments as of ``on_block`` of `bag_health`."""
+        if len(messages.received):
+            first, last = int(messages.received[0]), int(messages.received[-1])
+            self.first = first if math.isnan(self.first) else self.first
+            self.last = last
+        places, pressures = _pressures(messages)
+        known = np.append(self._pressure, pressures)
+        self._pressure = float(known[-1])
+        before = np.searchsorted(places, np.flatnonzero(answers.estimate_sizes))
+        pressure = known[before]
+        usable = (np.abs(pressure) < _LARGEST_PRESSURE) & (estimates['state'] == SLIDING)
+        if not usable.any():
+            return
+        chosen, level = estimates[usable], np.floor(pressure[usable] / LEVEL).astype(np.int64)
+        residual = chosen['residual'] * chosen['direction']
+        disagrees = (chosen['status'] & int(Status.MODEL_DISAGREES)) != 0
+        columns = np.array(
+            [
+                np.ones(len(chosen)),
+                np.abs(chosen['friction_force']),
+                chosen['coulomb_friction'],
+                residual,
+                residual**2,
+                disagrees,
+            ]
+        )
+        for one in np.unique(level).tolist():
+            self._sums[one] = self._sums.get(one, np.zeros(len(columns))) + columns[:, level == one].sum(axis=1)
+
+    def table(self) -> FloatArray:
+        """A row for each level, with `LEVEL_COLUMNS`."""
+        rows = []
+        for level, (count, *sums) in sorted(self._sums.items()):
+            friction, coulomb, residual, square, disagreeing = (total / count for total in sums)
+            middle = (level + 0.5) * LEVEL
+            rows.append([middle, count, friction, coulomb, residual, math.sqrt(square), disagreeing])
+        return np.array(rows, float).reshape(-1, len(LEVEL_COLUMNS))
+
+
+def _pressures(messages: Messages) -> tuple[Any, FloatArray]:
+    """Numbers of the pressure messages of a block, and the larger chamber pressure [Pa] of each."""
+    layout = next(one for one in LAYOUTS if one.message_type == PRESSURE_TYPE)
+    places = np.flatnonzero(messages.kinds == Kind.PRESSURE)
+    begin = messages.offsets[places] + messages.sizes[places] - layout.size
+    chambers = [messages.data[(begin + offset)[:, None] + np.arange(8)].view('<f8')[:, 0] for offset in layout.offsets]
+    larger: FloatArray = np.maximum(*chambers)
+    return places, larger
+
+
+_COMPILED_BAGS = 20  # bags whose laws are compiled before the work (our choice); another law compiles with its bag
+
+
+def summaries(
+    bags: Sequence[Path], namespace: str, override: Configuration | None, workers: Workers, kept: Kept
+) -> list[Outcome[BagSummary]]:
+    """`bag_summary` of each bag, in their order; arguments as of `try_bags`.
+
+    Raises:
+        ValueError: The work folder or the cluster cannot be used.
+    """
+    first = bags[:_COMPILED_BAGS]
+    outcomes = try_bags(
+        'fleet', bags, BagSummary._fields, bag_summary, (namespace, override), workers, kept,
+        lambda: compile_now(first_configurations(first, namespace, override)),
+    )  # fmt: skip
+    return [Outcome(_of_values(one.result) if one.result else None, one.error) for one in outcomes]
+
+
+def _of_values(values: Values) -> BagSummary:
+    return BagSummary(**{**values, 'levels': np.reshape(values['levels'], (-1, len(LEVEL_COLUMNS)))})

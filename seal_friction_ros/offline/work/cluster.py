@@ -1,0 +1,317 @@
+"""Calls on a Dask cluster instead of the processes of this machine: the same calls, the same results.
+
+A worker runs one call at a time. It has to have the same version of this package and of its libraries, and it reads
+files by the same paths: a relative path begins at the folder where the command was started. Whoever can reach a
+scheduler without TLS can run code on its workers. Dask is loaded by the first call, never before.
+"""
+
+import asyncio
+import logging
+import os
+import re
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any, NamedTuple
+
+from seal_friction_ros.offline.work.outcome import CRASHED, THREAD_VARIABLES, Outcome, outcome_of
+from seal_friction_ros.offline.work.progress import report_shares_to
+from seal_friction_ros.offline.work.versions import versions
+from seal_friction_ros.packages import needed
+
+ANSWER_TIME = 10.0  # [s] within which a scheduler and its workers answer (our choice)
+WORKERLESS_TIME = 60.0  # [s] without any worker after which the work ends (our choice)
+_CALLS_OF_A_WORKER = 4  # calls that are sent to the cluster before the first of them is done (our choice)
+_LOOK_PERIOD = 1.0  # [s] between two looks at the scheduler while no call is done
+_ADDRESS = re.compile(r'(tcp|tls)://(\[[0-9a-fA-F:.%]+\]|[\w.-]+):(\d{1,5})')
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A Dask cluster.
+
+    Args:
+        address: Of its scheduler, ``tcp://HOST:PORT`` or, with TLS, ``tls://HOST:PORT``.
+        tls: Files in PEM: certificate of the authority, own certificate, own key; None without TLS.
+
+    Raises:
+        ValueError: The address is none, or TLS is for one of both only.
+    """
+
+    address: str
+    tls: tuple[Path, Path, Path] | None = None
+
+    def __post_init__(self) -> None:
+        match = _ADDRESS.fullmatch(self.address)
+        if not match or not 0 < int(match[3]) < 65536:
+            raise ValueError(f'{self.address!r} is no address of a scheduler: write tcp://HOST:PORT or tls://HOST:PORT')
+        if (match[1] == 'tls') != (self.tls is not None):
+            raise ValueError(f'{self.address}: a tls:// address and --scheduler-tls CA CERT KEY belong together')
+        for file in self.tls or ():
+            if not file.is_file():
+                raise ValueError(f'{file}: no such file; --scheduler-tls takes CA CERT KEY in PEM')
+
+
+class _Refusal(NamedTuple):
+    """Why a worker does not run a call."""
+
+    reason: str
+
+
+class _Running:
+    """Calls on a cluster that are not done yet.
+
+    Args:
+        client: Connected to the cluster.
+        calls: All calls.
+    """
+
+    def __init__(self, client: Any, calls: Sequence[Callable[[], Any]]) -> None:
+        self.futures: dict[int, Any] = {}
+        self._client, self._calls = client, calls
+        self._done: SimpleQueue[int] = SimpleQueue()
+        self._start = (str(Path.cwd()), dict(versions()))
+
+    def begin(self, number: int) -> None:
+        """Send a call."""
+        call = self._calls[number]
+        future = self._client.submit(_run, call, _paths_here(call), *self._start, pure=False)
+        self.futures[number] = future
+        self._tell(number)
+
+    def next_done(self) -> tuple[int, Outcome[Any]] | None:
+        """Number and outcome of a call that is done; None if there was none for a while.
+
+        Raises:
+            ValueError: The scheduler has gone, or a worker refuses the call.
+        """
+        try:
+            number = self._done.get(timeout=_LOOK_PERIOD)
+        except Empty:
+            self._check_scheduler()
+            return None
+        future = self.futures.get(number)
+        if future is None:
+            return None
+        try:
+            answer = self._answer(future)
+        except TimeoutError:  # the worker with the result has gone: another one computes it again
+            self._check_scheduler()
+            self._tell(number)
+            return None
+        del self.futures[number]
+        if isinstance(answer, _Refusal):
+            raise ValueError(answer.reason)
+        return number, answer
+
+    def forget_after(self, number: int) -> None:
+        """Forget the calls after this one."""
+        for later in [one for one in self.futures if one > number]:
+            self.futures.pop(later).release()
+
+    def _tell(self, number: int) -> None:
+        self.futures[number].add_done_callback(lambda _: self._done.put(number))
+
+    def _check_scheduler(self) -> None:
+        if self._client.status != 'running':
+            raise ValueError(_GONE)
+
+    def _answer(self, future: Any) -> Outcome[Any] | _Refusal:
+        if future.status in ('cancelled', 'lost'):
+            raise ValueError(_GONE)
+        if future.status == 'error':
+            error = future.exception(timeout=ANSWER_TIME)
+            if type(error).__name__ not in ('KilledWorker', 'MemoryError'):  # a bug is seen
+                sys.stderr.write(''.join(traceback.format_exception(error)))
+            return Outcome(None, CRASHED)
+        answer: Outcome[Any] | _Refusal = future.result(timeout=ANSWER_TIME)
+        return answer
+
+
+_GONE = (
+    'the scheduler has gone before the work was done: start it and its workers again, then repeat the command; '
+    'with --work FOLDER it goes on where it was'
+)
+
+
+def completed_on(
+    cluster: Cluster, calls: Sequence[Callable[[], Any]], *, stop_at_error: bool
+) -> Iterator[tuple[int, Outcome[Any]]]:
+    """Number and outcome of each call as it is done.
+
+    At most a few calls for each worker are under way, so that memory does not grow with the number of calls. A worker
+    that ends amid a call costs time: another one repeats the call. A call that ends several workers has crashed.
+
+    Args:
+        cluster: Where.
+        calls: As of `executor.try_all`, and importable by name on the workers.
+        stop_at_error: Begin no call after an error, and leave out those after it.
+
+    Raises:
+        MissingPackageError: Dask is not installed.
+        ValueError: The cluster cannot be used, or not any more; one line.
+    """
+    with _connected(cluster) as client:
+        most = _CALLS_OF_A_WORKER * _checked_workers(client)
+        running, waiting = _Running(client, calls), list(range(len(calls)))[::-1]
+        lonely_since = None
+        while waiting or running.futures:
+            while waiting and len(running.futures) < most:
+                running.begin(waiting.pop())
+            done = running.next_done()
+            if done is None:
+                lonely_since = _lonely_since(client, lonely_since)
+                continue
+            number, outcome = done
+            if outcome.error and stop_at_error:
+                waiting.clear()
+                running.forget_after(number)
+            yield number, outcome
+
+
+def _lonely_since(client: Any, before: float | None) -> float | None:
+    """Time since when there is no worker; None if there is one."""
+    if client.scheduler_info()['workers']:
+        return None
+    now = time.monotonic()
+    since = now if before is None else before
+    if now - since > WORKERLESS_TIME:
+        raise ValueError(f'no worker is left for {WORKERLESS_TIME:.0f} s: start one, then repeat the command')
+    return since
+
+
+@contextmanager
+def _connected(cluster: Cluster) -> Iterator[Any]:
+    """Client of a cluster; every error of the scheduler names its address."""
+    distributed = needed('distributed')
+    for name in ('distributed', *(f'distributed.{part}' for part in ('client', 'comm', 'core', 'batched'))):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # one line tells the error, and we write it
+    for name in ('tornado.application', 'asyncio'):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    security = None
+    if cluster.tls:
+        authority, certificate, key = map(str, cluster.tls)
+        security = distributed.Security(
+            tls_ca_file=authority, tls_client_cert=certificate, tls_client_key=key, require_encryption=True
+        )
+    try:
+        kind = asyncio.run(asyncio.wait_for(_kind_of_server(cluster.address, security), ANSWER_TIME))
+        if kind != 'Scheduler':
+            raise ValueError(f'a Dask {kind.lower()} answers')
+        client = distributed.Client(cluster.address, timeout=ANSWER_TIME, security=security, set_as_default=False)
+    except Exception as error:  # noqa: BLE001  whatever a stranger at this address answers
+        reason = f' ({str(error).splitlines()[0][:200]})' if str(error) else ''
+        raise ValueError(
+            f'{cluster.address}: no Dask scheduler answers within {ANSWER_TIME:.0f} s: is the address right, and does '
+            f'`dask scheduler` run there?{reason}'
+        ) from None
+    try:
+        yield client
+    except ValueError as error:
+        raise ValueError(f'{cluster.address}: {error}') from None
+    finally:
+        with suppress(TimeoutError):
+            client.close(timeout=2.0)
+
+
+async def _kind_of_server(address: str, security: Any) -> str:
+    """What kind of Dask server answers; a client that meets a stranger would not end for a long time."""
+    core = needed('distributed.core')
+    connection = {} if security is None else security.get_connection_args('client')
+    async with core.rpc(address, connection_args=connection, timeout=ANSWER_TIME) as server:
+        return str((await server.identity())['type'])
+
+
+def _checked_workers(client: Any) -> int:
+    """Number of workers, of which each can give the same results as this machine.
+
+    Raises:
+        ValueError: There is none, or one that cannot.
+    """
+    try:
+        client.wait_for_workers(1, timeout=ANSWER_TIME)
+        answers = client.run(_unsuited, dict(versions()), on_error='return')
+        answers = {f'worker {address}': answer for address, answer in sorted(answers.items())}
+        answers['the scheduler'] = _of_scheduler(client)
+    except (TimeoutError, OSError):
+        if client.status == 'running':
+            raise ValueError(
+                f'it has no worker after {ANSWER_TIME:.0f} s: start one with `dask worker ADDRESS --nthreads 1`'
+            ) from None
+        raise ValueError(_GONE) from None
+    for place, answer in answers.items():
+        if isinstance(answer, BaseException):
+            raise ValueError(f'{place} cannot load this version of seal_friction_ros: install it there')
+        if answer:
+            raise ValueError(f'{place}: {answer}')
+    return len(answers) - 1
+
+
+def _of_scheduler(client: Any) -> Any:
+    """`_other_version` on the scheduler, which unpickles calls too, or the exception there."""
+    try:
+        return client.run_on_scheduler(_other_version, dict(versions()))
+    except (ImportError, AttributeError) as error:
+        return error
+
+
+# -- on a worker ------------------------------------------------------------------------------------------------------
+
+
+def _unsuited(expected: Mapping[str, str], dask_worker: Any = None) -> str:
+    """Why the worker that runs this cannot give the results of the machine with the ``expected`` versions; else empty.
+
+    Args:
+        expected: `versions` there.
+        dask_worker: The worker; None: one that was asked about its number of threads before.
+    """
+    if reason := _other_version(expected):
+        return reason
+    threads = 1 if dask_worker is None else dask_worker.state.nthreads
+    if threads != 1:
+        return f'it has {threads} threads: start it with --nthreads 1, and one worker for each core'
+    if several := [name for name in THREAD_VARIABLES if os.environ.get(name) != '1']:
+        return f'linear algebra may take several threads there: start it with {several[0]}=1 in its environment'
+    return ''
+
+
+def _other_version(expected: Mapping[str, str]) -> str:
+    """What differs here from the ``expected`` `versions`; empty if nothing."""
+    for name, wanted in expected.items():
+        if (there := versions().get(name)) != wanted:
+            return f'{name} {there} there, {wanted} here: install the same version everywhere'
+    return ''
+
+
+def _run(
+    call: Callable[[], Any], paths: Sequence[str], folder: str, expected: Mapping[str, str]
+) -> Outcome[Any] | _Refusal:
+    """Run a call on this worker, in ``folder`` if the worker has it; ``paths`` have to exist."""
+    if reason := _unsuited(expected):
+        return _Refusal(f'worker {_own_address()}: {reason}')
+    with suppress(OSError):
+        os.chdir(folder)
+    for path in paths:
+        if not os.path.lexists(path):
+            return _Refusal(
+                f'{path} is on the machine of the command, and not where worker {_own_address()} reads: put it on a '
+                'folder that both mount by the same path'
+            )
+    report_shares_to(lambda _: None)
+    return outcome_of(call)
+
+
+def _own_address() -> str:
+    address: str = needed('distributed').get_worker().address
+    return address
+
+
+def _paths_here(call: Callable[[], Any]) -> list[str]:
+    """Arguments of a call that are paths of this machine."""
+    arguments = (*getattr(call, 'args', ()), *getattr(call, 'keywords', {}).values())
+    return [str(path) for path in arguments if isinstance(path, Path) and path.exists()]
