@@ -4,12 +4,15 @@ from contextlib import contextmanager
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 from harness.spin_nodes import ros_context
 from paths import ROOT
 from rclpy.parameter import Parameter
 
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
+from seal_friction_ros.nodes.machine_estimator import MachineEstimator
 from seal_friction_ros.nodes.servo_simulator import ServoSimulator
+from seal_friction_ros.offline.commands.main import main
 
 POLICY = ROOT / 'config' / 'security' / 'policy.xml'
 # Every way a node can be wired: the policy has to allow each, and nothing beyond all of them.
@@ -19,9 +22,9 @@ WIRINGS = {
 }
 
 
-def allowed(node: str, kind: str, direction: str) -> set[str]:
-    """Absolute names that the policy allows a node without a namespace."""
-    tree = ElementTree.parse(POLICY)  # noqa: S314  our own file
+def allowed(policy: str, node: str, kind: str, direction: str) -> set[str]:
+    """Absolute names that a policy allows a node without a namespace."""
+    tree = ElementTree.fromstring(policy)  # noqa: S314  our own file
     (profile,) = tree.iterfind(f".//profile[@node='{node}']")
     names = [item.text or '' for part in profile.iterfind(f"{kind}[@{direction}='ALLOW']") for item in part]
     return {name.replace('~', f'/{node}') if name[0] in '/~' else f'/{name}' for name in names}
@@ -42,7 +45,37 @@ def running(kind, values):
 
 @pytest.mark.parametrize('name', WIRINGS)
 def test_the_policy_is_what_the_nodes_have(name):
-    kind, wirings = WIRINGS[name]
+    compare(POLICY.read_text(), name, *WIRINGS[name])
+
+
+def test_the_policy_of_a_machine_is_what_its_node_has(tmp_path):
+    for path in (*machines(), write_together(tmp_path)):
+        target = tmp_path / f'{path.stem}.xml'
+        assert main(['new', 'policy', str(path), '--out', str(target)]) == 0
+        wirings = [{'machine': str(path)}, {'machine': str(path), 'use_sim_time': True}]
+        compare(target.read_text(), 'machine_estimator', MachineEstimator, wirings)
+
+
+def machines():
+    """Mapping files whose messages are installed: control_msgs is not."""
+    return [
+        path for path in sorted((ROOT / 'config' / 'machines').glob('*.yaml')) if 'control_msgs' not in path.read_text()
+    ]
+
+
+def write_together(folder):
+    """Write a mapping file with one message for all answers, an ambient pressure that is measured, and an angle."""
+    document = yaml.safe_load((ROOT / 'config' / 'machines' / 'test_bench.yaml').read_text())
+    document['topics'] |= {'/ambient': 'sensor_msgs/msg/FluidPressure', '/angle': 'std_msgs/msg/Float64'}
+    document |= {'answers': 'together', 'ambient_pressure': '/ambient'}
+    for actuator in document['actuators'].values():
+        actuator['force_sum']['weight'] = {'mass': '80 kg', 'angle': '/angle'}
+    path = folder / 'together.yaml'
+    path.write_text(yaml.safe_dump(document))
+    return path
+
+
+def compare(policy, name, kind, wirings):
     # rcl gives a node name one publisher on /rosout per process, and an earlier test may have it.
     found = {'publish': {'/rosout'}, 'subscribe': set(), 'reply': set(), 'request': set()}
     for values in wirings:
@@ -52,10 +85,10 @@ def test_the_policy_is_what_the_nodes_have(name):
             found['subscribe'] |= {topic for topic, _ in node.get_subscriber_names_and_types_by_node(*where)}
             found['reply'] |= {service for service, _ in node.get_service_names_and_types_by_node(*where)}
             found['request'] |= {service for service, _ in node.get_client_names_and_types_by_node(*where)}
-    assert found['publish'] == allowed(name, 'topics', 'publish')
-    assert found['subscribe'] == allowed(name, 'topics', 'subscribe')
-    assert found['reply'] == allowed(name, 'services', 'reply')
-    assert found['request'] == allowed(name, 'services', 'request') == set()
+    assert found['publish'] == allowed(policy, name, 'topics', 'publish')
+    assert found['subscribe'] == allowed(policy, name, 'topics', 'subscribe')
+    assert found['reply'] == allowed(policy, name, 'services', 'reply')
+    assert found['request'] == allowed(policy, name, 'services', 'request') == set()
 
 
 def test_nothing_is_allowed_by_a_wildcard():

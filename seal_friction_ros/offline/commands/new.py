@@ -1,16 +1,16 @@
-"""``seal_friction new``: write a first file of a kind."""
+"""``seal_friction new``: write a file of a kind."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
-from seal_friction_ros.offline.work.targets import MAPPING_FILE
+from seal_friction_ros.offline.work.targets import MAPPING_FILE, POLICY
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    description = 'write a first mapping file for a machine'
+    description = 'write a first mapping file for a machine, or its security policy'
     kinds = cli.add_group(commands, 'new', 'KIND', description, 'new robot --from-topics --out robot.yaml')
     robot = cli.add_command(
         kinds, 'robot', run_robot, 'write a mapping file with what a bag or the topics show, and what is missing',
@@ -35,6 +35,12 @@ def add_parser(commands: Any) -> None:
         help='with --from-topics: wait for the first message, 15 s unless given',
     )
     cli.add_target(robot, '--out', MAPPING_FILE, required=True, metavar='FILE.yaml', help='mapping file to write')
+    help_text = 'write the SROS2 policy of machine_estimator for a machine'
+    policy = cli.add_command(
+        kinds, 'policy', run_policy, help_text, 'new policy config/machines/excavator.yaml --out policy.xml'
+    )
+    policy.add_argument('machine', type=Path, metavar='MAPPING', help='mapping file of the machine')
+    cli.add_target(policy, '--out', POLICY, required=True, metavar='FILE.xml', help='policy to write')
 
 
 def run_robot(arguments: argparse.Namespace) -> int:
@@ -53,6 +59,19 @@ def run_robot(arguments: argparse.Namespace) -> int:
     numbers = {'file': arguments.out, 'open': open_points, 'actuators': _actuators(arguments.out, read_machine)}
     summary = '\n'.join([f'{len(open_points)} points are open:', *open_points])
     return cli.print_result(arguments, numbers, summary)
+
+
+def run_policy(arguments: argparse.Namespace) -> int:
+    """Write the security policy for a mapping file."""
+    from seal_friction_ros.core.machine.security_policy import security_policy
+    from seal_friction_ros.files import read_machine
+    from seal_friction_ros.offline.work.atomic_file import write_whole
+    from seal_friction_ros.offline.work.targets import mark
+
+    machine = read_machine(str(arguments.machine))
+    made_by = f'SROS2 policy of machine_estimator for the machine {machine.name}, {mark("new")}'
+    write_whole(arguments.out, security_policy(machine, made_by).encode())
+    return cli.print_result(arguments, {'file': arguments.out}, '')
 
 
 def _actuators(path: Path, read: Any) -> list[str] | str:

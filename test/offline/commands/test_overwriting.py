@@ -25,6 +25,7 @@ COMMANDS = {
     ('spool',): ['ten_cycles.csv'],
     ('charts',): ['ms28775_114'],
     ('health',): [PULL_TEST],
+    ('new', 'policy'): [str(ROOT / 'config' / 'machines' / 'test_bench.yaml')],
     ('fleet',): [PULL_TEST],
     ('adapt',): [PULL_TEST, '--seal', 'ms28775_114'],
     ('tune',): [],
