@@ -26,10 +26,10 @@ from seal_friction_ros.core.lubrication.contact import (
     dry_contact,
     film_properties,
 )
-from seal_friction_ros.core.lubrication.elasticity import BODIES
 from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
+from seal_friction_ros.core.lubrication.seal_section import seal_body
 from seal_friction_ros.core.lubrication.shear import fluid_shear, sliding_velocity, solid_shear
 from seal_friction_ros.core.lubrication.wall import WallFilm
 
@@ -61,7 +61,7 @@ class LubricationModel:
 
 
 def lubrication_model(case: LubricationCase) -> LubricationModel:
-    """Model of a case of a profile on a half-plane or a layer.
+    """Model of a case of a profile on a half-plane, a layer or a section by finite elements.
 
     The air acts on the seal from all sides, and rubber transmits its pressure like a fluid: only the pressure above
     that of the air deflects the seal. The air pressure falls linearly over the middle half of the film (our choice).
@@ -73,12 +73,11 @@ def lubrication_model(case: LubricationCase) -> LubricationModel:
         raise ValueError(f'case {case.name}: an O-ring has a friction map only: seal_friction ehl map')
     numerics = case.numerics
     width = numerics.film_width / numerics.cells
-    body = BODIES[case.seal.body](numerics.cells, width, case.seal.modulus, case.seal.section_height)
+    body = seal_body(case.seal, numerics)
     place: FloatArray = np.asarray((np.arange(numerics.cells) + 0.5) * width - 0.5 * numerics.film_width)
-    radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
     passed = np.clip(0.5 + 2.0 * place / numerics.film_width, 0.0, 1.0)
     ambient = case.air.pressure_left + passed * (case.air.pressure_right - case.air.pressure_left)
-    profile = place**2 / (2.0 * radius) - case.interference - body.deflection(ambient)
+    profile = case.seal.fall(place) - case.interference - body.deflection(ambient)
     contact = LubricatedContact(body, case.topography, case.grease)
     return LubricationModel(case, contact, place, ambient, profile, math.pi * case.seal.sealing_diameter)
 

@@ -1,0 +1,38 @@
+"""The tables of test/system/seal_bodies.py, on coarse grids."""
+
+import json
+
+import pytest
+import seal_bodies
+
+
+@pytest.fixture(autouse=True)
+def _few(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(seal_bodies, 'MESHES', (12, 16))
+    monkeypatch.setattr(seal_bodies, 'HELD', ('bottom_and_flanks',))
+    monkeypatch.setattr(seal_bodies, 'WIDTHS', ())
+    monkeypatch.setattr(seal_bodies, 'SQUEEZES', (4e-6,))
+
+
+def table(name: str, monkeypatch, capsys) -> list[dict]:
+    monkeypatch.setattr('sys.argv', ['seal_bodies.py', name, '--cells', '64', '--time-step', '2e-3', '--json'])
+    assert seal_bodies.main() == 0
+    return json.loads(capsys.readouterr().out)[name]
+
+
+def test_a_section_is_between_half_plane_and_layer_and_stiffer_in_a_full_groove(monkeypatch, capsys):
+    plane, layer, coarse, fine, full = (row['friction [N]'] for row in table('bodies', monkeypatch, capsys))
+    assert plane < fine < layer < full
+    assert coarse == pytest.approx(fine, rel=0.03)
+
+
+def test_small_displacements_are_right_for_a_small_squeeze(monkeypatch, capsys):
+    for row in table('strain', monkeypatch, capsys):
+        assert abs(row['more [%]']) < 0.5
+
+
+def test_an_unknown_table_is_refused(monkeypatch, capsys):
+    monkeypatch.setattr('sys.argv', ['seal_bodies.py', 'soles'])
+    with pytest.raises(SystemExit):
+        seal_bodies.main()
+    assert 'there is no table soles: there are bodies, strain' in capsys.readouterr().err
