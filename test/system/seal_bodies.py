@@ -4,12 +4,14 @@ Tables, all of them by default:
 
 - ``bodies``: friction, solid share and rise on slowing down of ``inner_seal`` on each body, three meshes of finite
   elements, what the groove holds, and other widths of the section;
-- ``strain``: contact force of the section on a smooth wall by small displacements and by finite strain.
+- ``strain``: contact force of the section on a smooth wall by small displacements and by finite strain;
+- ``groove``: ``inner_seal_groove`` with friction of the seal in its groove.
 """
 
 import argparse
 import dataclasses
 import json
+import math
 import sys
 from collections.abc import Callable
 
@@ -26,7 +28,7 @@ from seal_friction_ros.core.lubrication.seal_section import (
     nothing_around,
     seal_section,
 )
-from seal_friction_ros.core.lubrication.transient import run_transient
+from seal_friction_ros.core.lubrication.transient import last_cycle, run_transient
 from seal_friction_ros.core.oring_contact.equilibrium import (
     make_assembly,
     outline,
@@ -39,6 +41,7 @@ from seal_friction_ros.offline.contact.lubrication_runs import single_case
 Rows = list[dict[str, float | str]]
 MESHES = (24, 48, 96)
 WIDTHS = (1.0e-3, 2.0e-3)  # [m]
+COEFFICIENTS = (0.0, 0.02, 0.03, 0.04, 0.05, 0.15)  # the last is that of the paper
 SQUEEZES = (4e-6, 12e-6, 36e-6)  # [m]
 PENALTIES = (200.0, 500.0, 1000.0, 2000.0)  # over E / height; the last two give the force on a rigid wall
 STEP = 4e-6  # [m] of squeeze
@@ -97,6 +100,30 @@ def strain(_: LubricationNumerics) -> Rows:
     return rows
 
 
+def groove(numerics: LubricationNumerics) -> Rows:
+    """Figure 14 of the paper with friction in the groove."""
+    case = dataclasses.replace(single_case('inner_seal_groove', 'finding'), numerics=numerics)
+    rows: Rows = []
+    for coefficient in COEFFICIENTS:
+        changed = dataclasses.replace(case.groove, friction_coefficient=coefficient)
+        result = run_transient(dataclasses.replace(case, groove=changed))
+        found, last = findings(result), last_cycle(result)
+        forth = result.friction[last & (result.velocity > 0.0)]
+        load = (result.film_pressure + result.contact_pressure)[last].sum(axis=1) * numerics.film_width / numerics.cells
+        rows.append(
+            {
+                'coefficient': coefficient,
+                'normal force [N]': float(load.mean()) * math.pi * case.seal.sealing_diameter,
+                'largest friction [N]': float(np.abs(result.friction[last]).max()),
+                'along the motion after a reversal [um]': 1e6 * (found.assisted_length or 0.0),
+                'falls again at [mm]': '-' if found.second_lobe is None else 1e3 * found.second_lobe,
+                'changes of sign': float(np.count_nonzero(np.diff(np.sign(forth[forth != 0.0])))),
+                'seats': float(len(set(np.sign(result.lag[last])))),
+            }
+        )
+    return rows
+
+
 def contact_forces(seal: SealBody, elements: int, squeeze: float) -> tuple[float, float]:
     """Contact force [N] of the section on a smooth wall, by small displacements and by finite strain."""
     section = seal_section(seal, 0.6e-3, elements)
@@ -129,7 +156,7 @@ def _of_finite_strain(seal: SealBody, section: SealSection, squeeze: float) -> f
     return 2.0 * forces[-1] - forces[-2]
 
 
-TABLES: dict[str, Callable[[LubricationNumerics], Rows]] = {'bodies': bodies, 'strain': strain}
+TABLES: dict[str, Callable[[LubricationNumerics], Rows]] = {'bodies': bodies, 'strain': strain, 'groove': groove}
 
 
 def main() -> int:

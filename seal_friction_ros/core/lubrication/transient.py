@@ -97,6 +97,7 @@ class TransientState(NamedTuple):
     time: float  # [s]
     position: float  # of the spool [m]
     lag: float  # of the contact behind the spool [m]
+    seat: float  # lag at which the seal would rest in its groove, s of `groove` [m]
     state: ContactState
     wall_film: WallFilm | None  # film on the wall outside the seal; None where it is flooded
     creep: FloatArray  # viscoelastic parts of the deflection [m], shape (parts, n); none for an elastic seal
@@ -177,7 +178,8 @@ def initial_state(model: LubricationModel, position: float) -> TransientState:
             )
         start = position - reach
         wall_film = WallFilm(start, width, np.full(count, film * width))
-    return TransientState(0.0, position, lag, ContactState(gap, np.array(model.ambient), saturation), wall_film, creep)
+    state = ContactState(gap, np.array(model.ambient), saturation)
+    return TransientState(0.0, position, lag, lag, state, wall_film, creep)
 
 
 def transient_step(
@@ -217,7 +219,8 @@ def transient_step(
     deflected = contact.body.deflection(state.pressure + solid_pressure)
     creep = kept[:, None] * start.creep + np.outer(shares * (1.0 - kept), deflected)
     before = None if wall_film is not None else StepBefore(_thickness(moment), moment.creep, step, velocity)
-    after = TransientState(time, position, lag, state, wall_film, creep, before)
+    seat = case.seated_groove.seat(moment.seat, lag, _bottom_force(model, moment.state))
+    after = TransientState(time, position, lag, seat, state, wall_film, creep, before)
     return after, _forces(model, after, at_end), done.iterations, defect
 
 
@@ -286,6 +289,14 @@ def solid_limit(model: LubricationModel, state: ContactState) -> float:
     return model.circumference * solid_shear(model.contact, state.gap, model.case.seal.solid_shear_stress)
 
 
+def _bottom_force(model: LubricationModel, state: ContactState) -> float:
+    """Normal force of the seal on the bottom of its groove [N]: that of film and asperities on its face."""
+    if model.case.groove.friction_coefficient == 0.0:
+        return 0.0
+    solid, _ = asperity_pressure(state.gap, model.contact.asperities)
+    return model.circumference * model.contact.body.cell_width * float((state.pressure + solid).sum())
+
+
 def _slide(model: LubricationModel, moment: TransientState, step: float, position: float) -> tuple[float, float]:
     """Sliding velocity [m/s] during the step and lag [m] after it."""
     groove = model.case.seated_groove
@@ -293,14 +304,19 @@ def _slide(model: LubricationModel, moment: TransientState, step: float, positio
     edge = _edge_force(model, moment)
     fluid_at_rest = fluid_force(model, moment.state, 0.0)
     solid = solid_limit(model, moment.state)
-    drive = groove.force(stuck_lag) - edge - fluid_at_rest
+    normal_force = _bottom_force(model, moment.state)
+
+    def spring(lag: float) -> float:
+        return groove.force(lag, groove.seat(moment.seat, lag, normal_force))
+
+    drive = spring(stuck_lag) - edge - fluid_at_rest
     if abs(drive) <= solid:
         return 0.0, stuck_lag
     velocity = sliding_velocity(
         drive,
         solid,
         lambda v: fluid_force(model, moment.state, v) - fluid_at_rest,
-        lambda v: groove.force(stuck_lag - v * step) - edge - fluid_at_rest,
+        lambda v: spring(stuck_lag - v * step) - edge - fluid_at_rest,
         max(abs(position - moment.position), (abs(drive) - solid) / groove.stiffness) / step,
     )
     return velocity, stuck_lag - velocity * step
@@ -313,7 +329,7 @@ def _forces(model: LubricationModel, moment: TransientState, velocity: float) ->
     if velocity:
         solid = math.copysign(limit, velocity)
     else:  # stuck: the asperities balance the spring, up to their limit
-        asked = model.case.seated_groove.force(moment.lag) - edge - fluid
+        asked = model.case.seated_groove.force(moment.lag, moment.seat) - edge - fluid
         solid = min(max(asked, -limit), limit)
     return SealForces(solid + fluid + edge, solid, fluid, edge, velocity)
 

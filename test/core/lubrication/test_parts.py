@@ -1,6 +1,8 @@
 """Grease, roughness, flow factors, half-plane, groove, wall, motion: each against its own book."""
 
+import dataclasses
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -201,6 +203,64 @@ def test_groove_with_clearance_has_two_seats_and_a_ridge():
 
 def test_groove_without_clearance_is_a_spring():
     assert GrooveSpring(stiffness=1e4).force(-2e-4) == pytest.approx(-2.0)
+
+
+GROOVE = GrooveSpring(stiffness=2e4, half_clearance=1e-4, friction_coefficient=0.15)
+
+
+def groove_run(groove: GrooveSpring, lags: np.ndarray, loads: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """Force and seat along ``lags`` under normal forces ``loads``, from rest at the first lag."""
+    seats = [float(lags[0])]
+    for lag, load in zip(lags[1:], np.broadcast_to(loads, lags.shape)[1:], strict=True):
+        seats.append(groove.seat(seats[-1], lag, load))
+    return np.array([groove.force(lag, seat) for lag, seat in zip(lags, seats, strict=True)]), np.array(seats)
+
+
+def bottom(groove: GrooveSpring, seats: np.ndarray) -> np.ndarray:
+    """Lag of the bottom of the seal [m]."""
+    return seats - np.array([groove.force(seat) for seat in seats]) / groove.stiffness
+
+
+def test_groove_with_friction_is_a_spring_with_a_coulomb_slider():
+    """From rest on the ridge, where F = -k e / 2: the shear k, then -k s / 2 + mu N with s = e - mu N / k."""
+    load, k = 1e-3, GROOVE.stiffness
+    play = 0.15 * load / k
+    lags = np.linspace(0.0, 4.0 * play, 401)
+    force, _ = groove_run(GROOVE, lags, load)
+    held = lags <= play
+    assert force[held] == pytest.approx(k * lags[held], abs=1e-15)
+    assert force[~held] == pytest.approx(0.15 * load - 0.5 * k * (lags[~held] - play), rel=1e-6, abs=1e-7 * load)
+
+
+def test_groove_takes_its_friction_times_the_way_of_the_bottom_from_a_closed_motion():
+    lags = np.concatenate([np.linspace(a, b, 40_001) for a, b in ((2e-4, -2e-4), (-2e-4, 2e-4), (2e-4, -2e-4))])
+    force, seats = groove_run(GROOVE, lags, 5.0)
+    loop = slice(40_001, None)
+    work = trapezoid(force[loop], lags[loop])
+    way = np.abs(np.diff(bottom(GROOVE, seats[loop]))).sum()
+    assert work == pytest.approx(0.15 * 5.0 * way, rel=1e-6)
+    assert way == pytest.approx(4e-4, rel=1e-6)  # flank to flank and back
+
+
+@given(
+    st.lists(st.floats(-3e-4, 3e-4), min_size=2, max_size=6),
+    st.lists(st.floats(0.0, 10.0), min_size=6, max_size=6),
+)
+def test_groove_never_gives_energy(turns, loads):
+    """Work done on it at least the rise of the stored energy, whatever motion and load."""
+    lags = np.concatenate([np.linspace(a, b, 1001) for a, b in pairwise(turns)])
+    force, seats = groove_run(GROOVE, lags, np.repeat(loads[: len(turns) - 1], 1001))
+    k, c = GROOVE.stiffness, GROOVE.half_clearance
+    ridge = k * c**2 / 8.0 * np.maximum(1.0 - (seats / c) ** 2, 0.0) ** 3
+    stored = 0.5 * k * (lags - bottom(GROOVE, seats)) ** 2 + ridge
+    work = (0.5 * (force[1:] + force[:-1]) * np.diff(lags)).cumsum()
+    assert (work - (stored[1:] - stored[0])).min() > -1e-4 * k * c**2
+
+
+@given(st.floats(-1e-3, 1e-3), st.floats(-1e-3, 1e-3), st.floats(0.0, 10.0))
+def test_friction_does_nothing_in_a_groove_without_clearance(before, lag, load):
+    groove = dataclasses.replace(GROOVE, half_clearance=0.0)
+    assert groove.force(lag, groove.seat(before, lag, load)) == pytest.approx(groove.force(lag), abs=1e-12)
 
 
 def test_control_edge_falls_by_its_depth_with_its_slope():

@@ -88,6 +88,16 @@ def test_seal_that_may_lean_either_way_has_a_second_lobe_near_minus_1_4_mm():
     assert findings(done(long_way)).second_lobe is None
 
 
+def test_friction_in_the_groove_holds_the_seal_on_one_seat():
+    """0.15 is that of the paper: more than the wall can pull beyond the ridge."""
+    groove = GrooveSpring(half_clearance=0.14e-3, friction_coefficient=0.15)
+    case = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=3e-3), groove=groove)
+    result = done(case)
+    assert findings(result).second_lobe is None
+    leaning = result.lag[result.time > 0.5 * result.time[-1]]
+    assert leaning.max() < 0.0 or leaning.min() > 0.0
+
+
 def test_pressure_difference_takes_the_second_seat_away():
     under_air = dataclasses.replace(
         INNER, groove=GrooveSpring(half_clearance=0.14e-3), air=AirPressure(pressure_left=1e5)

@@ -12,6 +12,7 @@ def _few(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(seal_bodies, 'HELD', ('bottom_and_flanks',))
     monkeypatch.setattr(seal_bodies, 'WIDTHS', ())
     monkeypatch.setattr(seal_bodies, 'SQUEEZES', (4e-6,))
+    monkeypatch.setattr(seal_bodies, 'COEFFICIENTS', (0.0, 0.15))
 
 
 def table(name: str, monkeypatch, capsys) -> list[dict]:
@@ -31,8 +32,15 @@ def test_small_displacements_are_right_for_a_small_squeeze(monkeypatch, capsys):
         assert abs(row['more [%]']) < 0.5
 
 
+def test_the_friction_of_the_paper_holds_the_seal_on_one_seat(monkeypatch, capsys):
+    free, held = table('groove', monkeypatch, capsys)
+    assert (free['seats'], held['seats']) == (2.0, 1.0)
+    assert free['falls again at [mm]'] == pytest.approx(-1.41, abs=0.03)
+    assert held['falls again at [mm]'] == '-'
+
+
 def test_an_unknown_table_is_refused(monkeypatch, capsys):
     monkeypatch.setattr('sys.argv', ['seal_bodies.py', 'soles'])
     with pytest.raises(SystemExit):
         seal_bodies.main()
-    assert 'there is no table soles: there are bodies, strain' in capsys.readouterr().err
+    assert 'there is no table soles: there are bodies, strain, groove' in capsys.readouterr().err
