@@ -5,7 +5,8 @@ Tables, all of them by default:
 - ``bodies``: friction, solid share and rise on slowing down of ``inner_seal`` on each body, three meshes of finite
   elements, what the groove holds, and other widths of the section;
 - ``strain``: contact force of the section on a smooth wall by small displacements and by finite strain;
-- ``groove``: ``inner_seal_groove`` with friction of the seal in its groove.
+- ``groove``: ``inner_seal_groove`` with friction of the seal in its groove;
+- ``air``: air under 6 bar through the gap that opens at the edge of ``inner_seal_control_edge``.
 """
 
 import argparse
@@ -20,7 +21,10 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import nnls
 
+from seal_friction_ros.core.lubrication.blow_by import blow_by
+from seal_friction_ros.core.lubrication.contact import dry_contact
 from seal_friction_ros.core.lubrication.findings import findings
+from seal_friction_ros.core.lubrication.grease import apparent_viscosity
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationNumerics, SealBody
 from seal_friction_ros.core.lubrication.seal_section import (
     SealSection,
@@ -28,7 +32,7 @@ from seal_friction_ros.core.lubrication.seal_section import (
     nothing_around,
     seal_section,
 )
-from seal_friction_ros.core.lubrication.transient import last_cycle, run_transient
+from seal_friction_ros.core.lubrication.transient import last_cycle, lubrication_model, run_transient
 from seal_friction_ros.core.oring_contact.equilibrium import (
     make_assembly,
     outline,
@@ -44,6 +48,8 @@ WIDTHS = (1.0e-3, 2.0e-3)  # [m]
 COEFFICIENTS = (0.0, 0.02, 0.03, 0.04, 0.05, 0.15)  # the last is that of the paper
 SQUEEZES = (4e-6, 12e-6, 36e-6)  # [m]
 PENALTIES = (200.0, 500.0, 1000.0, 2000.0)  # over E / height; the last two give the force on a rigid wall
+BEYOND = (0.18e-3, 0.21e-3, 0.24e-3, 0.26e-3, 0.27e-3, 0.30e-3, 0.36e-3, 0.45e-3)  # [m]
+PRESSURE = 6e5  # [Pa] gauge
 STEP = 4e-6  # [m] of squeeze
 
 
@@ -124,6 +130,29 @@ def groove(numerics: LubricationNumerics) -> Rows:
     return rows
 
 
+def air(_: LubricationNumerics) -> Rows:
+    """The seal at rest and dry on its way out of the seat, without the interference that pressure adds."""
+    case = single_case('inner_seal_control_edge', 'finding')
+    model, speed = lubrication_model(case), case.motion.speed
+    rows: Rows = []
+    for beyond in BEYOND:
+        gap = dry_contact(model.contact, model.rigid_gap(case.control_edge.position + beyond))
+        throat = float(gap.min())
+        viscosity = apparent_viscosity(case.grease.numbers, speed / throat)
+        flow = blow_by(gap, model.contact.body.cell_width, PRESSURE, viscosity, speed)
+        rows.append(
+            {
+                'beyond the edge [mm]': 1e3 * beyond,
+                'narrowest gap [um]': 1e6 * throat,
+                'viscous flow [g/(m s)]': 1e3 * flow.viscous,
+                'choked flow [g/(m s)]': 1e3 * flow.choked,
+                'Reynolds number': flow.reynolds_number,
+                'blow-out': flow.blow_out,
+            }
+        )
+    return rows
+
+
 def contact_forces(seal: SealBody, elements: int, squeeze: float) -> tuple[float, float]:
     """Contact force [N] of the section on a smooth wall, by small displacements and by finite strain."""
     section = seal_section(seal, 0.6e-3, elements)
@@ -156,7 +185,12 @@ def _of_finite_strain(seal: SealBody, section: SealSection, squeeze: float) -> f
     return 2.0 * forces[-1] - forces[-2]
 
 
-TABLES: dict[str, Callable[[LubricationNumerics], Rows]] = {'bodies': bodies, 'strain': strain, 'groove': groove}
+TABLES: dict[str, Callable[[LubricationNumerics], Rows]] = {
+    'bodies': bodies,
+    'strain': strain,
+    'groove': groove,
+    'air': air,
+}
 
 
 def main() -> int:

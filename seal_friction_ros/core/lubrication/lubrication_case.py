@@ -217,6 +217,12 @@ class MapGrid(CheckedParameters):
             )
 
 
+_WITHOUT_AIR = {
+    'film_supply': 'air that enters a starved film is not modelled',
+    'control_edge': 'air in the open gap is choked and its force on the seal is not known (docs/ehl.md)',
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class LubricationCase:
     """One seal, its wall, lubricant and motion.
@@ -254,10 +260,11 @@ class LubricationCase:
                 f'numerics.film_width = {self.numerics.film_width} m'
             )
         if self.air.pressure_left or self.air.pressure_right:
-            for part in ('film_supply', 'control_edge'):
+            for part, reason in _WITHOUT_AIR.items():
                 if getattr(self, part):
                     raise ValueError(
-                        f'case {self.name}: {part} needs both sides at ambient pressure: leave out air, or {part}'
+                        f'case {self.name}: {part} needs both sides at ambient pressure, since {reason}: leave out '
+                        f'air, or {part}'
                     )
 
     @property

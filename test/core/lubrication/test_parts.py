@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
+from seal_friction_ros.core.lubrication.blow_by import ATMOSPHERE, blow_by
 from seal_friction_ros.core.lubrication.contact import film_properties
 from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane
 from seal_friction_ros.core.lubrication.flow_factors import (
@@ -271,6 +272,32 @@ def test_control_edge_falls_by_its_depth_with_its_slope():
     assert slope == pytest.approx([0.0, 0.4, 0.0], abs=1e-3)
     beyond, _ = edge.fall(place + 1e-9)
     assert (beyond - fall) / 1e-9 == pytest.approx(slope, abs=1e-6)
+
+
+def test_air_in_an_even_gap_flows_as_the_square_of_pressure_says():
+    """Step by step along the gap: m R T = -p h^3 / (12 eta) dp/dx."""
+    cells, width, height, pressure = 2000, 1e-7, 1e-6, 6e5
+    flow = blow_by(np.full(cells, height), width, pressure, 0.3, 0.03).viscous
+    squares = np.linspace((ATMOSPHERE + pressure) ** 2, ATMOSPHERE**2, cells + 1)
+    inside = np.sqrt(0.5 * (squares[1:] + squares[:-1]))
+    by_cell = inside / (287.05 * 293.15) * height**3 / (12.0 * 1.82e-5) * -np.diff(np.sqrt(squares)) / width
+    assert by_cell == pytest.approx(flow, rel=1e-4)
+
+
+def test_air_chokes_as_a_nozzle_of_iso_6358_and_only_above_its_critical_ratio():
+    gap = np.full(100, 20e-6)
+    wide = blow_by(gap, 1e-6, 6e5, 0.3, 0.03)
+    assert wide.is_choked
+    assert wide.choked == pytest.approx(0.0404 * 20e-6 * (6e5 + ATMOSPHERE) / math.sqrt(293.15), rel=1e-3)
+    assert wide.reynolds_number == pytest.approx(2.0 * wide.choked / 1.82e-5)
+    assert blow_by(gap, 1e-6, 0.8 * ATMOSPHERE, 0.3, 0.03).choked == math.inf
+    assert not blow_by(gap, 1e-6, 0.8 * ATMOSPHERE, 0.3, 0.03).is_choked
+
+
+def test_grease_is_blown_out_of_a_wide_gap_and_not_of_a_narrow_one():
+    narrow, wide = (blow_by(np.full(100, h), 1e-6, 6e5, 0.3, 0.03).blow_out for h in (1e-6, 1e-5))
+    assert narrow == pytest.approx(1e-12 * 6e5 / (12.0 * 0.3 * 1e-4) / 0.03)
+    assert wide == pytest.approx(100.0 * narrow)
 
 
 def test_film_on_the_wall_is_moved_and_never_made():

@@ -39,8 +39,17 @@ def test_the_friction_of_the_paper_holds_the_seal_on_one_seat(monkeypatch, capsy
     assert held['falls again at [mm]'] == '-'
 
 
+def test_air_chokes_before_the_gap_is_wider_than_the_roughness(monkeypatch, capsys):
+    rows = table('air', monkeypatch, capsys)
+    choked = [row['narrowest gap [um]'] for row in rows if row['viscous flow [g/(m s)]'] > row['choked flow [g/(m s)]']]
+    assert 2.0 < min(choked) < 4.0
+    assert rows[-1]['Reynolds number'] > 4000.0
+    assert rows[0]['blow-out'] < 0.1
+    assert rows[-1]['blow-out'] > 1.0
+
+
 def test_an_unknown_table_is_refused(monkeypatch, capsys):
     monkeypatch.setattr('sys.argv', ['seal_bodies.py', 'soles'])
     with pytest.raises(SystemExit):
         seal_bodies.main()
-    assert 'there is no table soles: there are bodies, strain, groove' in capsys.readouterr().err
+    assert 'there is no table soles: there are bodies, strain, groove, air' in capsys.readouterr().err
