@@ -172,6 +172,20 @@ def test_the_tables_of_the_docs_are_those_of_the_script():
     assert row['F_n at 1000 psi [N]'] == pytest.approx(419.2, rel=0.1)
 
 
+def test_lindley_is_beside_hertz_and_the_finite_elements(monkeypatch: pytest.MonkeyPatch):
+    for name, values in (
+        ('SQUEEZES', (0.08,)),
+        ('LARGER_SQUEEZES', ()),
+        ('HERTZ_LINES', (17,)),
+        ('RITZ_DEGREES', (16,)),
+    ):
+        monkeypatch.setattr(oring_accuracy, name, values)
+    (row,) = oring_accuracy.squeezed()
+    assert row['elements, 17 lines'] == pytest.approx(row['Ritz, degree 16'], rel=0.02)
+    assert row['elements, 17 lines'] == pytest.approx(row['Hertz'], rel=0.05)
+    assert row['Lindley'] == pytest.approx(0.72 * row['elements, 17 lines'], rel=0.03)
+
+
 def test_what_stops_a_computation_names_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     path = written(tmp_path, document(groove={'width': 2.62e-3}))  # the section fits, the squeezed one does not
     assert main(['oring', str(path)]) == 2
