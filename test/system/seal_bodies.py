@@ -4,6 +4,7 @@ Tables, all of them by default:
 
 - ``bodies``: friction, solid share and rise on slowing down of ``inner_seal`` on each body, three meshes of finite
   elements, what the groove holds, and other widths of the section;
+- ``edge``: peak and forces at the control edge on each body, with the time step of ``inner_seal_control_edge``;
 - ``strain``: contact force of the section on a smooth wall by small displacements and by finite strain;
 - ``groove``: ``inner_seal_groove`` with friction of the seal in its groove;
 - ``air``: air under 6 bar through the gap that opens at the edge of ``inner_seal_control_edge``.
@@ -43,6 +44,7 @@ from seal_friction_ros.core.oring_contact.surroundings import node_areas, surfac
 from seal_friction_ros.offline.contact.lubrication_runs import single_case
 
 Rows = list[dict[str, float | str]]
+EDGE_BODIES = ('half_plane', 'finite_elements', 'bonded_layer')
 MESHES = (24, 48, 96)
 WIDTHS = (1.0e-3, 2.0e-3)  # [m]
 COEFFICIENTS = (0.0, 0.02, 0.03, 0.04, 0.05, 0.15)  # the last is that of the paper
@@ -85,6 +87,26 @@ def bodies(numerics: LubricationNumerics) -> Rows:
 
 
 HELD = ('bottom_and_flanks', 'sliding_bottom')
+
+
+def edge(numerics: LubricationNumerics) -> Rows:
+    """Findings of ``inner_seal_control_edge`` with each body."""
+    case = single_case('inner_seal_control_edge', 'finding')
+    numerics = dataclasses.replace(case.numerics, cells=numerics.cells)
+    rows: Rows = []
+    for body in EDGE_BODIES:
+        seal = dataclasses.replace(case.seal, body=body)
+        found = findings(run_transient(dataclasses.replace(case, seal=seal, numerics=numerics)))
+        rows.append(
+            {
+                'body': body,
+                'peak over friction after it': found.edge_peak or 0.0,
+                'friction after it [N]': found.after_edge or 0.0,
+                'push of the chamfer [N]': found.edge_assist or 0.0,
+                'friction on leaving [N]': found.friction_on_leaving or 0.0,
+            }
+        )
+    return rows
 
 
 def strain(_: LubricationNumerics) -> Rows:
@@ -187,6 +209,7 @@ def _of_finite_strain(seal: SealBody, section: SealSection, squeeze: float) -> f
 
 TABLES: dict[str, Callable[[LubricationNumerics], Rows]] = {
     'bodies': bodies,
+    'edge': edge,
     'strain': strain,
     'groove': groove,
     'air': air,

@@ -259,6 +259,12 @@ class LubricationCase:
                 f'case {self.name}: seal.section_width = {self.seal.section_width} m is not above '
                 f'numerics.film_width = {self.numerics.film_width} m'
             )
+        held_flanks = self.seal.body == 'finite_elements' and self.seal.section_hold == 'bottom_and_flanks'
+        if held_flanks and self.groove.half_clearance > 0.0:
+            raise ValueError(
+                f'case {self.name}: groove.half_clearance = {self.groove.half_clearance} m leaves the flanks free, but '
+                f'seal.section_hold is {self.seal.section_hold}'
+            )
         if self.air.pressure_left or self.air.pressure_right:
             for part, reason in _WITHOUT_AIR.items():
                 if getattr(self, part):

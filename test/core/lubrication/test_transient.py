@@ -341,6 +341,14 @@ def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
         ({'name': 'x', 'film_supply': {}, 'air': {'pressure_left': 1e5}}, 'film_supply needs both sides at ambient'),
         ({'name': 'x', 'control_edge': {}, 'air': {'pressure_right': 1e5}}, 'control_edge needs both sides at ambient'),
         ({'name': 'x', 'seal': {'mooney_c01': 0.0}}, 'give the seal a stiffness'),
+        (
+            {
+                'name': 'x',
+                'seal': {'body': 'finite_elements', 'section_hold': 'bottom_and_flanks'},
+                'groove': {'half_clearance': 1e-4},
+            },
+            'half_clearance = 0.0001 m leaves the flanks free, but seal.section_hold is bottom_and_flanks',
+        ),
         ({'name': 'x', 'seals': []}, 'seals is empty'),
         ({'name': 'x', 'seals': [{'case': 'y', 'side': 1}]}, r'seals\[0\] has no side'),
     ],

@@ -1,5 +1,6 @@
 """The tables of test/system/seal_bodies.py, on coarse grids."""
 
+import dataclasses
 import json
 
 import pytest
@@ -27,6 +28,17 @@ def test_a_section_is_between_half_plane_and_layer_and_stiffer_in_a_full_groove(
     assert coarse == pytest.approx(fine, rel=0.03)
 
 
+def test_the_table_of_the_edge_has_its_peak(monkeypatch, capsys):
+    case = seal_bodies.single_case('inner_seal_control_edge', 'finding')
+    motion = dataclasses.replace(case.motion, cycles=1)
+    brief = dataclasses.replace(case, numerics=dataclasses.replace(case.numerics, time_step=1e-3), motion=motion)
+    monkeypatch.setattr(seal_bodies, 'single_case', lambda *_: brief)
+    monkeypatch.setattr(seal_bodies, 'EDGE_BODIES', ('finite_elements',))
+    (row,) = table('edge', monkeypatch, capsys)
+    assert row['peak over friction after it'] > 1.1
+    assert row['push of the chamfer [N]'] > 0.2
+
+
 def test_small_displacements_are_right_for_a_small_squeeze(monkeypatch, capsys):
     for row in table('strain', monkeypatch, capsys):
         assert abs(row['more [%]']) < 0.5
@@ -52,4 +64,4 @@ def test_an_unknown_table_is_refused(monkeypatch, capsys):
     monkeypatch.setattr('sys.argv', ['seal_bodies.py', 'soles'])
     with pytest.raises(SystemExit):
         seal_bodies.main()
-    assert 'there is no table soles: there are bodies, strain, groove, air' in capsys.readouterr().err
+    assert 'there is no table soles: there are bodies, edge, strain, groove, air' in capsys.readouterr().err
