@@ -7,7 +7,8 @@ Tables, all of them by default:
   Lindley, whose formula is `squeeze_force`;
 - ``lines``, ``penalty``, ``transition``: the thesis's ring, calibrated, at its five pressures, with one number of
   `OringNumerics` changed; normal forces in N;
-- ``thesis``: calibrated and blind case against Appendix B [%], axial force over pressure times area, volume lost;
+- ``thesis``: calibrated and blind case against Appendix B [%], also cell by cell, axial force over pressure times area,
+  volume lost;
 - ``variants``: the blind case with another section, modulus, ring or friction;
 - ``friction``: friction of one seal from geometry alone against the measured one, thesis's seals and Delft O-ring.
 """
@@ -20,6 +21,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -39,6 +41,7 @@ from seal_friction_ros.core.oring_contact.results import WallContact, evaluate_c
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.oring_runs import compute_case
 from seal_friction_ros.offline.reports.oring_report import appendix_b, friction_deviation, thesis_case
+from seal_friction_ros.offline.reports.thesis_data import ThesisContact
 
 Rows = list[dict[str, float | str]]
 SQUEEZES = (0.02, 0.04, 0.06, 0.08)
@@ -135,6 +138,7 @@ def thesis() -> Rows:
             if its is None:
                 raise ValueError(f'{name}: Appendix B has no {result.pressure / PSI:.0f} psi')
             push = result.pressure * area
+            rms, worst = profile_deviation(its, result.rod)
             rows.append(
                 {
                     'case': name,
@@ -144,12 +148,23 @@ def thesis() -> Rows:
                     'F_n off [%]': 100.0 * (result.rod.force / its.normal_force - 1.0),
                     'peak off [%]': 100.0 * (result.rod.peak_stress / its.peak_stress - 1.0),
                     'width off [%]': 100.0 * (result.rod.width / its.width - 1.0),
+                    'profile rms [% of peak]': 100.0 * rms,
+                    'worst cell [% of peak]': 100.0 * worst,
                     'axial off [%]': 100.0 * (result.axial_force / push - 1.0) if push else '-',
                     'volume lost [%]': 100.0 * (1.0 - result.volume_ratio),
                     'slope': computed.summary.area_deformation_gain or '-',
                 }
             )
     return rows
+
+
+def profile_deviation(its: ThesisContact, rod: WallContact) -> tuple[float, float]:
+    """RMS and largest difference of the stress in the cells of the thesis, over its peak, at the best shift along z."""
+    shifts = np.linspace(rod.position[0] - its.position[-1], rod.position[-1] - its.position[0], 2001)
+    found = [np.interp(its.position + shift, rod.position, rod.stress, 0.0, 0.0) - its.stress for shift in shifts]
+    rms = np.sqrt(np.mean(np.square(found), axis=1))
+    best = int(rms.argmin())
+    return float(rms[best]) / its.peak_stress, float(np.abs(found[best]).max()) / its.peak_stress
 
 
 def friction() -> Rows:
