@@ -16,13 +16,16 @@ import json
 import math
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from scipy.optimize import nnls
 
-from seal_friction_ros.core.lubrication.blow_by import blow_by
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.blow_by import blow_by
+
 from seal_friction_ros.core.lubrication.contact import dry_contact
 from seal_friction_ros.core.lubrication.findings import findings
 from seal_friction_ros.core.lubrication.grease import apparent_viscosity

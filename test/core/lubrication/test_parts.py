@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from harness.blow_by import ATMOSPHERE, blow_by
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
-from seal_friction_ros.core.lubrication.blow_by import ATMOSPHERE, blow_by
 from seal_friction_ros.core.lubrication.contact import film_properties
 from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane
 from seal_friction_ros.core.lubrication.flow_factors import (

@@ -8,10 +8,7 @@ from scipy.sparse import coo_array
 from seal_bodies import contact_forces
 
 from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane
-from seal_friction_ros.core.lubrication.findings import findings
-from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
 from seal_friction_ros.core.lubrication.lubrication_case import (
-    LubricationCase,
     LubricationNumerics,
     SealBody,
     parse_lubrication_case,
@@ -22,7 +19,6 @@ from seal_friction_ros.core.lubrication.seal_section import (
     seal_body,
     seal_section,
 )
-from seal_friction_ros.core.lubrication.transient import run_transient
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, element_forces
 
 SEAL = SealBody(body='finite_elements')
@@ -143,14 +139,3 @@ def test_contact_force_of_a_small_squeeze_is_that_of_finite_strain():
 def test_a_section_that_cannot_be_is_refused(seal, words):
     with pytest.raises(ValueError, match=words):
         parse_lubrication_case({'name': 'x', 'seal': seal})
-
-
-def test_friction_on_a_section_lies_between_half_plane_and_layer():
-    numerics = LubricationNumerics(cells=64, time_step=2e-3, section_elements=16)
-    motion = ConstantAcceleration(cycles=1)
-    found = [
-        findings(run_transient(LubricationCase(name='x', seal=SealBody(body=body), numerics=numerics, motion=motion)))
-        for body in ('half_plane', 'finite_elements', 'bonded_layer')
-    ]
-    assert (np.diff([f.friction for f in found]) > 0.1).all()
-    assert (np.diff([f.rise_on_deceleration for f in found]) < 0.0).all()

@@ -23,9 +23,12 @@ def table(name: str, monkeypatch, capsys) -> list[dict]:
 
 
 def test_a_section_is_between_half_plane_and_layer_and_stiffer_in_a_full_groove(monkeypatch, capsys):
-    plane, layer, coarse, fine, full = (row['friction [N]'] for row in table('bodies', monkeypatch, capsys))
+    rows = table('bodies', monkeypatch, capsys)
+    plane, layer, coarse, fine, full = (row['friction [N]'] for row in rows)
     assert plane < fine < layer < full
     assert coarse == pytest.approx(fine, rel=0.03)
+    rises = [rows[k]['rise on slowing down [%]'] for k in (0, 3, 1, 4)]
+    assert rises == sorted(rises, reverse=True)
 
 
 def test_the_table_of_the_edge_has_its_peak(monkeypatch, capsys):

@@ -22,7 +22,7 @@ bearings); ISO 6358-1 for the choked flow. The comparison of velocities is our c
 import math
 from typing import NamedTuple
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
+import numpy as np
 
 ATMOSPHERE = 101_325.0
 """[Pa]"""
@@ -45,7 +45,7 @@ class BlowBy(NamedTuple):
         return self.viscous > self.choked
 
 
-def blow_by(gap: FloatArray, cell_width: float, pressure: float, grease_viscosity: float, speed: float) -> BlowBy:
+def blow_by(gap: np.ndarray, cell_width: float, pressure: float, grease_viscosity: float, speed: float) -> BlowBy:
     """Flow under a gauge ``pressure`` [Pa] on one side.
 
     Args:
