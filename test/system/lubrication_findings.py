@@ -61,8 +61,10 @@ def all_findings(names: Sequence[str]) -> list[Row]:
     """The findings of every case, and those of the study of the first case."""
     rows = []
     cases = [single_case(name, 'finding') for name in names]
-    layer = dataclasses.replace(cases[0].seal, body='bonded_layer')
-    cases.append(dataclasses.replace(cases[0], name=f'{cases[0].name}, layer', seal=layer))
+    first = cases[0]
+    for name, body in (('layer', 'bonded_layer'), ('section', 'finite_elements')):
+        seal = dataclasses.replace(first.seal, body=body)
+        cases.append(dataclasses.replace(first, name=f'{first.name}, {name}', seal=seal))
     for case in cases:
         name, found = case.name, run_case(case)
         values = found.found._asdict()

@@ -3,9 +3,12 @@
 Tables, all of them by default:
 
 - ``hertz``: force and peak of a cylinder between two plates over those of Hertz [%], peak over that of its own force;
+- ``squeeze``: force on a cylinder between two plates over E d by the finite elements, by Ritz's method, by Hertz and by
+  Lindley, whose formula is `squeeze_force`;
 - ``lines``, ``penalty``, ``transition``: the thesis's ring, calibrated, at its five pressures, with one number of
   `OringNumerics` changed; normal forces in N;
-- ``thesis``: calibrated and blind case against Appendix B [%], axial force over pressure times area, volume lost;
+- ``thesis``: calibrated and blind case against Appendix B [%], also cell by cell, axial force over pressure times area,
+  volume lost;
 - ``variants``: the blind case with another section, modulus, ring or friction;
 - ``friction``: friction of one seal from geometry alone against the measured one, thesis's seals and Delft O-ring.
 """
@@ -16,26 +19,36 @@ import json
 import math
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
-from harness.hertz import cylinder_between_plates
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.hertz import cylinder_between_plates
+from harness.squeezed_cylinder import force_per_length
+
 from seal_friction_ros.core.foundation.units import BAR, INCH, LBF, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
+from seal_friction_ros.core.friction.laws.normal_force import squeeze_force
 from seal_friction_ros.core.oring_contact.loading import oring_model, squeeze_ring
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
-from seal_friction_ros.core.oring_contact.results import evaluate_contact, oring_results
+from seal_friction_ros.core.oring_contact.results import WallContact, evaluate_contact, oring_results
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.oring_runs import compute_case
 from seal_friction_ros.offline.reports.oring_report import appendix_b, friction_deviation, thesis_case
+from seal_friction_ros.offline.reports.thesis_data import ThesisContact
 
 Rows = list[dict[str, float | str]]
 SQUEEZES = (0.02, 0.04, 0.06, 0.08)
 HERTZ_LINES = (33, 65)
+LARGER_SQUEEZES = (0.15, 0.25)
+RITZ_DEGREES = (22, 28)
+LARGEST_OF_RITZ = 0.15  # squeeze; Newton's method of degree 28 does not reach 0.25
 LINES = (13, 17, 25, 33, 41, 49)
 PENALTIES = (200.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 TRANSITIONS = (0.01, 0.02, 0.05, 0.1)
@@ -53,20 +66,54 @@ def contact(numerics: OringNumerics) -> dict[str, float]:
     return figures
 
 
+DIAMETER, PLATE_RADIUS, MODULUS = 2e-3, 1.0, 5e6  # [m], [m], [Pa]
+
+
+def plates(share: float) -> SealGeometry:
+    """A ring of so large a radius that rod and gland are plates, squeezed by a ``share`` of its section."""
+    inner, depth = 2.0 * PLATE_RADIUS, share * DIAMETER
+    return SealGeometry(DIAMETER, inner, inner + depth, inner + 2.0 * DIAMETER - depth, elastic_modulus=MODULUS)
+
+
+def between_plates(share: float, lines: int) -> tuple[WallContact, float]:
+    """Contact of the ring with the rod, and its force per length [N/m]."""
+    geometry, rubber, numerics = plates(share), Rubber(MODULUS), OringNumerics(lines=lines)
+    case = OringCase(name='plates', geometry=geometry, groove=Groove(5e-3), rubber=rubber, numerics=numerics)
+    model = oring_model(case)
+    rod = evaluate_contact(model, squeeze_ring(case, model)).rod
+    return rod, rod.force / (math.pi * geometry.rod_diameter)
+
+
+def squeezed() -> Rows:
+    """Force per length over E d."""
+    scale = MODULUS * DIAMETER
+    rows: Rows = []
+    for share in (*SQUEEZES, *LARGER_SQUEEZES):
+        geometry = plates(share)
+        of_hertz = cylinder_between_plates(share, DIAMETER, MODULUS / 0.75)
+        mean_length = math.pi * 0.5 * (geometry.rod_diameter + geometry.gland_diameter)
+        rows.append(
+            {
+                'squeeze [%]': 100.0 * share,
+                **{f'elements, {lines} lines': between_plates(share, lines)[1] / scale for lines in HERTZ_LINES},
+                **{
+                    f'Ritz, degree {degree}': force_per_length(share, degree) if share <= LARGEST_OF_RITZ else '-'
+                    for degree in RITZ_DEGREES
+                },
+                'Hertz': of_hertz.force_per_length / scale,
+                'Lindley': squeeze_force(geometry) / mean_length / scale,
+            }
+        )
+    return rows
+
+
 def hertz() -> Rows:
-    """A ring of 2 mm section and 1 m radius, for which rod and gland are plates."""
-    diameter, inner, rubber = 2e-3, 2.0, Rubber(5e6)
+    """Contact of the ring with one of the plates."""
     rows: Rows = []
     for lines in HERTZ_LINES:
         for share in SQUEEZES:
-            depth = share * diameter
-            geometry = SealGeometry(diameter, inner, inner + depth, inner + 2.0 * diameter - depth)
-            numerics = OringNumerics(lines=lines)
-            case = OringCase(name='plates', geometry=geometry, groove=Groove(5e-3), rubber=rubber, numerics=numerics)
-            model = oring_model(case)
-            rod = evaluate_contact(model, squeeze_ring(case, model)).rod
-            expected = cylinder_between_plates(share, diameter, rubber.elastic_modulus / 0.75)
-            force = rod.force / (math.pi * geometry.rod_diameter)
+            rod, force = between_plates(share, lines)
+            expected = cylinder_between_plates(share, DIAMETER, MODULUS / 0.75)
             peak_of_force = expected.peak_stress * math.sqrt(force / expected.force_per_length)
             rows.append(
                 {
@@ -91,6 +138,7 @@ def thesis() -> Rows:
             if its is None:
                 raise ValueError(f'{name}: Appendix B has no {result.pressure / PSI:.0f} psi')
             push = result.pressure * area
+            rms, worst = profile_deviation(its, result.rod)
             rows.append(
                 {
                     'case': name,
@@ -100,12 +148,23 @@ def thesis() -> Rows:
                     'F_n off [%]': 100.0 * (result.rod.force / its.normal_force - 1.0),
                     'peak off [%]': 100.0 * (result.rod.peak_stress / its.peak_stress - 1.0),
                     'width off [%]': 100.0 * (result.rod.width / its.width - 1.0),
+                    'profile rms [% of peak]': 100.0 * rms,
+                    'worst cell [% of peak]': 100.0 * worst,
                     'axial off [%]': 100.0 * (result.axial_force / push - 1.0) if push else '-',
                     'volume lost [%]': 100.0 * (1.0 - result.volume_ratio),
                     'slope': computed.summary.area_deformation_gain or '-',
                 }
             )
     return rows
+
+
+def profile_deviation(its: ThesisContact, rod: WallContact) -> tuple[float, float]:
+    """RMS and largest difference of the stress in the cells of the thesis, over its peak, at the best shift along z."""
+    shifts = np.linspace(rod.position[0] - its.position[-1], rod.position[-1] - its.position[0], 2001)
+    found = [np.interp(its.position + shift, rod.position, rod.stress, 0.0, 0.0) - its.stress for shift in shifts]
+    rms = np.sqrt(np.mean(np.square(found), axis=1))
+    best = int(rms.argmin())
+    return float(rms[best]) / its.peak_stress, float(np.abs(found[best]).max()) / its.peak_stress
 
 
 def friction() -> Rows:
@@ -181,6 +240,7 @@ def converging(name: str, choices: Sequence[float]) -> Rows:
 
 TABLES: dict[str, Callable[[Sequence[int]], Rows]] = {
     'hertz': lambda _: hertz(),
+    'squeeze': lambda _: squeezed(),
     'lines': lambda lines: converging('lines', lines),
     'penalty': lambda _: converging('penalty', PENALTIES),
     'transition': lambda _: converging('transition', TRANSITIONS),

@@ -178,7 +178,6 @@ def condensed_body(
     return CondensedBody(len(places), width, modulus, (shapes * np.maximum(values, least)) @ shapes.T)
 
 
-BODIES = {'half_plane': HalfPlane, 'bonded_layer': BondedLayer}
 _LARGEST_WAVE_NUMBER = 25.0  # [1/h] S is 1 to the last digit beyond
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 

@@ -197,13 +197,18 @@ def _turning_point(result: TransientResult, i: int) -> float:
 
 
 def _second_lobe(result: TransientResult, last: BoolArray) -> float | None:
-    """Position of the first maximum of friction on the stroke to the right, the vertex of a parabola [m]."""
+    """Position of the first maximum of friction on the stroke to the right, the vertex of a parabola [m].
+
+    None if the seal has begun to slide by then: it stays on one seat, since friction in the groove holds it there.
+    """
     if result.case.seated_groove.half_clearance == 0.0:
         return None
     steps = np.flatnonzero(last & (result.velocity > 0.0))
     friction = result.friction[steps]
     for i in range(1, len(steps) - 1):
         if friction[i] > 0.0 and friction[i] >= friction[i - 1] and friction[i] > friction[i + 1]:
+            if result.sliding_velocity[steps[i]] != 0.0:
+                return None
             bend = friction[i - 1] - 2.0 * friction[i] + friction[i + 1]
             ahead = 0.5 * (friction[i - 1] - friction[i + 1]) / bend  # in steps
             return float(np.interp(i + ahead, np.arange(len(steps)), result.position[steps]))

@@ -15,6 +15,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import (
     CheckedParameters,
     check_names,
@@ -22,13 +25,15 @@ from seal_friction_ros.core.foundation.parameters import (
     name_and_source,
     parameter,
 )
-from seal_friction_ros.core.lubrication.elasticity import BODIES
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
+
+BODIES = ('half_plane', 'bonded_layer', 'finite_elements')
+HOLDS = ('bottom', 'bottom_and_flanks', 'sliding_bottom')
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,16 @@ class SealBody(CheckedParameters):
         'half_plane',
         unit='',
         description='half_plane: the kernel of a half-plane, zero at the section height. bonded_layer: an '
-        'incompressible layer of that height, bonded to a rigid base.',
+        'incompressible layer of that height, bonded to a rigid base. finite_elements: a crowned section of it.',
+    )
+    section_width: float = parameter(
+        1.5e-3, unit='m', lower=1e-5, upper=1.0, description='Between the flanks of the section; for finite_elements.'
+    )
+    section_hold: str = parameter(
+        'bottom',
+        unit='',
+        description='What the groove holds; for finite_elements. bottom: it sticks, the flanks are free. '
+        'bottom_and_flanks: the flanks do not move along the axis either. sliding_bottom: the bottom slides freely.',
     )
     mooney_c10: float = parameter(0.0, unit='Pa', lower=0.0, upper=1e9, description='C_10.')
     mooney_c01: float = parameter(1.785e6, unit='Pa', lower=0.0, upper=1e9, description='C_01.')
@@ -70,6 +84,10 @@ class SealBody(CheckedParameters):
         super().__post_init__()
         if self.body not in BODIES:
             raise ValueError(f'SealBody.body = {self.body!r} is not one of {", ".join(BODIES)}')
+        if self.section_hold not in HOLDS:
+            raise ValueError(f'SealBody.section_hold = {self.section_hold!r} is not one of {", ".join(HOLDS)}')
+        if self.body == 'finite_elements':
+            self._check_section()
         if self.modulus <= 0.0:
             raise ValueError('SealBody.mooney_c10 and mooney_c01 are both 0 Pa: give the seal a stiffness')
 
@@ -77,6 +95,24 @@ class SealBody(CheckedParameters):
     def modulus(self) -> float:
         """Plane-strain modulus at small strain E* = E / (1 - 1/4) with E = 6 (C_10 + C_01) [Pa]."""
         return 8.0 * (self.mooney_c10 + self.mooney_c01)
+
+    def fall(self, place: FloatArray) -> FloatArray:
+        """Depth of the profile below its crown [m] at a ``place`` from it [m]: a parabola on each side."""
+        radius = np.where(place < 0.0, self.crown_radius_left, self.crown_radius_right)
+        return np.asarray(place**2 / (2.0 * radius))
+
+    def _check_section(self) -> None:
+        if self.section_height >= 0.5 * self.sealing_diameter:
+            raise ValueError(
+                f'SealBody.section_height = {self.section_height} m reaches the axis: sealing_diameter = '
+                f'{self.sealing_diameter} m'
+            )
+        lowest = self.section_height - float(self.fall(np.array([-0.5, 0.5]) * self.section_width).max())
+        if lowest < 0.2 * self.section_height:
+            raise ValueError(
+                f'SealBody.section_width = {self.section_width} m leaves {lowest:.3g} m of section_height = '
+                f'{self.section_height} m at the flanks: make it narrower, or the crown radii larger'
+            )
 
 
 @dataclass(frozen=True)
@@ -132,6 +168,9 @@ class LubricationNumerics(CheckedParameters):
     cells: int = parameter(226, unit='1', lower=32, upper=4000, description='Cells of the film (paper: 226 nodes).')
     film_width: float = parameter(0.6e-3, unit='m', lower=1e-5, upper=0.1, description='Length of the film region.')
     time_step: float = parameter(5e-4, unit='s', lower=1e-7, upper=0.1, description='Before any halving.')
+    section_elements: int = parameter(
+        48, unit='1', lower=8, upper=256, description='Finite elements along the film, if seal.body is finite_elements.'
+    )
 
 
 @dataclass(frozen=True)
@@ -178,6 +217,12 @@ class MapGrid(CheckedParameters):
             )
 
 
+_WITHOUT_AIR = {
+    'film_supply': 'air that enters a starved film is not modelled',
+    'control_edge': 'air in the open gap is choked and its force on the seal is not known (docs/ehl.md)',
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class LubricationCase:
     """One seal, its wall, lubricant and motion.
@@ -209,11 +254,23 @@ class LubricationCase:
                 f'case {self.name}: seal.section_height = {self.seal.section_height} m is less than '
                 f'numerics.film_width = {self.numerics.film_width} m: the half-plane needs more depth than width'
             )
+        if self.seal.body == 'finite_elements' and self.seal.section_width <= self.numerics.film_width:
+            raise ValueError(
+                f'case {self.name}: seal.section_width = {self.seal.section_width} m is not above '
+                f'numerics.film_width = {self.numerics.film_width} m'
+            )
+        held_flanks = self.seal.body == 'finite_elements' and self.seal.section_hold == 'bottom_and_flanks'
+        if held_flanks and self.groove.half_clearance > 0.0:
+            raise ValueError(
+                f'case {self.name}: groove.half_clearance = {self.groove.half_clearance} m leaves the flanks free, but '
+                f'seal.section_hold is {self.seal.section_hold}'
+            )
         if self.air.pressure_left or self.air.pressure_right:
-            for part in ('film_supply', 'control_edge'):
+            for part, reason in _WITHOUT_AIR.items():
                 if getattr(self, part):
                     raise ValueError(
-                        f'case {self.name}: {part} needs both sides at ambient pressure: leave out air, or {part}'
+                        f'case {self.name}: {part} needs both sides at ambient pressure, since {reason}: leave out '
+                        f'air, or {part}'
                     )
 
     @property

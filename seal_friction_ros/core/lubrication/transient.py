@@ -26,10 +26,10 @@ from seal_friction_ros.core.lubrication.contact import (
     dry_contact,
     film_properties,
 )
-from seal_friction_ros.core.lubrication.elasticity import BODIES
 from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
+from seal_friction_ros.core.lubrication.seal_section import seal_body
 from seal_friction_ros.core.lubrication.shear import fluid_shear, sliding_velocity, solid_shear
 from seal_friction_ros.core.lubrication.wall import WallFilm
 
@@ -61,7 +61,7 @@ class LubricationModel:
 
 
 def lubrication_model(case: LubricationCase) -> LubricationModel:
-    """Model of a case of a profile on a half-plane or a layer.
+    """Model of a case of a profile on a half-plane, a layer or a section by finite elements.
 
     The air acts on the seal from all sides, and rubber transmits its pressure like a fluid: only the pressure above
     that of the air deflects the seal. The air pressure falls linearly over the middle half of the film (our choice).
@@ -73,12 +73,11 @@ def lubrication_model(case: LubricationCase) -> LubricationModel:
         raise ValueError(f'case {case.name}: an O-ring has a friction map only: seal_friction ehl map')
     numerics = case.numerics
     width = numerics.film_width / numerics.cells
-    body = BODIES[case.seal.body](numerics.cells, width, case.seal.modulus, case.seal.section_height)
+    body = seal_body(case.seal, numerics)
     place: FloatArray = np.asarray((np.arange(numerics.cells) + 0.5) * width - 0.5 * numerics.film_width)
-    radius = np.where(place < 0.0, case.seal.crown_radius_left, case.seal.crown_radius_right)
     passed = np.clip(0.5 + 2.0 * place / numerics.film_width, 0.0, 1.0)
     ambient = case.air.pressure_left + passed * (case.air.pressure_right - case.air.pressure_left)
-    profile = place**2 / (2.0 * radius) - case.interference - body.deflection(ambient)
+    profile = case.seal.fall(place) - case.interference - body.deflection(ambient)
     contact = LubricatedContact(body, case.topography, case.grease)
     return LubricationModel(case, contact, place, ambient, profile, math.pi * case.seal.sealing_diameter)
 
@@ -98,6 +97,7 @@ class TransientState(NamedTuple):
     time: float  # [s]
     position: float  # of the spool [m]
     lag: float  # of the contact behind the spool [m]
+    seat: float  # lag at which the seal would rest in its groove, s of `groove` [m]
     state: ContactState
     wall_film: WallFilm | None  # film on the wall outside the seal; None where it is flooded
     creep: FloatArray  # viscoelastic parts of the deflection [m], shape (parts, n); none for an elastic seal
@@ -178,7 +178,8 @@ def initial_state(model: LubricationModel, position: float) -> TransientState:
             )
         start = position - reach
         wall_film = WallFilm(start, width, np.full(count, film * width))
-    return TransientState(0.0, position, lag, ContactState(gap, np.array(model.ambient), saturation), wall_film, creep)
+    state = ContactState(gap, np.array(model.ambient), saturation)
+    return TransientState(0.0, position, lag, lag, state, wall_film, creep)
 
 
 def transient_step(
@@ -218,7 +219,8 @@ def transient_step(
     deflected = contact.body.deflection(state.pressure + solid_pressure)
     creep = kept[:, None] * start.creep + np.outer(shares * (1.0 - kept), deflected)
     before = None if wall_film is not None else StepBefore(_thickness(moment), moment.creep, step, velocity)
-    after = TransientState(time, position, lag, state, wall_film, creep, before)
+    seat = case.seated_groove.seat(moment.seat, lag, _bottom_force(model, moment.state))
+    after = TransientState(time, position, lag, seat, state, wall_film, creep, before)
     return after, _forces(model, after, at_end), done.iterations, defect
 
 
@@ -287,6 +289,14 @@ def solid_limit(model: LubricationModel, state: ContactState) -> float:
     return model.circumference * solid_shear(model.contact, state.gap, model.case.seal.solid_shear_stress)
 
 
+def _bottom_force(model: LubricationModel, state: ContactState) -> float:
+    """Normal force of the seal on the bottom of its groove [N]: that of film and asperities on its face."""
+    if model.case.groove.friction_coefficient == 0.0:
+        return 0.0
+    solid, _ = asperity_pressure(state.gap, model.contact.asperities)
+    return model.circumference * model.contact.body.cell_width * float((state.pressure + solid).sum())
+
+
 def _slide(model: LubricationModel, moment: TransientState, step: float, position: float) -> tuple[float, float]:
     """Sliding velocity [m/s] during the step and lag [m] after it."""
     groove = model.case.seated_groove
@@ -294,14 +304,19 @@ def _slide(model: LubricationModel, moment: TransientState, step: float, positio
     edge = _edge_force(model, moment)
     fluid_at_rest = fluid_force(model, moment.state, 0.0)
     solid = solid_limit(model, moment.state)
-    drive = groove.force(stuck_lag) - edge - fluid_at_rest
+    normal_force = _bottom_force(model, moment.state)
+
+    def spring(lag: float) -> float:
+        return groove.force(lag, groove.seat(moment.seat, lag, normal_force))
+
+    drive = spring(stuck_lag) - edge - fluid_at_rest
     if abs(drive) <= solid:
         return 0.0, stuck_lag
     velocity = sliding_velocity(
         drive,
         solid,
         lambda v: fluid_force(model, moment.state, v) - fluid_at_rest,
-        lambda v: groove.force(stuck_lag - v * step) - edge - fluid_at_rest,
+        lambda v: spring(stuck_lag - v * step) - edge - fluid_at_rest,
         max(abs(position - moment.position), (abs(drive) - solid) / groove.stiffness) / step,
     )
     return velocity, stuck_lag - velocity * step
@@ -314,7 +329,7 @@ def _forces(model: LubricationModel, moment: TransientState, velocity: float) ->
     if velocity:
         solid = math.copysign(limit, velocity)
     else:  # stuck: the asperities balance the spring, up to their limit
-        asked = model.case.seated_groove.force(moment.lag) - edge - fluid
+        asked = model.case.seated_groove.force(moment.lag, moment.seat) - edge - fluid
         solid = min(max(asked, -limit), limit)
     return SealForces(solid + fluid + edge, solid, fluid, edge, velocity)
 

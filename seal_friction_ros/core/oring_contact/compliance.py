@@ -17,6 +17,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.oring_contact.equilibrium import (
     OringModel,
+    OringState,
     force_balance,
     make_assembly,
     outline,
@@ -71,7 +72,7 @@ def sliding_face(model: OringModel, loaded: LoadedRing, wall: int) -> SlidingFac
 
     pulled = np.zeros((model.mesh.nodes.size, 1))
     pulled[axial, 0] = weight
-    moved = _displacement(model, loaded, loaded.surroundings, stuck, pulled)
+    moved = small_displacements(model, loaded.surroundings, loaded.state, pulled, stuck)
     axial_stiffness = 1.0 / float(weight @ moved[axial, 0])
 
     stuck[2 * nodes + 1] += loaded.surroundings.penalty * areas * shares[:, wall]
@@ -81,7 +82,7 @@ def sliding_face(model: OringModel, loaded: LoadedRing, wall: int) -> SlidingFac
     radius = walls.rod_radius if wall == ROD else walls.gland_radius
     beyond = radius - inward * _OUT_OF_REACH
     without = walls._replace(rod_radius=beyond) if wall == ROD else walls._replace(gland_radius=beyond)
-    compliance = _displacement(model, loaded, without, stuck, pushed)[radial]
+    compliance = small_displacements(model, without, loaded.state, pushed, stuck)[radial]
     return SlidingFace(
         place=position[facing, 1],
         gap=inward * (position[facing, 0] - radius),
@@ -91,19 +92,38 @@ def sliding_face(model: OringModel, loaded: LoadedRing, wall: int) -> SlidingFac
     )
 
 
-def _displacement(
-    model: OringModel, loaded: LoadedRing, surroundings: Surroundings, springs: FloatArray, loads: FloatArray
+def small_displacements(
+    model: OringModel,
+    surroundings: Surroundings,
+    state: OringState,
+    loads: FloatArray,
+    springs: FloatArray | None = None,
+    held: tuple[int, ...] = (),
 ) -> FloatArray:
-    """Displacements by small loads on a loaded ring [m], both of shape (2 n, columns), with springs [N/m], (2 n,)."""
-    balance = force_balance(model, surroundings, loaded.state)
+    """Displacements by small loads about a state [m].
+
+    Args:
+        model: Meshed ring or section.
+        surroundings: Walls and fluid that give way or push back.
+        state: Equilibrium.
+        loads: [N], shape (2 n, columns).
+        springs: Stiffness of springs to the ground [N/m], shape (2 n,); default: none.
+        held: Displacements that are zero (2 node for r, 2 node + 1 for z).
+
+    Raises:
+        NotConvergedError: An element is inverted, or the stiffness is singular.
+    """
+    balance = force_balance(model, surroundings, state)
     if balance is None:
-        raise NotConvergedError('sliding_face: an element is inverted')
-    assembly = make_assembly(model)
-    size = len(assembly.free)
-    held = dia_array((springs[None, assembly.free], np.zeros(1, int)), shape=(size, size))
-    matrix = stiffness_matrix(assembly, balance.entries) + held
+        raise NotConvergedError('small_displacements: an element is inverted')
+    assembly = make_assembly(model, held)
+    matrix = stiffness_matrix(assembly, balance.entries)
+    if springs is not None:
+        size = len(assembly.free)
+        matrix = matrix + dia_array((springs[None, assembly.free], np.zeros(1, int)), shape=(size, size))
+    moved = np.zeros_like(loads)
     try:
-        moved: FloatArray = splu(matrix.tocsc()).solve(loads[assembly.free])
+        moved[assembly.free] = splu(matrix.tocsc()).solve(loads[assembly.free])
     except RuntimeError as error:
-        raise NotConvergedError(f'sliding_face: the stiffness is singular: {error}') from None
+        raise NotConvergedError(f'small_displacements: the stiffness is singular: {error}') from None
     return moved

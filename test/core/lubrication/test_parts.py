@@ -1,9 +1,12 @@
 """Grease, roughness, flow factors, half-plane, groove, wall, motion: each against its own book."""
 
+import dataclasses
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from harness.blow_by import ATMOSPHERE, blow_by
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import trapezoid
@@ -203,6 +206,64 @@ def test_groove_without_clearance_is_a_spring():
     assert GrooveSpring(stiffness=1e4).force(-2e-4) == pytest.approx(-2.0)
 
 
+GROOVE = GrooveSpring(stiffness=2e4, half_clearance=1e-4, friction_coefficient=0.15)
+
+
+def groove_run(groove: GrooveSpring, lags: np.ndarray, loads: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """Force and seat along ``lags`` under normal forces ``loads``, from rest at the first lag."""
+    seats = [float(lags[0])]
+    for lag, load in zip(lags[1:], np.broadcast_to(loads, lags.shape)[1:], strict=True):
+        seats.append(groove.seat(seats[-1], lag, load))
+    return np.array([groove.force(lag, seat) for lag, seat in zip(lags, seats, strict=True)]), np.array(seats)
+
+
+def bottom(groove: GrooveSpring, seats: np.ndarray) -> np.ndarray:
+    """Lag of the bottom of the seal [m]."""
+    return seats - np.array([groove.force(seat) for seat in seats]) / groove.stiffness
+
+
+def test_groove_with_friction_is_a_spring_with_a_coulomb_slider():
+    """From rest on the ridge, where F = -k e / 2: the shear k, then -k s / 2 + mu N with s = e - mu N / k."""
+    load, k = 1e-3, GROOVE.stiffness
+    play = 0.15 * load / k
+    lags = np.linspace(0.0, 4.0 * play, 401)
+    force, _ = groove_run(GROOVE, lags, load)
+    held = lags <= play
+    assert force[held] == pytest.approx(k * lags[held], abs=1e-15)
+    assert force[~held] == pytest.approx(0.15 * load - 0.5 * k * (lags[~held] - play), rel=1e-6, abs=1e-7 * load)
+
+
+def test_groove_takes_its_friction_times_the_way_of_the_bottom_from_a_closed_motion():
+    lags = np.concatenate([np.linspace(a, b, 40_001) for a, b in ((2e-4, -2e-4), (-2e-4, 2e-4), (2e-4, -2e-4))])
+    force, seats = groove_run(GROOVE, lags, 5.0)
+    loop = slice(40_001, None)
+    work = trapezoid(force[loop], lags[loop])
+    way = np.abs(np.diff(bottom(GROOVE, seats[loop]))).sum()
+    assert work == pytest.approx(0.15 * 5.0 * way, rel=1e-6)
+    assert way == pytest.approx(4e-4, rel=1e-6)  # flank to flank and back
+
+
+@given(
+    st.lists(st.floats(-3e-4, 3e-4), min_size=2, max_size=6),
+    st.lists(st.floats(0.0, 10.0), min_size=6, max_size=6),
+)
+def test_groove_never_gives_energy(turns, loads):
+    """Work done on it at least the rise of the stored energy, whatever motion and load."""
+    lags = np.concatenate([np.linspace(a, b, 1001) for a, b in pairwise(turns)])
+    force, seats = groove_run(GROOVE, lags, np.repeat(loads[: len(turns) - 1], 1001))
+    k, c = GROOVE.stiffness, GROOVE.half_clearance
+    ridge = k * c**2 / 8.0 * np.maximum(1.0 - (seats / c) ** 2, 0.0) ** 3
+    stored = 0.5 * k * (lags - bottom(GROOVE, seats)) ** 2 + ridge
+    work = (0.5 * (force[1:] + force[:-1]) * np.diff(lags)).cumsum()
+    assert (work - (stored[1:] - stored[0])).min() > -1e-4 * k * c**2
+
+
+@given(st.floats(-1e-3, 1e-3), st.floats(-1e-3, 1e-3), st.floats(0.0, 10.0))
+def test_friction_does_nothing_in_a_groove_without_clearance(before, lag, load):
+    groove = dataclasses.replace(GROOVE, half_clearance=0.0)
+    assert groove.force(lag, groove.seat(before, lag, load)) == pytest.approx(groove.force(lag), abs=1e-12)
+
+
 def test_control_edge_falls_by_its_depth_with_its_slope():
     edge = ControlEdge(position=0.0, slope=0.4, depth=80e-6, rounding=5e-6)
     place = np.array([-1e-3, 100e-6, 1e-3])
@@ -211,6 +272,32 @@ def test_control_edge_falls_by_its_depth_with_its_slope():
     assert slope == pytest.approx([0.0, 0.4, 0.0], abs=1e-3)
     beyond, _ = edge.fall(place + 1e-9)
     assert (beyond - fall) / 1e-9 == pytest.approx(slope, abs=1e-6)
+
+
+def test_air_in_an_even_gap_flows_as_the_square_of_pressure_says():
+    """Step by step along the gap: m R T = -p h^3 / (12 eta) dp/dx."""
+    cells, width, height, pressure = 2000, 1e-7, 1e-6, 6e5
+    flow = blow_by(np.full(cells, height), width, pressure, 0.3, 0.03).viscous
+    squares = np.linspace((ATMOSPHERE + pressure) ** 2, ATMOSPHERE**2, cells + 1)
+    inside = np.sqrt(0.5 * (squares[1:] + squares[:-1]))
+    by_cell = inside / (287.05 * 293.15) * height**3 / (12.0 * 1.82e-5) * -np.diff(np.sqrt(squares)) / width
+    assert by_cell == pytest.approx(flow, rel=1e-4)
+
+
+def test_air_chokes_as_a_nozzle_of_iso_6358_and_only_above_its_critical_ratio():
+    gap = np.full(100, 20e-6)
+    wide = blow_by(gap, 1e-6, 6e5, 0.3, 0.03)
+    assert wide.is_choked
+    assert wide.choked == pytest.approx(0.0404 * 20e-6 * (6e5 + ATMOSPHERE) / math.sqrt(293.15), rel=1e-3)
+    assert wide.reynolds_number == pytest.approx(2.0 * wide.choked / 1.82e-5)
+    assert blow_by(gap, 1e-6, 0.8 * ATMOSPHERE, 0.3, 0.03).choked == math.inf
+    assert not blow_by(gap, 1e-6, 0.8 * ATMOSPHERE, 0.3, 0.03).is_choked
+
+
+def test_grease_is_blown_out_of_a_wide_gap_and_not_of_a_narrow_one():
+    narrow, wide = (blow_by(np.full(100, h), 1e-6, 6e5, 0.3, 0.03).blow_out for h in (1e-6, 1e-5))
+    assert narrow == pytest.approx(1e-12 * 6e5 / (12.0 * 0.3 * 1e-4) / 0.03)
+    assert wide == pytest.approx(100.0 * narrow)
 
 
 def test_film_on_the_wall_is_moved_and_never_made():

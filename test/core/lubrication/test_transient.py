@@ -88,6 +88,16 @@ def test_seal_that_may_lean_either_way_has_a_second_lobe_near_minus_1_4_mm():
     assert findings(done(long_way)).second_lobe is None
 
 
+def test_friction_in_the_groove_holds_the_seal_on_one_seat():
+    """0.15 is that of the paper: more than the wall can pull beyond the ridge."""
+    groove = GrooveSpring(half_clearance=0.14e-3, friction_coefficient=0.15)
+    case = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=3e-3), groove=groove)
+    result = done(case)
+    assert findings(result).second_lobe is None
+    leaning = result.lag[result.time > 0.5 * result.time[-1]]
+    assert leaning.max() < 0.0 or leaning.min() > 0.0
+
+
 def test_pressure_difference_takes_the_second_seat_away():
     under_air = dataclasses.replace(
         INNER, groove=GrooveSpring(half_clearance=0.14e-3), air=AirPressure(pressure_left=1e5)
@@ -331,6 +341,14 @@ def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
         ({'name': 'x', 'film_supply': {}, 'air': {'pressure_left': 1e5}}, 'film_supply needs both sides at ambient'),
         ({'name': 'x', 'control_edge': {}, 'air': {'pressure_right': 1e5}}, 'control_edge needs both sides at ambient'),
         ({'name': 'x', 'seal': {'mooney_c01': 0.0}}, 'give the seal a stiffness'),
+        (
+            {
+                'name': 'x',
+                'seal': {'body': 'finite_elements', 'section_hold': 'bottom_and_flanks'},
+                'groove': {'half_clearance': 1e-4},
+            },
+            'half_clearance = 0.0001 m leaves the flanks free, but seal.section_hold is bottom_and_flanks',
+        ),
         ({'name': 'x', 'seals': []}, 'seals is empty'),
         ({'name': 'x', 'seals': [{'case': 'y', 'side': 1}]}, r'seals\[0\] has no side'),
     ],

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 import yaml
 from harness.hertz import LineContact, cylinder_between_plates
+from harness.squeezed_cylinder import force_per_length
 from paths import ROOT
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.foundation.units import INCH, LBF, PSI
 from seal_friction_ros.core.friction.geometry import SealGeometry, projected_area
 from seal_friction_ros.core.oring_contact import continuation, loading
+from seal_friction_ros.core.oring_contact.elements import deformation_gradient, volume_ratios
+from seal_friction_ros.core.oring_contact.equilibrium import make_assembly, solve_equilibrium, unstressed_state
 from seal_friction_ros.core.oring_contact.extrusion import extrusion_pressure
 from seal_friction_ros.core.oring_contact.loading import oring_model, squeeze_ring
 from seal_friction_ros.core.oring_contact.material import Rubber
@@ -28,6 +31,7 @@ from seal_friction_ros.core.oring_contact.oring_case import (
 )
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 from seal_friction_ros.core.oring_contact.results import OringResult, evaluate_contact, oring_results
+from seal_friction_ros.core.oring_contact.surroundings import Surroundings
 from seal_friction_ros.offline.reports.thesis_data import appendix_b
 
 PRESSURES = tuple(psi * PSI for psi in (0.0, 250.0, 500.0, 750.0, 1000.0))
@@ -94,6 +98,13 @@ def test_what_is_off_hertz_at_8_percent_squeeze_is_finite_strain_and_grows_in_pr
     assert 1.5 < off[1] / off[0] < 4.0
 
 
+@pytest.mark.parametrize('share', [0.04, 0.08])
+def test_force_between_plates_is_that_of_an_independent_solution_at_finite_strain(share: float):
+    case, result = between_plates(share)
+    force = result.rod.force / (math.pi * case.geometry.rod_diameter)
+    assert force / (5e6 * 2e-3) == pytest.approx(force_per_length(share, 28), rel=0.01)
+
+
 def test_without_fluid_stresses_are_even_about_the_middle():
     _, result = between_plates(0.05, lines=17)
     assert result.rod.position == pytest.approx(-result.rod.position[::-1], abs=1e-9)
@@ -121,6 +132,20 @@ def test_rubber_loses_the_volume_that_its_bulk_modulus_says_and_no_more(calibrat
         assert result.volume_ratio == pytest.approx(result.expected_volume_ratio, abs=1e-9)
         assert 1.0 - result.volume_ratio == pytest.approx(result.pressure / 2e9, abs=2e-4)
     assert 1.0 - calibrated[0].volume_ratio < 1e-3
+
+
+def test_a_ring_in_fluid_all_around_loses_its_pressure_over_its_bulk_modulus():
+    case = ring()
+    model, pressure = loading.oring_model(case), 2e7
+    nodes = model.mesh.surface
+    drowned = Surroundings(-math.inf, math.inf, math.inf, pressure, np.ones(len(nodes), dtype=bool), 1.0, 1e-3)
+    state, _ = solve_equilibrium(
+        model, make_assembly(model, (2 * int(nodes[0]) + 1,)), drowned, unstressed_state(model)
+    )
+    ratios = volume_ratios(model.elements, deformation_gradient(model.elements, state.displacement))
+    assert 1.0 - ratios == pytest.approx(pressure / 2e9, rel=0.01)
+    volumes = model.elements.weights.sum(axis=1)
+    assert 1.0 - ratios @ volumes / volumes.sum() == pytest.approx(pressure / 2e9, rel=1e-6)
 
 
 def test_rubber_ten_times_less_compressible_keeps_its_volume_to_0_1_percent_and_its_normal_force_to_2():

@@ -164,7 +164,12 @@ def test_every_command_of_the_page_is_one(small, ring, tmp_path, capsys, monkeyp
 
 def test_every_script_of_the_page_is_one():
     scripts = set(re.findall(r'`python ([^` ]*)', (ROOT / 'docs' / 'ehl.md').read_text()))
-    assert scripts == {'bench/ehl.py', 'test/system/lubrication_findings.py', 'test/system/oring_map.py'}
+    assert scripts == {
+        'bench/ehl.py',
+        'test/system/lubrication_findings.py',
+        'test/system/oring_map.py',
+        'test/system/seal_bodies.py',
+    }
     assert all((ROOT / script).is_file() for script in scripts)
 
 

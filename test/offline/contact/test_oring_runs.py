@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import oring_accuracy
 import pytest
 import yaml
@@ -12,10 +13,11 @@ from paths import ROOT
 from seal_friction_ros.core.friction.geometry import projected_area
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
+from seal_friction_ros.core.oring_contact.results import WallContact
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.contact.oring_runs import compute_case
-from seal_friction_ros.offline.reports.thesis_data import appendix_b, dynamic_readings
+from seal_friction_ros.offline.reports.thesis_data import ThesisContact, appendix_b, dynamic_readings
 
 CASES = ROOT / 'config' / 'oring'
 KEYS = {'pressure_Pa', 'normal_force_N', 'axial_force_N', 'peak_contact_stress_Pa', 'contact_width_m'}
@@ -170,6 +172,31 @@ def test_the_tables_of_the_docs_are_those_of_the_script():
     assert named == set(oring_accuracy.TABLES)
     (row,) = oring_accuracy.converging('lines', (9,))
     assert row['F_n at 1000 psi [N]'] == pytest.approx(419.2, rel=0.1)
+
+
+def test_a_profile_that_is_only_shifted_does_not_deviate():
+    place = np.linspace(0.0, 1.8e-3, 37)
+    stress = 1e6 * (place / 1.8e-3) * (1.0 - place / 1.8e-3)
+    its = ThesisContact(0.0, float(stress.max()), 1.8e-3, place, stress)
+    rod = WallContact(place - 0.7e-3, stress, 0.0, float(stress.max()), (-0.7e-3, 1.1e-3))
+    assert max(oring_accuracy.profile_deviation(its, rod)) < 0.01
+    rms, worst = oring_accuracy.profile_deviation(its, rod._replace(stress=1.1 * stress))
+    assert worst == pytest.approx(0.1, abs=0.02)
+    assert rms < worst
+
+
+def test_lindley_is_beside_hertz_and_the_finite_elements(monkeypatch: pytest.MonkeyPatch):
+    for name, values in (
+        ('SQUEEZES', (0.08,)),
+        ('LARGER_SQUEEZES', ()),
+        ('HERTZ_LINES', (17,)),
+        ('RITZ_DEGREES', (16,)),
+    ):
+        monkeypatch.setattr(oring_accuracy, name, values)
+    (row,) = oring_accuracy.squeezed()
+    assert row['elements, 17 lines'] == pytest.approx(row['Ritz, degree 16'], rel=0.02)
+    assert row['elements, 17 lines'] == pytest.approx(row['Hertz'], rel=0.05)
+    assert row['Lindley'] == pytest.approx(0.72 * row['elements, 17 lines'], rel=0.03)
 
 
 def test_what_stops_a_computation_names_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

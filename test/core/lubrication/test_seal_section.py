@@ -1,0 +1,141 @@
+"""The section of the seal by finite elements: rigid motion, patch, reciprocity, and the known bodies as limits."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_array
+from seal_bodies import contact_forces
+
+from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane
+from seal_friction_ros.core.lubrication.lubrication_case import (
+    LubricationNumerics,
+    SealBody,
+    parse_lubrication_case,
+)
+from seal_friction_ros.core.lubrication.seal_section import (
+    SealSection,
+    face_compliance,
+    seal_body,
+    seal_section,
+)
+from seal_friction_ros.core.oring_contact.elements import deformation_gradient, element_forces
+
+SEAL = SealBody(body='finite_elements')
+FILM = 0.6e-3  # [m]
+FAR = SealBody(body='finite_elements', sealing_diameter=10.0, mooney_c01=1785.0)
+"""so far from its axis that it is plane; so soft that its bulk modulus makes it incompressible"""
+
+
+def stiffness(section: SealSection) -> np.ndarray:
+    """Dense stiffness of the unloaded section, nothing held [N/m]."""
+    elements, size = section.model.elements, section.model.mesh.nodes.size
+    still = deformation_gradient(elements, np.zeros(size))
+    blocks = element_forces(elements, section.model.rubber, still).stiffness
+    rows, columns = np.repeat(elements.freedoms, 8, axis=1).ravel(), np.tile(elements.freedoms, (1, 8)).ravel()
+    return coo_array((blocks.ravel(), (rows, columns)), shape=(size, size)).toarray()
+
+
+def test_the_mesh_is_the_section_and_its_face_lies_under_the_film():
+    section = seal_section(SEAL, FILM, 24)
+    mesh = section.model.mesh
+    assert section.model.elements.weights.min() > 0.0
+    assert mesh.nodes[section.face, 1] == pytest.approx(section.place)
+    assert mesh.nodes[section.face, 0] == pytest.approx(3e-3 - section.place**2 / 2e-3)
+    assert (np.ptp(mesh.nodes[:, 1]), mesh.nodes[:, 0].min()) == pytest.approx((1.5e-3, 2e-3))
+    r, z = mesh.nodes[mesh.surface].T  # counterclockwise: the area is positive
+    assert 0.5 * (r * np.roll(z, -1) - z * np.roll(r, -1)).sum() == pytest.approx(1.5e-6 - 1.5e-3**3 / 24e-3, rel=1e-3)
+
+
+def test_rigid_motion_costs_nothing():
+    """Along the axis on any radius; off it and about a corner where the section is plane."""
+    for seal, moves in ((SEAL, ('along',)), (FAR, ('along', 'off', 'turn'))):
+        section = seal_section(seal, FILM, 8)
+        matrix, (r, z) = stiffness(section), section.model.mesh.nodes.T
+        none, even = np.zeros_like(r), np.ones_like(r)
+        motion = {'along': (none, even), 'off': (even, none), 'turn': (-z / z.max(), (r - r.min()) / z.max())}
+        for name in moves:
+            force = matrix @ np.stack(motion[name], axis=1).ravel()
+            assert np.abs(force).max() < (1e-13 if seal is SEAL else 2e-5) * np.abs(matrix).max(), name
+
+
+def test_patch_an_even_strain_leaves_no_force_inside():
+    section = seal_section(dataclasses.replace(SEAL, crown_radius_right=2e-3), FILM, 8)
+    model = section.model
+    moved = (model.mesh.nodes * [0.03, -0.05]).ravel()
+    forces = element_forces(model.elements, model.rubber, deformation_gradient(model.elements, moved)).force
+    whole = np.bincount(model.elements.freedoms.ravel(), forces.ravel()).reshape(-1, 2)
+    inside = np.setdiff1d(np.arange(len(model.mesh.nodes)), model.mesh.surface)
+    assert np.abs(whole[inside]).max() < 1e-12 * np.abs(whole[model.mesh.surface]).max()
+
+
+@pytest.mark.parametrize('hold', ['bottom', 'bottom_and_flanks', 'sliding_bottom'])
+def test_the_face_is_reciprocal_and_gives_way_to_every_pressure(hold):
+    compliance = face_compliance(seal_section(dataclasses.replace(SEAL, section_hold=hold), FILM, 24)).off_wall
+    assert np.abs(compliance - compliance.T).max() < 1e-10 * np.abs(compliance).max()
+    assert np.linalg.eigvalsh(0.5 * (compliance + compliance.T)).min() > 0.0
+
+
+def test_the_more_the_groove_holds_the_stiffer_is_the_section():
+    compliances = [
+        face_compliance(seal_section(dataclasses.replace(SEAL, section_hold=hold), FILM, 16))
+        for hold in ('sliding_bottom', 'bottom', 'bottom_and_flanks')
+    ]
+    assert (np.diff([c.off_wall.sum() for c in compliances]) < 0.0).all()
+    assert (np.diff([c.axial_stiffness for c in compliances]) > 0.0).all()
+
+
+def flat(height: float, width: float, film: float, elements: int, cells: int):
+    """A wide flat section, plane, and its cells."""
+    seal = dataclasses.replace(
+        FAR, section_height=height, section_width=width, crown_radius_left=1.0, crown_radius_right=1.0
+    )
+    numerics = LubricationNumerics(cells=cells, film_width=film, section_elements=elements)
+    return seal, seal_body(seal, numerics), film / cells
+
+
+def hertz(places: np.ndarray, half_width: float) -> np.ndarray:
+    return 1e6 * np.sqrt(np.maximum(1.0 - (places / half_width) ** 2, 0.0))
+
+
+def test_under_a_narrow_film_a_deep_section_is_a_half_plane_within_1_percent():
+    """Of 0.377 of its height, as a bonded layer is; 20 times as high as the film is wide."""
+    height, film = 6e-3, 0.3e-3
+    seal, body, width = flat(height, 8.0 * height, film, 48, 128)
+    plane = HalfPlane(128, width, seal.modulus, 0.377 * height)
+    places = (np.arange(128) - 63.5) * width
+    for pressure in (hertz(places, 0.1e-3), hertz(places - 0.05e-3, 0.05e-3), np.full(128, 1e6)):
+        known = plane.deflection(pressure)
+        assert np.abs(body.deflection(pressure) - known).max() < 0.01 * known.max()
+
+
+@pytest.mark.parametrize('share', [0.15, 0.3])
+def test_a_wide_flat_section_is_a_bonded_layer_within_half_a_percent(share):
+    height = 1e-3
+    seal, body, width = flat(height, 12.0 * height, 0.9 * height, 64, 128)
+    pressure = hertz((np.arange(128) - 63.5) * width, share * height)
+    known = BondedLayer(128, width, seal.modulus, height).deflection(pressure)
+    assert np.abs(body.deflection(pressure) - known).max() < 0.005 * known.max()
+
+
+def test_contact_force_of_a_small_squeeze_is_that_of_finite_strain():
+    """At 0.4 % of the height; at 3.6 %, the interference of the cases, finite strain adds 1.5 %."""
+    small, finite = contact_forces(SEAL, 24, 4e-6)
+    assert small == pytest.approx(finite, rel=0.005)
+    small, finite = contact_forces(SEAL, 24, SEAL.interference)
+    assert finite / small == pytest.approx(1.015, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ('seal', 'words'),
+    [
+        ({'body': 'foam'}, "body = 'foam' is not one of half_plane, bonded_layer, finite_elements"),
+        ({'section_hold': 'glue'}, "section_hold = 'glue' is not one of bottom, bottom_and_flanks, sliding_bottom"),
+        ({'body': 'finite_elements', 'section_height': 3e-3}, 'section_height = 0.003 m reaches the axis'),
+        ({'body': 'finite_elements', 'section_width': 2.6e-3}, 'section_width = 0.0026 m leaves 0.000155 m'),
+        ({'body': 'finite_elements', 'section_width': 0.6e-3}, 'section_width = 0.0006 m is not above'),
+    ],
+)
+def test_a_section_that_cannot_be_is_refused(seal, words):
+    with pytest.raises(ValueError, match=words):
+        parse_lubrication_case({'name': 'x', 'seal': seal})
