@@ -22,6 +22,8 @@ from seal_friction_ros.core.foundation.parameters import check_names, printable
 
 KINDS = {'relative_std': 1, 'factor': 1, 'tolerance': 1, 'range': 2}
 """Numbers that each kind of spread has."""
+_MOST = {'relative_std': 10.0, 'factor': 1000.0}
+_LARGEST = 1e15  # of any amount
 _ENDS = np.array([0.005, 0.995])  # shares at which a case has to be possible (our choice)
 
 
@@ -49,13 +51,13 @@ class Unknown:
 
     def __post_init__(self) -> None:
         first, last = self.amounts[0], self.amounts[-1]
-        if not all(map(math.isfinite, self.amounts)):
-            raise ValueError(f'{self.name}: {self.kind} is not finite')
         if self.kind == 'range' and first >= last:
             raise ValueError(f'{self.name}: range [{first:g}, {last:g}] does not go from a lower to a higher value')
         least = {'range': -math.inf, 'factor': 1.0}.get(self.kind, 0.0)
         if first <= least:
             raise ValueError(f'{self.name}: {self.kind} = {first:g} is not above {least:g}')
+        if first > (most := _MOST.get(self.kind, math.inf)):
+            raise ValueError(f'{self.name}: {self.kind} = {first:g} is above {most:g}')
         if self.kind in ('relative_std', 'factor') and self.value <= 0.0:
             raise ValueError(
                 f'{self.name} is {self.value:g} in the case: give it a range in the place of a {self.kind}'
@@ -117,4 +119,6 @@ def _spread(name: str, spread: Any) -> tuple[str, tuple[float, ...]]:
     if len(amounts) != KINDS[kind] or not all(type(amount) in (int, float) for amount in amounts):
         wanted = 'one number' if KINDS[kind] == 1 else 'a list of two numbers'
         raise ValueError(f'{name}: {kind} = {printable(given)} is not {wanted}')
+    if not all(abs(amount) <= _LARGEST for amount in amounts):
+        raise ValueError(f'{name}: {kind} is not finite, or above {_LARGEST:g}')
     return kind, tuple(map(float, amounts))

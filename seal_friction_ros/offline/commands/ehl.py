@@ -33,7 +33,7 @@ def add_parser(commands: Any) -> None:
     chart = cli.add_command(
         steps, 'map', run_map, 'compute a friction map: steady friction over speed and pressure',
         'ehl map inner_seal --seal-file mapped.yaml',
-        'ehl map inner_seal --uncertain 50 --seal-file mapped.yaml --work build/map',
+        'ehl map inner_seal --uncertain 100 --seal-file mapped.yaml --work build/map',
         needs=('numba',),
     )  # fmt: skip
     cli.add_target(chart, '--seal-file', SEAL_FILE, metavar='FILE.yaml', help='seal file to write')

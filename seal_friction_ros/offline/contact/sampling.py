@@ -61,7 +61,7 @@ def uncertain_map(
     def parts_of(values: Mapping[str, float]) -> list[Part]:
         return row_parts(varied_case(coarse, values))
 
-    outcome = _sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work, partial(compile_for, coarse))
+    outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work, partial(compile_for, coarse))
     tables = np.array([[row['friction'] for row in rows] for rows in outcome.computed])
     pressures, speeds = tuple(map_pressures(coarse.map).tolist()), tuple(map_speeds(coarse.map).tolist())
     return Uncertainty(seed, names, drawn, outcome.failed, pressures, speeds, tables[0], tables[1:])
@@ -116,7 +116,7 @@ def uncertain_ring(
         key = part_key('ring', [asdict(varied), pressures])
         return [Part(key, RingForces._fields, partial(ring_forces, varied, pressures))]
 
-    outcome = _sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work)
+    outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work)
     forces = np.array([ring['normal_force'] for (ring,) in outcome.computed])
     factors = np.ones(len(forces))
     if FRICTION_COEFFICIENT in names:
@@ -135,7 +135,9 @@ def ring_forces(case: OringCase, pressures: tuple[float, ...]) -> RingForces:
     return RingForces(np.array([sliding_contact(case, result).force for result in oring_results(case, pressures)]))
 
 
-class _Outcome(NamedTuple):
+class Sampled(NamedTuple):
+    """What became of samples."""
+
     computed: list[list[Mapping[str, Any]]]  # results of the parts of the case itself, then of each sample not failed
     failed: dict[int, str]  # reason by number of the sample
 
@@ -146,7 +148,7 @@ def _drawn(name: str, unknowns: Sequence[Unknown], samples: int, seed: int) -> t
     return tuple(unknown.name for unknown in unknowns), latin_hypercube(unknowns, samples, seed)
 
 
-def _sampled(
+def sampled(
     label: str,
     names: Sequence[str],
     drawn: FloatArray,
@@ -154,7 +156,7 @@ def _sampled(
     workers: Workers,
     work: Path | None,
     prepare: Callable[[], None] = nothing,
-) -> _Outcome:
+) -> Sampled:
     """Compute the parts of a case, and of each sample; one that fails does not stop the others.
 
     Args:
@@ -186,4 +188,4 @@ def _sampled(
             failed[number] = reason
         else:
             computed.append([outcome.result or {} for outcome in outcomes])
-    return _Outcome(computed, dict(sorted(failed.items())))
+    return Sampled(computed, dict(sorted(failed.items())))

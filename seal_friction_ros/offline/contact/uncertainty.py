@@ -48,8 +48,11 @@ class Uncertainty:
 
     @property
     def quantiles(self) -> FloatArray:
-        """Force that a share `QUANTILES` of the samples does not exceed [N], shape (3, *nominal.shape)."""
-        return np.quantile(self.computed, QUANTILES, axis=0)
+        """Force that a share `QUANTILES` of the samples does not exceed [N], shape (3, *nominal.shape).
+
+        With fewer than ten samples the outer two are the lowest and the highest sample.
+        """
+        return _quantiles(self.computed, QUANTILES)
 
     @property
     def relative_stds(self) -> FloatArray:
@@ -62,7 +65,7 @@ class Uncertainty:
 
         which is the relative standard deviation of a normal distribution about F (our choice).
         """
-        sides = np.abs(np.quantile(self.computed, _ONE_STD, axis=0) - self.nominal).max(axis=0)
+        sides = np.abs(_quantiles(self.computed, _ONE_STD) - self.nominal).max(axis=0)
         return np.asarray(sides / self.nominal)
 
     @property
@@ -117,6 +120,11 @@ class Uncertainty:
             first = next(iter(self.failed.values()))
             lines.append(f'{len(self.failed)} samples could not be computed and are left out; the first: {first}')
         return '\n'.join(lines)
+
+
+def _quantiles(samples: FloatArray, shares: Sequence[float]) -> FloatArray:
+    """Quantiles along the first axis; sample k of N stands for the middle of the kth of N equal parts (Hazen)."""
+    return np.asarray(np.quantile(samples, shares, axis=0, method='hazen'))
 
 
 def _ranks(columns: FloatArray) -> FloatArray:

@@ -173,11 +173,10 @@ def of_fleet(counts: Mapping[str, int], damaged: int, name: str, why: str) -> Ve
     """
     total = sum(counts.values())
     if not name:
-        return Verdict(GOOD, f'All {total} bags are good.', 'nothing; look again after the next recordings.')
-    are = 'is' if counts[BAD] == 1 else 'are'
-    text = (
-        f'{counts[BAD]} of {total} bags {are} bad, {damaged} of them damaged; {counts[LOOK]} to look at. {name}: {why}.'
-    )
+        said = 'The bag is good.' if total == 1 else f'All {total} bags are good.'
+        return Verdict(GOOD, said, 'nothing; look again after the next recordings.')
+    bags, are = 'bag' if total == 1 else 'bags', 'is' if counts[BAD] == 1 else 'are'
+    text = f'{counts[BAD]} of {total} {bags} {are} bad, {damaged} damaged; {counts[LOOK]} to look at. {name}: {why}.'
     after = 'sort by what you look for; seal_friction report BAG --out PAGE.html shows a bag in full.'
     return Verdict(BAD if counts[BAD] else LOOK, text, after)
 
