@@ -154,7 +154,7 @@ def test_every_command_of_the_page_is_one(small, ring, tmp_path, capsys, monkeyp
         assert program == '.venv/bin/seal_friction'
         assert main([*(swapped.get(word, word) for word in words), '--jobs', '1']) == 0, line
     pages = {path.stem: path.read_text() for path in Path('build').glob('*.html')}
-    assert pages.keys() == {'inner_seal', 'spool', 'study', 'map', 'compared', 'from_drawing'}
+    assert pages.keys() == {'inner_seal', 'spool', 'study', 'map', 'uncertain', 'compared', 'from_drawing'}
     assert 'Findings' in pages['inner_seal']
     assert 'grease.flow_index' in pages['inner_seal']
     assert 'simulation_against_measurement' in pages['compared']
@@ -166,7 +166,12 @@ def test_every_command_of_the_page_is_one(small, ring, tmp_path, capsys, monkeyp
 
 def test_every_script_of_the_page_is_one():
     scripts = set(re.findall(r'`python ([^` ]*)', (ROOT / 'docs' / 'ehl.md').read_text()))
-    assert scripts == {'bench/ehl.py', 'test/system/lubrication_findings.py', 'test/system/oring_map.py'}
+    assert scripts == {
+        'bench/ehl.py',
+        'test/system/lubrication_findings.py',
+        'test/system/oring_map.py',
+        'test/system/uncertain_grid.py',
+    }
     assert all((ROOT / script).is_file() for script in scripts)
 
 
