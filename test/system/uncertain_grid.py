@@ -15,7 +15,7 @@ from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase,
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case, varied_ring
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.contact.lubrication_runs import compile_for, single_case
+from seal_friction_ros.offline.contact.lubrication_runs import compile_for_map, single_case
 from seal_friction_ros.offline.contact.sampling import coarse_case, coarse_ring, latin_hypercube, ring_forces
 from seal_friction_ros.offline.work.executor import available_cores, try_all
 
@@ -40,7 +40,7 @@ def compared(name: str, samples: int) -> np.ndarray:
     if kind == 'ehl':
         case = single_case(short, 'friction map')
         coarse, unknowns = coarse_case(case), case.unknown
-        compile_for(coarse)
+        compile_for_map(coarse)
         grids = partial(map_forces, coarse), partial(map_forces, replace(case, map=coarse.map))
     else:
         file = parse_oring_case(read_yaml(config_path('oring', short)))

@@ -50,6 +50,7 @@ from seal_friction_ros.offline.work.finished_parts import Part, part_key, run_pa
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
 
+_FEWEST_CELLS = 32  # that a case may have
 _PROFILES = ('gap', 'film_pressure', 'contact_pressure', 'saturation')
 _CURVES = tuple(name for name in TransientResult._fields if name not in (*_PROFILES, 'case'))
 
@@ -102,6 +103,13 @@ def compile_for(case: LubricationCase) -> None:
     time = case.numerics.time_step
     with suppress(NotConvergedError):
         transient_step(model, initial_state(model, case.motion.position(0.0)), time, case.motion.position(time))
+
+
+def compile_for_map(case: LubricationCase) -> None:
+    """Compile the code of a friction map in this process, so that worker processes inherit it."""
+    numerics, grid = replace(case.numerics, cells=_FEWEST_CELLS), replace(case.map, velocities=2)
+    with suppress(NotConvergedError):
+        steady_friction(replace(case, oring=None, numerics=numerics, map=grid), 0.0)
 
 
 def run_with_progress(case: LubricationCase, motion: SpoolMotion) -> TransientResult:
@@ -330,7 +338,7 @@ def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -
     known = varied_case(case, {})
     memory_part = Part(part_key('memory', asdict(known)), MemoryLength._fields, partial(memory_length, known))
     parts = [*row_parts(known), memory_part]
-    *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for, case))
+    *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for_map, known))
     rows, memory = [SteadyFriction(**row) for row in found], MemoryLength(**kept_memory)
     retried = memory.retried_steps + sum(row.retried_steps for row in rows)
     return MapRuns(case, friction_map(case, rows, memory.length), rows, retried)

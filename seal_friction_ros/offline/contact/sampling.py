@@ -24,7 +24,7 @@ from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase,
 from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.oring_case_file import FRICTION_COEFFICIENT, varied_ring
 from seal_friction_ros.core.oring_contact.results import oring_results
-from seal_friction_ros.offline.contact.lubrication_runs import compile_for, row_parts
+from seal_friction_ros.offline.contact.lubrication_runs import compile_for_map, row_parts
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty, check_unknown
 from seal_friction_ros.offline.work.executor import Workers, nothing
@@ -61,7 +61,7 @@ def uncertain_map(
     def parts_of(values: Mapping[str, float]) -> list[Part]:
         return row_parts(varied_case(coarse, values))
 
-    outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work, partial(compile_for, coarse))
+    outcome = sampled(f'{case.name}: samples', names, drawn, parts_of, workers, work, partial(compile_for_map, coarse))
     tables = np.array([[row['friction'] for row in rows] for rows in outcome.computed])
     pressures, speeds = tuple(map_pressures(coarse.map).tolist()), tuple(map_speeds(coarse.map).tolist())
     return Uncertainty(seed, names, drawn, outcome.failed, pressures, speeds, tables[0], tables[1:])

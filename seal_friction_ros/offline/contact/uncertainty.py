@@ -118,7 +118,7 @@ class Uncertainty:
         ]
         if self.failed:
             first = next(iter(self.failed.values()))
-            lines.append(f'{len(self.failed)} samples could not be computed and are left out; the first: {first}')
+            lines.append(f'samples left out since they cannot be computed: {len(self.failed)}; the first: {first}')
         return '\n'.join(lines)
 
 
