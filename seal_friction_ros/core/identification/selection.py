@@ -8,13 +8,14 @@ not recommended while a sound one is near.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
 from scipy.stats import t as student_t
 
-from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.identification.candidate_laws import (
     EXPONENTS,
     CandidateLaw,
@@ -275,28 +276,50 @@ class ChosenAnew(NamedTuple):
     laws: tuple[str, ...]  # name of the law without each group; '' where none could be chosen
 
 
+class LeftOut(NamedTuple):
+    """Prediction of one group by a law that was chosen and fitted without it."""
+
+    predicted: FloatArray  # [N] shape (readings of the group,); NaN where no law could be chosen
+    law: str  # its name; '' where none could be chosen
+
+
+Chosen = Callable[[Sequence[Callable[[], LeftOut]]], Sequence[LeftOut]]
+"""runs independent calls and returns their results in order"""
+
+
+def _in_turn(calls: Sequence[Callable[[], LeftOut]]) -> list[LeftOut]:
+    return [call() for call in calls]
+
+
 def choose_anew(
-    readings: FrictionReadings, choose: Callable[[FrictionReadings], LawScore], tick: Ticks = lambda _: None
+    readings: FrictionReadings, choose: Callable[[FrictionReadings], LawScore], run: Chosen = _in_turn
 ) -> ChosenAnew:
     """Predict each group by the law that ``choose`` recommends for the other groups.
 
-    Unlike `cross_validate`, which fits a given law anew, the choice of the law has not seen the group either. ``tick``
-    is called with 1 after each group.
+    Unlike `cross_validate`, which fits a given law anew, the choice of the law has not seen the group either. ``run``
+    computes the groups, which are independent of each other.
 
     Source: nested cross-validation, [VarmaSimon2006]_.
     """
-    predicted, laws = np.full(readings.count, np.nan), []
-    for out in readings.groups:
-        try:
-            chosen = choose(readings.without(out))
-        except ValueError:
-            laws.append('')
-        else:
-            near = chosen.fit.values if chosen.fit else {}
-            _, predicted[out], _ = predict(chosen.law, readings.without(out), readings.taken(out), near)
-            laws.append(chosen.law.name)
-        tick(1)
-    return ChosenAnew(predicted, tuple(laws))
+    groups = list(readings.groups)
+    found = run([partial(choose_without, readings, out, choose) for out in groups])
+    predicted = np.full(readings.count, np.nan)
+    for out, one in zip(groups, found, strict=True):
+        predicted[out] = one.predicted
+    return ChosenAnew(predicted, tuple(one.law for one in found))
+
+
+def choose_without(
+    readings: FrictionReadings, out: BoolArray, choose: Callable[[FrictionReadings], LawScore]
+) -> LeftOut:
+    """Predict the readings ``out`` by the law that ``choose`` recommends for the others."""
+    others, left_out = readings.without(out), readings.taken(out)
+    try:
+        chosen = choose(others)
+    except ValueError:
+        return LeftOut(np.full(left_out.count, np.nan), '')
+    _, predicted, _ = predict(chosen.law, others, left_out, chosen.fit.values if chosen.fit else {})
+    return LeftOut(predicted, chosen.law.name)
 
 
 def collinear_spread(scores: Sequence[LawScore], selected: LawFit, readings: FrictionReadings) -> float:

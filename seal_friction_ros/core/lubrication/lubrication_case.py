@@ -8,11 +8,13 @@ Example; docs/ehl.md describes every field::
     motion: {distance: 1.8e-3}
     control_edge: {position: 0.3e-3}     # optional, like film_supply and viscoelasticity
     oring: ms28775_114_blind             # in the place of the profile of the seal: a case of config/oring
+    unknown: {seal.solid_shear_stress: {factor: 2.0}}   # for the uncertainty of a friction map
 """
 
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,15 +24,18 @@ from seal_friction_ros.core.foundation.parameters import (
     CheckedParameters,
     check_names,
     from_mapping,
+    meanings,
     name_and_source,
     parameter,
 )
+from seal_friction_ros.core.foundation.unknowns import Unknown, parse_unknowns
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.groove import GrooveSpring
 from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
+from seal_friction_ros.core.oring_contact.oring_case_file import FRICTION_COEFFICIENT, OringCaseFile, varied_ring
 
 BODIES = ('half_plane', 'bonded_layer', 'finite_elements')
 HOLDS = ('bottom', 'bottom_and_flanks', 'sliding_bottom')
@@ -247,6 +252,8 @@ class LubricationCase:
     viscoelasticity: Viscoelasticity | None = None
     oring: OringCase | None = None
     """finite-element ring in the place of the profile of ``seal``; it has a friction map only"""
+    unknown: tuple[Unknown, ...] = ()
+    """numbers that are not known exactly, those of the ring with ``oring.`` before their names"""
 
     def __post_init__(self) -> None:
         if self.oring is None and self.seal.section_height < self.numerics.film_width:
@@ -325,24 +332,24 @@ class Spool:
             raise ValueError(f'spool {self.name}: seals is empty')
 
 
-def _no_oring(name: str) -> OringCase:
+def _no_oring(name: str) -> OringCaseFile:
     raise ValueError(f'oring = {name!r}: there are no O-ring cases here')
 
 
 def parse_lubrication_case(
-    document: Any, load_oring: Callable[[str], OringCase] = _no_oring
+    document: Any, load_oring: Callable[[str], OringCaseFile] = _no_oring
 ) -> LubricationCase | Spool:
     """Parse the document of a case file: a spool if it has ``seals``, else a case.
 
     Args:
         document: Mapping of a YAML file.
-        load_oring: Gives the O-ring case of a name or path.
+        load_oring: Gives the O-ring case file of a name or path.
 
     Raises:
         ValueError: A value is invalid; the message names case, field, value and bound.
     """
     name, source = name_and_source(document, 'case')
-    known = ('name', 'source', *(('seals', 'motion') if 'seals' in document else ('oring', *_PARTS)))
+    known = ('name', 'source', *(('seals', 'motion') if 'seals' in document else ('oring', 'unknown', *_PARTS)))
     check_names(document, sorted(known), f'case {name}')
     if 'seals' in document:
         return _parse_spool(document, name, source)
@@ -351,12 +358,22 @@ def parse_lubrication_case(
         for key, record in _PARTS.items()
         if key in document
     }
+    unknown: tuple[Unknown, ...] = ()
     if 'oring' in document:
-        parts['oring'] = _oring(document, f'case {name}', load_oring)
-    return LubricationCase(name=name, source=source, **parts)
+        file = _oring(document, f'case {name}', load_oring)
+        parts['oring'] = file.case
+        unknown = tuple(
+            dataclasses.replace(one, name=f'{_OF_RING}{one.name}')
+            for one in file.unknown
+            if one.name != FRICTION_COEFFICIENT
+        )
+    case = LubricationCase(name=name, source=source, **parts)
+    if 'unknown' in document:
+        unknown = _unknown(document, case) + unknown
+    return dataclasses.replace(case, unknown=unknown)
 
 
-def _oring(document: Mapping[str, Any], where: str, load_oring: Callable[[str], OringCase]) -> OringCase:
+def _oring(document: Mapping[str, Any], where: str, load_oring: Callable[[str], OringCaseFile]) -> OringCaseFile:
     """The ring of a case, which takes nothing of a profile, an air pressure or a motion over a control edge."""
     if not isinstance(document['oring'], str):
         raise ValueError(f'{where}: oring = {document["oring"]!r} is not the name or path of an O-ring case')
@@ -374,3 +391,44 @@ def _parse_spool(document: Mapping[str, Any], name: str, source: str) -> Spool:
     members = tuple(from_mapping(SpoolSeal, seal, f'spool {name}: seals[{i}]') for i, seal in enumerate(seals))
     motion = from_mapping(ConstantAcceleration, document.get('motion', {}), f'spool {name}: motion')
     return Spool(name, source, motion, members)
+
+
+# -- what is not known ------------------------------------------------------------------------------------------------
+
+_OF_RING = 'oring.'
+_OF_RINGS_FILM = ('seal.solid_shear_stress', 'topography.', 'grease.')
+_MAY_BE_UNKNOWN = ('seal', 'topography', 'grease', 'groove', 'air')
+
+
+def varied_case(case: LubricationCase, values: Mapping[str, float]) -> LubricationCase:
+    """A case with other ``values`` of its unknowns, by their names, and nothing unknown.
+
+    A surface with another ``rms_height`` or ``roll_off_length`` is the same one, stretched: its slope goes with height
+    over length. The ``rms_slope`` among the values is that before the stretch (our choice).
+
+    Raises:
+        ValueError: There is no such case.
+    """
+    parts: dict[str, dict[str, float]] = {}
+    for name, value in values.items():
+        part, _, field_name = name.partition('.')
+        parts.setdefault(part, {})[field_name] = value
+    if 'topography' in parts:
+        was, surface = case.topography, parts['topography']
+        higher = surface.get('rms_height', was.rms_height) / was.rms_height
+        longer = surface.get('roll_off_length', was.roll_off_length) / was.roll_off_length
+        surface['rms_slope'] = surface.get('rms_slope', was.rms_slope) * higher / longer
+    ring = parts.pop('oring', None)
+    oring = varied_ring(case.oring, ring) if case.oring and ring else case.oring
+    changed = {part: dataclasses.replace(getattr(case, part), **fields) for part, fields in parts.items()}
+    return dataclasses.replace(case, **changed, oring=oring, unknown=())
+
+
+def _unknown(document: Mapping[str, Any], case: LubricationCase) -> tuple[Unknown, ...]:
+    """Unknowns of a case file; the case is possible at both ends of each."""
+    records = {part: getattr(case, part) for part in _MAY_BE_UNKNOWN}
+    known = {f'{part}.{name}': getattr(record, name) for part, record in records.items() for name in meanings(record)}
+    known = {name: value for name, value in known.items() if isinstance(value, float)}
+    if case.oring is not None:
+        known = {name: value for name, value in known.items() if name.startswith(_OF_RINGS_FILM)}
+    return parse_unknowns(document['unknown'], known, partial(varied_case, case), f'case {case.name}: unknown')

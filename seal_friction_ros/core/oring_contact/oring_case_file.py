@@ -13,19 +13,23 @@ Example; docs/oring.md describes every field::
       stiction: 2.5
       uncertainty: {relative_std: 0.2}
     measured: {seals: 2, pressures: [...], frictions: [...], source: ...}   # optional: for comparison
+    unknown: {rubber.hardness: {tolerance: 5.0}}    # optional: for the uncertainty of what is computed
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from seal_friction_ros.core.foundation.parameters import (
     CheckedParameters,
     check_names,
     from_mapping,
+    meanings,
     name_and_source,
     parameter,
 )
+from seal_friction_ros.core.foundation.unknowns import Unknown, parse_unknowns
 from seal_friction_ros.core.friction.actuator import Uncertainty
 from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.friction_coefficient import FrictionCoefficientLaw
@@ -35,6 +39,7 @@ from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, O
 
 _KEYS = (
     'name', 'source', 'geometry', 'groove', 'rubber', 'wall_friction', 'numerics', 'pressures', 'friction', 'measured',
+    'unknown',
 )  # fmt: skip
 
 
@@ -83,6 +88,7 @@ class OringCaseFile:
     source: str
     friction: SealFriction | None
     measured: MeasuredFriction | None
+    unknown: tuple[Unknown, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -115,7 +121,9 @@ def parse_oring_case(document: Any) -> OringCaseFile:
     )
     pressures = from_mapping(_Pressures, {'pressures': document.get('pressures')}, where).pressures
     check_pressures(case, pressures)
-    return OringCaseFile(case, pressures, source, _friction(document, where), _measured(document, where))
+    friction = _friction(document, where)
+    unknown = _unknown(document, case, friction is not None, where)
+    return OringCaseFile(case, pressures, source, friction, _measured(document, where), unknown)
 
 
 def _rubber(values: Any, where: str) -> Rubber:
@@ -161,3 +169,45 @@ def _friction(document: Mapping[str, Any], where: str) -> SealFriction | None:
 def _measured(document: Mapping[str, Any], where: str) -> MeasuredFriction | None:
     values = document.get('measured')
     return None if values is None else from_mapping(MeasuredFriction, values, f'{where}: measured')
+
+
+# -- what is not known ------------------------------------------------------------------------------------------------
+
+FRICTION_COEFFICIENT, HARDNESS = 'friction_coefficient', 'rubber.hardness'
+
+
+def varied_ring(case: OringCase, values: Mapping[str, float]) -> OringCase:
+    """A case with other ``values`` of its unknowns, by their names; a hardness [Shore A] gives the modulus.
+
+    Raises:
+        ValueError: There is no such ring.
+    """
+    parts: dict[str, dict[str, float]] = {}
+    others: dict[str, Any] = {}
+    for name, value in values.items():
+        part, _, field = name.rpartition('.')
+        if name == HARDNESS:
+            parts.setdefault(part, {})['elastic_modulus'] = elastic_modulus_of_hardness(value)
+        elif part:
+            parts.setdefault(part, {})[field] = value
+        elif name != FRICTION_COEFFICIENT:  # a factor on what is computed with the case
+            others[name] = value
+    if 'elastic_modulus' in (rubber := parts.get('rubber', {})):
+        parts.setdefault('geometry', {})['elastic_modulus'] = rubber['elastic_modulus']
+    return replace(case, **{part: replace(getattr(case, part), **changed) for part, changed in parts.items()}, **others)
+
+
+def _unknown(document: Mapping[str, Any], case: OringCase, has_friction: bool, where: str) -> tuple[Unknown, ...]:
+    """Unknowns of a case file; the case is possible at both ends of each."""
+    if 'unknown' not in document:
+        return ()
+    known = {'wall_friction': case.wall_friction} | ({FRICTION_COEFFICIENT: 1.0} if has_friction else {})
+    for part in ('geometry', 'groove', 'rubber'):
+        record = getattr(case, part)
+        known |= {f'{part}.{name}': getattr(record, name) for name in meanings(record)}
+    known = {name: value for name, value in known.items() if isinstance(value, float)}
+    del known['geometry.elastic_modulus']
+    if 'hardness' in document['rubber']:
+        del known['rubber.elastic_modulus']
+        known[HARDNESS] = float(document['rubber']['hardness'])
+    return parse_unknowns(document['unknown'], known, partial(varied_ring, case), f'{where}: unknown')

@@ -186,6 +186,28 @@ def add_work(parser: argparse.ArgumentParser, *, has_failures: bool = True) -> N
         parser.add_argument('--retry-failed', action='store_true', help=help_text)
 
 
+def add_uncertainty(parser: argparse.ArgumentParser) -> None:
+    """Add the options for samples of what is not known."""
+    help_text = 'quantiles from so many samples of what the case says is unknown'
+    parser.add_argument('--uncertain', type=at_least_two, metavar='N', help=help_text)
+    parser.add_argument(
+        '--seed', type=non_negative_whole, metavar='S', help='with --uncertain: of the samples; default: 0'
+    )
+
+
+def samples_of(arguments: argparse.Namespace) -> tuple[int, int] | None:
+    """Number of samples and seed; None without samples.
+
+    Raises:
+        ValueError: An option is for samples, and there are none.
+    """
+    if arguments.uncertain is not None:
+        return arguments.uncertain, arguments.seed or 0
+    if arguments.seed is not None:
+        raise ValueError('--seed is only for --uncertain N')
+    return None
+
+
 def kept_in(arguments: argparse.Namespace) -> 'Kept':
     """Where finished parts are kept, as given.
 
@@ -247,6 +269,22 @@ def at_least_one(text: str) -> int:
     value = int(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f'{text} is below 1')
+    return value
+
+
+def at_least_two(text: str) -> int:
+    """Type of an option: a whole number of at least 2."""
+    value = int(text)
+    if value < 2:
+        raise argparse.ArgumentTypeError(f'{text} is below 2')
+    return value
+
+
+def non_negative_whole(text: str) -> int:
+    """Type of an option: a whole number of at least 0."""
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f'{text} is below 0')
     return value
 
 

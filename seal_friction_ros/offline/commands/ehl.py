@@ -33,9 +33,11 @@ def add_parser(commands: Any) -> None:
     chart = cli.add_command(
         steps, 'map', run_map, 'compute a friction map: steady friction over speed and pressure',
         'ehl map inner_seal --seal-file mapped.yaml',
+        'ehl map inner_seal --uncertain 100 --seal-file mapped.yaml --work build/map',
         needs=('numba',),
     )  # fmt: skip
     cli.add_target(chart, '--seal-file', SEAL_FILE, metavar='FILE.yaml', help='seal file to write')
+    cli.add_uncertainty(chart)
     for step in (run, study, chart):
         cli.add_file(step, 'case', 'ehl', 'case file', metavar='CASE')
         cli.add_workers(step, 'runs')
@@ -95,8 +97,14 @@ def run_map(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.reports.lubrication_report import write_map_page
     from seal_friction_ros.offline.work.seal_writer import write_seal
 
+    samples, workers = cli.samples_of(arguments), cli.workers_of(arguments)
     case = runs.single_case(arguments.case, 'friction map')
-    computed = runs.run_map(case, cli.workers_of(arguments), arguments.work)
+    uncertainty = None
+    if samples:
+        from seal_friction_ros.offline.contact.sampling import uncertain_map
+
+        uncertainty = uncertain_map(case, *samples, workers, arguments.work)
+    computed = runs.run_map(case, workers, arguments.work)._replace(uncertainty=uncertainty)
     numbers, summary = _with_page(arguments, computed, lambda page: write_map_page(computed, page))
     if arguments.seal_file is not None:
         document = runs.seal_document(computed, arguments.seal_file.stem)

@@ -67,6 +67,7 @@ def add_parser(commands: Any) -> None:
         '--largest-acceleration', type=cli.non_negative, metavar='M/S2', help='samples beyond it are not used'
     )
     cli.add_namespace(parser)
+    cli.add_workers(parser, 'groups of readings that are left out')
 
 
 def _chambers(text: str) -> tuple[str, ...]:
@@ -85,7 +86,10 @@ def _kind(text: str) -> tuple[str, tuple[str, ...]]:
     return name, _chambers(chambers)
 
 
-NOT_FOR_KINDS = ('report', 'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding')
+NOT_FOR_KINDS = (
+    'report', 'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',
+    'scheduler',
+)  # fmt: skip
 """options that several kinds of seals do not take"""
 
 
@@ -133,7 +137,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ValueError(f'{arguments.report}: --next writes its page there: choose another name for one of them')
     source_options = SourceOptions(**cli.options_from(arguments, SourceOptions))
     options = IdentifyOptions(**{**cli.options_from(arguments, IdentifyOptions), 'sources': source_options})
-    found = identify(arguments.sources, options, arguments.out.stem)
+    found = identify(arguments.sources, options, arguments.out.stem, cli.workers_of(arguments))
     design = next_readings.design_for(found) if arguments.next else None
     written: dict[str, Any] = {'seal_file': arguments.out}
     if arguments.report:

@@ -26,7 +26,12 @@ from seal_friction_ros.core.lubrication.friction_map import (
     steady_friction,
 )
 from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, Spool, parse_lubrication_case
+from seal_friction_ros.core.lubrication.lubrication_case import (
+    LubricationCase,
+    Spool,
+    parse_lubrication_case,
+    varied_case,
+)
 from seal_friction_ros.core.lubrication.spool import SpoolResult, SpoolSealMotion, stroke_friction, superposed
 from seal_friction_ros.core.lubrication.study import StudyTable, study_table
 from seal_friction_ros.core.lubrication.transient import (
@@ -37,14 +42,15 @@ from seal_friction_ros.core.lubrication.transient import (
     transient_step,
     with_solid_shear_stress,
 )
-from seal_friction_ros.core.oring_contact.oring_case import OringCase
-from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
+from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, parse_oring_case
 from seal_friction_ros.files import config_path, read_yaml
+from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.work.executor import Workers, run_all
 from seal_friction_ros.offline.work.finished_parts import Part, part_key, run_parts
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
 
+_FEWEST_CELLS = 32  # that a case may have
 _PROFILES = ('gap', 'film_pressure', 'contact_pressure', 'saturation')
 _CURVES = tuple(name for name in TransientResult._fields if name not in (*_PROFILES, 'case'))
 
@@ -63,8 +69,8 @@ def load_case(name: str) -> LubricationCase | Spool:
         raise ValueError(f'{path}: {error}') from None
 
 
-def load_oring(name: str, beside: Path) -> OringCase:
-    """O-ring case of a file in the folder ``beside``, from a path, or of a name in config/oring.
+def load_oring(name: str, beside: Path) -> OringCaseFile:
+    """O-ring case file in the folder ``beside``, from a path, or of a name in config/oring.
 
     Raises:
         ValueError: The file cannot be read or a value is invalid; one line that names the file.
@@ -72,7 +78,7 @@ def load_oring(name: str, beside: Path) -> OringCase:
     local = beside / f'{name}.yaml'
     path = local if local.is_file() else config_path('oring', name)
     try:
-        return parse_oring_case(read_yaml(path)).case
+        return parse_oring_case(read_yaml(path))
     except ValueError as error:
         text = str(error)
         raise ValueError(text if text.startswith(str(path)) else f'{path}: {text}') from None
@@ -97,6 +103,13 @@ def compile_for(case: LubricationCase) -> None:
     time = case.numerics.time_step
     with suppress(NotConvergedError):
         transient_step(model, initial_state(model, case.motion.position(0.0)), time, case.motion.position(time))
+
+
+def compile_for_map(case: LubricationCase) -> None:
+    """Compile the code of a friction map in this process, so that worker processes inherit it."""
+    numerics, grid = replace(case.numerics, cells=_FEWEST_CELLS), replace(case.map, velocities=2)
+    with suppress(NotConvergedError):
+        steady_friction(replace(case, oring=None, numerics=numerics, map=grid), 0.0)
 
 
 def run_with_progress(case: LubricationCase, motion: SpoolMotion) -> TransientResult:
@@ -296,6 +309,7 @@ class MapRuns(NamedTuple):
     law: FrictionMap
     rows: list[SteadyFriction]
     retried_steps: int  # steps that did not converge and were repeated in halves
+    uncertainty: Uncertainty | None = None  # None: no samples
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for JSON."""
@@ -308,38 +322,48 @@ class MapRuns(NamedTuple):
             'memory_length_m': self.law.memory_length,
             'presliding_length_m': self.law.presliding_length,
             'retried_steps': self.retried_steps,
+            **({} if self.uncertainty is None else {'uncertainty': self.uncertainty.numbers()}),
         }
 
     def summary(self) -> str:
-        """One line for a person."""
+        """One line for a person, more with samples."""
         low, high = min(self.law.frictions), max(self.law.frictions)
         size = f'{len(self.law.speeds)} speeds x {len(self.law.pressures)} pressures'
-        return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N'
+        sampled = '' if self.uncertainty is None else f'\n{self.uncertainty.summary()}'
+        return f'{self.case.name}: {size}, {low:.3g} to {high:.3g} N{sampled}'
 
 
 def run_map(case: LubricationCase, workers: Workers, work: Path | None = None) -> MapRuns:
     """Compute the friction map of a case; arguments and errors as `run_study`."""
-    pressures = map_pressures(case.map).tolist()
-    settings = asdict(case)
-    parts = [
-        Part(part_key(f'map {pressure!r}', settings), SteadyFriction._fields, partial(steady_friction, case, pressure))
-        for pressure in pressures
-    ]
-    parts.append(Part(part_key('memory', settings), MemoryLength._fields, partial(memory_length, case)))
-    *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for, case))
+    known = varied_case(case, {})
+    memory_part = Part(part_key('memory', asdict(known)), MemoryLength._fields, partial(memory_length, known))
+    parts = [*row_parts(known), memory_part]
+    *found, kept_memory = run_parts(f'{case.name}: map', parts, workers, work, partial(compile_for_map, known))
     rows, memory = [SteadyFriction(**row) for row in found], MemoryLength(**kept_memory)
     retried = memory.retried_steps + sum(row.retried_steps for row in rows)
     return MapRuns(case, friction_map(case, rows, memory.length), rows, retried)
 
 
+def row_parts(case: LubricationCase) -> list[Part]:
+    """Part for each pressure of the grid of a case; its result is the `SteadyFriction`."""
+    settings, fields = asdict(case), SteadyFriction._fields
+    pressures = map_pressures(case.map).tolist()
+    return [Part(part_key(f'map {p!r}', settings), fields, partial(steady_friction, case, p)) for p in pressures]
+
+
 def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
     """Seal file called ``name`` of a friction map.
 
-    The uncertainty is our choice, since nothing is measured here: one tenth of the friction; of an O-ring from its
-    drawing 0.7, the error that was found against readings (docs/ehl.md). The breakaway friction is the friction at the
+    The uncertainty is that of the samples. Without samples it is our choice, since nothing is measured here: one tenth
+    of the friction; of an O-ring from its drawing 0.7, the error that was found against readings (docs/ehl.md). The
+    breakaway friction is the friction at the
     lowest speed of the map over that at its reference speed, mean over the pressures.
     """
     law, case = computed.law, computed.case
+    if computed.uncertainty is None:
+        relative_std = 0.7 if case.oring else 0.1
+    else:
+        relative_std = rounded(computed.uncertainty.relative_std, 3)
     creeping = fmean(law.sliding_friction(p, law.speeds[0]) / law.coulomb_friction(p) for p in law.pressures)
     pressures = [rounded(value, 7) for value in law.pressures]
     elastic = presliding_of_map(law)
@@ -357,7 +381,7 @@ def seal_document(computed: MapRuns, name: str) -> dict[str, Any]:
             'presliding_length': rounded(law.presliding_length, 7),
         },
         'stiction_ratio': rounded(max(0.0, creeping - 1.0), 3),
-        'uncertainty': {'relative_std': 0.7 if case.oring else 0.1},
+        'uncertainty': {'relative_std': relative_std},
         'identified_pressure': [pressures[0], pressures[-1]],
     }
     if elastic is not None:

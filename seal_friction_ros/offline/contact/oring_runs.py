@@ -6,10 +6,11 @@ from pathlib import Path
 from statistics import linear_regression
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.oring_contact.oring_case import check_pressures
+from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, SealFriction, parse_oring_case
 from seal_friction_ros.core.oring_contact.results import OringResult, WallContact, oring_results
 from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.contact.uncertainty import Uncertainty, check_unknown
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.seal_writer import rounded
 
@@ -56,18 +57,21 @@ class Computed(NamedTuple):
     summary: OringSummary
 
 
-def sliding_contact(file: OringCaseFile, result: OringResult) -> WallContact:
+def sliding_contact(case: OringCase, result: OringResult) -> WallContact:
     """Contact on the sliding wall."""
-    return result.rod if file.case.geometry.sliding_wall == 'rod' else result.gland
+    return result.rod if case.geometry.sliding_wall == 'rod' else result.gland
 
 
-def compute_case(path: Path, pressures: Sequence[float] = (), *, for_seal_file: bool = False) -> Computed:
+def compute_case(
+    path: Path, pressures: Sequence[float] = (), *, for_seal_file: bool = False, for_samples: bool = False
+) -> Computed:
     """Compute a case file, with a progress bar.
 
     Args:
         path: The case file.
         pressures: Increasing pressures instead of those in the file [Pa, gauge].
         for_seal_file: Refuse a case without what `seal_document` needs, before computing.
+        for_samples: Refuse a case in which nothing is unknown, before computing.
 
     Raises:
         ValueError: The file is invalid or insufficient for a seal file, or the ring does not fit, does not seal or has
@@ -80,6 +84,8 @@ def compute_case(path: Path, pressures: Sequence[float] = (), *, for_seal_file: 
         check_pressures(file.case, wanted)
         if for_seal_file:
             _friction_of_seal(file, wanted)
+        if for_samples:
+            check_unknown(file.case.name, file.unknown)
         results = []
         with progress(f'{file.case.name}: pressures', len(wanted)) as advance:
             for result in oring_results(file.case, wanted):
@@ -91,7 +97,7 @@ def compute_case(path: Path, pressures: Sequence[float] = (), *, for_seal_file: 
 
 
 def _summary(file: OringCaseFile, results: Sequence[OringResult]) -> OringSummary:
-    contacts = [sliding_contact(file, result) for result in results]
+    contacts = [sliding_contact(file.case, result) for result in results]
     normal = tuple(contact.force for contact in contacts)
     axial = tuple(result.axial_force for result in results)
     gain, radial = linear_regression(axial, normal) if len(results) > 1 else (None, None)
@@ -125,8 +131,12 @@ def _friction_of_seal(file: OringCaseFile, pressures: Sequence[float]) -> SealFr
     return file.friction
 
 
-def seal_document(computed: Computed) -> dict[str, Any]:
+def seal_document(computed: Computed, uncertainty: Uncertainty | None = None) -> dict[str, Any]:
     """Seal file whose normal force is a table of the computed pressures.
+
+    Args:
+        computed: The case and its results.
+        uncertainty: Of the friction, from samples; None: that of the case file.
 
     Raises:
         ValueError: The case has no friction coefficient or one pressure only.
@@ -134,6 +144,7 @@ def seal_document(computed: Computed) -> dict[str, Any]:
     file, summary = computed.file, computed.summary
     friction = _friction_of_seal(file, summary.pressure_Pa)
     pressures = [rounded(value, DIGITS) for value in summary.pressure_Pa]
+    sampled = {} if uncertainty is None else {'relative_std': rounded(uncertainty.relative_std, 3)}
     source = f'{file.source} Normal force: finite elements, {file.case.numerics.lines} lines.'
     return {
         'name': file.case.name,
@@ -147,7 +158,7 @@ def seal_document(computed: Computed) -> dict[str, Any]:
         },
         'friction_coefficient': dict(friction.friction_coefficient),
         'stiction': friction.stiction,
-        'uncertainty': asdict(friction.uncertainty),
+        'uncertainty': asdict(friction.uncertainty) | sampled,
         'identified_pressure': [pressures[0], pressures[-1]],
     }
 

@@ -7,6 +7,7 @@ number is rounded to six digits before another number is computed from it: the s
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,7 @@ from seal_friction_ros.offline.identification.results import (
 )
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
 from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
+from seal_friction_ros.offline.work.executor import Workers, run_all
 from seal_friction_ros.offline.work.progress import progress
 
 MOST_EXTENSIONS = 3  # of a law by velocity terms
@@ -79,10 +81,14 @@ class IdentifyOptions:
     name: str = ''  # of the seal; empty: the name of the seal file
 
 
-def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Identification:
+def identify(paths: Sequence[Path], options: IdentifyOptions, name: str, workers: Workers = 1) -> Identification:
     """Read bags, logs, tables or data sheets, fit every law, select one and assess it.
 
-    ``name`` is that of the seal, unless the options name it.
+    Args:
+        paths: The sources.
+        options: How.
+        name: Of the seal, unless the options name it.
+        workers: Groups of readings at a time that are left out, or a cluster; the result does not depend on it.
 
     Raises:
         ValueError: The data are unfit for identification, or no law predicts them; one line with the reason and what to
@@ -90,7 +96,7 @@ def identify(paths: Sequence[Path], options: IdentifyOptions, name: str) -> Iden
     """
     data = gather(paths, options)
     elastic = identify_presliding(data.sources) if options.presliding else None
-    selection = select_law(data, options.law)
+    selection = select_law(data, options.law, workers)
     _check_one_seal(diagnostics.swept_logs_compared(data.used, selection.fit), options.refuse_changed)
     quality = assess(data, selection, options.run_to_run)
     as_measured = seal_document(data, selection, quality, options.name or name, presliding=elastic)
@@ -193,14 +199,14 @@ def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[C
     return candidate_laws(variation_of(readings), *(ring or ()))
 
 
-def select_law(data: IdentificationData, name: str | None) -> LawSelection:
-    """Fit and score every candidate law; select the recommended one, or the one called ``name``.
+def select_law(data: IdentificationData, name: str | None, workers: Workers = 1) -> LawSelection:
+    """Fit and score every candidate law; select the recommended one, or the one called ``name``; ``workers`` as above.
 
     Raises:
         ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
     """
     with progress('fit and leave out', len(_candidates(data.used, data.ring)) + MOST_EXTENSIONS) as advance:
-        scores = _scored(data, data.used, advance)
+        scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)
     best = recommended(scores, rise_over_pressures(data.used))
     by_name = {None: best} | {score.law.name: score for score in scores}
     if name not in by_name:
@@ -216,23 +222,25 @@ def select_law(data: IdentificationData, name: str | None) -> LawSelection:
         )
     anew = None
     if name is None and not data.used.are_samples:  # a swept log would take minutes
-        with progress('choose without', len(data.used.groups)) as advance:
-            anew = choose_anew(data.used, lambda left: _recommended(data, with_predictable_groups(left)), advance)
+        choose = partial(_recommended, ring=data.ring, has_fitted_load=data.sources.has_fitted_load)
+        anew = choose_anew(data.used, choose, lambda calls: run_all('choose without', calls, workers))
     return LawSelection(scores, best, selected.fit, selected.validation, validation.plain_mean(data.used), anew)
 
 
-def _recommended(data: IdentificationData, readings: FrictionReadings) -> LawScore:
-    return recommended(_scored(data, readings), rise_over_pressures(readings))
+def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool) -> LawScore:
+    """Recommended law for the readings that are left."""
+    predictable = with_predictable_groups(readings)
+    return recommended(_scored(predictable, ring, has_fitted_load), rise_over_pressures(predictable))
 
 
 def _scored(
-    data: IdentificationData, readings: FrictionReadings, tick: validation.Ticks = lambda _: None
+    readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool, tick: validation.Ticks = lambda _: None
 ) -> tuple[LawScore, ...]:
     """Scores of the ladder on some of the readings."""
     variation = variation_of(readings)
-    if data.sources.has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
+    if has_fitted_load:  # asymmetry is not identifiable: the fitted load holds it
         variation = variation._replace(asymmetry=False)
-    return score_ladder(candidate_laws(variation, *(data.ring or ())), readings, variation, tick)
+    return score_ladder(candidate_laws(variation, *(ring or ())), readings, variation, tick)
 
 
 def assess(data: IdentificationData, selection: LawSelection, run_to_run: float | None) -> LawQuality:

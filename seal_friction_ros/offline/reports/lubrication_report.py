@@ -19,11 +19,13 @@ from seal_friction_ros.core.lubrication.spool import SpoolResult
 from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
 from seal_friction_ros.offline.contact.lubrication_comparison import Comparison
 from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, MapRuns, StudyRuns
+from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import number
 from seal_friction_ros.offline.reports.page import PARAMETER_HEADS, Table, head_of, parameter_rows, write_page
+from seal_friction_ros.offline.reports.uncertainty_tables import uncertainty_values
 from seal_friction_ros.offline.work.status import command_line
 
 POSITION_LABEL, FRICTION_LABEL = 'position of the spool [mm]', 'friction [N]'
@@ -104,9 +106,17 @@ def write_map_page(computed: MapRuns, out: Path) -> tuple[Path, ...]:
     ]
     table = Table(heads, rows)
     plots = [map_figure(computed)]
+    if computed.uncertainty is not None:
+        plots.append(quantiles_figure(computed.uncertainty))
     frictions = np.concatenate([row.friction for row in computed.rows])
-    verdict = verdicts.of_map(float(frictions.min()), float(frictions.max()), '--seal-file' in command_line())
+    verdict = verdicts.of_map(
+        float(frictions.min()),
+        float(frictions.max()),
+        None if computed.uncertainty is None else computed.uncertainty.relative_std,
+        '--seal-file' in command_line(),
+    )
     values = {'verdict': verdict, 'law': computed.law, 'map_table': table}
+    values |= uncertainty_values(computed.uncertainty, computed.case.unknown)
     return _write_case_page(out, 'lubrication_map', plots, computed.case, **values)
 
 
@@ -313,6 +323,23 @@ def map_figure(computed: MapRuns) -> Plot:
         ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f'{value:g}'))
         style.legend_above(ax)
     return Plot('friction_map', figure)
+
+
+def quantiles_figure(uncertainty: Uncertainty) -> Plot:
+    """Median of the samples over speed, and the band that holds nine tenths of them, at each pressure."""
+    low, median, high = uncertainty.quantiles
+    count = len(uncertainty.pressures)
+    figure, axes = style.new_figure('Friction of 90 % of the samples', 4.0, ncols=count, sharey=True)
+    speeds = np.array(uncertainty.speeds) / MM
+    for i, (ax, pressure) in enumerate(zip(axes, uncertainty.pressures, strict=True)):
+        ax.fill_between(speeds, low[i], high[i], color=style.SKY, alpha=0.4, lw=0, label='5 to 95 %')
+        ax.semilogx(speeds, median[i], color=style.BLUE, label='median')
+        ax.semilogx(speeds, uncertainty.nominal[i], color=style.BLACK, lw=1.0, label='the case')
+        ax.set(title=f'{pressure / BAR:.3g} bar', xlabel='speed [mm/s]')
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f'{value:g}'))
+    axes[0].set(ylabel='friction of the seal [N]', ylim=(0.0, None))
+    style.legend_above(axes[-1])
+    return Plot('friction_quantiles', figure)
 
 
 def comparison_figure(comparison: Comparison) -> Plot:

@@ -18,12 +18,14 @@ from seal_friction_ros.core.oring_contact.oring_case import gland_fill
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.oring_contact.results import OringResult, WallContact
 from seal_friction_ros.offline.contact.oring_runs import Computed, sliding_contact
+from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, house_style
 from seal_friction_ros.offline.reports.formatting import force_unit, number, pressure_text
 from seal_friction_ros.offline.reports.page import Table, Verdict, head_of, write_page
 from seal_friction_ros.offline.reports.thesis_data import THESIS_SEAL, ThesisContact, appendix_b
+from seal_friction_ros.offline.reports.uncertainty_tables import uncertainty_values
 
 
 def thesis_case(computed: Computed, result: OringResult) -> ThesisContact | None:
@@ -59,8 +61,8 @@ def numbers_text(computed: Computed) -> str:
 
 
 @house_style()
-def write_oring_report(computed: Computed, out: Path) -> tuple[Path, ...]:
-    """Write the report of a computed case; see `write_page`.
+def write_oring_report(computed: Computed, out: Path, uncertainty: Uncertainty | None = None) -> tuple[Path, ...]:
+    """Write the report of a computed case, with the ``uncertainty`` of its force from samples; see `write_page`.
 
     Returns:
         Paths of the figures.
@@ -84,6 +86,7 @@ def write_oring_report(computed: Computed, out: Path) -> tuple[Path, ...]:
         number_table=_number_table(computed),
         thesis_table=_thesis_table(computed),
         friction_table=_friction_table(computed),
+        **uncertainty_values(uncertainty, computed.file.unknown),
     )
 
 
@@ -111,7 +114,7 @@ def _number_table(computed: Computed) -> Table:
     )  # fmt: skip
     rows = []
     for result in computed.results:
-        contact = sliding_contact(computed.file, result)
+        contact = sliding_contact(computed.file.case, result)
         other = result.gland if contact is result.rod else result.rod
         off = 100.0 * (result.axial_force / (result.pressure * area) - 1.0) if result.pressure else None
         rows.append(
@@ -140,7 +143,7 @@ def _thesis_table(computed: Computed) -> Table:
     for result in computed.results:
         thesis = thesis_case(computed, result)
         if thesis is not None:
-            contact = sliding_contact(computed.file, result)
+            contact = sliding_contact(computed.file.case, result)
             row = [number(result.pressure / PSI, 0)]
             for own, expected, size, digits in (
                 (contact.force, thesis.normal_force, LBF, 2),
@@ -248,7 +251,7 @@ def profile_figure(computed: Computed) -> Plot:
     title = f'Peak contact stress on the {computed.file.case.geometry.sliding_wall} {rise}'
     figure, axes = style.panels(title, len(results), 2.2)
     for ax, result in zip(axes, results, strict=True):
-        position, stress = _closed_profile(sliding_contact(computed.file, result))
+        position, stress = _closed_profile(sliding_contact(computed.file.case, result))
         ax.fill_between(position / MM, stress / MPA, color=style.BLUE, alpha=0.15, lw=0)
         ax.plot(position / MM, stress / MPA, color=style.BLUE, lw=1.8, label='this computation')
         if result.pressure > 0.0:

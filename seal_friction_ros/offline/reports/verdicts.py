@@ -173,10 +173,10 @@ def of_fleet(counts: Mapping[str, int], damaged: int, name: str, why: str) -> Ve
     """
     total = sum(counts.values())
     if not name:
-        return Verdict(GOOD, f'All {total} bags are good.', 'nothing; look again after the next recordings.')
-    text = (
-        f'{counts[BAD]} of {total} bags are bad, {damaged} of them damaged; {counts[LOOK]} to look at. {name}: {why}.'
-    )
+        said = 'The bag is good.' if total == 1 else f'All {total} bags are good.'
+        return Verdict(GOOD, said, 'nothing; look again after the next recordings.')
+    bags, are = 'bag' if total == 1 else 'bags', 'is' if counts[BAD] == 1 else 'are'
+    text = f'{counts[BAD]} of {total} {bags} {are} bad, {damaged} damaged; {counts[LOOK]} to look at. {name}: {why}.'
     after = 'sort by what you look for; seal_friction report BAG --out PAGE.html shows a bag in full.'
     return Verdict(BAD if counts[BAD] else LOOK, text, after)
 
@@ -282,14 +282,26 @@ def of_study(deviation: float) -> Verdict:
     return Verdict(level, text, after)
 
 
-def of_map(lowest: float, highest: float, seal_file: bool) -> Verdict:
-    """Verdict on a friction map with frictions [N] from ``lowest`` to ``highest``."""
+def of_map(lowest: float, highest: float, relative_std: float | None, seal_file: bool) -> Verdict:
+    """Verdict on a friction map.
+
+    Args:
+        lowest: Lowest friction [N].
+        highest: Highest friction [N].
+        relative_std: Relative standard deviation of the friction, from samples; None without samples.
+        seal_file: Whether a seal file is written.
+    """
+    spread = (
+        '' if relative_std is None else f', with a relative standard deviation of {_percent(relative_std)} by samples'
+    )
     after = (
         'use the seal file; its band is not from measurements.'
         if seal_file
         else 'write a seal file for the node: --seal-file.'
     )
-    return Verdict(LOOK, f'Friction {lowest:.3g} to {highest:.3g} N over the map; computed, not measured.', after)
+    return Verdict(
+        LOOK, f'Friction {lowest:.3g} to {highest:.3g} N over the map{spread}; computed, not measured.', after
+    )
 
 
 def of_spool(largest: float) -> Verdict:

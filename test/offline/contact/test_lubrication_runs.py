@@ -32,6 +32,7 @@ motion: {cycles: 1}
 numerics: {cells: 48, time_step: 2.0e-3}
 study: {solid_shear_stresses: [1.0e+6, 2.0e+6]}
 map: {velocity_min: 1.0e-3, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+5, pressures: 2}
+unknown: {seal.solid_shear_stress: {factor: 2.0}}
 """
 
 
@@ -143,16 +144,17 @@ def test_every_command_of_the_page_is_one(small, ring, tmp_path, capsys, monkeyp
         'inner_seal': small,
         'spool': 'spool.yaml',
         'BAG': str(measured_bag(tmp_path, with_position=True)),
+        '100': '2',  # samples
     }
     blocks = re.findall(r'```bash\n(.*?)```', (ROOT / 'docs' / 'ehl.md').read_text(), re.DOTALL)
     lines = [line for block in blocks for line in block.splitlines()]
-    assert len(lines) == 6
+    assert len(lines) == 7
     for line in lines:
         program, *words = line.split()
         assert program == '.venv/bin/seal_friction'
         assert main([*(swapped.get(word, word) for word in words), '--jobs', '1']) == 0, line
     pages = {path.stem: path.read_text() for path in Path('build').glob('*.html')}
-    assert pages.keys() == {'inner_seal', 'spool', 'study', 'map', 'compared', 'from_drawing'}
+    assert pages.keys() == {'inner_seal', 'spool', 'study', 'map', 'uncertain', 'compared', 'from_drawing'}
     assert 'Findings' in pages['inner_seal']
     assert 'grease.flow_index' in pages['inner_seal']
     assert 'simulation_against_measurement' in pages['compared']
@@ -169,6 +171,7 @@ def test_every_script_of_the_page_is_one():
         'test/system/lubrication_findings.py',
         'test/system/oring_map.py',
         'test/system/seal_bodies.py',
+        'test/system/uncertain_grid.py',
     }
     assert all((ROOT / script).is_file() for script in scripts)
 
@@ -330,4 +333,5 @@ def test_run_that_does_not_converge_is_an_error_and_no_curve(tmp_path, capsys):
 
 def test_case_of_the_paper_stands_in_full_in_its_file_and_is_what_the_others_build_on():
     case = load_case('inner_seal')
-    assert replace(case, name='x', source='') == LubricationCase(name='x')
+    assert case.unknown
+    assert replace(case, name='x', source='', unknown=()) == LubricationCase(name='x')

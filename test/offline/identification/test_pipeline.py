@@ -280,6 +280,17 @@ def readings_table(path, scatter, friction):
     return str(path)
 
 
+def test_the_number_of_workers_changes_no_byte(tmp_path):
+    table, files = readings_table(tmp_path / 'table.csv', 0.02, lambda bar, _: 2.0 + 0.1 * bar), []
+    for workers in ('1', '2'):
+        (folder := tmp_path / workers).mkdir()
+        run = Run(folder, table, '--workers', workers, '--name', 'seal')
+        assert run.code == 0, run.errors
+        assert all(run.figures['left_out_nested_laws'])
+        files.append([path.read_bytes() for path in sorted(folder.glob('*.yaml'))])
+    assert files[0] == files[1] != []
+
+
 def test_a_level_at_which_the_law_of_the_others_gives_no_friction_is_no_outlier(tmp_path):
     """The power law fitted to the other pressures gives 0 N at 0 bar, where no relative deviation exists."""
     table = readings_table(

@@ -55,12 +55,26 @@ def test_the_page_names_the_worst_and_links_the_pages_there_are(tmp_path):
     ]
     report = write_fleet_report(bags, folder, tmp_path / 'fleet.html')
     page = checked_page(report.page)
-    assert page.texts['p.said'][0].startswith('Bad: 1 of 3 bags are bad, 1 of them damaged; 1 to look at.')
+    assert page.texts['p.said'][0].startswith('Bad: 1 of 3 bags is bad, 1 damaged; 1 to look at.')
     assert [row['verdict'] for row in page.table('bag')] == [BAD, LOOK, GOOD]
     html = report.page.read_text()
     assert '<script>alert' not in html
     assert html.count('<a href') == 1
     assert '<a href="rig%20%3C1%3E%20%26%20%222%22/good%20%231.html">' in html
+
+
+@pytest.mark.parametrize(
+    ('reasons', 'said'),
+    [
+        ([None], 'Good: The bag is good.'),
+        (['x: damaged'], 'Bad: 1 of 1 bag is bad, 1 damaged; 0 to look at.'),
+        (['x: damaged', 'x: damaged'], 'Bad: 2 of 2 bags are bad, 2 damaged; 0 to look at.'),
+    ],
+)
+def test_one_bag_is_one_and_several_are_several(reasons, said, tmp_path):
+    bags = [bag(f'rig/{number}', *([reason] if reason else [])) for number, reason in enumerate(reasons)]
+    page = checked_page(write_fleet_report(bags, Path('rig'), tmp_path / 'fleet.html').page)
+    assert page.texts['p.said'][0].startswith(said)
 
 
 def test_a_good_fleet_is_good_and_its_page_the_same_bytes_again(tmp_path):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from harness.report_page import checked_page
 
+from seal_friction_ros.core.foundation.unknowns import Unknown
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.findings import Findings
 from seal_friction_ros.core.lubrication.friction_map import SteadyFriction
@@ -16,6 +17,7 @@ from seal_friction_ros.core.lubrication.study import StudyTable
 from seal_friction_ros.core.lubrication.transient import TransientResult
 from seal_friction_ros.offline.contact.lubrication_comparison import Comparison
 from seal_friction_ros.offline.contact.lubrication_runs import CaseRun, MapRuns, StudyRuns
+from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports import lubrication_report as report
 
 EVIL = '<b>case</b> & "1"'
@@ -101,7 +103,7 @@ def test_a_study_shows_each_solid_shear_stress(tmp_path):
     assert 'All within 0.5 mm of the middle, in the last cycle.' in page.texts['p']
 
 
-def test_a_map_shows_friction_by_speed_and_pressure(tmp_path):
+def computed_map() -> MapRuns:
     speeds, pressures = (1e-3, 1e-2, 1e-1), (0.0, 1e5)
     law = FrictionMap(speeds, pressures, (0.9, 0.7, 0.4, 1.1, 0.8, 0.4), 1e-2, 2.2e-4, 4.2e-5)
     frictions = np.array(law.frictions).reshape(2, 3)
@@ -109,10 +111,47 @@ def test_a_map_shows_friction_by_speed_and_pressure(tmp_path):
         SteadyFriction(**{**dict.fromkeys(SteadyFriction._fields), 'pressure': p, 'friction': f, 'solid': 0.9 * f})
         for p, f in zip(pressures, frictions, strict=True)
     ]
-    report.write_map_page(MapRuns(CASE, law, rows, 0), tmp_path / 'map.html')
+    return MapRuns(CASE, law, rows, 0)
+
+
+def test_a_map_shows_friction_by_speed_and_pressure(tmp_path):
+    report.write_map_page(computed_map(), tmp_path / 'map.html')
     page = checked_page(tmp_path / 'map.html')
+    assert page.figures == ['friction_map']
     assert list(page.table('speed [mm/s]')[0].values()) == ['1.00', '0.900', '1.100']
     assert page.tiles['distance before the seal slides'] == '0.042 mm'
+
+
+def test_a_map_with_samples_shows_what_is_unknown_its_quantiles_and_what_failed(tmp_path):
+    nominal = np.array([[0.9, 0.4], [1.1, 0.5]])
+    scales = np.array([0.5, 1.0, 2.0])
+    samples = Uncertainty(
+        seed=7,
+        names=('seal.solid_shear_stress',),
+        drawn=np.array([[1e6], [1.5e6], [2e6], [3e6]]),
+        failed={2: 'no <b>film</b>'},
+        pressures=(0.0, 1e5),
+        speeds=(1e-3, 1e-1),
+        nominal=nominal,
+        computed=scales[:, None, None] * nominal,
+    )
+    case = replace(CASE, unknown=(Unknown('seal.solid_shear_stress', 1.5e6, 'factor', (2.0,)),))
+    report.write_map_page(computed_map()._replace(case=case, uncertainty=samples), tmp_path / 'map.html')
+    page = checked_page(tmp_path / 'map.html')
+    assert page.figures == ['friction_map', 'friction_quantiles']
+    assert page.table('unknown') == [
+        {
+            'unknown': 'seal.solid_shear_stress',
+            'in the case': '1.5e+06',
+            'spread': 'factor 2',
+            'rank correlation with the force': '+1.00',
+        }
+    ]
+    last = list(page.table('pressure [bar]')[-1].values())
+    assert last[:3] == ['1.00', '100.00', '0.500']
+    assert last[3:6] == ['0.250', '0.500', '1.000']
+    assert page.table('sample') == [{'sample': '3', 'reason': 'no <b>film</b>'}]
+    assert f'{samples.relative_std:.3g}' in next(text for text in page.texts['p'] if 'Latin hypercube' in text)
 
 
 @pytest.mark.parametrize('resonance', [None, 153.0])

@@ -1,5 +1,6 @@
 """The page of a computed O-ring, on a coarse mesh."""
 
+import numpy as np
 import pytest
 import yaml
 from harness.report_page import checked_page
@@ -7,6 +8,7 @@ from paths import ROOT
 
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.contact.oring_runs import compute_case
+from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.reports.formatting import number
 from seal_friction_ros.offline.reports.oring_report import friction_deviation, write_oring_report
 
@@ -47,10 +49,25 @@ def test_the_page_stands_alone_and_shows_the_numbers_and_the_thesis(computed, tm
 
 
 def test_a_case_of_one_pressure_without_friction_still_makes_a_page_and_its_name_is_escaped(tmp_path):
-    path = case_file(tmp_path, name='<script>x', source='<b>', friction=None, measured=None, pressures=[0.0])
+    gone = dict.fromkeys(('friction', 'measured', 'unknown'))
+    path = case_file(tmp_path, name='<script>x', source='<b>', pressures=[0.0], **gone)
     assert main(['oring', str(path), '--report', str(tmp_path / 'page.html')]) == 0
     page = checked_page(tmp_path / 'page.html')
     assert page.texts['h1'] == ['O-ring <script>x']
     assert page.texts['dd'][0] == '<b>'
     assert page.figures == ['deformed_shape', 'contact_stress_profiles', 'contact_stress_walls']
     assert 'Against Appendix B of the thesis' not in page.texts['h2']
+
+
+def test_a_case_with_samples_shows_the_quantiles_of_its_friction(computed, tmp_path):
+    friction = np.array(computed.summary.friction_N)
+    names = tuple(unknown.name for unknown in computed.file.unknown)
+    drawn = np.array([[unknown.value] * 2 for unknown in computed.file.unknown]).T
+    forces = np.array([friction, 2.0 * friction])
+    samples = Uncertainty(0, names, drawn, {}, computed.summary.pressure_Pa, (), friction, forces)
+    write_oring_report(computed, tmp_path / 'page.html', samples)
+    page = checked_page(tmp_path / 'page.html')
+    assert [row['unknown'] for row in page.table('unknown')] == list(names)
+    (table,) = (table for table in page.tables if '95 % [N]' in table[0])
+    assert [row[1] for row in table[1:]] == [number(force, 3) for force in friction]
+    assert [row[3] for row in table[1:]] == [number(1.5 * force, 3) for force in friction]

@@ -22,6 +22,7 @@ motion: {cycles: 1}
 numerics: {cells: 32, time_step: 50.0e-3}
 study: {solid_shear_stresses: [1.0e+6, 2.0e+6]}
 map: {velocity_min: 2.0e-2, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+5, pressures: 2}
+unknown: {seal.solid_shear_stress: {factor: 2.0}}
 """
 
 
@@ -112,7 +113,7 @@ def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
 def test_a_study_and_a_map_are_the_same_on_a_cluster(cluster, tmp_path):
     case, seal = tmp_path / 'tiny.yaml', tmp_path / 'seal.yaml'
     case.write_text(CASE)
-    for words in (['study', str(case)], ['map', str(case), '--seal-file', str(seal)]):
+    for words in (['study', str(case)], ['map', str(case), '--seal-file', str(seal), '--uncertain', '2']):
         found = []
         for workers in (['--workers', '1'], ['--scheduler', cluster.address]):
             code, out, errors = done(*COMMAND, 'ehl', *words, *workers, '--json')
@@ -120,6 +121,19 @@ def test_a_study_and_a_map_are_the_same_on_a_cluster(cluster, tmp_path):
             found.append((out, seal.read_bytes() if seal.exists() else b''))
         assert found[0] == found[1]
     assert found[0][1]
+
+
+def test_an_identification_is_the_same_on_a_cluster(cluster, tmp_path):
+    rows = ['pressure_bar,friction_N,direction']
+    for bar in (1, 3, 5, 7):
+        rows += [f'{bar},{(2.0 + 0.5 * bar) * (1.0 + 0.01 * ((bar * k) % 3))},extend' for k in range(4)]
+    (tmp_path / 'table.csv').write_text('\n'.join(rows))
+    found = []
+    for workers in (['--workers', '1'], ['--scheduler', cluster.address]):
+        said = done(*COMMAND, 'identify', 'table.csv', '--out', 'seal.yaml', '--json', *workers, folder=tmp_path)
+        found.append((said, (tmp_path / 'seal.yaml').read_bytes()))
+    assert found[0] == found[1]
+    assert found[0][0][0] == 0, found[0][0][2]
 
 
 def test_of_calls_for_one_result_the_first_error_counts_and_a_bug_is_seen(cluster, tmp_path):

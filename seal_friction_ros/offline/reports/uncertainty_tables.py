@@ -1,0 +1,57 @@
+"""Tables of the uncertainty of what is computed."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from seal_friction_ros.core.foundation.units import BAR, MM
+from seal_friction_ros.core.foundation.unknowns import Unknown
+from seal_friction_ros.offline.contact.uncertainty import QUANTILES, Uncertainty
+from seal_friction_ros.offline.reports.formatting import number
+from seal_friction_ros.offline.reports.page import Table
+
+
+def uncertainty_values(uncertainty: Uncertainty | None, unknowns: Sequence[Unknown]) -> dict[str, Any]:
+    """Values of the template ``uncertainty.html``."""
+    if uncertainty is None:
+        return {'uncertainty': None}
+    return {
+        'uncertainty': uncertainty,
+        'quantile_table': _quantile_table(uncertainty),
+        'unknown_table': _unknown_table(uncertainty, unknowns),
+        'failed_table': Table(
+            ('sample', 'reason'), [(i + 1, reason) for i, reason in uncertainty.failed.items()], (1,)
+        ),
+    }
+
+
+def _quantile_table(uncertainty: Uncertainty) -> Table:
+    """Row for each pressure and speed."""
+    heads = [
+        'pressure [bar]',
+        *(['speed [mm/s]'] if uncertainty.speeds else []),
+        'the case [N]',
+        *(f'{100.0 * share:g} % [N]' for share in QUANTILES),
+        'relative standard deviation [%]',
+    ]
+    columns = [uncertainty.nominal, *uncertainty.quantiles, 100.0 * uncertainty.relative_stds]
+    rows = []
+    for place in np.ndindex(*uncertainty.nominal.shape):
+        axes = [number(uncertainty.pressures[place[0]] / BAR)]
+        axes += [number(uncertainty.speeds[place[1]] / MM)] if uncertainty.speeds else []
+        rows.append(
+            (*axes, *(number(float(column[place]), 3) for column in columns[:-1]), number(columns[-1][place], 0))
+        )
+    return Table(heads, rows)
+
+
+def _unknown_table(uncertainty: Uncertainty, unknowns: Sequence[Unknown]) -> Table:
+    """Row for each unknown."""
+    spread = {unknown.name: unknown for unknown in unknowns}
+    rows = []
+    for name, correlation in uncertainty.rank_correlations.items():
+        one = spread[name]
+        amounts = ' to '.join(f'{amount:.6g}' for amount in one.amounts)
+        rows.append((name, f'{one.value:.6g}', f'{one.kind} {amounts}', number(correlation, 2, signed=True)))
+    return Table(('unknown', 'in the case', 'spread', 'rank correlation with the force'), rows, (0, 2))
