@@ -182,8 +182,6 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
     late = ('PRESSURE_MISSING', 'FORCE_MISSING', 'PRESSURE_STALE', 'FORCE_STALE', 'STAMP_AGE')  # or a busy machine
     counts = evaluate_run(run).status_counts
     assert {bit for bit, count in counts.items() if count} <= {*late, 'MOTION_UNCERTAIN'}  # near rest, at reversals
-    learning = 100  # samples until the ripple of the velocity is known
-    assert sum(counts.values()) < learning + 0.3 * verdict.recorded_estimates  # each lost message makes some
     assert float(abs(run.feedforward_force[200:]).max()) == pytest.approx(0.9 * run.coulomb_friction.max(), rel=0.1)
 
 

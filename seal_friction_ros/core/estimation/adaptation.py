@@ -80,7 +80,7 @@ class AdaptationSettings:
     COMPILED: ClassVar = ('moving_mass', 'acceleration_max', 'scale_min', 'scale_max')
 
     mode: str = parameter(
-        'off',
+        'observe',
         unit='',
         description='off: the seal file as it is. observe: scale and offset are learnt and published, nothing else '
         'changes but the standard deviation and the status. on: estimate and feed-forward use the scale.',

@@ -224,7 +224,7 @@ def parse_snapshot(text: str) -> Snapshot:
             tuple(document['seal_documents']),
             _settings(EstimatorSettings, document['settings'], version, 'configuration: settings'),
             _settings(FeedForwardSettings, document['feedforward'], version, 'configuration: feedforward'),
-            from_mapping(AdaptationSettings, document.get('adaptation', {}), 'configuration: adaptation'),
+            from_mapping(AdaptationSettings, document.get('adaptation', {'mode': 'off'}), 'configuration: adaptation'),
         )
         state = _state(configuration, document['state'], version)
         return Snapshot(configuration, state, version, _recorded(document.get('recorded'), version))

@@ -250,10 +250,12 @@ def tracking_error(held: Held) -> float | None:
 def measured_friction(known: Known, held: Held) -> float | None:
     """Friction [N] that the measurements show: the force sum, which is the friction while the speed is even.
 
-    With adaptation, inertia and offset are known while the rod slides, so that the friction is estimate plus residual.
+    Once adaptation has learnt a scale, inertia and offset are known while the rod slides: the friction is estimate plus
+    residual. Before, the offset would hide what the law misses.
     """
     estimate, force = held.estimate, held.records.get(Force)
-    if known.adaptation != OFF and estimate.state == FrictionState.SLIDING and estimate.residual != 0.0:
+    has_learnt = known.adaptation != OFF and estimate.adaptation_scale != 1.0
+    if has_learnt and estimate.state == FrictionState.SLIDING and estimate.residual != 0.0:
         return estimate.friction_force + estimate.residual
     if force is None:
         return None

@@ -164,7 +164,7 @@ def friction_by_pressure(run: RecordedRun) -> FrictionByPressure:
     has the offset of `offset_of_strokes` removed.
     """
     columns = (run.velocity, run.pressure, run.force_sum, run.coulomb_friction, run.coulomb_friction_std)
-    usable = run.status & ~int(EXTRAPOLATED) == 0  # the inputs are good
+    usable = run.status & ~int(EXTRAPOLATED | Status.MODEL_DISAGREES) == 0  # the inputs are good
     for column in (*columns, run.breakaway_force):
         usable &= np.abs(column) < LARGEST_INPUT
     runs = _runs(run)

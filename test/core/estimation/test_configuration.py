@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationState
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings, AdaptationState
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, ConditionedVelocity
 from seal_friction_ros.core.estimation.configuration import (
     Configuration,
@@ -158,7 +158,7 @@ def test_a_snapshot_from_before_there_was_adaptation_has_learnt_nothing():
     document = json.loads(snapshot_text(SNAPSHOT))
     del document['adaptation'], document['state']['estimator']['adaptation']
     back = parse_snapshot(json.dumps(document))
-    assert back.configuration == CONFIGURATION
+    assert back.configuration == dataclasses.replace(CONFIGURATION, adaptation=AdaptationSettings('off'))
     assert back.state.estimator.adaptation == NOT_ADAPTED
 
 

@@ -112,6 +112,7 @@ def test_the_column_goes_into_the_bag_and_identify_finds_the_same_coefficient_th
         assert part[name] == pytest.approx(expected[name], rel=0.02)
 
 
+@pytest.mark.long
 def test_a_bag_with_a_seal_file_of_that_kind_replays_at_its_temperature(logs, tmp_path, capsys):
     identified(logs, 'with.yaml', tmp_path / 'seal.yaml', capsys)
     friction = {}

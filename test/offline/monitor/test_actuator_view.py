@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from seal_friction_ros.core.estimation.adaptation import MODES
+from seal_friction_ros.core.estimation.adaptation import MODES, AdaptationSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.records import (
     Force,
@@ -37,7 +37,7 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     take,
 )
 
-KNOWN = known_of(default_configuration())
+KNOWN = known_of(dataclasses.replace(default_configuration(), adaptation=AdaptationSettings('off')))
 SECOND = 10**9
 NO_BITS = Bits()
 ESTIMATE = FrictionEstimate(SECOND, 40.0, 3.0, 45.0, -40.0, SLIDING, -1, 0, 0.001)
@@ -76,7 +76,7 @@ def test_a_row_has_the_newest_numbers_in_the_units_of_the_page():
     assert (shown['feedforward'], shown['limit'], shown['below']) == (-36.0, 150.0, -150.0)
     assert shown['error'] == pytest.approx(2000.0)  # [um]
     assert (shown['pressure_a'], shown['pressure_b']) == (20.0, 10.0)  # [bar]
-    assert shown['scale'] is shown['residual'] is None  # nothing is learnt with the default settings
+    assert shown['scale'] is shown['residual'] is None  # nothing is learnt
     assert shown['limited'] == Limited.SLEW
 
 

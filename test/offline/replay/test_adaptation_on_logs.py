@@ -23,7 +23,7 @@ PARAMETERS = "/**: {{ros__parameters: {{adaptation.mode: '{mode}', stamp_age_max
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp('logs')
-    for mode in ('off', 'on'):
+    for mode in ('observe', 'on'):
         (made / f'{mode}.yaml').write_text(PARAMETERS.format(mode=mode))
     return made
 
@@ -51,14 +51,22 @@ def test_a_ram_on_another_day_is_followed_within_130_newtons_and_the_band_holds(
     seal = folder / f'{learnt_on}.yaml'
     logs = {name: SHARED_DATA / 'mbari' / file for name, file in RAM.items()}
     assert main(['identify', str(logs[learnt_on]), '--rig', 'mbari', '--out', str(seal)]) == 0
-    estimates, velocity = replayed(folder, imported(folder, logs[used_on], 'mbari'), seal, 'on')
+    bag = imported(folder, logs[used_on], 'mbari')
+    rms, inside = of_even_sliding(*replayed(folder, bag, seal, 'on'))
+    assert rms < 130.0  # [N] measured: 97 and 94; a fixed law 421 and 542
+    assert 0.9 <= inside <= 0.99  # measured: 0.980 and 0.988
+    if learnt_on == '2022.01.28':  # by default the law stays as it is, but what is called good is
+        _, inside = of_even_sliding(*replayed(folder, bag, seal, 'observe'))
+        assert inside >= 0.9  # measured: 0.991; without looking at the force sum 0.76
+
+
+def of_even_sliding(estimates, velocity):
+    """RMS of the residual [N], and share of the good samples that are in their 95 % band."""
     std, state, status, residual = (estimates[:, i] for i in (2, 5, 7, 12))
     acceleration = np.gradient(velocity[:, 1], velocity[:, 0] * 1e-9)
     even = (np.abs(velocity[:, 1]) > 0.01) & (np.abs(acceleration) < 0.05) & (state == SLIDING)
     good = even & (status == 0)
-    inside = np.abs(residual[good]) < 1.96 * std[good]
-    assert np.sqrt(np.mean(residual[even] ** 2)) < 130.0  # [N] measured: 97 and 94; a fixed law 421 and 542
-    assert 0.9 <= np.mean(inside) <= 0.99  # measured: 0.980 and 0.988
+    return np.sqrt(np.mean(residual[even] ** 2)), np.mean(np.abs(residual[good]) < 1.96 * std[good])
 
 
 @pytest.fixture(scope='module')
@@ -69,12 +77,13 @@ def ring(folder):
     return seal
 
 
+RUNS = [(run, pressure) for run in ('O-ring257', 'O-ring257_run2') for pressure in (1, 3, 5, 7)]
+SHORT = ('O-ring257', 1), ('O-ring257_run2', 7)
+
+
 @pytest.mark.parametrize(
-    ('run', 'pressure'),
-    [('O-ring257', 1), ('O-ring257', 7), ('O-ring257_run2', 3), ('O-ring257_run2', 7)]
-    + [pytest.param(*rest, marks=pytest.mark.long)
-       for rest in (('O-ring257', 3), ('O-ring257', 5), ('O-ring257_run2', 1), ('O-ring257_run2', 5))],
-)  # fmt: skip
+    ('run', 'pressure'), [one if one in SHORT else pytest.param(*one, marks=pytest.mark.long) for one in RUNS]
+)
 def test_a_law_that_is_off_by_a_factor_ends_at_the_same_friction(folder, ring, run, pressure):
     bag = imported(folder, SHARED_DATA / 'delft' / f'{run}_{pressure}bar.csv', 'delft')
     frictions = {}

@@ -98,6 +98,7 @@ def test_the_page_shows_the_numbers_the_seal_and_the_settings(tmp_path):
 
 
 @pytest.mark.renders
+@pytest.mark.long
 def test_the_same_bag_gives_the_same_bytes(tmp_path):
     bag = make_bag(tmp_path)
     first = write_report(bag, tmp_path / 'a' / 'report.html')

@@ -63,6 +63,7 @@ def test_without_geometry_or_starts_the_page_says_which_figures_are_missing(tmp_
 
 
 @pytest.mark.renders
+@pytest.mark.long
 def test_the_same_sources_give_the_same_page(tmp_path):
     pages = []
     for name in ('one', 'two'):

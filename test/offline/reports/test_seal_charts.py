@@ -91,6 +91,7 @@ def test_each_seal_file_of_the_project_makes_a_page(tmp_path, name):
 
 
 @pytest.mark.renders
+@pytest.mark.long
 def test_the_same_seal_gives_the_same_bytes(tmp_path):
     one = write_seal_charts(SEAL_FILE, tmp_path / 'a' / 'charts.html')
     other = write_seal_charts(SEAL_FILE, tmp_path / 'b' / 'charts.html')

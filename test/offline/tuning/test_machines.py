@@ -58,6 +58,7 @@ def test_feed_forward_cuts_the_tracking_error_of_a_single_rod_cylinder_by_60_per
     assert compensated.dwell < 0.7 * without.dwell
 
 
+@pytest.mark.long
 def test_tune_finds_a_feed_forward_for_the_pneumatic_axis(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(simulated_axis, 'MOST_CANDIDATES', 15)
     out = tmp_path / 'feedforward.yaml'

@@ -188,7 +188,7 @@ BY_VELOCITY = {
 }
 
 
-@pytest.mark.parametrize('law', BY_VELOCITY)
+@pytest.mark.parametrize('law', ['velocity terms', pytest.param('friction map', marks=pytest.mark.long)])
 def test_friction_over_velocity_can_be_tuned(law, monkeypatch):
     monkeypatch.setattr(simulated_axis, 'MOST_CANDIDATES', 14)  # the grid, to save time
     known = default_configuration()

@@ -86,6 +86,7 @@ def test_bags_are_replayed_to_the_same_bytes_on_a_cluster_also_by_relative_paths
     assert [bag.get('identical') for bag in json.loads(here[1])['bags']] == [False] * 5 + [True, None]
 
 
+@pytest.mark.long
 def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
     (tmp_path / 'bags').mkdir()
     for number in range(2):
@@ -110,6 +111,7 @@ def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
         assert found[0][0][2].count('seal_friction: bags/garbage.mcap: ') == 1
 
 
+@pytest.mark.long
 def test_a_study_and_a_map_are_the_same_on_a_cluster(cluster, tmp_path):
     case, seal = tmp_path / 'tiny.yaml', tmp_path / 'seal.yaml'
     case.write_text(CASE)
@@ -123,6 +125,7 @@ def test_a_study_and_a_map_are_the_same_on_a_cluster(cluster, tmp_path):
     assert found[0][1]
 
 
+@pytest.mark.long
 def test_an_identification_is_the_same_on_a_cluster(cluster, tmp_path):
     rows = ['pressure_bar,friction_N,direction']
     for bar in (1, 3, 5, 7):
@@ -282,6 +285,7 @@ def test_options_that_make_no_sense_are_one_line_and_load_no_dask(options, said)
     assert said in last_line(errors)
 
 
+@pytest.mark.long
 def test_a_worker_of_another_version_or_with_threads_or_none_at_all_is_one_line(tmp_path):
     other = tmp_path / 'other'
     shutil.copytree(
@@ -301,6 +305,7 @@ def test_a_worker_of_another_version_or_with_threads_or_none_at_all_is_one_line(
         assert 'it has no worker after 2 s' in refused(cluster.address, tmp_path)
 
 
+@pytest.mark.long
 def test_a_worker_without_the_package_or_with_threads_of_linear_algebra_is_one_line(tmp_path):
     (tmp_path / 'empty').mkdir()
     (tmp_path / 'empty' / 'seal_friction_ros.py').touch()
@@ -322,6 +327,7 @@ def test_a_path_that_only_the_client_has_is_one_line(cluster, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which('openssl') is None, reason='certificates are made by openssl')
+@pytest.mark.long
 def test_with_certificates_everything_is_encrypted_and_a_foreign_authority_is_refused(tmp_path):
     for name in ('ours', 'theirs'):
         subject = ['-subj', '/CN=localhost', '-days', '2', '-newkey', 'rsa:2048', '-nodes', '-x509']
