@@ -81,7 +81,7 @@ def stages() -> dict[str, Callable[[], object]]:
         'decode velocity': lambda: decode(VELOCITY_TYPE, velocity_bytes),
         'receive pressure': lambda: receive(parameters, alone, pressure, 1, drop),
         'estimator step': lambda: step(parameters.estimator, alone.estimator, sample),
-        'estimator step, sliding': sliding(parameters.estimator),
+        'estimator step, sliding': sliding(replace(parameters.estimator, adaptation=AdaptationSettings('off'))),
         'estimator step, sliding, with adaptation': sliding(replace(parameters.estimator, adaptation=ADAPTATION)),
         'receive velocity': lambda: receive(parameters, alone, velocity, 1, drop),
         'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity, 1, drop),

@@ -357,7 +357,6 @@ def test_mbari_the_law_of_one_log_is_sound_and_its_band_holds_the_other(friction
     assert np.mean(np.abs(deviation) <= BAND_95 * std) >= 0.9
 
 
-@pytest.mark.long
 def test_mbari_two_logs_are_fitted_together_and_their_difference_is_in_the_band(tmp_path, friction_id):
     both = Run(tmp_path, *(str(data(f'mbari/{name}')) for name in (FRICTION_ID, OTHER)))
     assert both.figures['between_runs_measured'] > 0.15

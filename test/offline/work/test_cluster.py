@@ -111,7 +111,6 @@ def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
         assert found[0][0][2].count('seal_friction: bags/garbage.mcap: ') == 1
 
 
-@pytest.mark.long
 def test_a_study_and_a_map_are_the_same_on_a_cluster(cluster, tmp_path):
     case, seal = tmp_path / 'tiny.yaml', tmp_path / 'seal.yaml'
     case.write_text(CASE)
@@ -285,7 +284,6 @@ def test_options_that_make_no_sense_are_one_line_and_load_no_dask(options, said)
     assert said in last_line(errors)
 
 
-@pytest.mark.long
 def test_a_worker_of_another_version_or_with_threads_or_none_at_all_is_one_line(tmp_path):
     other = tmp_path / 'other'
     shutil.copytree(
@@ -305,7 +303,6 @@ def test_a_worker_of_another_version_or_with_threads_or_none_at_all_is_one_line(
         assert 'it has no worker after 2 s' in refused(cluster.address, tmp_path)
 
 
-@pytest.mark.long
 def test_a_worker_without_the_package_or_with_threads_of_linear_algebra_is_one_line(tmp_path):
     (tmp_path / 'empty').mkdir()
     (tmp_path / 'empty' / 'seal_friction_ros.py').touch()
@@ -327,7 +324,6 @@ def test_a_path_that_only_the_client_has_is_one_line(cluster, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which('openssl') is None, reason='certificates are made by openssl')
-@pytest.mark.long
 def test_with_certificates_everything_is_encrypted_and_a_foreign_authority_is_refused(tmp_path):
     for name in ('ours', 'theirs'):
         subject = ['-subj', '/CN=localhost', '-days', '2', '-newkey', 'rsa:2048', '-nodes', '-x509']
