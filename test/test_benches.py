@@ -72,7 +72,6 @@ def test_the_lubricated_contact_is_timed_by_grid_and_step(tmp_path):
     assert found['estimator step, friction_map [us]'] > 0.0
 
 
-@pytest.mark.long
 def test_a_fleet_is_timed_by_step_and_number_of_bags():
     found = run_json('bench/scale.py', '--seconds', '2', '--bags', '2')
     hour = found['an hour']

@@ -154,7 +154,7 @@ def add_workers(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the options for who computes; ``what`` each of the workers works on."""
     text = f'{what} at a time, one process each; default: number of cores'
     group = parser.add_mutually_exclusive_group()
-    group.add_argument('--workers', '--jobs', type=at_least_one, metavar='N', help=text)
+    group.add_argument('--workers', '--jobs', type=at_least(1), metavar='N', help=text)
     group.add_argument('--scheduler', metavar='ADDRESS', help='compute on the Dask cluster with this scheduler')
     parser.add_argument(
         '--scheduler-tls', type=Path, nargs=3, metavar=('CA', 'CERT', 'KEY'), help='its certificates, PEM files'
@@ -189,10 +189,8 @@ def add_work(parser: argparse.ArgumentParser, *, has_failures: bool = True) -> N
 def add_uncertainty(parser: argparse.ArgumentParser) -> None:
     """Add the options for samples of what is not known."""
     help_text = 'quantiles from so many samples of what the case says is unknown'
-    parser.add_argument('--uncertain', type=at_least_two, metavar='N', help=help_text)
-    parser.add_argument(
-        '--seed', type=non_negative_whole, metavar='S', help='with --uncertain: of the samples; default: 0'
-    )
+    parser.add_argument('--uncertain', type=at_least(2), metavar='N', help=help_text)
+    parser.add_argument('--seed', type=at_least(0), metavar='S', help='with --uncertain: of the samples; default: 0')
 
 
 def samples_of(arguments: argparse.Namespace) -> tuple[int, int] | None:
@@ -264,28 +262,16 @@ def positive(text: str) -> float:
     return value
 
 
-def at_least_one(text: str) -> int:
-    """Type of an option: a whole number of at least 1."""
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f'{text} is below 1')
-    return value
+def at_least(least: int) -> Callable[[str], int]:
+    """Type of an option: a whole number of at least ``least``."""
 
+    def whole_number(text: str) -> int:
+        value = int(text)
+        if value < least:
+            raise argparse.ArgumentTypeError(f'{text} is below {least}')
+        return value
 
-def at_least_two(text: str) -> int:
-    """Type of an option: a whole number of at least 2."""
-    value = int(text)
-    if value < 2:
-        raise argparse.ArgumentTypeError(f'{text} is below 2')
-    return value
-
-
-def non_negative_whole(text: str) -> int:
-    """Type of an option: a whole number of at least 0."""
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f'{text} is below 0')
-    return value
+    return whole_number
 
 
 # -- output -----------------------------------------------------------------------------------------------------------

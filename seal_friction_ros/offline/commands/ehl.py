@@ -23,7 +23,7 @@ def add_parser(commands: Any) -> None:
     run.add_argument('--bag', type=Path, help=help_text)
     run.add_argument('--window', type=float, nargs=2, metavar=('FROM', 'TO'), help='with --bag: part to take [s]')
     run.add_argument(
-        '--average', type=cli.at_least_one, metavar='SAMPLES', help='with --bag: moving average, default 50'
+        '--average', type=cli.at_least(1), metavar='SAMPLES', help='with --bag: moving average, default 50'
     )
     study = cli.add_command(
         steps, 'study', run_study, 'compute friction with other solid shear stresses',

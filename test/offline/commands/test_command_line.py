@@ -10,7 +10,7 @@ import pytest
 
 from seal_friction_ros.offline.commands.command_line import (
     add_workers,
-    at_least_one,
+    at_least,
     json_value,
     non_negative,
     workers_of,
@@ -46,9 +46,9 @@ def test_only_finite_numbers_of_at_least_0_are_non_negative(text):
 
 @pytest.mark.parametrize('text', ['0', '-2', '1.5', 'x'])
 def test_only_whole_numbers_of_at_least_1_are_at_least_one(text):
-    assert at_least_one('1') == 1
+    assert at_least(1)('1') == 1
     with pytest.raises((argparse.ArgumentTypeError, ValueError)):
-        at_least_one(text)
+        at_least(1)(text)
 
 
 def test_workers_and_jobs_are_one_option_and_the_default_is_every_core():

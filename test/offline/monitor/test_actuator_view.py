@@ -123,6 +123,9 @@ def test_with_adaptation_what_is_measured_is_estimate_plus_residual_while_the_ro
     assert shown['measured'] == -42.0
     assert (shown['scale'], shown['residual']) == (1.05, -2.0)
     assert shown['scale_high'] - shown['scale_low'] == pytest.approx(2 * BAND * 0.01)
+    nothing_learnt = estimate._replace(adaptation_scale=1.0)  # its offset would hide what the law misses
+    raw = as_mapping(row(known_of(adapting), held_of(Force(SECOND, 400.0), nothing_learnt), 0.0))
+    assert raw['measured'] == 400.0
     at_rest = as_mapping(row(known_of(adapting), held_of(Force(SECOND, 20.0), estimate._replace(state=STUCK)), 0.0))
     assert at_rest['measured'] == 20.0
 
