@@ -145,17 +145,21 @@ def for_compiler(value: Any) -> Any:
     if _runs_as_python():
         return value
     make_known()
+    return _converted(value)
+
+
+def _converted(value: Any) -> Any:
     if dataclasses.is_dataclass(value):
         names = getattr(value, 'COMPILED', None) or tuple(field.name for field in dataclasses.fields(value))
-        return _record_type(type(value).__name__, names)(*(for_compiler(getattr(value, name)) for name in names))
+        return _record_type(type(value).__name__, names)(*(_converted(getattr(value, name)) for name in names))
     if isinstance(value, partial):
-        return _bound_type(value.func)(tuple(map(for_compiler, value.args)))
+        return _bound_type(value.func)(tuple(map(_converted, value.args)))
     if isinstance(value, tuple):
         if hasattr(value, '_fields'):
-            return type(value)(*map(for_compiler, value))
+            return type(value)(*map(_converted, value))
         if value and isinstance(value[0], float):
             return np.array(value)
-        return tuple(map(for_compiler, value))
+        return tuple(map(_converted, value))
     return value
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.identification import runs
@@ -73,7 +73,7 @@ def shares_inside(ratios: FloatArray) -> FloatArray:
     """
     if not len(ratios):
         return np.full(len(NOMINAL), np.nan)
-    quantiles = norm.ppf(0.5 * (1.0 + NOMINAL))
+    quantiles = ndtri(0.5 * (1.0 + NOMINAL))
     return np.asarray(np.mean(ratios <= quantiles[:, np.newaxis], axis=1))
 
 

@@ -120,20 +120,19 @@ class CandidateLaw:
 
 def friction_of_seals(seal: SealNumbers, at: OperatingConditions) -> FloatArray:
     """Magnitude of the sliding friction [N] of k equal seals, shape (n,). An unknown speed counts as 0."""
-    speed, direction = np.nan_to_num(np.abs(at.velocity)), at.direction.astype(np.int64)
     if at.pressure.size >= COMPILED_FROM:
-        return np.asarray(_compiled_sum()(for_compiler((seal,)), at.pressure, speed, direction))
-    rows = zip(at.pressure.tolist(), speed.tolist(), direction.tolist(), strict=True)
-    return np.array([sum(sliding_friction_of_seals((seal,), p, p, v, d) for p in each) for each, v, d in rows])
+        return np.asarray(_compiled_sum()(for_compiler((seal,)), at.pressure, at.velocity, at.direction))
+    return _sum_over_seals((seal,), at.pressure, at.velocity, at.direction)
 
 
-def _sum_over_seals(seal: Any, pressure: FloatArray, speed: FloatArray, direction: IntArray) -> FloatArray:
+def _sum_over_seals(seal: Any, pressure: FloatArray, velocity: FloatArray, direction: FloatArray) -> FloatArray:
     """Compilable part of `friction_of_seals`; ``seal`` as compiled code takes it, ``pressure`` of shape (n, k)."""
-    total = np.zeros(len(speed))
+    total = np.zeros(len(velocity))
     for i in range(pressure.shape[0]):
+        speed = 0.0 if math.isnan(velocity[i]) else abs(velocity[i])
         for k in range(pressure.shape[1]):
             p = pressure[i, k]
-            total[i] += sliding_friction_of_seals(seal, p, p, speed[i], direction[i])
+            total[i] += sliding_friction_of_seals(seal, p, p, speed, int(direction[i]))
     return total
 
 

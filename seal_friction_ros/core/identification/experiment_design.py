@@ -13,7 +13,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.units import BAR
@@ -288,7 +288,7 @@ def repeated_run(between: BetweenRuns, freedom: int) -> RepeatedRun:
     :math:`r_0` if they agree; see `runs.between_runs`.
     """
     had = PRIOR_FREEDOM + between.freedom
-    shrink = float(student_t.ppf(0.975, had + freedom) / student_t.ppf(0.975, had))
+    shrink = float(stdtrit(had + freedom, 0.975) / stdtrit(had, 0.975))
     return RepeatedRun(freedom, shrink, shrink * math.sqrt(had / (had + freedom)))
 
 

@@ -1,7 +1,7 @@
 """Fit of a candidate law to friction readings, together with one offset of the force sum for each source."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -73,12 +73,13 @@ def offsets_of(readings: FrictionReadings, friction: FloatArray) -> FloatArray:
 
     The offset of a source in one direction only is 0 N, because it cannot be separated from friction.
     """
-    signed = readings.force - readings.at.direction * friction
-    result = np.zeros(len(readings.names))
-    for source, index in enumerate(readings.two_sided):
-        if len(index):
-            result[source] = np.average(signed[index], weights=1.0 / readings.scale[index] ** 2)
-    return result
+    return _means_of_sources(readings, readings.force - readings.at.direction * friction)
+
+
+def _means_of_sources(readings: FrictionReadings, force: FloatArray) -> FloatArray:
+    """Weighted mean of a ``force`` [N], shape (n,), over each source, shape (sources,); 0 N as in `offsets_of`."""
+    means = [np.sum(force[index] * share) for index, share in zip(readings.two_sided, readings.shares, strict=True)]
+    return np.array(means)
 
 
 def fit(
@@ -122,13 +123,14 @@ def fit(
 
 def _fit_linear(law: CandidateLaw, readings: FrictionReadings) -> LawFit:
     """As `fit`, for a law that is linear in its parameters, none of them negative [LawsonHanson1974]_."""
-    count = len(law.parameters)
-    nothing = replace(readings, force=np.zeros(readings.count))
-    columns = np.empty((readings.count, count))
-    for i, unit in enumerate(np.eye(count)):
-        friction = law.friction(readings.at, law.named(unit))
-        columns[:, i] = (friction - nothing.magnitudes(offsets_of(nothing, friction))) / readings.scale
-    measured = readings.magnitudes(offsets_of(readings, np.zeros(readings.count))) / readings.scale
+
+    def without_offset(friction: FloatArray) -> FloatArray:
+        means = _means_of_sources(readings, readings.at.direction * friction)
+        return np.asarray((friction - readings.at.direction * means[readings.source]) / readings.scale)
+
+    units = np.eye(len(law.parameters))
+    columns = np.column_stack([without_offset(law.friction(readings.at, law.named(unit))) for unit in units])
+    measured = without_offset(readings.at.direction * readings.force)
     lengths = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     solution = nnls(columns / lengths, measured)[0] / lengths
     values = law.named(solution)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from seal_friction_ros.core.identification.readings import NARROWEST_PRESSURES, PreparedReadings
 from seal_friction_ros.core.identification.signal_preparation import OffsetLine, Signals, offset_line
@@ -51,6 +51,6 @@ def force_correction(prepared: PreparedReadings) -> ForceCorrection | None:
     freedom = len(levels) - 2
     spread = float(np.sum((pressure - pressure.mean()) ** 2))
     error = line.rms * float(np.sqrt(len(levels) / freedom / spread))
-    sure = abs(line.area_error) > float(student_t.ppf(CONFIDENCE, freedom)) * error
+    sure = abs(line.area_error) > float(stdtrit(freedom, CONFIDENCE)) * error
     large = abs(line.area_error) * float(np.ptp(pressure)) > NOTICED * float(friction.mean())
     return ForceCorrection('ab'[number], -line.area_error, error, line, bool(sure and large))

@@ -176,6 +176,12 @@ class FrictionReadings:
         of_source = [np.flatnonzero(self.source == source) for source in range(len(self.names))]
         return tuple(index if len(np.unique(self.at.direction[index])) == 2 else index[:0] for index in of_source)
 
+    @cached_property
+    def shares(self) -> tuple[FloatArray, ...]:
+        """Shares of the readings of `two_sided` in the mean force of their source; their sum is 1."""
+        weights = [1.0 / self.scale[index] ** 2 for index in self.two_sided]
+        return tuple(each / max(each.sum(), 1e-300) for each in weights)
+
 
 class PreparedReadings(NamedTuple):
     """Readings of all sources."""

@@ -8,7 +8,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
@@ -29,7 +29,7 @@ class BetweenRuns(NamedTuple):
     @property
     def of_band(self) -> float:
         """Standard deviation whose 95 % band holds 95 % of new runs [-]: of Student's t, since ``std`` is uncertain."""
-        return self.std * float(student_t.ppf(0.975, PRIOR_FREEDOM + self.freedom)) / BAND_95
+        return self.std * float(stdtrit(PRIOR_FREEDOM + self.freedom, 0.975)) / BAND_95
 
 
 def between_runs(readings: FrictionReadings, friction: FloatArray, offsets: FloatArray) -> BetweenRuns:

@@ -12,8 +12,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import t as student_t
+from scipy.special import chdtrc, stdtrit
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.identification.candidate_laws import (
@@ -99,7 +98,7 @@ def rise_over_pressures(readings: FrictionReadings) -> Rise | None:
     )
     error = errors
     freedom = len(friction) - 2
-    if chi2.sf(float(np.sum((residuals / error) ** 2)), freedom) < OVERDISPERSED:
+    if chdtrc(freedom, float(np.sum((residuals / error) ** 2))) < OVERDISPERSED:
         squares = float(np.sum((residuals / friction) ** 2))
         scatter = math.sqrt((PRIOR_FREEDOM * PRIOR_SCATTER**2 + squares) / (PRIOR_FREEDOM + freedom))
         error = np.hypot(error, scatter * friction)
@@ -262,7 +261,7 @@ def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = Fals
     difference = losses - others
     groups = len(difference)
     error = float(difference.std(ddof=1)) / math.sqrt(groups)
-    noise = float(student_t.ppf(BEATEN_CONFIDENCE, groups - 1)) * error
+    noise = float(stdtrit(groups - 1, BEATEN_CONFIDENCE)) * error
     worse = float(difference.mean())
     if many_times and float(losses.mean()) > MANY_TIMES * float(others.mean()) > 0.0:
         return True

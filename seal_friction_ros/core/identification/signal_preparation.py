@@ -10,7 +10,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
@@ -110,6 +109,8 @@ def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArra
 
     Source: [SavitzkyGolay1964]_; grid, gaps and edges are our choice.
     """
+    from scipy.signal import savgol_filter  # noqa: PLC0415  half a second, for logs and bags only
+
     result = np.full(len(time), np.nan)
     for segment in _unbroken(time, np.flatnonzero(np.isfinite(values)), law.largest_gap):
         rows, at = len(segment), time[segment]

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
@@ -164,7 +164,7 @@ def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     square, freedom = float(x @ x), len(x) - 2
     slope = float(x @ y) / square
     error = math.sqrt(float(np.sum((y - slope * x) ** 2)) / freedom / square)
-    return slope, error * float(student_t.ppf(0.975, freedom)) / BAND_95
+    return slope, error * float(stdtrit(freedom, 0.975)) / BAND_95
 
 
 def _centred(column: FloatArray, cells: IntArray) -> FloatArray:

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from seal_friction_ros.core.estimation import feedforward
 from seal_friction_ros.core.estimation.feedforward import (
@@ -124,6 +123,8 @@ def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
         time: [s], shape (n,).
         velocity: [m/s], shape (n,).
     """
+    from scipy.signal import savgol_filter  # noqa: PLC0415  half a second, for bags only
+
     half = ACCELERATION_WINDOW // 2
     slope = np.full(len(time), math.nan)
     if len(time) <= 2 * half:
