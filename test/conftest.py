@@ -2,7 +2,7 @@
 
 import signal
 
-from harness import compiled_code  # before numba is loaded
+from harness import compiled_code  # noqa: F401  before anything is compiled
 from hypothesis import settings
 
 import seal_friction_ros.offline.commands.main  # noqa: F401  sets the number of threads, before any test loads numpy
@@ -12,5 +12,4 @@ from seal_friction_ros.nodes.discovery import set_up_discovery
 settings.register_profile('reproducible', derandomize=True, deadline=None, database=None)
 settings.load_profile('reproducible')
 set_up_discovery()
-compiled_code.compile_in_turn()
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background inherits an ignored SIGINT

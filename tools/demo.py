@@ -21,7 +21,7 @@ from rich.table import Table
 from rich.text import Text
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
-from harness import compiled_code  # noqa: F401  before numba is loaded: each process would compile the plant anew
+from harness import compiled_code  # noqa: F401  before anything is compiled: each process would compile the plant anew
 from harness.live_closed_loop import record_closed_loop
 from harness.live_machine import record_machine
 from harness.processes import free_domain, play_live

@@ -6,6 +6,7 @@ Before, the interpreter itself starts for some 50 ms, in which SIGINT ends it wi
 import signal
 import sys
 
+from seal_friction_ros.compiled_code import keep_compiled_code
 from seal_friction_ros.packages import MissingPackageError, needed
 
 
@@ -30,6 +31,7 @@ def machine_estimator() -> int:
 
 def servo_simulator() -> int:
     """Run the simulator."""
+    keep_compiled_code()
     return _run('servo_simulator')
 
 

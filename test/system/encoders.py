@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from harness import compiled_code  # noqa: F401  before numba is loaded
+from harness import compiled_code  # noqa: F401  before anything is compiled
 
 from seal_friction_ros.core.estimation.compiled_pipeline import MOST_MESSAGES, Kind, Messages, receive_all
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, decode, encode

@@ -8,7 +8,7 @@ What a friction law needs beyond numbers is here too: `bound` binds the paramete
 calls it, `unrolled` loops over records of different types, `chosen_by_type` is a table of functions by the type of a
 record, and `for_compiler` converts records for compiled code.
 
-numba is imported where it is used: it takes half a second, and the live node does without.
+numba and numpy are imported where they are used: numba takes half a second, and the live node does without.
 
 With ``NUMBA_DISABLE_JIT=1`` in the environment, or without numba, everything runs as plain Python and gives the same
 numbers.
@@ -24,7 +24,7 @@ from pkgutil import resolve_name
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar, cast
 
-import numpy as np
+from seal_friction_ros.core.foundation.compiler_hooks import hooks
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -37,6 +37,7 @@ _waiting: list[Callable[..., Any]] = []  # compilable functions that the compile
 @cache
 def has_compiler() -> bool:
     """Whether numba is installed; loads it."""
+    hooks().before_loading()
     try:
         resolve_name('numba')
     except ModuleNotFoundError:
@@ -58,8 +59,7 @@ def compiled(function: Function) -> Function:
     """Decorator: ``function`` compiled at its first call.
 
     No fast-math: sums keep their order, so both ways round alike. The compiled code is kept on disk only if
-    ``NUMBA_CACHE_DIR`` names a folder for it. Use another folder after every change of the sources, as the tests do:
-    numba compares the file of a function, not the files of the functions it calls.
+    ``NUMBA_CACHE_DIR`` names a folder for it, see `seal_friction_ros.compiled_code`.
     """
     if not has_compiler():
         return function
@@ -67,7 +67,15 @@ def compiled(function: Function) -> Function:
 
     make_known()
     config: Any = numba.config
-    return cast(Function, numba.njit(error_model='numpy', cache=bool(config.CACHE_DIR))(_with_unrolled_loops(function)))
+    made: Any = numba.njit(error_model='numpy', cache=bool(config.CACHE_DIR))(_with_unrolled_loops(function))
+    if config.CACHE_DIR and not config.DISABLE_JIT:
+        made.compile = partial(_compile_alone, f'{function.__module__}.{function.__qualname__}', made.compile)
+    return cast(Function, made)
+
+
+def _compile_alone(name: str, compile_function: Callable[[Any], Any], signature: Any) -> Any:
+    with hooks().alone_with(name):
+        return compile_function(signature)
 
 
 def make_known() -> None:
@@ -158,6 +166,8 @@ def _converted(value: Any) -> Any:
         if hasattr(value, '_fields'):
             return type(value)(*map(_converted, value))
         if value and isinstance(value[0], float):
+            import numpy as np
+
             return np.array(value)
         return tuple(map(_converted, value))
     return value
@@ -268,6 +278,7 @@ def _stand_in(function: Callable[..., Any], known: Callable[..., Any]) -> None:
 @cache
 def _teach_the_compiler() -> None:
     """Once: what `evaluate` and `bisect_right` are in compiled code."""
+    import numpy as np
     from numba.extending import overload
 
     @overload(evaluate, jit_options=INNER)

@@ -10,6 +10,7 @@ import shutil
 import sys
 import textwrap
 
+from seal_friction_ros.compiled_code import keep_compiled_code
 from seal_friction_ros.offline.commands import (
     adapt,
     charts,
@@ -121,6 +122,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run_and_exit() -> None:
     """Entry point; a reader that closes the pipe early is no error."""
+    keep_compiled_code()
     try:
         code = main()
         sys.stdout.flush()

@@ -1,0 +1,93 @@
+"""A command compiles once for each version; whatever is wrong with the folder, it works without."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from paths import ROOT
+
+from seal_friction_ros import compiled_code
+
+PROGRAM = """
+import json, sys
+from seal_friction_ros.compiled_code import keep_compiled_code
+keep_compiled_code()
+from seal_friction_ros.core.lubrication.grease import apparent_viscosity as function
+grease = tuple((float, int)[int(digit)](2) for digit in sys.argv[1])
+print(json.dumps([function(grease, 3.0), sum(function.stats.cache_hits.values())]))
+"""
+
+
+def started(folder: Path | str, program: str = PROGRAM, kinds: str = '00000', **more: str) -> subprocess.Popen[str]:
+    environment = {name: value for name, value in os.environ.items() if name != compiled_code.VARIABLE}
+    environment |= {'XDG_CACHE_HOME': str(folder), 'PYTHONPATH': str(ROOT), **more}
+    command = [sys.executable, '-c', program, kinds]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+
+def result(process: subprocess.Popen[str]) -> list[float]:
+    """Value of the function, and whether it came from disk."""
+    out, _ = process.communicate(timeout=100.0)
+    assert process.returncode == 0
+    return json.loads(out)
+
+
+def test_the_second_process_compiles_nothing(tmp_path):
+    value, hits = result(started(tmp_path))
+    assert hits == 0
+    assert result(started(tmp_path)) == [value, 1]
+
+
+@pytest.mark.parametrize('variable', ['XDG_CACHE_HOME', compiled_code.VARIABLE])
+def test_a_folder_of_the_user_is_taken(tmp_path, variable):
+    named = tmp_path / 'named'
+    result(started(tmp_path / 'other', **{variable: str(named)}))
+    assert list(named.rglob('*.nbc'))
+    assert not (tmp_path / 'other').exists()
+
+
+def test_without_a_folder_it_works_as_well(tmp_path):
+    (tmp_path / 'file').write_text('')
+    value, hits = result(started(tmp_path / 'file'))
+    assert value > 0.0
+    assert hits == 0
+
+
+def test_processes_that_compile_at_once_mix_nothing_up(tmp_path):
+    """Each for arguments of other types: numba alone may give the files of both the same name."""
+    kinds = ['00000', '00001']
+    once = [result(each) for each in [started(tmp_path, kinds=kind) for kind in kinds]]
+    again = [result(each) for each in [started(tmp_path, kinds=kind) for kind in kinds]]
+    assert [value for value, _ in again] == [value for value, _ in once]
+    assert [hits for _, hits in again] == [1, 1]
+
+
+def test_what_was_not_used_for_a_month_is_removed(tmp_path, monkeypatch):
+    monkeypatch.setenv(compiled_code.VARIABLE, 'set, so that it comes back')
+    monkeypatch.delenv(compiled_code.VARIABLE)
+    ages = {'today': 0.0, 'last week': 7.0, 'last year': 365.0}  # [days]
+    for name, age in ages.items():
+        (tmp_path / name).mkdir()
+        os.utime(tmp_path / name, 2 * (time.time() - age * 86400.0,))
+    monkeypatch.setattr('numba.config.CACHE_DIR', '')
+    compiled_code.use_folder(tmp_path)
+    made = Path(os.environ[compiled_code.VARIABLE])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(['last week', 'today', made.name])
+
+
+def test_a_changed_source_is_compiled_anew(tmp_path):
+    source = tmp_path / 'part' / 'module.py'
+    source.parent.mkdir()
+    source.write_text('a = 1')
+    keys = [compiled_code.key_of(tmp_path)]
+    os.utime(source, (1.0, 1.0))
+    keys.append(compiled_code.key_of(tmp_path))
+    (tmp_path / 'new.py').write_text('')
+    keys.append(compiled_code.key_of(tmp_path))
+    assert len(set(keys)) == 3
+    (tmp_path / 'notes.txt').write_text('')
+    assert compiled_code.key_of(tmp_path) == keys[-1]
