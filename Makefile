@@ -27,8 +27,7 @@ test:
 	$(python) -m ruff check .
 	$(python) -m ruff format --check .
 	$(python) -m mypy
-	$(python) -m pytest --numprocesses auto --dist loadfile test/core test/offline
-	$(python) -m pytest --numprocesses auto --dist loadfile --ignore test/core --ignore test/offline
+	$(python) -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 test-long:
 	@tools/setup.sh dev

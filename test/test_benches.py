@@ -21,13 +21,14 @@ def test_every_node_answers_round_trips():
     assert wakes < 3.0  # the effect of config/fastdds.xml; four to eight times without
 
 
+@pytest.mark.long
 def test_a_machine_is_timed_and_its_bags_replay_to_the_byte():
     found = run_json('bench/machine.py', '--actuators', '2', '--rounds', '1', '--seconds', '0.5', '--rate', '100')
     assert list(found) == ['one actuator, own messages', 'machine of 2', 'machine of 2, answers together']
     assert [figures['replay identical'] for figures in found.values()] == ['', True, True]
 
 
-@pytest.mark.parametrize('case', ['one actuator', 'machine of three'])
+@pytest.mark.parametrize('case', ['one actuator', pytest.param('machine of three', marks=pytest.mark.long)])
 def test_what_the_live_view_costs_is_timed(case):
     found = run_json('bench/monitor.py', '--cases', case, '--seconds', '0.5', '--warm-up', '0.1', '--rounds', '1')
     assert list(found) == [case]
@@ -72,6 +73,7 @@ def test_the_lubricated_contact_is_timed_by_grid_and_step(tmp_path):
     assert found['estimator step, friction_map [us]'] > 0.0
 
 
+@pytest.mark.long
 def test_a_fleet_is_timed_by_step_and_number_of_bags():
     found = run_json('bench/scale.py', '--seconds', '2', '--bags', '2')
     hour = found['an hour']

@@ -20,6 +20,7 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from importlib import import_module
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -105,6 +106,7 @@ def read_and_recover(path: Path) -> None:
 
 def log_reader() -> Callable[[Path], None]:
     """Reader of logs with a rig file of the corpus."""
+    import_module('scipy.signal')  # which takes longer than any log
     rig = read_rig(CORPUS / 'rig' / 'position')
     return lambda path: void(read_samples(path, rig))
 

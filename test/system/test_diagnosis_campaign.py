@@ -10,13 +10,14 @@ LOGS = ROOT.parent / 'shared' / 'data'
 
 
 def test_on_random_machines_each_wrong_input_is_named_within_30_s_and_none_on_clean_ones():
-    for row in campaign(2, None, 2):
+    for row in campaign(1, None, 1):
         assert row['named'] == (0 if row['fault'] == 'clean' else row['runs']), row
         assert row['something_else_named'] == 0, row
         assert row['longest_s'] <= 30.0, row
 
 
 @pytest.mark.skipif(not LOGS.is_dir(), reason='the shared data are not beside the project')
+@pytest.mark.long  # the random machines below have each fault, too
 def test_on_the_second_run_of_a_ring_each_wrong_input_is_named_within_30_s_and_none_without(tmp_path):
     seal, first = tmp_path / 'seal.yaml', sorted((LOGS / 'delft').glob('O-ring257_[0-9]bar.csv'))
     assert main(['identify', *map(str, first), '--rig', 'delft', '--out', str(seal)]) == 0

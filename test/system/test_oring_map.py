@@ -38,6 +38,7 @@ def test_one_factor_is_what_is_missing_to_the_friction_of_the_thesis(thesis):
     assert 0.5 < thesis.errors.mean() < 3.0
 
 
+@pytest.mark.long  # a fine map
 def test_the_ring_of_delft_is_within_a_factor_of_two_of_its_readings_with_nothing_chosen_for_it():
     found = beside(coarse('oring_delft', 113, 17), (1e5, 7e5), 2)
     assert np.abs(found.errors).max() < 0.9
@@ -52,6 +53,7 @@ def test_each_unknown_can_be_varied_by_itself(label):
         assert now == factor * was
 
 
+@pytest.mark.long  # the test below does what the command does
 def test_the_command_prints_what_the_docs_say(monkeypatch, capsys):
     arguments = ['oring_map.py', 'oring_delft', '--readings', '1', '--cells', '48', '--json']
     monkeypatch.setattr(sys, 'argv', arguments)

@@ -165,6 +165,7 @@ def test_a_seal_that_creeps_at_once_is_the_elastic_one(decades):
     assert findings(done(fast)).friction == pytest.approx(findings(done(INNER)).friction, rel=0.01)
 
 
+@pytest.mark.long  # the test below holds that creep raises it
 def test_slow_decades_of_creep_raise_the_friction_after_a_control_edge_more():
     after = [
         findings(
@@ -309,6 +310,7 @@ def test_run_that_does_not_converge_ends_in_an_error_that_says_when(monkeypatch)
         run_transient(INNER)
 
 
+@pytest.mark.long  # two whole runs across the edge
 def test_mirrored_pair_of_seals_makes_a_friction_without_preference():
     members = (SpoolSeal('edge', shift=0.33e-3), SpoolSeal('edge', mirrored=True, shift=0.33e-3))
     motion = ConstantAcceleration(distance=2.7e-3, cycles=2)

@@ -60,6 +60,7 @@ def test_outliers_do_not_move_the_gain(hydraulic):
     assert found.gain == pytest.approx(clean.gain, rel=0.1)
 
 
+@pytest.mark.long  # many draws
 def test_standard_error_covers_the_spread_of_the_gain_over_noise():
     rng = np.random.default_rng(3)
     n, gains, errors = 4000, [], []

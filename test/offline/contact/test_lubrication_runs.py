@@ -176,6 +176,7 @@ def test_every_script_of_the_page_is_one():
     assert all((ROOT / script).is_file() for script in scripts)
 
 
+@pytest.mark.long  # twelve runs
 def test_findings_and_influence_of_our_choices_come_as_numbers(small, monkeypatch):
     monkeypatch.setitem(OUR_CHOICES, 'small', ('topography.rms_height', 'seal.crown_radius'))
     found = {row.name: row for row in all_findings([small])}

@@ -14,6 +14,7 @@ def computed():
     return run_map(single_case('inner_seal', 'map'), 1)
 
 
+@pytest.mark.long  # a whole map
 def test_the_loop_of_the_seal_follows_from_the_map(computed):
     law, run = computed.law, run_transient(single_case('inner_seal', 'loop'))
     numbers, state, found = presliding_numbers([presliding_of_map(law)]), NOT_SHEARED, []
@@ -29,6 +30,7 @@ def test_the_loop_of_the_seal_follows_from_the_map(computed):
     assert np.sqrt(np.mean(error**2)) < 0.1 * np.ptp(run.friction[last])
 
 
+@pytest.mark.long  # a whole map
 def test_the_seal_file_of_a_map_has_its_elasticity(computed):
     seal = parse_seal(seal_document(computed, 'inner'))
     assert seal.presliding.stiffness == pytest.approx(computed.case.groove.stiffness, rel=1e-6)

@@ -37,7 +37,13 @@ def written(folder, log, rig):
     return str(folder / 'log.csv'), '--rig', str(folder / 'rig.yaml')
 
 
-@pytest.mark.parametrize('rig', [RIG + POSITION + 'load: position\n', RIG + POSITION, FROM_POSITION])
+@pytest.mark.parametrize(
+    'rig',
+    [
+        RIG + POSITION,
+        *(pytest.param(rig, marks=pytest.mark.long) for rig in (RIG + POSITION + 'load: position\n', FROM_POSITION)),
+    ],
+)
 def test_identify_gives_friction_and_load_without_a_load_cell(tmp_path, rig):
     machine = Boom()
     simulated = boom.simulate(machine, 'sines')

@@ -321,7 +321,10 @@ def other(run_of):
     return run_of(str(data(f'mbari/{OTHER}')))
 
 
-@pytest.mark.parametrize(('name', 'bar', 'table'), [('friction_id', 150.0, 197.0), ('other', 200.0, 504.0)])
+@pytest.mark.parametrize(
+    ('name', 'bar', 'table'),
+    [('friction_id', 150.0, 197.0), pytest.param('other', 200.0, 504.0, marks=pytest.mark.long)],
+)
 def test_mbari_blocks_are_predicted_from_the_others(name, bar, table, request):
     run = request.getfixturevalue(name)
     assert run.figures['left_out_by'] == 'block'
@@ -357,6 +360,7 @@ def test_mbari_the_law_of_one_log_is_sound_and_its_band_holds_the_other(friction
     assert np.mean(np.abs(deviation) <= BAND_95 * std) >= 0.9
 
 
+@pytest.mark.long  # a fit of 29 000 samples with every log left out
 def test_mbari_two_logs_are_fitted_together_and_their_difference_is_in_the_band(tmp_path, friction_id):
     both = Run(tmp_path, *(str(data(f'mbari/{name}')) for name in (FRICTION_ID, OTHER)))
     assert both.figures['between_runs_measured'] > 0.15

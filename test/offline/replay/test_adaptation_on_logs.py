@@ -46,7 +46,10 @@ def replayed(folder, bag, seal, mode):
     return np.array(estimates, float), np.array(velocities, float)
 
 
-@pytest.mark.parametrize(('learnt_on', 'used_on'), [('FrictionID', '2022.01.28'), ('2022.01.28', 'FrictionID')])
+@pytest.mark.parametrize(
+    ('learnt_on', 'used_on'),
+    [('FrictionID', '2022.01.28'), pytest.param('2022.01.28', 'FrictionID', marks=pytest.mark.long)],
+)
 def test_a_ram_on_another_day_is_followed_within_130_newtons_and_the_band_holds(folder, learnt_on, used_on):
     seal = folder / f'{learnt_on}.yaml'
     logs = {name: SHARED_DATA / 'mbari' / file for name, file in RAM.items()}

@@ -205,6 +205,7 @@ def test_thinning_keeps_the_ends_and_every_spike():
 
 
 @pytest.mark.renders
+@pytest.mark.long  # makes a long bag
 def test_figures_of_a_long_bag_stay_small(tmp_path):
     short = read_run(make_bag(tmp_path))
     times = 250  # 100 000 estimates

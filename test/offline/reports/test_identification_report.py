@@ -94,6 +94,7 @@ def swept() -> Samples:
     return Samples(1_000_000_000 + (time * 1e9).astype(np.int64), pressure, np.zeros(6000), force, velocity)
 
 
+@pytest.mark.long  # identifies a swept log
 def test_a_swept_log_shows_friction_over_velocity(tmp_path):
     write_samples(tmp_path / 'bag', swept(), 'rod')
     found = identify([tmp_path / 'bag'], IdentifyOptions(), 'swept')
@@ -111,6 +112,7 @@ def test_a_swept_log_shows_friction_over_velocity(tmp_path):
 
 
 @pytest.mark.renders
+@pytest.mark.long  # draws every length of the ladder
 def test_labels_of_the_ladder_neither_overlap_nor_leave_the_figure(tmp_path):
     write_samples(tmp_path / 'bag', swept(), 'rod')
     found = identify([tmp_path / 'bag'], IdentifyOptions(), 'swept')

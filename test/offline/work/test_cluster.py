@@ -111,17 +111,18 @@ def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
         assert found[0][0][2].count('seal_friction: bags/garbage.mcap: ') == 1
 
 
-def test_a_study_and_a_map_are_the_same_on_a_cluster(cluster, tmp_path):
+@pytest.mark.parametrize('words', [pytest.param(['study'], marks=pytest.mark.long), ['map', '--uncertain', '2']])
+def test_a_study_and_a_map_are_the_same_on_a_cluster(words, cluster, tmp_path):
     case, seal = tmp_path / 'tiny.yaml', tmp_path / 'seal.yaml'
     case.write_text(CASE)
-    for words in (['study', str(case)], ['map', str(case), '--seal-file', str(seal), '--uncertain', '2']):
-        found = []
-        for workers in (['--workers', '1'], ['--scheduler', cluster.address]):
-            code, out, errors = done(*COMMAND, 'ehl', *words, *workers, '--json')
-            assert code == 0, errors
-            found.append((out, seal.read_bytes() if seal.exists() else b''))
-        assert found[0] == found[1]
-    assert found[0][1]
+    into = ['--seal-file', str(seal)] if 'map' in words else []
+    found = []
+    for workers in (['--workers', '1'], ['--scheduler', cluster.address]):
+        code, out, errors = done(*COMMAND, 'ehl', words[0], str(case), *words[1:], *into, *workers, '--json')
+        assert code == 0, errors
+        found.append((out, seal.read_bytes() if into else b''))
+    assert found[0] == found[1]
+    assert bool(found[0][1]) == bool(into)
 
 
 @pytest.mark.long
