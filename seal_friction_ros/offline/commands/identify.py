@@ -68,6 +68,7 @@ def add_parser(commands: Any) -> None:
     )
     cli.add_namespace(parser)
     cli.add_workers(parser, 'groups of readings that are left out')
+    cli.add_work(parser, has_failures=False)
 
 
 def _chambers(text: str) -> tuple[str, ...]:
@@ -88,7 +89,7 @@ def _kind(text: str) -> tuple[str, tuple[str, ...]]:
 
 NOT_FOR_KINDS = (
     'report', 'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',
-    'scheduler',
+    'scheduler', 'work',
 )  # fmt: skip
 """options that several kinds of seals do not take"""
 
@@ -137,7 +138,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ValueError(f'{arguments.report}: --next writes its page there: choose another name for one of them')
     source_options = SourceOptions(**cli.options_from(arguments, SourceOptions))
     options = IdentifyOptions(**{**cli.options_from(arguments, IdentifyOptions), 'sources': source_options})
-    found = identify(arguments.sources, options, arguments.out.stem, cli.workers_of(arguments))
+    workers = cli.workers_of(arguments)
+    found = identify(arguments.sources, options, arguments.out.stem, workers, arguments.work)
     design = next_readings.design_for(found) if arguments.next else None
     written: dict[str, Any] = {'seal_file': arguments.out}
     if arguments.report:

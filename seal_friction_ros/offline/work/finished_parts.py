@@ -7,6 +7,7 @@ version of the package never finds an old result. Where parts may fail one by on
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -50,6 +51,15 @@ def part_key(kind: str, inputs: Any) -> str:
     """
     text = f'{kind} {json.dumps([inputs, dict(versions())], sort_keys=True)}'
     return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def content_of(value: Any) -> Any:
+    """A value as `part_key` takes it: records and sequences as lists, an array by its shape and digest."""
+    if isinstance(value, np.ndarray):
+        return [list(value.shape), value.dtype.str, hashlib.sha256(value.tobytes()).hexdigest()]
+    if is_dataclass(value):
+        return [type(value).__name__, *(content_of(getattr(value, one.name)) for one in fields(value) if one.init)]
+    return [content_of(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def input_digest(path: Path) -> str:
