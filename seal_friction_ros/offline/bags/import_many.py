@@ -10,10 +10,11 @@ from uuid import uuid4
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.work.executor import Workers, try_all
 from seal_friction_ros.offline.work.outcome import Outcome
+from seal_friction_ros.offline.work.places import Place, as_path, name_of
 
 
 def import_many(
-    convert: Callable[[Path, Path], Any], sources: Sequence[Path], out: Path, workers: Workers
+    convert: Callable[[Path, Path], Any], sources: Sequence[Place], out: Path, workers: Workers
 ) -> list[Outcome[Any]]:
     """Convert every source, whatever becomes of the others.
 
@@ -21,7 +22,7 @@ def import_many(
 
     Args:
         convert: Picklable function of a source and of the bag to write.
-        sources: Logs or bags.
+        sources: Logs or bags: paths, or URLs that are copied where they are converted.
         out: The bag of one source; of several a folder with a bag each, by `bag_names`. Must not exist.
         workers: Sources at a time, or a cluster, whose workers write into the folder of ``out``.
 
@@ -54,11 +55,12 @@ def import_many(
     ]
 
 
-def _import(convert: Callable[[Path, Path], Any], source: Path, place: Path, name: str) -> Any:
+def _import(convert: Callable[[Path, Path], Any], source: Place, place: Path, name: str) -> Any:
     """Convert one source; a call that a cluster repeats, since its worker was killed, begins anew."""
     own, done = place / uuid4().hex, place / 'done' / name
     try:
-        result = convert(source, own / name)
+        with as_path(source) as path:
+            result = convert(path, own / name)
         shutil.rmtree(done, ignore_errors=True)
         (own / name).rename(done)
     finally:
@@ -66,13 +68,13 @@ def _import(convert: Callable[[Path, Path], Any], source: Path, place: Path, nam
     return result
 
 
-def bag_names(sources: Sequence[Path]) -> list[str]:
-    """Name of the bag of each source: that of the folder, or of the file without its suffix.
+def bag_names(sources: Sequence[Place]) -> list[str]:
+    """Name of the bag of each source, by `name_of`.
 
     Raises:
         ValueError: Two are the same.
     """
-    names = [path.name if path.is_dir() else path.stem for path in map(Path.resolve, sources)]
+    names = list(map(name_of, sources))
     for number, name in enumerate(names):
         if name in names[:number]:
             raise ValueError(f'{sources[names.index(name)]} and {sources[number]} would both be bag {name}: rename one')

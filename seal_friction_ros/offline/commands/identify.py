@@ -17,7 +17,13 @@ def add_parser(commands: Any) -> None:
         'identify bags/pull_test --out my_seal.yaml --next next.csv',
         'identify bags/cylinder --seal-kind rod=a --seal-kind piston=difference --out cylinder.yaml',
     )  # fmt: skip
-    parser.add_argument('sources', type=Path, nargs='+', metavar='SOURCE', help='bag, log, table or data sheet')
+    parser.add_argument(
+        'sources',
+        type=cli.place,
+        nargs='+',
+        metavar='SOURCE',
+        help='bag, log, table or data sheet; path, or URL of fsspec',
+    )
     cli.add_target(parser, '--out', SEAL_FILE, required=True, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
     cli.add_target(
@@ -111,7 +117,8 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
         raise ValueError(f'--seal-kind {", ".join(names)}: give two kinds at least, with different names')
     files = kinds.seal_files(arguments.out, names)
     targets = [(path, SEAL_FILE) for path in files.values()]
-    with checked_targets('identify', targets, arguments.sources, force=arguments.force):
+    paths = [one for one in arguments.sources if isinstance(one, Path)]
+    with checked_targets('identify', targets, paths, force=arguments.force):
         options = SourceOptions(**cli.options_from(arguments, SourceOptions))
         each = [SealKind(*kind) for kind in arguments.kinds]
         name = arguments.name or arguments.out.stem

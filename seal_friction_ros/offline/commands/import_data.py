@@ -13,6 +13,7 @@ from seal_friction_ros.offline.work.targets import BAG
 if TYPE_CHECKING:
     from seal_friction_ros.offline.bags.import_bag import ActuatorImport
     from seal_friction_ros.offline.bags.import_log import ImportSummary
+    from seal_friction_ros.offline.work.places import Place
 
 
 def add_parser(commands: Any) -> None:
@@ -25,13 +26,15 @@ def add_parser(commands: Any) -> None:
         'import log ram.csv --rig my_rig.yaml --out ram',
         'import log monday.csv tuesday.csv --rig my_rig.yaml --out bags',
     )  # fmt: skip
-    log.add_argument('logs', type=Path, nargs='+', metavar='LOG', help='log file')
+    log.add_argument('logs', type=cli.place, nargs='+', metavar='LOG', help='log file, or URL of fsspec')
     cli.add_file(log, '--rig', 'rigs', 'rig file', required=True)
     bag = cli.add_command(
         sources, 'bag', run_bag, 'make a bag of each actuator from any rosbag with standard messages',
         'import bag RUN --mapping robot.yaml --out run',
     )  # fmt: skip
-    bag.add_argument('bags', type=Path, nargs='+', metavar='RUN', help='rosbag2 bag, MCAP or SQLite')
+    bag.add_argument(
+        'bags', type=cli.place, nargs='+', metavar='RUN', help='rosbag2 bag, MCAP or SQLite, or URL of fsspec'
+    )
     cli.add_file(bag, '--mapping', 'machines', 'mapping file', required=True)
     help_text = 'topic to copy as it is, for example the command of a controller; repeat it for more'
     bag.add_argument('--also', action='append', default=[], metavar='TOPIC', help=help_text)
@@ -83,19 +86,22 @@ def _of_bag(found: 'dict[str, ActuatorImport]', out: Path) -> tuple[dict[str, An
 
 def _run(
     arguments: argparse.Namespace,
-    sources: list[Path],
+    sources: 'list[Place]',
     convert: Callable[[Path, Path], Any],
     told: Callable[[Any, Path], tuple[dict[str, Any], str]],
 ) -> int:
     """Import one source, or several: a bag for each, and one line for each that cannot be imported."""
     from seal_friction_ros.offline.bags.import_many import bag_names, import_many
+    from seal_friction_ros.offline.work.places import as_path
 
     out = arguments.out
     if len(sources) == 1 and not arguments.scheduler:
-        return cli.print_result(arguments, *told(convert(sources[0], out), out))
+        with as_path(sources[0]) as path:
+            return cli.print_result(arguments, *told(convert(path, out), out))
     outcomes = import_many(convert, sources, out, cli.workers_of(arguments))
     targets = [out / name for name in bag_names(sources)] if len(sources) > 1 else [out]
-    found, lines, errors = [], [], []
+    found: list[dict[str, Any]] = []
+    lines, errors = [], []
     for source, target, (result, error) in zip(sources, targets, outcomes, strict=True):
         if error:
             found.append({'source': source, 'error': error})

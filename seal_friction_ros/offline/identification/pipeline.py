@@ -62,6 +62,7 @@ from seal_friction_ros.offline.identification.sources import SourceOptions, Sour
 from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import Part, content_of, part_key, run_parts
+from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
 
 MOST_EXTENSIONS = 3  # of a law by velocity terms
@@ -85,12 +86,12 @@ class IdentifyOptions:
 
 
 def identify(
-    paths: Sequence[Path], options: IdentifyOptions, name: str, workers: Workers = 1, work: Path | None = None
+    paths: Sequence[Place], options: IdentifyOptions, name: str, workers: Workers = 1, work: Path | None = None
 ) -> Identification:
     """Read bags, logs, tables or data sheets, fit every law, select one and assess it.
 
     Args:
-        paths: The sources.
+        paths: The sources, by path or URL.
         options: How.
         name: Of the seal, unless the options name it.
         workers: Groups of readings at a time that are left out, or a cluster; the result does not depend on it.
@@ -116,7 +117,7 @@ def identify(
     return Identification(data, selection, quality, levels, document, as_measured, warnings, remarks, elastic)
 
 
-def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationData:
+def gather(paths: Sequence[Place], options: IdentifyOptions) -> IdentificationData:
     """Read the sources, correct the force sum, take all readings to one temperature, exclude a pressure that is off.
 
     Raises:

@@ -36,6 +36,7 @@ from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_sample
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.identification.load_numbers import load_text
+from seal_friction_ros.offline.work.places import Place, as_path
 from seal_friction_ros.offline.work.progress import progress
 
 LARGEST_ACCELERATION = 1.0  # [m/s2] limit with known inertia (our choice)
@@ -125,7 +126,7 @@ class Sources:
         return replace(self, each=each)
 
 
-def read_sources(paths: Sequence[Path], options: SourceOptions) -> Sources:
+def read_sources(paths: Sequence[Place], options: SourceOptions) -> Sources:
     """Read every source: bags and logs, or tables and data sheets.
 
     Raises:
@@ -136,7 +137,7 @@ def read_sources(paths: Sequence[Path], options: SourceOptions) -> Sources:
     twice = sorted({str(path) for path in paths if list(paths).count(path) > 1})
     if twice:
         raise ValueError(f'{twice[0]} is named twice')
-    each = tuple(_read(path, options) for path in paths)
+    each = tuple(_read_place(path, options) for path in paths)
     digests = [source.file.sha256 for source in each]
     same = next(((i, digests.index(d)) for i, d in enumerate(digests) if digests.index(d) < i), None)
     if same is not None:
@@ -164,6 +165,11 @@ def _chambers(each: Sequence[Source], options: SourceOptions) -> tuple[tuple[str
     found = tuple(under_pressure) or ('a',)
     assumed = 'one seal for each chamber under pressure' if logs else 'one seal with all friction'
     return found, [f'{assumed} is assumed: {",".join(found)}; give others with --seal-chambers']
+
+
+def _read_place(place: Place, options: SourceOptions) -> Source:
+    with as_path(place) as path:
+        return _read(path, options)
 
 
 def _read(path: Path, options: SourceOptions) -> Source:

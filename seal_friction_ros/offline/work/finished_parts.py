@@ -17,6 +17,7 @@ import numpy as np
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.executor import Workers, nothing, run_all, try_all
 from seal_friction_ros.offline.work.outcome import CRASHED, Outcome
+from seal_friction_ros.offline.work.places import Place, url_digest
 from seal_friction_ros.offline.work.versions import versions
 
 Values = Mapping[str, Any]
@@ -62,13 +63,15 @@ def content_of(value: Any) -> Any:
     return [content_of(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-def input_digest(path: Path) -> str:
-    """Digest of the content of a file, or of the files in a folder with their names.
+def input_digest(path: Place) -> str:
+    """Digest of the content of a file, or of the files in a folder with their names; of a URL its `url_digest`.
 
     Raises:
-        ValueError: It is neither a file nor a folder.
+        ValueError: It is neither a file nor a folder, or a URL that cannot be read.
         OSError: It cannot be read.
     """
+    if isinstance(path, str):
+        return url_digest(path)
     if not path.is_dir() and not path.is_file():  # a device may have no end
         raise ValueError(f'{path}: neither a file nor a folder')
     digest = hashlib.sha256()
@@ -125,7 +128,7 @@ def try_parts(
     return [outcomes[number] for number in range(len(parts))]
 
 
-def input_digests(paths: Sequence[Path], workers: Workers) -> list[Outcome[str]]:
+def input_digests(paths: Sequence[Place], workers: Workers) -> list[Outcome[str]]:
     """`input_digest` of each path."""
     return try_all(f'digests of {len(paths)} inputs', [partial(input_digest, path) for path in paths], workers)
 

@@ -120,6 +120,17 @@ def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
         assert found[0][0][2].count('seal_friction: bags/garbage.mcap: ') == 1
 
 
+def test_a_url_is_read_where_the_worker_is(cluster, tmp_path):
+    bag = write_recorded(tmp_path)
+    here, there = f'local://{bag}', 'memory://only/the/command/has/this'
+    words = ['replay', here, there, '--verify', '--scheduler', cluster.address]
+    program = 'import fsspec, sys; from seal_friction_ros.offline.commands.main import main; '
+    program += "fsspec.filesystem('memory').pipe_file('/only/the/command/has/this/metadata.yaml', b''); "
+    code, out, errors = done(sys.executable, '-c', f'{program}sys.exit(main(sys.argv[1:]))', *words)
+    assert (code, out) == (2, f'{here}: 300 estimates and 200 feed-forwards, identical to the byte\n')
+    assert last_line(errors) == f'seal_friction: {there}: there is no such file or bag\n'
+
+
 def test_logs_are_imported_to_the_same_bytes_on_a_cluster(cluster, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for number in range(3):
