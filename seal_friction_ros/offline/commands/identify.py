@@ -73,7 +73,7 @@ def add_parser(commands: Any) -> None:
         '--largest-acceleration', type=cli.non_negative, metavar='M/S2', help='samples beyond it are not used'
     )
     cli.add_namespace(parser)
-    cli.add_workers(parser, 'groups of readings that are left out')
+    cli.add_workers(parser, 'sources, and groups of readings that are left out,')
     cli.add_work(parser, has_failures=False)
 
 

@@ -94,14 +94,15 @@ def identify(
         paths: The sources, by path or URL.
         options: How.
         name: Of the seal, unless the options name it.
-        workers: Groups of readings at a time that are left out, or a cluster; the result does not depend on it.
+        workers: Sources, and groups of readings that are left out, at a time, or a cluster; the result does not depend
+            on it.
         work: Folder that keeps what was found without each group, so that an interrupted run resumes; None keeps none.
 
     Raises:
         ValueError: The folder or the cluster cannot be used, the data are unfit for identification, or no law predicts
             them; one line with the reason and what to measure instead.
     """
-    data = gather(paths, options)
+    data = gather(paths, options, workers)
     elastic = identify_presliding(data.sources) if options.presliding else None
     selection = select_law(data, options.law, workers, work)
     _check_one_seal(diagnostics.swept_logs_compared(data.used, selection.fit), options.refuse_changed)
@@ -117,13 +118,15 @@ def identify(
     return Identification(data, selection, quality, levels, document, as_measured, warnings, remarks, elastic)
 
 
-def gather(paths: Sequence[Place], options: IdentifyOptions) -> IdentificationData:
+def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 1) -> IdentificationData:
     """Read the sources, correct the force sum, take all readings to one temperature, exclude a pressure that is off.
+
+    Arguments are those of `identify`.
 
     Raises:
         ValueError: The data are unfit for identification.
     """
-    sources = read_sources(paths, options.sources)
+    sources = read_sources(paths, options.sources, workers)
     ring = _ring(sources, options)
     prepared = sources.prepare()
     _check_one_seal(diagnostics.shared_levels(prepared.readings), options.refuse_changed)
