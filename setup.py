@@ -42,7 +42,15 @@ setup(
     python_requires='>=3.11',
     zip_safe=False,
     # Commands on a Dask cluster, and tables for it; the versions of requirements/dev.txt.
-    extras_require={'cluster': ['dask==2026.8.0', 'distributed==2026.8.0', 'cloudpickle==3.1.2', 'pyarrow==26.0.1']},
+    extras_require={
+        'cluster': [
+            'dask==2026.8.0',
+            'distributed==2026.8.0',
+            'cloudpickle==3.1.2',
+            'pyarrow==26.0.1',
+            'fsspec==2026.9.0',
+        ]
+    },
     maintainer='seal_friction_ros maintainers',
     maintainer_email='maintainers@seal-friction.invalid',
     description='Live, recorded and replayable estimate of hydraulic seal friction for ROS 2.',

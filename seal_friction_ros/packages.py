@@ -16,6 +16,7 @@ OPTIONAL = {
     'rich': 'python3-rich',
     'argcomplete': 'python3-argcomplete',
     'distributed': '',
+    'fsspec': '',
     'pyarrow': '',
 }
 """Module, which is also its name on PyPI -> package of Debian and Ubuntu; empty: there is none that we tested."""

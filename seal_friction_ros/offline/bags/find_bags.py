@@ -4,15 +4,17 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from seal_friction_ros.offline.work.places import Place, place_of
+
 _FILES = ('.mcap', '.db3')
 _LONGEST_LIST = 100 << 20  # [bytes] our choice
 
 
-def find_bags(where: Path) -> list[Path]:
+def find_bags(where: Path) -> list[Place]:
     """Bags below a folder, sorted by path, or in a text file, in its order; each once.
 
-    In a file every line is the path of a bag, relative to the folder of the file; empty lines and those that begin with
-    ``#`` do not count. A path of a list need not exist: the computation on it says what is wrong.
+    In a file every line is the path of a bag, relative to the folder of the file, or a URL; empty lines and
+    those that begin with ``#`` do not count. A path of a list need not exist: the computation on it says what is wrong.
 
     Args:
         where: Folder or text file.
@@ -21,10 +23,10 @@ def find_bags(where: Path) -> list[Path]:
         ValueError: There is no bag, or the file is no list.
         OSError: It cannot be read.
     """
-    found = sorted(_below(where)) if where.is_dir() else list(_listed(where))
-    known: dict[str, Path] = {}
+    found: list[Place] = [*sorted(_below(where))] if where.is_dir() else list(_listed(where))
+    known: dict[str, Place] = {}
     for bag in found:
-        known.setdefault(os.path.realpath(bag), bag)
+        known.setdefault(bag if isinstance(bag, str) else os.path.realpath(bag), bag)
     if not known:
         raise ValueError(f'{where}: no bag in it: give a folder with bags below it, or a text file with a path a line')
     return list(known.values())
@@ -42,7 +44,7 @@ def _below(folder: Path) -> Iterator[Path]:
     yield from (Path(str(error.filename)) for error in unreadable)
 
 
-def _listed(file: Path) -> Iterator[Path]:
+def _listed(file: Path) -> Iterator[Place]:
     if file.stat().st_size > _LONGEST_LIST:
         raise ValueError(f'{file}: larger than {_LONGEST_LIST >> 20} MB: no list of bags')
     try:
@@ -53,4 +55,5 @@ def _listed(file: Path) -> Iterator[Path]:
         if line and not line.startswith('#'):
             if not line.isprintable():
                 raise ValueError(f'{file}: {line[:60]!r} is no path: a list has the path of a bag in each line')
-            yield file.parent / line
+            place = place_of(line)
+            yield place if isinstance(place, str) else file.parent / place

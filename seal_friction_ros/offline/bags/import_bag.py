@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation import pipeline
-from seal_friction_ros.core.estimation.configuration import Snapshot, snapshot_text
+from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, snapshot_text
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, INPUTS, Input, encode, encode_text, type_of
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
@@ -52,6 +52,24 @@ class ActuatorImport(NamedTuple):
     remarks: tuple[str, ...]  # what was missing or looks wrong
 
 
+class Mapping(NamedTuple):
+    """A mapping file with the configurations of its actuators."""
+
+    name: str  # as given
+    file: MachineFile
+    configurations: dict[str, Configuration]
+
+
+def read_mapping(name: str) -> Mapping:
+    """Mapping file: a path, or the name of one in ``config/machines``.
+
+    Raises:
+        ValueError: It, or a seal file in it, cannot be read or is invalid; one line that names file and actuator.
+    """
+    file = read_machine(name)
+    return Mapping(name, file, machine_configurations(file, name))
+
+
 def import_bag(bag: Path, mapping: str, out: Path, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
     """Convert a bag with standard messages.
 
@@ -65,13 +83,23 @@ def import_bag(bag: Path, mapping: str, out: Path, also: Collection[str] = ()) -
         ValueError: The mapping does not fit the bag; one line that names file, actuator or topic. Nothing is written.
         BagError: The bag cannot be read, or ``out`` exists or cannot be made.
     """
-    file = read_machine(mapping)
+    return convert_bag(bag, out, read_mapping(mapping), also)
+
+
+def convert_bag(bag: Path, out: Path, mapping: Mapping, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
+    """`import_bag` with a mapping file that is read already.
+
+    Raises:
+        ValueError: The mapping does not fit the bag; one line that names file, actuator or topic. Nothing is written.
+        BagError: The bag cannot be read, or ``out`` exists or cannot be made.
+    """
+    file = mapping.file
     topics = bag_topics(bag)
-    _check_types(file, {topic: info.type_name for topic, info in topics.items()}, mapping, bag)
+    _check_types(file, {topic: info.type_name for topic, info in topics.items()}, mapping.name, bag)
     if absent := [topic for topic in also if topic not in topics]:
         raise ValueError(f'{bag}: {absent[0]} is not in it; it has {", ".join(sorted(topics))}')
     definitions = read_definitions(bag, file.topics.values())
-    machine = make_machine(file, machine_configurations(file, mapping), definitions)
+    machine = make_machine(file, mapping.configurations, definitions)
     several = len(machine.actuators) > 1
     folders = {one.name: out / one.name if several else out for one in machine.actuators}
     if several and out.exists():

@@ -240,7 +240,16 @@ def import_log(log: Path, rig_file: Path, out: Path) -> ImportSummary:
             is written.
         BagError: ``out`` exists already or cannot be made.
     """
-    rig = read_rig(rig_file)
+    return convert_log(log, out, read_rig(rig_file))
+
+
+def convert_log(log: Path, out: Path, rig: Rig) -> ImportSummary:
+    """`import_log` with a rig that is read already.
+
+    Raises:
+        ValueError: The log cannot be read or is invalid; one line that names file and line. Nothing is written.
+        BagError: ``out`` exists already or cannot be made.
+    """
     read = read_samples(log, rig)
     return write_samples(out, read.samples, rig.frame_id, read.track)
 

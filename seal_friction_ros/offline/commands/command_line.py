@@ -18,6 +18,7 @@ from seal_friction_ros.packages import needed
 if TYPE_CHECKING:
     from seal_friction_ros.offline.work.executor import Workers
     from seal_friction_ros.offline.work.finished_parts import Kept
+    from seal_friction_ros.offline.work.places import Place
 
 _OF_A_PAGE = ('matplotlib', 'jinja2')
 SUCCESS, DIFFERENT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
@@ -244,6 +245,18 @@ def _paths(value: Any) -> Iterator[Path]:
     for item in value if isinstance(value, list) else [value]:
         if isinstance(item, Path) or (isinstance(item, str) and item):
             yield Path(item)
+
+
+def place(text: str) -> 'Place':
+    """Type of an argument: a path, or a URL of fsspec."""
+    if '://' not in text:
+        return Path(text)
+    from seal_friction_ros.offline.work.places import place_of
+
+    try:
+        return place_of(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def non_negative(text: str) -> float:

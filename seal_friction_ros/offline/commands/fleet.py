@@ -15,7 +15,7 @@ def add_parser(commands: Any) -> None:
         'fleet bags --out fleet.html',
         'fleet bags.txt --out fleet.html --parquet fleet.parquet --work build/fleet --scheduler tcp://HOST:8786',
     )  # fmt: skip
-    help_text = 'folder with bags below it, or text file with the path of a bag in each line'
+    help_text = 'folder with bags below it, or text file with the path or URL of a bag in each line'
     parser.add_argument('where', type=Path, metavar='DIR|LIST', help=help_text)
     cli.add_page(parser)
     help_text = 'table with a row for each bag and pressure level'

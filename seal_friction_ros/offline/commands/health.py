@@ -1,7 +1,6 @@
 """``seal_friction health``: how the seals are doing, over bags in order of time."""
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
@@ -13,7 +12,7 @@ def add_parser(commands: Any) -> None:
         commands, 'health', run, 'show how friction, offset and starts of the seals change over bags',
         'health monday tuesday wednesday --out health.html',
     )  # fmt: skip
-    parser.add_argument('bags', type=Path, nargs='+', metavar='BAG')
+    parser.add_argument('bags', type=cli.place, nargs='+', metavar='BAG', help='path, or URL of fsspec')
     cli.add_configuration(parser)
     cli.add_namespace(parser)
     cli.add_page(parser, required=False)

@@ -17,7 +17,13 @@ def add_parser(commands: Any) -> None:
         'identify bags/pull_test --out my_seal.yaml --next next.csv',
         'identify bags/cylinder --seal-kind rod=a --seal-kind piston=difference --out cylinder.yaml',
     )  # fmt: skip
-    parser.add_argument('sources', type=Path, nargs='+', metavar='SOURCE', help='bag, log, table or data sheet')
+    parser.add_argument(
+        'sources',
+        type=cli.place,
+        nargs='+',
+        metavar='SOURCE',
+        help='bag, log, table or data sheet; path, or URL of fsspec',
+    )
     cli.add_target(parser, '--out', SEAL_FILE, required=True, metavar='SEAL.yaml', help='seal file to write')
     cli.add_page(parser, '--report', required=False)
     cli.add_target(
@@ -67,7 +73,8 @@ def add_parser(commands: Any) -> None:
         '--largest-acceleration', type=cli.non_negative, metavar='M/S2', help='samples beyond it are not used'
     )
     cli.add_namespace(parser)
-    cli.add_workers(parser, 'groups of readings that are left out')
+    cli.add_workers(parser, 'sources, and groups of readings that are left out,')
+    cli.add_work(parser, has_failures=False)
 
 
 def _chambers(text: str) -> tuple[str, ...]:
@@ -88,7 +95,7 @@ def _kind(text: str) -> tuple[str, tuple[str, ...]]:
 
 NOT_FOR_KINDS = (
     'report', 'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',
-    'scheduler',
+    'scheduler', 'work',
 )  # fmt: skip
 """options that several kinds of seals do not take"""
 
@@ -110,7 +117,8 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
         raise ValueError(f'--seal-kind {", ".join(names)}: give two kinds at least, with different names')
     files = kinds.seal_files(arguments.out, names)
     targets = [(path, SEAL_FILE) for path in files.values()]
-    with checked_targets('identify', targets, arguments.sources, force=arguments.force):
+    paths = [one for one in arguments.sources if isinstance(one, Path)]
+    with checked_targets('identify', targets, paths, force=arguments.force):
         options = SourceOptions(**cli.options_from(arguments, SourceOptions))
         each = [SealKind(*kind) for kind in arguments.kinds]
         name = arguments.name or arguments.out.stem
@@ -137,7 +145,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ValueError(f'{arguments.report}: --next writes its page there: choose another name for one of them')
     source_options = SourceOptions(**cli.options_from(arguments, SourceOptions))
     options = IdentifyOptions(**{**cli.options_from(arguments, IdentifyOptions), 'sources': source_options})
-    found = identify(arguments.sources, options, arguments.out.stem, cli.workers_of(arguments))
+    workers = cli.workers_of(arguments)
+    found = identify(arguments.sources, options, arguments.out.stem, workers, arguments.work)
     design = next_readings.design_for(found) if arguments.next else None
     written: dict[str, Any] = {'seal_file': arguments.out}
     if arguments.report:

@@ -1,12 +1,19 @@
 """``seal_friction import``: make a bag from measurements."""
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from seal_friction_ros.core.foundation.units import MM
 from seal_friction_ros.offline.commands import command_line as cli
 from seal_friction_ros.offline.work.targets import BAG
+
+if TYPE_CHECKING:
+    from seal_friction_ros.offline.bags.import_bag import ActuatorImport
+    from seal_friction_ros.offline.bags.import_log import ImportSummary
+    from seal_friction_ros.offline.work.places import Place
 
 
 def add_parser(commands: Any) -> None:
@@ -17,14 +24,17 @@ def add_parser(commands: Any) -> None:
     log = cli.add_command(
         sources, 'log', run_log, 'make a bag from a measured log, CSV or white space',
         'import log ram.csv --rig my_rig.yaml --out ram',
+        'import log monday.csv tuesday.csv --rig my_rig.yaml --out bags',
     )  # fmt: skip
-    log.add_argument('log', type=Path, help='log file')
+    log.add_argument('logs', type=cli.place, nargs='+', metavar='LOG', help='log file, or URL of fsspec')
     cli.add_file(log, '--rig', 'rigs', 'rig file', required=True)
     bag = cli.add_command(
         sources, 'bag', run_bag, 'make a bag of each actuator from any rosbag with standard messages',
         'import bag RUN --mapping robot.yaml --out run',
     )  # fmt: skip
-    bag.add_argument('bag', type=Path, help='rosbag2 bag, MCAP or SQLite')
+    bag.add_argument(
+        'bags', type=cli.place, nargs='+', metavar='RUN', help='rosbag2 bag, MCAP or SQLite, or URL of fsspec'
+    )
     cli.add_file(bag, '--mapping', 'machines', 'mapping file', required=True)
     help_text = 'topic to copy as it is, for example the command of a controller; repeat it for more'
     bag.add_argument('--also', action='append', default=[], metavar='TOPIC', help=help_text)
@@ -32,31 +42,77 @@ def add_parser(commands: Any) -> None:
         sources, 'thesis', run_thesis, 'make a bag from the pull test of the thesis, Tables A-1 to A-3',
         'import thesis --out pull_test',
     )  # fmt: skip
-    for source in (log, bag, thesis):
-        cli.add_target(source, '--out', BAG, required=True, metavar='BAG', help='bag to make')
+    cli.add_target(thesis, '--out', BAG, required=True, metavar='BAG', help='bag to make')
+    for source, what in ((log, 'logs'), (bag, 'bags')):
+        help_text = f'bag to make; of several {what} a folder with a bag each, by their names'
+        cli.add_target(source, '--out', BAG, required=True, metavar='BAG', help=help_text)
+        cli.add_workers(source, what)
 
 
 def run_log(arguments: argparse.Namespace) -> int:
-    """Import a log."""
+    """Import a log, or several in parallel."""
     from seal_friction_ros.files import config_path
-    from seal_friction_ros.offline.bags.import_log import import_log
+    from seal_friction_ros.offline.bags.import_log import convert_log, read_rig
 
-    summary = import_log(arguments.log, config_path('rigs', arguments.rig), arguments.out)
-    return cli.print_result(arguments, summary, f'{summary.rows} rows')
+    rig = read_rig(config_path('rigs', arguments.rig))
+    return _run(arguments, arguments.logs, partial(convert_log, rig=rig), _of_log)
 
 
 def run_bag(arguments: argparse.Namespace) -> int:
-    """Import a bag with standard messages."""
-    from seal_friction_ros.offline.bags.import_bag import import_bag
+    """Import a bag with standard messages, or several in parallel."""
+    from seal_friction_ros.offline.bags.import_bag import convert_bag, read_mapping
 
-    found = import_bag(arguments.bag, arguments.mapping, arguments.out, arguments.also)
-    lines = []
+    convert = partial(convert_bag, mapping=read_mapping(arguments.mapping), also=arguments.also)
+    return _run(arguments, arguments.bags, convert, _of_bag)
+
+
+def _of_log(summary: 'ImportSummary', _: Path) -> tuple[dict[str, Any], str]:
+    """Numbers and text for an imported log."""
+    return summary._asdict(), f'{summary.rows} rows'
+
+
+def _of_bag(found: 'dict[str, ActuatorImport]', out: Path) -> tuple[dict[str, Any], str]:
+    """Numbers and text for a bag that was imported to ``out``."""
+    numbers, lines = {}, []
     for name, one in found.items():
+        bag = out / name if len(found) > 1 else out
+        numbers[name] = one._replace(bag=bag)._asdict()
         counts = ', '.join(f'{count} {topic.lstrip("/")}' for topic, count in sorted(one.messages.items()))
-        lines += [f'{one.bag}: {name}: {counts}']
+        lines += [f'{bag}: {name}: {counts}']
         lines += [] if one.tracking_rms is None else [f'  tracking error {one.tracking_rms / MM:.3g} mm RMS']
         lines += [f'  {remark}' for remark in one.remarks]
-    return cli.print_result(arguments, {name: one._asdict() for name, one in found.items()}, '\n'.join(lines))
+    return numbers, '\n'.join(lines)
+
+
+def _run(
+    arguments: argparse.Namespace,
+    sources: 'list[Place]',
+    convert: Callable[[Path, Path], Any],
+    told: Callable[[Any, Path], tuple[dict[str, Any], str]],
+) -> int:
+    """Import one source, or several: a bag for each, and one line for each that cannot be imported."""
+    from seal_friction_ros.offline.bags.import_many import bag_names, import_many
+    from seal_friction_ros.offline.work.places import as_path
+
+    out = arguments.out
+    if len(sources) == 1 and not arguments.scheduler:
+        with as_path(sources[0]) as path:
+            return cli.print_result(arguments, *told(convert(path, out), out))
+    outcomes = import_many(convert, sources, out, cli.workers_of(arguments))
+    targets = [out / name for name in bag_names(sources)] if len(sources) > 1 else [out]
+    found: list[dict[str, Any]] = []
+    lines, errors = [], []
+    for source, target, (result, error) in zip(sources, targets, outcomes, strict=True):
+        if error:
+            found.append({'source': source, 'error': error})
+            errors.append(error)
+        else:
+            numbers, text = told(result, target)
+            found.append({'source': source, 'out': target, 'imported': numbers})
+            lines.append(f'{source}: {text}')
+    return cli.print_result(
+        arguments, {'sources': found}, '\n'.join(lines), cli.UNUSABLE if errors else cli.SUCCESS, errors
+    )
 
 
 def run_thesis(arguments: argparse.Namespace) -> int:

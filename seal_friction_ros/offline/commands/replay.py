@@ -1,7 +1,6 @@
 """``seal_friction replay``: replay bags through the estimator."""
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
@@ -15,7 +14,7 @@ def add_parser(commands: Any) -> None:
         'replay bags/pull_test --verify',
         'replay bags/pull_test --seal my_seal.yaml --out with_my_seal',
     )  # fmt: skip
-    parser.add_argument('bags', type=Path, nargs='+', metavar='BAG')
+    parser.add_argument('bags', type=cli.place, nargs='+', metavar='BAG', help='path, or URL of fsspec')
     cli.add_workers(parser, 'bags')
     cli.add_work(parser)
     cli.add_configuration(parser)
@@ -28,12 +27,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Replay one bag, or several in parallel."""
     from seal_friction_ros.offline.replay.parallel_replay import verify
     from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
+    from seal_friction_ros.offline.work.places import as_path
 
     override = chosen_configuration(arguments.params, arguments.seal)
     if len(arguments.bags) > 1 or arguments.scheduler or arguments.work:
         return _run_many(arguments, override)
-    bag, namespace = arguments.bags[0], arguments.namespace
-    result = replay(bag, override, arguments.out, namespace) if arguments.out else verify(bag, override, namespace)
+    namespace = arguments.namespace
+    with as_path(arguments.bags[0]) as bag:
+        result = replay(bag, override, arguments.out, namespace) if arguments.out else verify(bag, override, namespace)
     code = cli.DIFFERENT if arguments.verify and not result.identical else cli.SUCCESS
     return cli.print_result(arguments, result.numbers(), result.summary(verified=arguments.verify), code)
 

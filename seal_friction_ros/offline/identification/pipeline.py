@@ -5,7 +5,7 @@ number is rounded to six digits before another number is computed from it: the s
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -33,7 +33,9 @@ from seal_friction_ros.core.identification.force_correction import force_correct
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.selection import (
+    ChosenAnew,
     LawScore,
+    LeftOut,
     choose_anew,
     collinear_spread,
     recommended,
@@ -58,7 +60,9 @@ from seal_friction_ros.offline.identification.results import (
 )
 from seal_friction_ros.offline.identification.sources import SourceOptions, Sources, read_sources
 from seal_friction_ros.offline.identification.wording import remarks_on, warnings_of
-from seal_friction_ros.offline.work.executor import Workers, run_all
+from seal_friction_ros.offline.work.executor import Workers
+from seal_friction_ros.offline.work.finished_parts import Part, content_of, part_key, run_parts
+from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
 
 MOST_EXTENSIONS = 3  # of a law by velocity terms
@@ -81,22 +85,26 @@ class IdentifyOptions:
     name: str = ''  # of the seal; empty: the name of the seal file
 
 
-def identify(paths: Sequence[Path], options: IdentifyOptions, name: str, workers: Workers = 1) -> Identification:
+def identify(
+    paths: Sequence[Place], options: IdentifyOptions, name: str, workers: Workers = 1, work: Path | None = None
+) -> Identification:
     """Read bags, logs, tables or data sheets, fit every law, select one and assess it.
 
     Args:
-        paths: The sources.
+        paths: The sources, by path or URL.
         options: How.
         name: Of the seal, unless the options name it.
-        workers: Groups of readings at a time that are left out, or a cluster; the result does not depend on it.
+        workers: Sources, and groups of readings that are left out, at a time, or a cluster; the result does not depend
+            on it.
+        work: Folder that keeps what was found without each group, so that an interrupted run resumes; None keeps none.
 
     Raises:
-        ValueError: The data are unfit for identification, or no law predicts them; one line with the reason and what to
-            measure instead.
+        ValueError: The folder or the cluster cannot be used, the data are unfit for identification, or no law predicts
+            them; one line with the reason and what to measure instead.
     """
-    data = gather(paths, options)
+    data = gather(paths, options, workers)
     elastic = identify_presliding(data.sources) if options.presliding else None
-    selection = select_law(data, options.law, workers)
+    selection = select_law(data, options.law, workers, work)
     _check_one_seal(diagnostics.swept_logs_compared(data.used, selection.fit), options.refuse_changed)
     quality = assess(data, selection, options.run_to_run)
     as_measured = seal_document(data, selection, quality, options.name or name, presliding=elastic)
@@ -110,13 +118,15 @@ def identify(paths: Sequence[Path], options: IdentifyOptions, name: str, workers
     return Identification(data, selection, quality, levels, document, as_measured, warnings, remarks, elastic)
 
 
-def gather(paths: Sequence[Path], options: IdentifyOptions) -> IdentificationData:
+def gather(paths: Sequence[Place], options: IdentifyOptions, workers: Workers = 1) -> IdentificationData:
     """Read the sources, correct the force sum, take all readings to one temperature, exclude a pressure that is off.
+
+    Arguments are those of `identify`.
 
     Raises:
         ValueError: The data are unfit for identification.
     """
-    sources = read_sources(paths, options.sources)
+    sources = read_sources(paths, options.sources, workers)
     ring = _ring(sources, options)
     prepared = sources.prepare()
     _check_one_seal(diagnostics.shared_levels(prepared.readings), options.refuse_changed)
@@ -199,8 +209,10 @@ def _candidates(readings: FrictionReadings, ring: Ring | None = None) -> tuple[C
     return candidate_laws(variation_of(readings), *(ring or ()))
 
 
-def select_law(data: IdentificationData, name: str | None, workers: Workers = 1) -> LawSelection:
-    """Fit and score every candidate law; select the recommended one, or the one called ``name``; ``workers`` as above.
+def select_law(
+    data: IdentificationData, name: str | None, workers: Workers = 1, work: Path | None = None
+) -> LawSelection:
+    """Fit and score every candidate law; select the recommended one, or the one called ``name``; the rest as above.
 
     Raises:
         ValueError: No law could be fitted, the selected one predicts nothing, or there is no law of that name.
@@ -222,9 +234,23 @@ def select_law(data: IdentificationData, name: str | None, workers: Workers = 1)
         )
     anew = None
     if name is None and not data.used.are_samples:  # a swept log would take minutes
-        choose = partial(_recommended, ring=data.ring, has_fitted_load=data.sources.has_fitted_load)
-        anew = choose_anew(data.used, choose, lambda calls: run_all('choose without', calls, workers))
+        anew = _choose_anew(data, workers, work)
     return LawSelection(scores, best, selected.fit, selected.validation, validation.plain_mean(data.used), anew)
+
+
+def _choose_anew(data: IdentificationData, workers: Workers, work: Path | None) -> ChosenAnew:
+    """Prediction of each group by a law chosen without it; the groups are parts of the work."""
+    ring, has_fitted_load = data.ring, data.sources.has_fitted_load
+    known = content_of([data.used, ring, has_fitted_load])
+
+    def run(calls: Sequence[Callable[[], LeftOut]]) -> list[LeftOut]:
+        parts = [
+            Part(part_key('choose without', [known, content_of(out)]), LeftOut._fields, call)
+            for out, call in zip(data.used.groups, calls, strict=True)
+        ]
+        return [LeftOut(**found) for found in run_parts('choose without', parts, workers, work)]
+
+    return choose_anew(data.used, partial(_recommended, ring=ring, has_fitted_load=has_fitted_load), run)
 
 
 def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool) -> LawScore:

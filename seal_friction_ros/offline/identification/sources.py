@@ -9,6 +9,7 @@ import math
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -36,6 +37,8 @@ from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_sample
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.identification.load_numbers import load_text
+from seal_friction_ros.offline.work.executor import Workers, run_all
+from seal_friction_ros.offline.work.places import Place, as_path
 from seal_friction_ros.offline.work.progress import progress
 
 LARGEST_ACCELERATION = 1.0  # [m/s2] limit with known inertia (our choice)
@@ -125,18 +128,26 @@ class Sources:
         return replace(self, each=each)
 
 
-def read_sources(paths: Sequence[Path], options: SourceOptions) -> Sources:
+def read_sources(paths: Sequence[Place], options: SourceOptions, workers: Workers = 1) -> Sources:
     """Read every source: bags and logs, or tables and data sheets.
 
+    Args:
+        paths: The sources, by path or URL.
+        options: How.
+        workers: Sources at a time, or a cluster, whose workers read them.
+
     Raises:
-        ValueError: A source cannot be read, is of no known kind, or does not fit the others; one line that names it.
+        ValueError: A source cannot be read, is of no known kind, or does not fit the others; one line that names it. Or
+            the cluster cannot be used.
     """
     if not paths:
         raise ValueError('no source: give a bag, a log or a table')
     twice = sorted({str(path) for path in paths if list(paths).count(path) > 1})
     if twice:
         raise ValueError(f'{twice[0]} is named twice')
-    each = tuple(_read(path, options) for path in paths)
+    calls = [partial(_read_place, path, options) for path in paths]
+    is_here = workers == 1 or (len(paths) == 1 and isinstance(workers, int))
+    each = tuple(call() for call in calls) if is_here else tuple(run_all('read', calls, workers))
     digests = [source.file.sha256 for source in each]
     same = next(((i, digests.index(d)) for i, d in enumerate(digests) if digests.index(d) < i), None)
     if same is not None:
@@ -164,6 +175,11 @@ def _chambers(each: Sequence[Source], options: SourceOptions) -> tuple[tuple[str
     found = tuple(under_pressure) or ('a',)
     assumed = 'one seal for each chamber under pressure' if logs else 'one seal with all friction'
     return found, [f'{assumed} is assumed: {",".join(found)}; give others with --seal-chambers']
+
+
+def _read_place(place: Place, options: SourceOptions) -> Source:
+    with as_path(place) as path:
+        return _read(path, options)
 
 
 def _read(path: Path, options: SourceOptions) -> Source:

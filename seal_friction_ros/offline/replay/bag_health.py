@@ -29,6 +29,7 @@ from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
 from seal_friction_ros.offline.work.outcome import Outcome
+from seal_friction_ros.offline.work.places import Place
 
 REST = 0.5  # [s] our choice: after a rest of this length a start counts as a breakaway
 START = 0.1  # [s] our choice: the friction of a start is the largest within this time
@@ -100,7 +101,7 @@ def bag_health(
 
 
 def health_of_bags(
-    bags: Sequence[Path],
+    bags: Sequence[Place],
     namespace: str = '',
     override: Configuration | None = None,
     workers: Workers = 1,

@@ -22,6 +22,7 @@ from seal_friction_ros.offline.replay.parallel_replay import verify
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import Kept, Values
 from seal_friction_ros.offline.work.outcome import Outcome
+from seal_friction_ros.offline.work.places import Place
 
 LEVEL = 1e6  # [Pa] width of a pressure level (our choice)
 _LARGEST_PRESSURE = 1e9  # [Pa] our choice: a larger one is no pressure
@@ -174,7 +175,7 @@ _COMPILED_BAGS = 20  # bags whose laws are compiled before the work (our choice)
 
 
 def summaries(
-    bags: Sequence[Path], namespace: str, override: Configuration | None, workers: Workers, kept: Kept
+    bags: Sequence[Place], namespace: str, override: Configuration | None, workers: Workers, kept: Kept
 ) -> list[Outcome[BagSummary]]:
     """`bag_summary` of each bag, in their order; arguments as of `try_bags`.
 

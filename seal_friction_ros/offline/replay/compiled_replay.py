@@ -36,6 +36,7 @@ from seal_friction_ros.offline.bags.block_reader import KindOf, read_in_bulk
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.bags.topics import TYPES, Topics, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
+from seal_friction_ros.offline.work.places import Place
 
 _RECORDED = {ESTIMATE_TYPE: Kind.ESTIMATE, FEEDFORWARD_TYPE: Kind.FEEDFORWARD}
 
@@ -102,17 +103,18 @@ def compile_now(configurations: Iterable[Configuration] = ()) -> None:
     block_reader.compile_now()
 
 
-def first_configurations(bags: Sequence[Path], namespace: str, override: Configuration | None) -> list[Configuration]:
+def first_configurations(bags: Sequence[Place], namespace: str, override: Configuration | None) -> list[Configuration]:
     """What each bag is replayed with at its beginning; the default where a bag has no configuration or is unreadable.
 
     Only for `compile_now`: the replay itself reports what is wrong with a bag.
 
     Args:
-        bags: The bags.
+        bags: The bags; a URL is not read.
         namespace: Use only topics below it.
         override: Configuration instead of the recorded ones.
     """
-    return [override] if override else [_first_configuration(bag, namespace) for bag in bags]
+    paths = [bag for bag in bags if isinstance(bag, Path)]
+    return [override] if override else [_first_configuration(bag, namespace) for bag in paths]
 
 
 def _first_configuration(bag: Path, namespace: str) -> Configuration:

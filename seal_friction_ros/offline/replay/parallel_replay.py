@@ -17,6 +17,7 @@ from seal_friction_ros.offline.replay.replay import count_messages, replay
 from seal_friction_ros.offline.work.executor import Workers, nothing
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
 from seal_friction_ros.offline.work.outcome import Outcome
+from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
 
 BULK_FROM = 500_000
@@ -48,7 +49,7 @@ def verify(
 
 
 def replay_many(
-    bags: Sequence[Path],
+    bags: Sequence[Place],
     override: Configuration | None = None,
     namespace: str = '',
     workers: Workers = 1,
@@ -77,7 +78,7 @@ def _verified(bag: Path, namespace: str, override: Configuration | None, *, bulk
     return asdict(verify(bag, override, namespace, bulk_from=bulk_from))
 
 
-def _compile(bags: Sequence[Path], namespace: str, override: Configuration | None) -> None:
+def _compile(bags: Sequence[Place], namespace: str, override: Configuration | None) -> None:
     from seal_friction_ros.offline.replay.compiled_replay import (  # noqa: PLC0415  loads the compiler
         compile_now,
         first_configurations,
@@ -86,7 +87,9 @@ def _compile(bags: Sequence[Path], namespace: str, override: Configuration | Non
     compile_now(first_configurations(bags, namespace, override))
 
 
-def _size(bag: Path) -> int:
-    """Size of the files of a bag [bytes]; 0 if there is none."""
+def _size(bag: Place) -> int:
+    """Size of the files of a bag [bytes]; 0 if there is none, and of a URL, which is not here."""
+    if isinstance(bag, str):
+        return 0
     files = bag.glob('*') if bag.is_dir() else [bag]
     return sum(file.stat().st_size for file in files if file.is_file())

@@ -18,6 +18,7 @@ from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.page import BAD, GOOD, LOOK, ReportSummary, head_of, script, write_page
 from seal_friction_ros.offline.work.outcome import Outcome
+from seal_friction_ros.offline.work.places import Place
 
 DRIFT = 0.1  # [-] change of the scale within a bag: LOOK above, if it is beyond its 95 % band (our choice)
 DISAGREEING = 0.05  # [-] share of the sliding samples whose friction disagrees with the model: LOOK above (our choice)
@@ -27,7 +28,7 @@ HOURS_A_DAY = 24.0
 class FleetBag(NamedTuple):
     """A bag of a fleet, and what to think of it."""
 
-    path: Path
+    path: Place
     level: str  # GOOD, LOOK or BAD
     why: str  # empty if GOOD
     summary: BagSummary | None  # None if the recording is damaged
@@ -44,7 +45,7 @@ class Rig(NamedTuple):
     disagreeing: float  # [-] mean over its bags
 
 
-def judged(path: Path, outcome: Outcome[BagSummary]) -> FleetBag:
+def judged(path: Place, outcome: Outcome[BagSummary]) -> FleetBag:
     """A bag with its level and the reasons for it."""
     found = outcome.result
     if found is None:
@@ -69,7 +70,9 @@ def rigs_of(bags: Sequence[FleetBag]) -> list[Rig]:
     """The folders of the bags, sorted by name."""
     folders: dict[str, list[FleetBag]] = {}
     for bag in bags:
-        folders.setdefault(str(bag.path.parent), []).append(bag)
+        path = bag.path
+        folder = str(path.parent) if isinstance(path, Path) else path.rpartition('/')[0]
+        folders.setdefault(folder, []).append(bag)
     return [_rig(name, of_rig) for name, of_rig in sorted(folders.items())]
 
 
@@ -141,7 +144,7 @@ def _worst_names(bags: Sequence[FleetBag]) -> tuple[str, str]:
     for level in (BAD, LOOK):
         for bag in bags:
             if bag.level == level:
-                return bag.path.name, bag.why
+                return Path(bag.path).name, bag.why
     return '', ''
 
 
@@ -186,9 +189,11 @@ def _cell(value: Any, show: Any) -> tuple[str, Any]:
     return show(value), key
 
 
-def _page_of(bag: Path, out: Path) -> str:
+def _page_of(bag: Place, out: Path) -> str:
     """Link to the page of a bag, relative to ``out``; empty if there is none beside the bag or beside ``out``."""
-    for page in (bag.parent / f'{bag.name}.html', out.parent / f'{bag.name}.html'):
+    name = f'{Path(bag).name}.html'
+    beside = [bag.parent / name] if isinstance(bag, Path) else []
+    for page in (*beside, out.parent / name):
         if page.is_file() and page.resolve() != out.resolve():
             return quote(os.path.relpath(page.resolve(), out.parent.resolve()), errors='surrogateescape')
     return ''

@@ -7,6 +7,7 @@ version of the package never finds an old result. Where parts may fail one by on
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ import numpy as np
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.executor import Workers, nothing, run_all, try_all
 from seal_friction_ros.offline.work.outcome import CRASHED, Outcome
+from seal_friction_ros.offline.work.places import Place, url_digest
 from seal_friction_ros.offline.work.versions import versions
 
 Values = Mapping[str, Any]
@@ -52,13 +54,24 @@ def part_key(kind: str, inputs: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def input_digest(path: Path) -> str:
-    """Digest of the content of a file, or of the files in a folder with their names.
+def content_of(value: Any) -> Any:
+    """A value as `part_key` takes it: records and sequences as lists, an array by its shape and digest."""
+    if isinstance(value, np.ndarray):
+        return [list(value.shape), value.dtype.str, hashlib.sha256(value.tobytes()).hexdigest()]
+    if is_dataclass(value):
+        return [type(value).__name__, *(content_of(getattr(value, one.name)) for one in fields(value) if one.init)]
+    return [content_of(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def input_digest(path: Place) -> str:
+    """Digest of the content of a file, or of the files in a folder with their names; of a URL its `url_digest`.
 
     Raises:
-        ValueError: It is neither a file nor a folder.
+        ValueError: It is neither a file nor a folder, or a URL that cannot be read.
         OSError: It cannot be read.
     """
+    if isinstance(path, str):
+        return url_digest(path)
     if not path.is_dir() and not path.is_file():  # a device may have no end
         raise ValueError(f'{path}: neither a file nor a folder')
     digest = hashlib.sha256()
@@ -115,7 +128,7 @@ def try_parts(
     return [outcomes[number] for number in range(len(parts))]
 
 
-def input_digests(paths: Sequence[Path], workers: Workers) -> list[Outcome[str]]:
+def input_digests(paths: Sequence[Place], workers: Workers) -> list[Outcome[str]]:
     """`input_digest` of each path."""
     return try_all(f'digests of {len(paths)} inputs', [partial(input_digest, path) for path in paths], workers)
 

@@ -9,6 +9,8 @@ from harness.identify_run import THESIS, Run
 from paths import ROOT
 
 from seal_friction_ros.offline.bags.import_log import Samples, write_samples
+from seal_friction_ros.offline.identification.sources import SourceOptions, read_sources
+from seal_friction_ros.offline.work.finished_parts import content_of
 
 # --- garbage ---
 
@@ -217,3 +219,17 @@ def test_a_table_with_the_dwell_gives_a_breakaway_that_grows_with_it_and_says_so
     held = 0.1 + 0.12 * np.log10(1.0 + breakaway['dwell'])
     both = run.document['stiction_ratio'] + run.document['stiction'] / 11.0  # [-] of the mean friction of the seal
     assert both == pytest.approx(held, rel=0.15)
+
+
+def test_sources_are_read_by_workers_as_by_one_and_the_first_error_counts(tmp_path):
+    paths = []
+    for number in range(3):
+        paths.append(tmp_path / f'{number}.csv')
+        paths[-1].write_text(f'pressure_bar,friction_N\n1,{2 + number}\n5,{7 + number}\n')
+    one, several = (read_sources(paths, SourceOptions(), workers) for workers in (1, 3))
+    assert content_of(one) == content_of(several)
+    for path in paths[1:]:
+        path.write_text(f'pressure_bar,friction_N\n1,{path.stem}x\n')
+    for workers in (1, 3):
+        with pytest.raises(ValueError, match='1x'):
+            read_sources(paths, SourceOptions(), workers)

@@ -15,6 +15,8 @@ from harness.dask_cluster import ENVIRONMENT, DaskCluster, begun, dask_cluster, 
 from harness.example_bags import default_configuration, write_inputs, write_recorded
 from paths import ROOT
 
+from seal_friction_ros.offline.commands.main import main
+
 pytest.importorskip('distributed')
 COMMAND = [sys.executable, '-m', 'seal_friction_ros']
 CASE = """name: tiny
@@ -23,6 +25,13 @@ numerics: {cells: 32, time_step: 50.0e-3}
 study: {solid_shear_stresses: [1.0e+6, 2.0e+6]}
 map: {velocity_min: 2.0e-2, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1.0e+5, pressures: 2}
 unknown: {seal.solid_shear_stress: {factor: 2.0}}
+"""
+RIG = """name: rig
+time: {column: 0, unit: ms}
+chamber_a: {terms: [{column: 1, unit: bar}]}
+chamber_b: {constant: 0.0}
+force_sum: {terms: [{column: 2, unit: N}]}
+velocity: {terms: [{column: 3, unit: mm/s}]}
 """
 
 
@@ -109,6 +118,35 @@ def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
         assert found[0] == found[1]
         assert found[0][0][0] == 2
         assert found[0][0][2].count('seal_friction: bags/garbage.mcap: ') == 1
+
+
+def test_a_url_is_read_where_the_worker_is(cluster, tmp_path):
+    bag = write_recorded(tmp_path)
+    here, there = f'local://{bag}', 'memory://only/the/command/has/this'
+    words = ['replay', here, there, '--verify', '--scheduler', cluster.address]
+    program = 'import fsspec, sys; from seal_friction_ros.offline.commands.main import main; '
+    program += "fsspec.filesystem('memory').pipe_file('/only/the/command/has/this/metadata.yaml', b''); "
+    code, out, errors = done(sys.executable, '-c', f'{program}sys.exit(main(sys.argv[1:]))', *words)
+    assert (code, out) == (2, f'{here}: 300 estimates and 200 feed-forwards, identical to the byte\n')
+    assert last_line(errors) == f'seal_friction: {there}: there is no such file or bag\n'
+
+
+def test_logs_are_imported_to_the_same_bytes_on_a_cluster(cluster, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for number in range(3):
+        rows = [f'{20 * row},{2 + number},{row % 7},{row % 5 - 2}\n' for row in range(50)]
+        (tmp_path / f'log {number}.csv').write_text(''.join(rows))
+    (tmp_path / 'bad.csv').write_text('no numbers\n')
+    (tmp_path / 'rig.yaml').write_text(RIG)
+    logs, found = ['log 0.csv', 'bad.csv', 'log 1.csv', 'log 2.csv'], []
+    for workers in (['--workers', '1'], ['--scheduler', cluster.address]):
+        said = (main(['import', 'log', *logs, '--rig', './rig.yaml', '--out', 'bags', *workers]), capsys.readouterr())
+        bags = (tmp_path / 'bags').rename(tmp_path / f'bags {len(found)}')
+        found.append((said, {path.relative_to(bags): path.read_bytes() for path in bags.rglob('*') if path.is_file()}))
+    assert found[0] == found[1]
+    (code, texts), files = found[0]
+    assert (code, texts.err.count('seal_friction: bad.csv: '), len(files)) == (2, 1, 6)
+    assert not list(tmp_path.glob('.*'))
 
 
 @pytest.mark.parametrize('words', [pytest.param(['study'], marks=pytest.mark.long), ['map', '--uncertain', '2']])

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.offline.work import finished_parts
-from seal_friction_ros.offline.work.finished_parts import Part, part_key, run_parts
+from seal_friction_ros.offline.work.finished_parts import Part, content_of, part_key, run_parts
+from seal_friction_ros.offline.work.outcome import Outcome
 
 NAMES = ('number', 'array')
 
@@ -73,6 +74,15 @@ def test_the_key_follows_kind_inputs_and_code(monkeypatch):
     monkeypatch.setattr(finished_parts, 'versions', lambda: {'seal_friction_ros': 'another version'})
     keys.append(part_key('a', {'x': 1.0, 'y': [2.0]}))
     assert len(set(keys)) == len(keys)
+
+
+def test_the_content_of_records_and_arrays_makes_keys():
+    numbers = np.arange(6.0)
+    known = content_of(numbers)
+    assert known == content_of(numbers[::-1][::-1])
+    for other in (numbers + 1e-9, numbers[::2], numbers.reshape(2, 3), numbers.astype(np.float32), -numbers):
+        assert content_of(other) != known
+    assert content_of([Outcome(numbers), None, 1.5, 'a']) == [[known, ''], None, 1.5, 'a']
 
 
 def test_what_is_prepared_is_there_for_all_and_only_if_a_part_is_missing(tmp_path):

@@ -1,0 +1,155 @@
+"""Inputs of a command: paths, and URLs of fsspec, which are copied to the machine that reads them while it reads.
+
+fsspec is loaded by the first URL, never before. What speaks a protocol is the user's: ``s3://`` needs the package s3fs
+where the bag is read, and its credentials there.
+"""
+
+import hashlib
+import json
+import re
+import signal
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FrameType
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+from seal_friction_ros.offline.work.outcome import error_text
+from seal_friction_ros.packages import MissingPackageError, needed
+
+Place = Path | str
+"""path of a file or folder, or a URL"""
+
+_URL = re.compile(r'[A-Za-z][A-Za-z0-9+.:-]*://.+')
+_VERSION = ('etag', 'md5', 'md5hash', 'contentmd5', 'crc32c', 'checksum', 'mtime', 'lastmodified', 'modified')
+"""entries of a listing that change with a file, in lower case letters alone"""
+
+
+def place_of(text: str) -> Place:
+    """What a text names: a URL, or a path; ``file://`` is a path.
+
+    Raises:
+        ValueError: It is a ``file://`` of another machine.
+    """
+    if not _URL.fullmatch(text):
+        return Path(text)
+    parts = urlsplit(text)
+    if parts.scheme != 'file':
+        return text
+    if parts.netloc not in ('', 'localhost'):
+        raise ValueError(f'{text} is a file of machine {parts.netloc}: write file:///PATH, as this machine sees it')
+    return Path(unquote(parts.path))
+
+
+def name_of(place: Place) -> str:
+    """Name of a folder, or of a file without its suffix; the last part of a URL always is without."""
+    if isinstance(place, str):
+        return Path(place.rstrip('/').rpartition('/')[2]).stem
+    path = place.resolve()
+    return path.name if path.is_dir() else path.stem
+
+
+@contextmanager
+def as_path(place: Place) -> Iterator[Path]:
+    """Path of a file or bag, in the block; of a URL a copy, which is removed after the block.
+
+    Raises:
+        MissingPackageError: fsspec is not installed.
+        ValueError: The URL cannot be read; one line that names it. Errors of the block name it, too, and not the copy.
+    """
+    if isinstance(place, Path):
+        yield place
+        return
+    with _ended_in_order(), TemporaryDirectory(prefix='seal_friction_') as folder:
+        path = _copied(place, Path(folder))
+        try:
+            yield path
+        except (ValueError, OSError) as error:
+            raise ValueError(error_text(error).replace(str(path), place)) from None
+
+
+def url_digest(url: str) -> str:
+    """Digest of what tells that the files of a URL have changed: as their store lists them, else their content.
+
+    Raises:
+        MissingPackageError: fsspec is not installed.
+        ValueError: The URL cannot be read; one line that names it.
+    """
+    with _as_one_line(url):
+        system, _, files = _listed(url)
+        versions = [[name, _version(details) or _content(system, name)] for name, details in sorted(files.items())]
+    return hashlib.sha256(json.dumps(versions).encode()).hexdigest()
+
+
+def _listed(url: str) -> tuple[Any, str, Mapping[str, Mapping[str, Any]]]:
+    """File system, place in it, and details of the file, or of each file of the bag, there."""
+    system, place = needed('fsspec.core').url_to_fs(url)
+    files = system.find(place, maxdepth=1, detail=True)
+    if not files:
+        raise FileNotFoundError
+    if not system.isfile(place) and not any(name.endswith('/metadata.yaml') for name in files):
+        raise ValueError('not a rosbag2 bag: there is no metadata.yaml')
+    return system, place, files
+
+
+def _version(details: Mapping[str, Any]) -> str:
+    """Version of a file as its store lists it; empty if the store does not tell."""
+    known = {re.sub('[^a-z0-9]', '', name.lower()): value for name, value in details.items() if value is not None}
+    found = [f'{name} {known[name]}' for name in _VERSION if name in known]
+    return ' '.join([*found, f'size {known.get("size")}']) if found else ''
+
+
+def _content(system: Any, name: str) -> str:
+    with system.open(name, 'rb') as file:
+        return hashlib.file_digest(file, 'sha256').hexdigest()
+
+
+def _copied(url: str, folder: Path) -> Path:
+    """Copy of the file, or of the files of the bag, that a URL names."""
+    with _as_one_line(url):
+        system, place, files = _listed(url)
+        target = folder / (Path(place).name or 'bag')
+        if system.isfile(place):
+            system.get_file(place, str(target))
+            return target
+        target.mkdir()
+        for name in files:
+            system.get_file(name, str(target / Path(name).name))
+    return target
+
+
+@contextmanager
+def _as_one_line(url: str) -> Iterator[None]:
+    """Make one line of whatever a file system raises."""
+    try:
+        yield
+    except MissingPackageError:
+        raise
+    except FileNotFoundError:
+        raise ValueError(f'{url}: there is no such file or bag') from None
+    except Exception as error:  # noqa: BLE001  of a plugin of the user
+        reason = (str(error).splitlines() or [''])[0] or type(error).__name__
+        raise ValueError(f'{url}: cannot be read: {reason}') from None
+
+
+@contextmanager
+def _ended_in_order() -> Iterator[None]:
+    """Let a signal that ends this process end the block first, so that no copy is left."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signals = [one for one in (signal.SIGTERM, signal.SIGINT) if signal.getsignal(one) is signal.SIG_DFL]
+    try:
+        for one in signals:
+            signal.signal(one, _end)
+        yield
+    finally:
+        for one in signals:
+            signal.signal(one, signal.SIG_DFL)
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    raise SystemExit(128 + number)
