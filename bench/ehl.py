@@ -61,6 +61,9 @@ def times(case: LubricationCase, cells: Sequence[int], steps: Sequence[float], c
 
 
 def _exponent(times: Sequence[float], sizes: Sequence[float]) -> float:
+    """Slope of log time over log size; NaN of one size."""
+    if sizes[0] == sizes[-1]:
+        return math.nan
     return math.log(times[-1] / times[0]) / math.log(sizes[-1] / sizes[0])
 
 

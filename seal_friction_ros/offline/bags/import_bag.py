@@ -52,7 +52,7 @@ class ActuatorImport(NamedTuple):
     remarks: tuple[str, ...]  # what was missing or looks wrong
 
 
-class Mapping(NamedTuple):
+class MappingFile(NamedTuple):
     """A mapping file with the configurations of its actuators."""
 
     name: str  # as given
@@ -60,14 +60,14 @@ class Mapping(NamedTuple):
     configurations: dict[str, Configuration]
 
 
-def read_mapping(name: str) -> Mapping:
+def read_mapping(name: str) -> MappingFile:
     """Mapping file: a path, or the name of one in ``config/machines``.
 
     Raises:
         ValueError: It, or a seal file in it, cannot be read or is invalid; one line that names file and actuator.
     """
     file = read_machine(name)
-    return Mapping(name, file, machine_configurations(file, name))
+    return MappingFile(name, file, machine_configurations(file, name))
 
 
 def import_bag(bag: Path, mapping: str, out: Path, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
@@ -86,7 +86,7 @@ def import_bag(bag: Path, mapping: str, out: Path, also: Collection[str] = ()) -
     return convert_bag(bag, out, read_mapping(mapping), also)
 
 
-def convert_bag(bag: Path, out: Path, mapping: Mapping, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
+def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
     """`import_bag` with a mapping file that is read already.
 
     Raises:
