@@ -173,6 +173,10 @@ class LubricationNumerics(CheckedParameters):
     cells: int = parameter(226, unit='1', lower=32, upper=4000, description='Cells of the film (paper: 226 nodes).')
     film_width: float = parameter(0.6e-3, unit='m', lower=1e-5, upper=0.1, description='Length of the film region.')
     time_step: float = parameter(5e-4, unit='s', lower=1e-7, upper=0.1, description='Before any halving.')
+    steps_at_once: int = parameter(
+        1, unit='1', lower=1, upper=16,
+        description='So many time steps in one, while the seal does not touch the rounding of a control edge.',
+    )  # fmt: skip
     section_elements: int = parameter(
         48, unit='1', lower=8, upper=256, description='Finite elements along the film, if seal.body is finite_elements.'
     )

@@ -379,7 +379,8 @@ def run_transient(
 ) -> TransientResult:
     """Run a case through its motion, or through another.
 
-    A step that does not converge is repeated in two halves, up to 10 times.
+    A step that does not converge is repeated in two halves, up to 10 times. Of steps that were taken at once
+    (``numerics.steps_at_once``) those in between are interpolated.
 
     Args:
         case: The case.
@@ -399,12 +400,18 @@ def run_transient(
             'shorter, or numerics.time_step longer'
         )
     moment = initial_state(model, moved.position(0.0))
-    rows: list[tuple[float, ...]] = []
-    profiles: list[tuple[FloatArray, ...]] = []
+    rows: list[FloatArray] = []
+    profiles: list[FloatArray] = []
     retried = iterations = 0
     worst = 0.0
-    for i in range(1, steps + 1):
-        goals = [moved.duration * i / steps]
+    while len(rows) < steps:
+        first = len(rows)
+        times = [
+            moved.duration * i / steps for i in range(first + 1, min(first + case.numerics.steps_at_once, steps) + 1)
+        ]
+        if first == 0 or not _may_be_one_step(model, moment, [moved.position(time) for time in times]):
+            times = times[:1]
+        goals = times[-1:]
         while goals:
             goal = goals[-1]
             try:
@@ -420,17 +427,40 @@ def run_transient(
             moment = after
             iterations += newton
             worst = max(worst, defect)
-        rows.append((moment.time, moment.position, velocity, moment.lag, *forces))
+        row = np.array([moment.time, moment.position, velocity, moment.lag, *forces])
         solid_pressure, _ = asperity_pressure(moment.state.gap, model.contact.asperities)
-        profiles.append((moment.state.gap, moment.state.pressure, solid_pressure, moment.state.saturation))
+        profile = np.array([moment.state.gap, moment.state.pressure, solid_pressure, moment.state.saturation])
+        for k in range(1, len(times)):
+            share = k / len(times)
+            rows.append(rows[first - 1] + share * (row - rows[first - 1]))
+            profiles.append(profiles[first - 1] + share * (profile - profiles[first - 1]))
+        rows.append(row)
+        profiles.append(profile)
         if on_step:
-            on_step(1)
+            on_step(len(times))
     time, position, velocities, lag, friction, solid, fluid, edge, sliding = np.array(rows).T
     gap, film, contact, saturation = (np.array(values) for values in zip(*profiles, strict=True))
     return TransientResult(
         case, time, position, velocities, sliding, friction, solid, fluid, edge, lag, model.place,
         gap, film, contact, saturation, retried, iterations, worst,
     )  # fmt: skip
+
+
+def _may_be_one_step(model: LubricationModel, moment: TransientState, positions: list[float]) -> bool:
+    """Whether the spool may go on to the last of some ``positions`` [m] at once.
+
+    It has to go on in one direction, without the film on the rounding of a control edge on the way.
+    """
+    ways = np.diff([moment.position, *positions])
+    if not (np.all(ways > 0.0) or np.all(ways < 0.0)):
+        return False
+    edge = model.case.control_edge
+    if edge is None:
+        return True
+    places = moment.contact_place, positions[-1] - moment.lag
+    low, high = min(places) + model.place[0], max(places) + model.place[-1]
+    begin, end = edge.position - 2.0 * edge.rounding, edge.position + edge.depth / edge.slope + 2.0 * edge.rounding
+    return bool(high < begin or low > end)
 
 
 def with_solid_shear_stress(case: LubricationCase, solid_shear_stress: float) -> LubricationCase:

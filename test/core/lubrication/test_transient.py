@@ -252,6 +252,20 @@ def test_friction_is_of_nearly_second_order_in_the_time_step():
     assert coarse < 1e-4  # [N] of 0.65 N
 
 
+def test_steps_at_once_away_from_the_edge_leave_the_findings_as_they_are():
+    once = dataclasses.replace(EDGE, motion=ConstantAcceleration(distance=2.7e-3, cycles=1))
+    runs = [
+        run_transient(dataclasses.replace(once, numerics=dataclasses.replace(EDGE.numerics, time_step=4e-4, **more)))
+        for more in ({}, {'steps_at_once': 4})
+    ]
+    assert runs[1].newton_iterations < 0.7 * runs[0].newton_iterations
+    assert runs[1].time == pytest.approx(runs[0].time, rel=1e-12)
+    assert runs[1].position == pytest.approx(runs[0].position, abs=1e-6)
+    plain, found = (findings(run)._asdict() for run in runs)
+    for field in ('friction', 'edge_peak', 'edge_assist', 'after_edge', 'solid_share'):
+        assert found[field] == pytest.approx(plain[field], rel=0.01), field
+
+
 @pytest.mark.long
 def test_the_error_of_the_peak_at_the_control_edge_holds_a_finer_one():
     def with_step(step):
