@@ -449,7 +449,8 @@ def run_transient(
 def _may_be_one_step(model: LubricationModel, moment: TransientState, positions: list[float]) -> bool:
     """Whether the spool may go on to the last of some ``positions`` [m] at once.
 
-    It has to go on in one direction, without the film on the rounding of a control edge on the way.
+    It has to go on in one direction, without the loaded part of the seal (beyond 1 % of the highest pressure, our
+    choice) on a rounded corner of the control edge on the way.
     """
     ways = np.diff([moment.position, *positions])
     if not (np.all(ways > 0.0) or np.all(ways < 0.0)):
@@ -457,8 +458,11 @@ def _may_be_one_step(model: LubricationModel, moment: TransientState, positions:
     edge = model.case.control_edge
     if edge is None:
         return True
+    solid, _ = asperity_pressure(moment.state.gap, model.contact.asperities)
+    load = moment.state.pressure + solid
+    loaded = model.place[load > 0.01 * load.max()]
     places = moment.contact_place, positions[-1] - moment.lag
-    low, high = min(places) + model.place[0], max(places) + model.place[-1]
+    low, high = min(places) + loaded[0], max(places) + loaded[-1]
     begin, end = edge.position - 2.0 * edge.rounding, edge.position + edge.depth / edge.slope + 2.0 * edge.rounding
     return bool(high < begin or low > end)
 
