@@ -57,6 +57,21 @@ def test_without_a_folder_it_works_as_well(tmp_path):
     assert hits == 0
 
 
+def test_damaged_files_are_as_good_as_none(tmp_path):
+    value, _ = result(started(tmp_path))
+    for path in (*tmp_path.rglob('*.nbi'), *tmp_path.rglob('*.nbc')):
+        path.write_bytes(path.read_bytes()[:40])
+    assert result(started(tmp_path)) == [value, 0]
+
+
+def test_a_folder_that_is_gone_is_as_good_as_none(tmp_path):
+    gone = "import os, pathlib, shutil; place = pathlib.Path(os.environ['NUMBA_CACHE_DIR']); shutil.rmtree(place); "
+    program = PROGRAM.replace('grease =', f'{gone}place.write_text(""); grease =')
+    value, hits = result(started(tmp_path, program))
+    assert value > 0.0
+    assert hits == 0
+
+
 def test_processes_that_compile_at_once_mix_nothing_up(tmp_path):
     """Each for arguments of other types: numba alone may give the files of both the same name."""
     kinds = ['00000', '00001']

@@ -69,12 +69,19 @@ def compiled(function: Function) -> Function:
     config: Any = numba.config
     made: Any = numba.njit(error_model='numpy', cache=bool(config.CACHE_DIR))(_with_unrolled_loops(function))
     if config.CACHE_DIR and not config.DISABLE_JIT:
-        made.compile = partial(_compile_alone, f'{function.__module__}.{function.__qualname__}', made.compile)
+        made.compile = partial(_compile_alone, made, made.compile, f'{function.__module__}.{function.__qualname__}')
     return cast(Function, made)
 
 
-def _compile_alone(name: str, compile_function: Callable[[Any], Any], signature: Any) -> Any:
-    with hooks().alone_with(name):
+def _compile_alone(made: Any, compile_function: Callable[[Any], Any], name: str, signature: Any) -> Any:
+    """Compile, or load from disk, while no other process does. Without the disk if anything is wrong there."""
+    try:
+        with hooks().alone_with(name):
+            return compile_function(signature)
+    except Exception:  # noqa: BLE001  of damaged files and full disks; what the compiler has to say comes again
+        from numba.core.caching import NullCache
+
+        made._cache = NullCache()
         return compile_function(signature)
 
 
