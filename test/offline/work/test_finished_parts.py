@@ -100,5 +100,5 @@ def test_what_is_prepared_is_there_for_all_and_only_if_a_part_is_missing(tmp_pat
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
     (tmp_path / 'work').write_text('a file')
-    with pytest.raises(ValueError, match='work: File exists'):
+    with pytest.raises(ValueError, match='work: cannot be the work folder: File exists: name another one'):
         run(tmp_path, 1.0)
