@@ -105,6 +105,20 @@ def test_a_law_is_found_again_from_what_it_made_with_its_offset(name):
     assert {p: found.values[p] for p in found.values} == pytest.approx({p: truth[p] for p in found.values}, rel=1e-3)
 
 
+def test_a_linear_law_and_the_offset_are_the_joint_least_squares_solution():
+    """With the directions unbalanced over the pressures, so that the weights of the readings decide."""
+    law, readings = LAWS['pressure_power_law_1'], noted(scatter=0.1, offset=20.0)
+    readings = readings.taken((readings.at.direction > 0.0) | (readings.level % 3 > 0))
+    names = [parameter.name for parameter in law.parameters]
+    terms = [law.friction(readings.at, law.named(unit)) for unit in np.eye(len(names))]
+    columns = np.column_stack([*terms, readings.at.direction]) / readings.scale[:, None]
+    measured = readings.at.direction * readings.force / readings.scale
+    *values, offset = np.linalg.lstsq(columns, measured)[0]
+    found = fit(law, readings)
+    assert [found.values[name] for name in names] == pytest.approx(values, rel=1e-9)
+    assert found.offsets == pytest.approx([offset], rel=1e-9)
+
+
 def test_a_term_that_is_not_there_is_exactly_nothing():
     falling = {
         CONSTANT: 200.0,
