@@ -60,6 +60,7 @@ def make_bag(folder: Path, seconds: float) -> Path:
 
 def _read(_: Path) -> Callable[[Path], object]:
     def read(bag: Path) -> None:
+        """Read every byte."""
         for file in files_of(bag):
             with file.open('rb', buffering=0) as content:
                 while content.read(1 << 20):

@@ -1,8 +1,8 @@
 """Compiled code is kept on disk, so that a command compiles once for each version and not at each start.
 
 It is in ``$XDG_CACHE_HOME/seal_friction_ros``, by default ``~/.cache/seal_friction_ros``, in a folder whose name is a
-hash of the sources: a change compiles anew. ``NUMBA_CACHE_DIR`` names another folder. Where none can be written,
-nothing is kept.
+hash of path, size and time of the sources: a change compiles anew. ``NUMBA_CACHE_DIR`` names another folder. Where none
+can be written, nothing is kept.
 """
 
 import fcntl

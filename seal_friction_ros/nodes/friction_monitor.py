@@ -257,6 +257,7 @@ def main() -> int:
     servers: list[MonitorServer] = []
 
     def start(node: FrictionMonitor) -> bool:
+        """Serve the page; False, with one line, if the port is taken."""
         try:
             server = MonitorServer(node.view, arguments.port)
         except ValueError as error:

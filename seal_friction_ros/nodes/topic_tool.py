@@ -127,6 +127,7 @@ class Tool:
         shown = 0
 
         def take(message: Any) -> None:
+            """Show a message, unless enough were shown."""
             nonlocal shown
             if count is None or shown < count:
                 shown += 1

@@ -189,8 +189,8 @@ def test_with_the_estimator_the_loop_closes_and_what_was_recorded_verifies(tmp_p
     places = np.arange(len(gap))
     steady = places - np.maximum.accumulate(np.where(gap, places, 0)) >= settled
     uncertain = (run.status & int(Status.MOTION_UNCERTAIN)) != 0
-    near_rest = 30  # samples of a reversal that are uncertain, however few are steady on a busy machine
-    assert np.count_nonzero(uncertain & steady) <= 0.3 * np.count_nonzero(steady) + near_rest
+    if np.count_nonzero(steady) > settled:  # a busy machine leaves a few, which may all be of one reversal
+        assert np.count_nonzero(uncertain & steady) <= 0.3 * np.count_nonzero(steady)
     assert float(abs(run.feedforward_force[200:]).max()) == pytest.approx(0.9 * run.coulomb_friction.max(), rel=0.1)
 
 

@@ -4,9 +4,7 @@ import pytest
 from system.elastic_seals import PLANTS, identified, result
 
 
-@pytest.mark.parametrize(
-    ('plant', 'less'), [pytest.param('elements, 4e5 N/m', 0.80, marks=pytest.mark.long), ('LuGre, 3e5 N/m', 0.65)]
-)
+@pytest.mark.parametrize(('plant', 'less'), [('elements, 4e5 N/m', 0.80), ('LuGre, 3e5 N/m', 0.65)])
 @pytest.mark.long  # `core/tuning/test_other_plants.py` has a shorter form
 def test_the_elastic_feed_forward_reduces_the_tracking_error(plant, less):
     found = result(PLANTS[plant], identified(PLANTS[plant]).presliding)

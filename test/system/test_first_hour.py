@@ -71,17 +71,17 @@ def tracking_error(bag: Path) -> float:
     return float(np.median([np.sqrt(np.mean(error[second == k] ** 2)) for k in range(int(second[-1]))]))
 
 
-def check_result(folder: Path, terminals: Terminals) -> None:
-    """The mapping is short, the loop tracks, and every recording replays to the byte."""
+def share_left(folder: Path, terminals: Terminals) -> float:
+    """Share of the tracking error that is left, after a check that the mapping is short and recordings replay."""
     lines = (folder / 'build' / 'robot.yaml').read_text().splitlines()
     assert len([line for line in lines if not line.startswith('#')]) <= MOST_LINES
     terminals.run('.venv/bin/seal_friction import bag build/with --mapping build/robot.yaml --out build/again')
     without, compensated = (tracking_error(folder / 'build' / bag) for bag in ('run_without', 'again'))
-    assert compensated < LARGEST_SHARE * without
     for bag in ('without', 'with'):
         result = replay(folder / 'build' / bag)
         assert result.identical, result.first_difference
         assert result.recorded_feedforwards > 500
+    return compensated / without
 
 
 def test_the_test_bench_tracks_after_the_first_hour(checkout: Path):
@@ -109,7 +109,7 @@ def test_the_test_bench_tracks_after_the_first_hour(checkout: Path):
                     terminals.run(command)
     finally:
         terminals.stop_machine()
-    check_result(checkout, terminals)
+    assert share_left(checkout, terminals) < LARGEST_SHARE
 
 
 @pytest.mark.long  # the bench above holds the same chain of files and commands
@@ -137,4 +137,4 @@ def test_a_pneumatic_axis_without_force_sensor_and_velocity_tracks(checkout: Pat
         )
     finally:
         terminals.stop_machine()
-    check_result(checkout, terminals)
+    assert share_left(checkout, terminals) < LARGEST_SHARE

@@ -63,6 +63,7 @@ def test_replay_compare_and_info_need_numpy_and_yaml_alone(tmp_path: Path):
         ('matplotlib', ['ehl', 'run', 'inner_seal', '--out', '{}.html']),
         ('matplotlib', ['tune', '--out', '{}.yaml']),
         ('jinja2', ['sheet', 'rod_seal', '--pressures', '1:5:3', '--out', '{}.csv']),
+        ('scipy', ['import', 'log', 'test/corpus/log/spaces', '--rig', 'test/corpus/rig/position', '--out', '{}']),
         ('scipy', ['identify', PULL_TEST, '--out', '{}.yaml']),
         ('scipy', ['oring', 'ms28775_114']),
         ('scipy', ['tune', '--out', '{}.yaml']),

@@ -175,7 +175,7 @@ class LubricationNumerics(CheckedParameters):
     time_step: float = parameter(5e-4, unit='s', lower=1e-7, upper=0.1, description='Before any halving.')
     steps_at_once: int = parameter(
         1, unit='1', lower=1, upper=16,
-        description='So many time steps in one, while the seal does not touch the rounding of a control edge.',
+        description='So many time steps in one, while no loaded part of the seal is on the rounding of a control edge.',
     )  # fmt: skip
     section_elements: int = parameter(
         48, unit='1', lower=8, upper=256, description='Finite elements along the film, if seal.body is finite_elements.'

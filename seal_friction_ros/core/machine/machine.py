@@ -378,6 +378,7 @@ def _passed(
     name, force = actuator.mapping.name, state.force
 
     def pass_on(record: Output, frame_id: bytes) -> None:
+        """Emit with the name of the actuator, and keep the force [N] of a feed-forward."""
         nonlocal force
         if type(record) is FeedForward:
             force = record.force

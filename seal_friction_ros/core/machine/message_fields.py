@@ -162,6 +162,7 @@ def _checked(found: Mapping[str, tuple[Field, ...]], type_name: str) -> Definiti
     complete = {kind: fields or (Field(*_EMPTY),) for kind, fields in found.items()}
 
     def visit(kind: str, above: tuple[str, ...]) -> None:
+        """Check a message, which is a field of those ``above``, and all messages in it."""
         if kind in above:
             raise ValueError(f'{type_name}: {printable(kind)} contains itself')
         if kind not in complete:
@@ -183,6 +184,7 @@ def number_paths(definition: Definition, type_name: str) -> list[str]:
     paths: list[str] = []
 
     def collect(kind: str, above: str) -> None:
+        """Add the paths of the numbers of a message whose own path is ``above``."""
         for field in definition[kind]:
             path = above + field.name + ('[]' if field.form else '')
             if '/' in field.kind:

@@ -279,6 +279,7 @@ def at_least(least: int) -> Callable[[str], int]:
     """Type of an option: a whole number of at least ``least``."""
 
     def whole_number(text: str) -> int:
+        """Number that a text is."""
         value = int(text)
         if value < least:
             raise argparse.ArgumentTypeError(f'{text} is below {least}')

@@ -31,6 +31,14 @@ def add_parser(commands: Any) -> None:
         help='data sheet of the pressures and speeds that would make the law certain; a page goes beside it',
     )  # fmt: skip
     cli.add_file(parser, '--rig', 'rigs', 'rig file of the logs')
+    _add_what_is_known(parser)
+    cli.add_namespace(parser)
+    cli.add_workers(parser, 'sources, and groups of readings that are left out,')
+    cli.add_work(parser, has_failures=False)
+
+
+def _add_what_is_known(parser: argparse.ArgumentParser) -> None:
+    """Options that say what is known of the seals, and how they are fitted."""
     cli.add_file(parser, '--seal', 'seals', 'seal file with the geometry of the ring')
     parser.add_argument(
         '--squeeze-force', action='store_true', help='normal force from the geometry, even if --seal has one'
@@ -72,9 +80,6 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         '--largest-acceleration', type=cli.non_negative, metavar='M/S2', help='samples beyond it are not used'
     )
-    cli.add_namespace(parser)
-    cli.add_workers(parser, 'sources, and groups of readings that are left out,')
-    cli.add_work(parser, has_failures=False)
 
 
 def _chambers(text: str) -> tuple[str, ...]:

@@ -244,6 +244,7 @@ def _choose_anew(data: IdentificationData, workers: Workers, work: Path | None) 
     known = content_of([data.used, ring, has_fitted_load])
 
     def run(calls: Sequence[Callable[[], LeftOut]]) -> list[LeftOut]:
+        """Results of the calls, one for each group, kept in the work folder."""
         parts = [
             Part(part_key('choose without', [known, content_of(out)]), LeftOut._fields, call)
             for out, call in zip(data.used.groups, calls, strict=True)
