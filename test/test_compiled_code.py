@@ -64,12 +64,16 @@ def test_damaged_files_are_as_good_as_none(tmp_path):
     assert result(started(tmp_path)) == [value, 0]
 
 
-def test_a_folder_that_is_gone_is_as_good_as_none(tmp_path):
-    gone = "import os, pathlib, shutil; place = pathlib.Path(os.environ['NUMBA_CACHE_DIR']); shutil.rmtree(place); "
-    program = PROGRAM.replace('grease =', f'{gone}place.write_text(""); grease =')
-    value, hits = result(started(tmp_path, program))
+GONE = "import os, pathlib, shutil; place = pathlib.Path(os.environ['NUMBA_CACHE_DIR']); shutil.rmtree(place); "
+FULL = 'import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))'
+
+
+@pytest.mark.parametrize('wrong', [GONE + "place.write_text('')", FULL], ids=['gone', 'full'])
+def test_a_folder_that_takes_no_file_is_as_good_as_none(tmp_path, wrong):
+    value, hits = result(started(tmp_path, PROGRAM.replace('grease =', f'{wrong}; grease =')))
     assert value > 0.0
     assert hits == 0
+    assert not list(tmp_path.rglob('*.nbc'))
 
 
 def test_processes_that_compile_at_once_mix_nothing_up(tmp_path):
