@@ -16,6 +16,7 @@ from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, Esti
 from seal_friction_ros.core.estimation.feedforward import FADED_OUT, FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
 from seal_friction_ros.core.estimation.records import NO_TEMPERATURE, Force, Pressure
+from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.mounting import CHAMBERS_TEXT, check_chambers
 from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of
@@ -164,6 +165,7 @@ ALGORITHM_VERSION = 2
 """
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
+_WITHOUT = {'use_presliding': False}  # settings that older bags have not: without effect
 _NOT_YET = {'stamp_age_max': 0.0}  # settings that version 1 had not: without effect
 
 
@@ -222,7 +224,7 @@ def parse_snapshot(text: str) -> Snapshot:
         configuration = Configuration(
             selection,
             tuple(document['seal_documents']),
-            _settings(EstimatorSettings, document['settings'], version, 'configuration: settings'),
+            _settings(EstimatorSettings, _WITHOUT | document['settings'], version, 'configuration: settings'),
             _settings(FeedForwardSettings, document['feedforward'], version, 'configuration: feedforward'),
             from_mapping(AdaptationSettings, document.get('adaptation', {'mode': 'off'}), 'configuration: adaptation'),
         )
@@ -269,8 +271,9 @@ def _state(configuration: Configuration, document: Any, version: int) -> Pipelin
         return init(configuration.parameters())._replace(
             pressure=pressure, force=force, refused=bool(document['refused'])
         )
-    # Older bags are without adaptation, temperature and elements of the feed-forward.
-    estimator = {'adaptation': _encoded_record(NOT_ADAPTED)} | document['estimator']
+    # Older bags are without adaptation, temperature, sheared seals and elements of the feed-forward.
+    new = {'adaptation': _encoded_record(NOT_ADAPTED), 'shear': _encoded_record(NOT_FOLLOWED)}
+    estimator = new | document['estimator']
     guided = _encoded_record(FADED_OUT) | document['feedforward']
     document = {'temperature': _encoded_record(NO_TEMPERATURE)} | document
     state: PipelineState = _parsed(PipelineState, document | {'estimator': estimator, 'feedforward': guided})

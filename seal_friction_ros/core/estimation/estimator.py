@@ -38,6 +38,14 @@ from seal_friction_ros.core.estimation.records import (
     SealTemperature,
     Status,
 )
+from seal_friction_ros.core.estimation.sheared_seals import (
+    NOT_FOLLOWED,
+    FollowedElasticity,
+    FollowedShear,
+    Moment,
+    follow,
+    followed_elasticity,
+)
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.actuator import (
@@ -57,7 +65,15 @@ from seal_friction_ros.core.friction.force_sum_correction import (
 )
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, MotionLimits, motion_limits
 from seal_friction_ros.core.friction.presliding import PreslidingNumbers, presliding_numbers
-from seal_friction_ros.core.friction.states import UNKNOWN, StateFriction, is_at_rest, state_friction
+from seal_friction_ros.core.friction.states import (
+    SLIDING,
+    STUCK,
+    UNKNOWN,
+    StateFriction,
+    is_at_rest,
+    sign,
+    state_friction,
+)
 from seal_friction_ros.core.friction.temperature import (
     NO_SCALE,
     TemperatureScale,
@@ -89,6 +105,11 @@ class EstimatorSettings:
     )
     use_stiction: bool = parameter(
         True, unit='', description='Breakaway force above Coulomb friction by the stiction of the seals.'
+    )
+    use_presliding: bool = parameter(
+        True,
+        unit='',
+        description='After a reversal the friction follows the elasticity of the seals where their seal files have it.',
     )
     pressure_timeout: float = parameter(
         0.1, unit='s', lower=1e-3, upper=1.0, description='Largest time between the stamps of velocity and pressure.'
@@ -175,6 +196,7 @@ class EstimatorParameters:
         'limits_motion',
         'motion_limits',
         'elasticity',
+        'followed_elasticity',
         'adaptation',
         'adapts',
         'uses_scale',
@@ -204,6 +226,9 @@ class EstimatorParameters:
     elasticity: PreslidingNumbers | None = field(init=False, repr=False, compare=False)
     """of all seals together; None (rigid) if a seal file does not tell: then compiled code has no elements"""
 
+    followed_elasticity: FollowedElasticity | None = field(init=False, repr=False, compare=False)
+    """that the friction follows; None: rigid"""
+
     def __post_init__(self) -> None:
         if not self.seals:
             raise ValueError('EstimatorParameters.seals is empty: name at least one seal')
@@ -212,6 +237,11 @@ class EstimatorParameters:
         temperature_scale = one_temperature_scale(seal.temperature for seal in seals)
         motions = [seal.identified_motion for seal in seals]
         elastic = [seal.presliding for seal in seals if seal.presliding]
+        elasticity = presliding_numbers(elastic) if len(elastic) == len(seals) else None
+        followed = None
+        if elasticity is not None and self.settings.use_presliding:
+            softened = math.fsum(seal.stiffness * seal.relative_std for seal in elastic)
+            followed = followed_elasticity(elasticity, softened / elasticity.stiffness)
         derived = {
             'seal_numbers': numbers_of_seals(self.seals),
             'depends_on_velocity': any(seal.depends_on_velocity for seal in seals),
@@ -219,7 +249,8 @@ class EstimatorParameters:
             'force_sum_correction': correction or NO_CORRECTION,
             'limits_motion': any(motion != ANY_MOTION for motion in motions),
             'motion_limits': motion_limits(motions),
-            'elasticity': presliding_numbers(elastic) if len(elastic) == len(seals) else None,
+            'elasticity': elasticity,
+            'followed_elasticity': followed,
             'adapts': self.adaptation.mode != 'off',
             'uses_scale': self.adaptation.mode == 'on',
             'has_temperature_scale': temperature_scale is not None,
@@ -252,6 +283,7 @@ class EstimatorState(NamedTuple):
     leapt_velocity: Speed  # likewise
     motion: ConditionedVelocity  # of the usable velocities
     adaptation: AdaptationState = NOT_ADAPTED
+    shear: FollowedShear = NOT_FOLLOWED
 
 
 class Observation(NamedTuple):
@@ -298,6 +330,7 @@ _FORCE_CONTAINS_LOAD = int(Status.FORCE_CONTAINS_LOAD)
 _MODEL_DISAGREES = int(Status.MODEL_DISAGREES)
 _TEMPERATURE_MISSING = int(Status.TEMPERATURE_MISSING)
 _OUTSIDE_IDENTIFIED_TEMPERATURE = int(Status.OUTSIDE_IDENTIFIED_TEMPERATURE)
+_PRESLIDING = int(Status.PRESLIDING)
 _EXTRAPOLATED = int(EXTRAPOLATED)
 
 NO_VELOCITY = _VELOCITY_NOT_FINITE | _VELOCITY_OUT_OF_RANGE | _VELOCITY_LEAP
@@ -345,7 +378,11 @@ def step(
     if parameters.has_temperature_scale:
         seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
     if not parameters.adapts:
-        return state, estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
+        estimate = estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
+        elasticity = parameters.followed_elasticity
+        if elasticity is not None:
+            return _with_sheared_seals(elasticity, state, seen, friction, estimate)
+        return state, estimate
     return _adapted_step(parameters, state, seen, friction)
 
 
@@ -399,10 +436,13 @@ def _adapted_step(
         if not uses_scale:
             left += (learnt.scale - 1.0) * law * (1.0 if velocity > 0.0 else -1.0)
     estimate = estimate_of(parameters, seen, adapted, learnt.scale, scale_std, learnt.offset, left)
+    elasticity = parameters.followed_elasticity
+    if elasticity is not None:
+        state, estimate = _with_sheared_seals(elasticity, state, seen, adapted, estimate)
     if not is_due(known, stamp):
         return state, estimate
     status = estimate.status & ~_MODEL_DISAGREES
-    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _ = state
+    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear = state
     slide = Slide(
         stamp,
         velocity,
@@ -416,7 +456,56 @@ def _adapted_step(
     )
     known = adapt(settings, known, slide)
     return EstimatorState(
-        last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known
+        last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear
+    ), estimate
+
+
+@compilable
+def _with_sheared_seals(
+    elasticity: FollowedElasticity,
+    state: EstimatorState,
+    seen: Observation,
+    friction: ActuatorFriction,
+    estimate: FrictionEstimate,
+) -> tuple[EstimatorState, FrictionEstimate]:
+    """Estimate with the friction of seals that shear, while the rod moves; at rest it is that of rigid seals.
+
+    Without a usable velocity or pressure the seals are not followed: after a short gap the way over it counts.
+
+    Args:
+        elasticity: Of the seals.
+        state: With the shear of the sample before.
+        seen: The sample.
+        friction: Of seals that slide.
+        estimate: With rigid seals.
+    """
+    stamp, coulomb, std, breakaway, force, name, direction, status, age, scale, scale_std, offset, left = estimate
+    if status & _NO_STATE:
+        return state, estimate
+    moment = Moment(
+        stamp,
+        state.velocity.velocity,
+        sign(seen.velocity),
+        seen.force_sum,
+        not status & _NO_FORCE_SUM,
+        coulomb,
+        friction.velocity_friction,
+        breakaway - coulomb,
+    )
+    shear, sheared = follow(elasticity, state.shear, moment)
+    if seen.velocity != 0.0:
+        if left != 0.0:
+            left += force - sheared.force
+        force, std = sheared.force, math.sqrt(std * std + sheared.std * sheared.std)
+        name, direction = (SLIDING, moment.direction) if sheared.slides else (STUCK, sign(force))
+        if not sheared.slides:
+            status |= _PRESLIDING
+        estimate = FrictionEstimate(
+            stamp, coulomb, std, breakaway, force, name, direction, status, age, scale, scale_std, offset, left
+        )
+    last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, _ = state
+    return EstimatorState(
+        last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear
     ), estimate
 
 
@@ -431,7 +520,19 @@ def assess_inputs(
     """
     # One unpacking takes a quarter of the time of an attribute each.
     stamp, given, newest_pressure, newest_force, refused, stamp_age, _ = sample
-    last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known = state
+    (
+        last_stamp,
+        at_rest,
+        pressure,
+        force,
+        velocity,
+        leapt_pressure,
+        leapt_force,
+        leapt_velocity,
+        motion,
+        known,
+        shear,
+    ) = state
     settings = parameters.settings
     status = _INPUT_REFUSED if refused else 0
     if last_stamp != NEVER and stamp <= last_stamp:
@@ -468,7 +569,7 @@ def assess_inputs(
         if not at_rest or (uncertain and drives):
             sliding_velocity = motion.velocity
     state = EstimatorState(
-        stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known
+        stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear
     )
     return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
 
