@@ -227,7 +227,7 @@ class EstimatorDiagnostics:
         status = 0
         for bits in estimates:
             status |= bits
-        status &= ~sum(_NEAR_REST_MESSAGES)
+        status &= ~(sum(_NEAR_REST_MESSAGES) | Status.PRESLIDING)  # seals shear in every reversal
         said: list[str] = []
         if parameters is not None:
             said = findings(parameters, self._health, status)

@@ -1,7 +1,9 @@
 """The feed-forward with fitted elasticity, on a plant of the same kind and on a structurally different one."""
 
 import pytest
-from system.elastic_seals import PLANTS, identified, result
+from system.elastic_seals import MOTIONS, PLANTS, estimate_errors, identified, result
+
+from seal_friction_ros.core.friction.presliding import Presliding
 
 
 @pytest.mark.parametrize(('plant', 'less'), [('elements, 4e5 N/m', 0.80), ('LuGre, 3e5 N/m', 0.65)])
@@ -11,3 +13,33 @@ def test_the_elastic_feed_forward_reduces_the_tracking_error(plant, less):
     assert found.elastic < (1.0 - less) * found.without
     assert max(found.softer, found.stiffer) < 0.4 * found.without
     assert found.elastic < 0.5 * found.rigid
+
+
+FOUND = Presliding(stiffness=6.22e5, yield_exponent=2.32, memory_length=4e-4, relative_std=0.004)
+"""What `identified` finds on the LuGre plant, so that no log is simulated here; see `test_the_fit_is_known`."""
+
+
+@pytest.mark.long
+def test_the_fit_is_known():
+    found = identified(PLANTS['LuGre, 3e5 N/m']).presliding
+    assert found.stiffness == pytest.approx(FOUND.stiffness, rel=0.01)
+    assert found.yield_exponent == pytest.approx(FOUND.yield_exponent, rel=0.02)
+
+
+def test_on_another_structure_the_estimate_follows_the_shear_and_status_0_is_a_promise():
+    wave, duration = MOTIONS[1]
+    rigid, elastic = (estimate_errors(PLANTS['LuGre, 3e5 N/m'], model, wave, duration) for model in (None, FOUND))
+    assert elastic.rms < 0.15 * rigid.rms
+    assert elastic.in_band > 0.97
+    assert elastic.good > 0.65
+    assert rigid.rms_good > 2.0 * elastic.rms_good
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('plant', PLANTS)
+def test_on_every_plant_status_0_is_a_promise(plant):
+    model = identified(PLANTS[plant]).presliding
+    for wave, duration in MOTIONS:
+        rigid, elastic = (estimate_errors(PLANTS[plant], seals, wave, duration) for seals in (None, model))
+        assert elastic.rms < 0.6 * rigid.rms
+        assert not elastic.in_band < 0.95  # NaN: no sample is good on soft seals and a short stroke

@@ -66,8 +66,6 @@ from seal_friction_ros.core.friction.force_sum_correction import (
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, MotionLimits, motion_limits
 from seal_friction_ros.core.friction.presliding import PreslidingNumbers, presliding_numbers
 from seal_friction_ros.core.friction.states import (
-    SLIDING,
-    STUCK,
     UNKNOWN,
     StateFriction,
     is_at_rest,
@@ -379,10 +377,7 @@ def step(
         seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
     if not parameters.adapts:
         estimate = estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
-        elasticity = parameters.followed_elasticity
-        if elasticity is not None:
-            return _with_sheared_seals(elasticity, state, seen, friction, estimate)
-        return state, estimate
+        return _with_sheared_seals(parameters.followed_elasticity, state, seen, friction, estimate)
     return _adapted_step(parameters, state, seen, friction)
 
 
@@ -436,9 +431,7 @@ def _adapted_step(
         if not uses_scale:
             left += (learnt.scale - 1.0) * law * (1.0 if velocity > 0.0 else -1.0)
     estimate = estimate_of(parameters, seen, adapted, learnt.scale, scale_std, learnt.offset, left)
-    elasticity = parameters.followed_elasticity
-    if elasticity is not None:
-        state, estimate = _with_sheared_seals(elasticity, state, seen, adapted, estimate)
+    state, estimate = _with_sheared_seals(parameters.followed_elasticity, state, seen, adapted, estimate)
     if not is_due(known, stamp):
         return state, estimate
     status = estimate.status & ~_MODEL_DISAGREES
@@ -462,7 +455,7 @@ def _adapted_step(
 
 @compilable
 def _with_sheared_seals(
-    elasticity: FollowedElasticity,
+    elasticity: FollowedElasticity | None,
     state: EstimatorState,
     seen: Observation,
     friction: ActuatorFriction,
@@ -473,13 +466,15 @@ def _with_sheared_seals(
     Without a usable velocity or pressure the seals are not followed: after a short gap the way over it counts.
 
     Args:
-        elasticity: Of the seals.
+        elasticity: Of the seals; None: rigid.
         state: With the shear of the sample before.
         seen: The sample.
         friction: Of seals that slide.
         estimate: With rigid seals.
     """
-    stamp, coulomb, std, breakaway, force, name, direction, status, age, scale, scale_std, offset, left = estimate
+    if elasticity is None:
+        return state, estimate
+    stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left = estimate
     if status & _NO_STATE:
         return state, estimate
     moment = Moment(
@@ -497,11 +492,10 @@ def _with_sheared_seals(
         if left != 0.0:
             left += force - sheared.force
         force, std = sheared.force, math.sqrt(std * std + sheared.std * sheared.std)
-        name, direction = (SLIDING, moment.direction) if sheared.slides else (STUCK, sign(force))
         if not sheared.slides:
             status |= _PRESLIDING
         estimate = FrictionEstimate(
-            stamp, coulomb, std, breakaway, force, name, direction, status, age, scale, scale_std, offset, left
+            stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left
         )
     last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, _ = state
     return EstimatorState(

@@ -9,8 +9,9 @@ r"""Friction of seals that still shear: the elastic state that the estimate foll
 - **Uncertainty**: the same way also shears seals that are softer by two standard deviations of the stiffness. Half the
   difference of the two forces is the standard deviation that elasticity adds. The rod counts as sliding when both have
   come within 5 % of the sliding friction.
-- **Unknown shear**: at the start, after a pause, and after a rest without a force sum the seals may be sheared in any
-  way. The softer ones then begin fully sheared against the motion. A displacement keeps the order of the forces of an
+- **Unknown shear**: at the start, after a gap, and after a rest without a force sum the seals may be sheared in any
+  way. The force is then a guess: sliding friction at the start, that of before after a gap. The softer ones begin
+  fully sheared against the motion. A displacement keeps the order of the forces of an
   element, so when these slide, any seals of their stiffness do.
 
 Source: the elements are those of `presliding`; all else is our choice.
@@ -25,6 +26,7 @@ from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.friction.presliding import (
     NO_ELEMENTS,
     NOT_SHEARED,
+    SLOTS,
     Elements,
     PreslidingNumbers,
     Shear,
@@ -33,10 +35,11 @@ from seal_friction_ros.core.friction.presliding import (
     shear,
 )
 
-LONGEST_STEP = 0.02  # [s] after a longer gap nobody knows how far the rod went
+LONGEST_STEP = 0.05  # [s] after a longer gap nobody knows how far the rod went
 SETTLED = 0.95  # [-] of the sliding friction, from which on the rod counts as sliding
 BAND = 2.0  # [-] standard deviations by which the softer seals are softer
 LEAST_STD = 0.15  # [-] of the stiffness: elements of one power law miss a seal of another structure by as much
+TOLERANCE = 1e-9  # [-] of the friction, to which the seals of a rod at rest bear the force sum
 LEAST_SOFTNESS = 0.2  # [-] stiffness of the softer seals over that of the file, at least
 
 
@@ -112,9 +115,12 @@ def follow(
         moment: The sample.
     """
     last_stamp, last_velocity, sheared, softer, is_known, last_direction = state
-    elapsed = (moment.stamp - last_stamp) * 1e-9 if last_stamp != NEVER else -1.0
-    if not 0.0 <= elapsed <= LONGEST_STEP:
-        last_velocity, sheared, is_known, last_direction, elapsed = 0.0, NOT_SHEARED, False, 0, 0.0
+    elapsed = (moment.stamp - last_stamp) * 1e-9 if last_stamp != NEVER else 0.0
+    if last_stamp == NEVER:
+        sliding = moment.direction * (moment.coulomb_friction + moment.velocity_friction)
+        sheared = Shear(_fully_sheared(elasticity.seals, sliding), moment.velocity_friction)
+    elif not 0.0 <= elapsed <= LONGEST_STEP:
+        is_known, last_direction, elapsed = False, 0, 0.0
     if moment.direction == 0:
         sheared, softer = _held(elasticity, sheared, softer, moment, elapsed)
         is_known = is_known and moment.knows_force_sum
@@ -136,20 +142,37 @@ def follow(
 def _held(
     elasticity: FollowedElasticity, sheared: Shear, softer: Elements, moment: Moment, elapsed: float
 ) -> tuple[Shear, Elements]:
-    """Seals of a rod at rest, ``elapsed`` [s] after the sample before, sheared towards the force sum.
+    """Seals of a rod at rest, ``elapsed`` [s] after the sample before, sheared until they bear the force sum.
 
-    One step goes as far as elements that do not yield need: in a few samples the seals bear the force sum.
+    Each pass shears them as far as the elements that do not yield need, so one more may yield in each.
     """
-    further = 0.0
-    if moment.knows_force_sum:
-        f1, f2, f3, f4, f5, f6 = sheared.forces
-        breakaway = moment.coulomb_friction + moment.stiction
-        further = between(-breakaway, moment.force_sum, breakaway) - (f1 + f2 + f3 + f4 + f5 + f6)
-    slide = Slide(further / elasticity.seals.stiffness, elapsed, moment.coulomb_friction, 0.0, moment.stiction)
-    sheared, _ = shear(elasticity.seals, sheared, slide)
-    sliding = between(0.0, moment.coulomb_friction + sheared.excess, math.inf)
-    softer, _ = element_forces(elasticity.softer, softer, further / elasticity.softer.stiffness, sliding)
+    sheared, force = shear(
+        elasticity.seals, sheared, Slide(0.0, elapsed, moment.coulomb_friction, 0.0, moment.stiction)
+    )
+    breakaway = moment.coulomb_friction + moment.stiction
+    held = between(-breakaway, moment.force_sum, breakaway)
+    for _ in range(SLOTS):
+        further = held - force
+        sliding = moment.coulomb_friction + sheared.excess
+        stiffness = _stiffness(elasticity.seals, sheared.forces, further, sliding)
+        if not moment.knows_force_sum or abs(further) <= TOLERANCE * breakaway or stiffness == 0.0:
+            break
+        slide = Slide(further / stiffness, 0.0, moment.coulomb_friction, 0.0, moment.stiction)
+        sheared, force = shear(elasticity.seals, sheared, slide)
+        share = elasticity.seals.stiffness / elasticity.softer.stiffness  # the same force
+        softer, _ = element_forces(elasticity.softer, softer, share * slide.displacement, sliding)
     return sheared, softer
+
+
+@compilable
+def _stiffness(elasticity: PreslidingNumbers, forces: Elements, direction: float, friction: float) -> float:
+    """Stiffness [N/m] of the elements that do not yield in a direction, at a sliding friction [N]."""
+    stiffness = 0.0
+    for i in range(SLOTS):
+        force = forces[i] if direction > 0.0 else -forces[i]
+        if force < (1.0 - TOLERANCE) * elasticity.shares[i] * friction:
+            stiffness += elasticity.stiffnesses[i]
+    return stiffness
 
 
 @compilable

@@ -110,10 +110,11 @@ STATUS_WORDS = {
     Status.MODEL_DISAGREES: 'the force sum shows another friction than the seal files',
     Status.TEMPERATURE_MISSING: 'no valid temperature of the seals',
     Status.OUTSIDE_IDENTIFIED_TEMPERATURE: 'outside the identified temperatures: extrapolated',
+    Status.PRESLIDING: 'the seals may still shear: the friction follows their elasticity',
 }
 """Bit of the status -> what it means for a person who looks on; FrictionEstimate.msg has the definition."""
 
-USUAL = Status.MOTION_UNCERTAIN | Status.SLOWER_THAN_IDENTIFIED
+USUAL = Status.MOTION_UNCERTAIN | Status.SLOWER_THAN_IDENTIFIED | Status.PRESLIDING
 """Bits that every reversal has."""
 
 

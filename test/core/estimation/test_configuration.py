@@ -37,6 +37,7 @@ from seal_friction_ros.core.estimation.records import (
     ServoReference,
     Velocity,
 )
+from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED, FollowedShear
 from seal_friction_ros.core.friction.presliding import NO_ELEMENTS, SLOTS, Elements
 from seal_friction_ros.files import load_configuration, read_yaml
 
@@ -91,7 +92,7 @@ conditioned = st.just(NOT_CONDITIONED) | st.builds(
 
 def records(kind: type) -> st.SearchStrategy:
     """A record of numbers and of such records, every number of it usable."""
-    of_type = {float: usable, int: st.integers(-(2**62), 2**62)}
+    of_type = {float: usable, int: st.integers(-(2**62), 2**62), bool: st.booleans()}
     return st.builds(
         kind, *(of_type[hint] if hint in of_type else records(hint) for hint in get_type_hints(kind).values())
     )
@@ -106,6 +107,7 @@ states = st.builds(
         *[usable_pressures, usable_forces, usable_speeds] * 2,
         conditioned,
         st.just(NOT_ADAPTED) | records(AdaptationState),
+        st.just(NOT_FOLLOWED) | records(FollowedShear),
     ),
     st.builds(
         FeedForwardState,

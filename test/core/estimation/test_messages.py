@@ -314,7 +314,7 @@ def test_status_bits_in_the_message_definition_are_those_of_the_code():
 
 
 def test_status_bits_are_different_powers_of_two():
-    assert [bit.value for bit in Status] == [2**i for i in range(25)]
+    assert [bit.value for bit in Status] == [2**i for i in range(26)]
 
 
 def test_the_generated_message_has_the_constants_of_the_code():
