@@ -36,6 +36,7 @@ from seal_friction_ros.core.estimation.estimator import init as init_estimator
 from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, Output, decode, encode
 from seal_friction_ros.core.estimation.pipeline import init, init_running, receive
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, ServoReference, Velocity
+from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.offline.bags.recorder import Recorder
@@ -74,6 +75,8 @@ def stages() -> dict[str, Callable[[], object]]:
     records: list[tuple[Output, bytes]] = []
     receive(parameters, guided, velocity, 1, lambda record, frame: records.append((record, frame)))
     estimate, feedforward = records
+    seals = [replace(m, seal=replace(m.seal, presliding=Presliding(stiffness=1e5))) for m in parameters.estimator.seals]
+    elastic = EstimatorParameters(parameters.estimator.settings, tuple(seals), AdaptationSettings('off'))
     velocity_bytes, pressure_bytes = encode(velocity), encode(pressure, b'rod')
     return {
         'bare call': lambda: None,
@@ -83,6 +86,7 @@ def stages() -> dict[str, Callable[[], object]]:
         'estimator step': lambda: step(parameters.estimator, alone.estimator, sample),
         'estimator step, sliding': sliding(replace(parameters.estimator, adaptation=AdaptationSettings('off'))),
         'estimator step, sliding, with adaptation': sliding(replace(parameters.estimator, adaptation=ADAPTATION)),
+        'estimator step, sliding, on elastic seals': sliding(elastic),
         'receive velocity': lambda: receive(parameters, alone, velocity, 1, drop),
         'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity, 1, drop),
         'encode estimate': lambda: encode(*estimate),

@@ -28,7 +28,8 @@ def test_a_machine_is_timed_and_its_bags_replay_to_the_byte():
     assert [figures['replay identical'] for figures in found.values()] == ['', True, True]
 
 
-@pytest.mark.parametrize('case', ['one actuator', pytest.param('machine of three', marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('case', ['one actuator', 'machine of three'])
 def test_what_the_live_view_costs_is_timed(case):
     found = run_json('bench/monitor.py', '--cases', case, '--seconds', '0.5', '--warm-up', '0.1', '--rounds', '1')
     assert list(found) == [case]
@@ -59,12 +60,14 @@ def test_the_servo_is_timed_by_inner_step():
     assert all(min(row['step'], row['simulate']) > 0.0 for row in rows)
 
 
+@pytest.mark.long
 def test_the_o_ring_is_timed_by_mesh():
     (row,) = run_json('bench/oring.py', '--lines', '9')
     assert row['unknowns'] > 100
     assert row['Newton steps'] > 10
 
 
+@pytest.mark.long
 def test_the_lubricated_contact_is_timed_by_grid_and_step(tmp_path):
     (tmp_path / 'small.yaml').write_text(SMALL_CASE)
     grid = ('--cells', '32', '48', '--steps', '8e-3', '4e-3', '--calls', '200')

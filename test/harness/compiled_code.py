@@ -2,6 +2,9 @@
 
 from paths import ROOT
 
-from seal_friction_ros.compiled_code import keep_compiled_code
+from seal_friction_ros.compiled_code import keep_compiled_code, use_folder
 
-keep_compiled_code(ROOT / 'build' / 'numba')
+FOLDER = ROOT / 'build' / 'numba'
+
+keep_compiled_code(FOLDER)
+use_folder(FOLDER)  # commands that a test starts before it compiles anything take it, too

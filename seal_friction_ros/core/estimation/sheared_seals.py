@@ -32,6 +32,7 @@ from seal_friction_ros.core.friction.presliding import (
     Shear,
     Slide,
     element_forces,
+    relaxed,
     shear,
 )
 
@@ -39,7 +40,7 @@ LONGEST_STEP = 0.05  # [s] after a longer gap nobody knows how far the rod went
 SETTLED = 0.95  # [-] of the sliding friction, from which on the rod counts as sliding
 BAND = 2.0  # [-] standard deviations by which the softer seals are softer
 LEAST_STD = 0.15  # [-] of the stiffness: elements of one power law miss a seal of another structure by as much
-TOLERANCE = 1e-9  # [-] of the friction, to which the seals of a rod at rest bear the force sum
+NOISE = 0.01  # [-] of the friction, to which the seals of a rod at rest bear the force sum
 LEAST_SOFTNESS = 0.2  # [-] stiffness of the softer seals over that of the file, at least
 
 
@@ -48,6 +49,7 @@ class FollowedElasticity(NamedTuple):
 
     seals: PreslidingNumbers
     softer: PreslidingNumbers
+    yield_compliance: float  # [m/N] way in which every element takes up one more newton of sliding friction
 
 
 class FollowedShear(NamedTuple):
@@ -59,9 +61,10 @@ class FollowedShear(NamedTuple):
     softer: Elements  # [N] of softer ones
     is_known: bool  # whether no other shear is possible
     direction: int  # -1 or 1: of the motion since the shear was not known; 0: no motion since then
+    fully_sheared: float  # [N] with sign: sliding friction that all elements bear, which are 0 here; 0.0: not all yield
 
 
-NOT_FOLLOWED = FollowedShear(NEVER, 0.0, NOT_SHEARED, NO_ELEMENTS, False, 0)
+NOT_FOLLOWED = FollowedShear(NEVER, 0.0, NOT_SHEARED, NO_ELEMENTS, False, 0, 0.0)
 """State before the first sample."""
 
 
@@ -100,7 +103,8 @@ def followed_elasticity(seals: PreslidingNumbers, relative_std: float) -> Follow
     softer = seals._replace(
         stiffness=softness * seals.stiffness, stiffnesses=Elements(*(softness * k for k in seals.stiffnesses))
     )
-    return FollowedElasticity(seals, softer)
+    each = zip(softer.shares, softer.stiffnesses, strict=True)
+    return FollowedElasticity(seals, softer, max(share / stiffness for share, stiffness in each if stiffness > 0.0))
 
 
 @compilable
@@ -114,27 +118,42 @@ def follow(
         state: `NOT_FOLLOWED` or the state before.
         moment: The sample.
     """
-    last_stamp, last_velocity, sheared, softer, is_known, last_direction = state
-    elapsed = (moment.stamp - last_stamp) * 1e-9 if last_stamp != NEVER else 0.0
+    last_stamp, last_velocity, sheared, softer, is_known, last_direction, full = state
+    stamp, velocity, direction, _, knows_force_sum, coulomb, velocity_friction, stiction = moment
+    elapsed = (stamp - last_stamp) * 1e-9 if last_stamp != NEVER else 0.0
     if last_stamp == NEVER:
-        sliding = moment.direction * (moment.coulomb_friction + moment.velocity_friction)
-        sheared = Shear(_fully_sheared(elasticity.seals, sliding), moment.velocity_friction)
+        full, sheared = direction * (coulomb + velocity_friction), Shear(NO_ELEMENTS, velocity_friction)
     elif not 0.0 <= elapsed <= LONGEST_STEP:
         is_known, last_direction, elapsed = False, 0, 0.0
-    if moment.direction == 0:
+    displacement = 0.5 * (last_velocity + velocity) * elapsed
+    if is_known and full * direction > 0.0 and displacement * direction > 0.0:  # most samples: three times as fast
+        excess = sheared.excess
+        stretch = (coulomb + excess - abs(full)) * elasticity.seals.shares.last / elasticity.seals.stiffnesses.last
+        length = between(0.0, abs(displacement) - stretch, abs(displacement))  # as `presliding.gross_sliding`
+        excess = relaxed(excess, velocity_friction, length, elasticity.seals.memory_length)
+        sliding = between(0.0, coulomb + excess, math.inf)
+        if (sliding - abs(full)) * elasticity.yield_compliance <= abs(displacement):
+            full = direction * sliding
+            state = FollowedShear(stamp, velocity, Shear(NO_ELEMENTS, excess), NO_ELEMENTS, True, direction, full)
+            return state, ShearedFriction(full, 0.0, True)
+    if full != 0.0:
+        sheared = Shear(_fully_sheared(elasticity.seals, full), sheared.excess)
+        softer = _fully_sheared(elasticity.softer, full)
+    if direction == 0:
         sheared, softer = _held(elasticity, sheared, softer, moment, elapsed)
-        is_known = is_known and moment.knows_force_sum
-        return FollowedShear(moment.stamp, moment.velocity, sheared, softer, is_known, 0), NO_FRICTION
-    displacement = 0.5 * (last_velocity + moment.velocity) * elapsed
-    slide = Slide(displacement, elapsed, moment.coulomb_friction, moment.velocity_friction, moment.stiction)
+        return FollowedShear(stamp, velocity, sheared, softer, is_known and knows_force_sum, 0, 0.0), NO_FRICTION
+    slide = Slide(displacement, elapsed, coulomb, velocity_friction, stiction)
     sheared, force = shear(elasticity.seals, sheared, slide)
-    sliding = between(0.0, moment.coulomb_friction + sheared.excess, math.inf)
-    if not is_known and moment.direction != last_direction:
-        softer = _fully_sheared(elasticity.softer, -moment.direction * sliding)
+    sliding = between(0.0, coulomb + sheared.excess, math.inf)
+    if not is_known and direction != last_direction:
+        softer = _fully_sheared(elasticity.softer, -direction * sliding)
     softer, softer_force = element_forces(elasticity.softer, softer, displacement, sliding)
-    enough = SETTLED * sliding
-    slides = force * moment.direction >= enough and softer_force * moment.direction >= enough
-    state = FollowedShear(moment.stamp, moment.velocity, sheared, softer, is_known or slides, moment.direction)
+    slides = force * direction >= SETTLED * sliding and softer_force * direction >= SETTLED * sliding
+    is_known = is_known or slides
+    full = 0.0
+    if is_known and force == softer_force and abs(force) == sliding:
+        full, sheared, softer = force, Shear(NO_ELEMENTS, sheared.excess), NO_ELEMENTS
+    state = FollowedShear(stamp, velocity, sheared, softer, is_known, direction, full)
     return state, ShearedFriction(force, 0.5 * abs(force - softer_force), slides)
 
 
@@ -144,24 +163,26 @@ def _held(
 ) -> tuple[Shear, Elements]:
     """Seals of a rod at rest, ``elapsed`` [s] after the sample before, sheared until they bear the force sum.
 
-    Each pass shears them as far as the elements that do not yield need, so one more may yield in each.
+    They stay as they are while the force sum is within `NOISE` of what they bear. Each pass shears them as far as the
+    elements that do not yield need, so one more may yield in each.
     """
-    sheared, force = shear(
-        elasticity.seals, sheared, Slide(0.0, elapsed, moment.coulomb_friction, 0.0, moment.stiction)
-    )
+    forces, excess = sheared
+    excess = relaxed(excess, moment.stiction, elapsed, elasticity.seals.dwell_time)
+    f1, f2, f3, f4, f5, f6 = forces
     breakaway = moment.coulomb_friction + moment.stiction
-    held = between(-breakaway, moment.force_sum, breakaway)
+    further = between(-breakaway, moment.force_sum, breakaway) - (f1 + f2 + f3 + f4 + f5 + f6)
+    if not moment.knows_force_sum or abs(further) <= NOISE * breakaway:
+        return Shear(forces, excess), softer
+    sliding, wanted = moment.coulomb_friction + excess, f1 + f2 + f3 + f4 + f5 + f6 + further
+    share = elasticity.seals.stiffness / elasticity.softer.stiffness  # the same force
     for _ in range(SLOTS):
-        further = held - force
-        sliding = moment.coulomb_friction + sheared.excess
-        stiffness = _stiffness(elasticity.seals, sheared.forces, further, sliding)
-        if not moment.knows_force_sum or abs(further) <= TOLERANCE * breakaway or stiffness == 0.0:
+        stiffness = _stiffness(elasticity.seals, forces, further, sliding)
+        if stiffness == 0.0 or abs(further) <= 1e-9 * breakaway:
             break
-        slide = Slide(further / stiffness, 0.0, moment.coulomb_friction, 0.0, moment.stiction)
-        sheared, force = shear(elasticity.seals, sheared, slide)
-        share = elasticity.seals.stiffness / elasticity.softer.stiffness  # the same force
-        softer, _ = element_forces(elasticity.softer, softer, share * slide.displacement, sliding)
-    return sheared, softer
+        forces, force = element_forces(elasticity.seals, forces, further / stiffness, sliding)
+        softer, _ = element_forces(elasticity.softer, softer, share * further / stiffness, sliding)
+        further = wanted - force
+    return Shear(forces, excess), softer
 
 
 @compilable
@@ -170,7 +191,7 @@ def _stiffness(elasticity: PreslidingNumbers, forces: Elements, direction: float
     stiffness = 0.0
     for i in range(SLOTS):
         force = forces[i] if direction > 0.0 else -forces[i]
-        if force < (1.0 - TOLERANCE) * elasticity.shares[i] * friction:
+        if force < (1.0 - 1e-9) * elasticity.shares[i] * friction:
             stiffness += elasticity.stiffnesses[i]
     return stiffness
 

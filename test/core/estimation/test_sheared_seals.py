@@ -26,11 +26,15 @@ from seal_friction_ros.core.estimation.sheared_seals import (
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.presliding import (
     NO_ELEMENTS,
+    NOT_SHEARED,
     Elements,
     Presliding,
+    Shear,
+    Slide,
     element_forces,
     initial_loading,
     presliding_numbers,
+    shear,
 )
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
@@ -145,10 +149,38 @@ def test_at_100_hertz_one_sample_at_rest_is_enough_to_bear_the_force_sum():
     state, moving = NOT_FOLLOWED, Moment(START, 0.01, 1, 0.0, True, 40.0, 0.0, 2.0)
     for i in range(50):
         state, _ = follow(elasticity, state, moving._replace(stamp=START + 10 * i * MS))
-    for force_sum in (-10.0, 38.0, -41.9, 41.9, 0.0):
+    for force_sum in (-10.0, 38.0, -42.0, 42.0, 0.0):
         at_rest = Moment(state.stamp + 10 * MS, 0.0, 0, force_sum, True, 40.0, 0.0, 2.0)
         state, _ = follow(elasticity, state, at_rest)
         assert sum(state.shear.forces) == pytest.approx(force_sum, abs=1e-6)
+
+
+@given(
+    velocities=st.lists(st.tuples(st.floats(-0.05, 0.05), st.integers(1, 60)), min_size=1, max_size=12),
+    memory_length=st.sampled_from([0.0, 1e-4]),
+    dwell_time=st.sampled_from([0.0, 0.01]),
+)
+def test_the_force_is_that_of_the_law_of_elastic_seals_but_for_rounding(velocities, memory_length, dwell_time):
+    numbers = presliding_numbers([Presliding(stiffness=1e5, memory_length=memory_length, dwell_time=dwell_time)])
+    elasticity = followed_elasticity(numbers, 0.1)
+    state, stamp, last = NOT_FOLLOWED, START, 0.0
+    sheared, first = NOT_SHEARED, True
+    for velocity, samples in velocities:
+        for i in range(samples):
+            direction = (velocity >= 0.0) - (velocity < 0.0)
+            coulomb = 40.0 + 0.3 * ((7 * i) % 5)  # pressures have ripple
+            moment = Moment(stamp, velocity, direction, 0.0, True, coulomb, 100.0 * abs(velocity), 3.0)
+            if first:
+                share = direction * (coulomb + 100.0 * abs(velocity))
+                forces = Elements(*(w * share for w in numbers.shares))
+                sheared, last, first = Shear(forces, 100.0 * abs(velocity)), -velocity, False
+            slide = Slide(0.5 * (last + velocity) * 1e-3, 1e-3, coulomb, 100.0 * abs(velocity), 3.0)
+            if stamp == START:
+                slide = slide._replace(displacement=0.0, elapsed=0.0)
+            sheared, force = shear(numbers, sheared, slide)
+            state, found = follow(elasticity, state, moment)
+            assert found.force == pytest.approx(force, rel=1e-9, abs=1e-9)
+            last, stamp = velocity, stamp + MS
 
 
 def test_a_rest_without_a_force_sum_leaves_the_shear_unknown():

@@ -133,6 +133,7 @@ def test_map_does_not_overwrite_a_seal_file(small, tmp_path, capsys):
     assert there.read_text() == 'mine'
 
 
+@pytest.mark.long
 @pytest.mark.renders
 def test_every_command_of_the_page_is_one(small, ring, tmp_path, capsys, monkeypatch):
     """With a small case instead of those of the page, so that it takes no longer than it must."""
