@@ -1,5 +1,6 @@
 """Import of several sources in parallel, here or on a cluster: the same bags whatever the number of workers."""
 
+import json
 import shutil
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -8,29 +9,45 @@ from typing import Any
 from uuid import uuid4
 
 from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.work.executor import Workers, try_all
+from seal_friction_ros.offline.work.executor import Workers
+from seal_friction_ros.offline.work.finished_parts import (
+    NOWHERE,
+    Kept,
+    Part,
+    Values,
+    content_of,
+    input_digests,
+    part_key,
+    try_parts,
+)
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place, as_path, name_of
 
+Convert = Callable[[Path, Path], tuple[dict[str, Any], str]]
+"""Picklable function of a source and of the bag to write; returns numbers and text for people."""
+
 
 def import_many(
-    convert: Callable[[Path, Path], Any], sources: Sequence[Place], out: Path, workers: Workers
-) -> list[Outcome[Any]]:
+    convert: Convert, sources: Sequence[Place], out: Path, workers: Workers, kept: Kept = NOWHERE, settings: Any = None
+) -> list[Outcome[Values]]:
     """Convert every source, whatever becomes of the others.
 
-    All bags appear together at the end, so that an interrupted command leaves none.
+    All bags appear together at the end, so that an interrupted command leaves none, except in a work folder: there each
+    is kept until the bags appear, also if some could not be made.
 
     Args:
-        convert: Picklable function of a source and of the bag to write.
+        convert: Conversion of one source.
         sources: Logs or bags: paths, or URLs that are copied where they are converted.
         out: The bag of one source; of several a folder with a bag each, by `bag_names`. Must not exist.
-        workers: Sources at a time, or a cluster, whose workers write into the folder of ``out``.
+        workers: Sources at a time, or a cluster, whose workers write into the folder of ``out`` or the work folder.
+        kept: Where finished bags and errors are kept, by content and name of a source and by the settings.
+        settings: What the conversion depends on, as of `content_of`.
 
     Returns:
-        Outcomes in the order of the sources.
+        Outcomes in the order of the sources; results have ``numbers`` and ``text``.
 
     Raises:
-        ValueError: Two sources have one name, or the cluster cannot be used.
+        ValueError: Two sources have one name, or the work folder or the cluster cannot be used.
         BagError: ``out`` exists already, or cannot be made.
     """
     names = bag_names(sources) if len(sources) > 1 else [out.name]
@@ -43,8 +60,20 @@ def import_many(
     except OSError as error:
         raise BagError(f'{out}: cannot make a bag there: {error.strerror}') from None
     try:
-        calls = [partial(_import, convert, source, place, name) for source, name in zip(sources, names, strict=True)]
-        outcomes = try_all(f'import {len(sources)} sources', calls, workers)
+        keys = list(map(str, range(len(sources))))
+        if kept.folder is not None:
+            digests = [one.result or one.error for one in input_digests(sources, workers)]
+            keys = [part_key('import', [*one, content_of(settings)]) for one in zip(digests, names, strict=True)]
+        folders = [(kept.folder or place) / f'{key}.bag' for key in keys]
+        parts = [
+            Part(key, ('numbers', 'text'), partial(_import, convert, source, folder / name), folder)
+            for key, source, folder, name in zip(keys, sources, folders, names, strict=True)
+        ]
+        outcomes = try_parts(f'import of {len(sources)} sources', parts, workers, kept)
+        for folder, name, outcome in zip(folders, names, outcomes, strict=True):
+            if not outcome.error:
+                shutil.move(folder / name, done / name)
+                folder.rmdir()
         if any(not outcome.error for outcome in outcomes):
             (done if len(sources) > 1 else done / out.name).rename(out)
     finally:
@@ -55,17 +84,18 @@ def import_many(
     ]
 
 
-def _import(convert: Callable[[Path, Path], Any], source: Place, place: Path, name: str) -> Any:
-    """Convert one source; a call that a cluster repeats, since its worker was killed, begins anew."""
-    own, done = place / uuid4().hex, place / 'done' / name
+def _import(convert: Convert, source: Place, bag: Path) -> Values:
+    """Convert one source to ``bag``; a call that a cluster repeats, since its worker was killed, begins anew."""
+    folder = bag.parent
+    own = folder.with_name(f'.{folder.name}.{uuid4().hex}')
     try:
         with as_path(source) as path:
-            result = convert(path, own / name)
-        shutil.rmtree(done, ignore_errors=True)
-        (own / name).rename(done)
+            numbers, text = convert(path, own / bag.name)
+        shutil.rmtree(folder, ignore_errors=True)
+        own.rename(folder)
     finally:
         shutil.rmtree(own, ignore_errors=True)
-    return result
+    return {'numbers': json.loads(json.dumps(numbers, default=str)), 'text': text}
 
 
 def bag_names(sources: Sequence[Place]) -> list[str]:

@@ -24,7 +24,7 @@ def add_parser(commands: Any) -> None:
     log = cli.add_command(
         sources, 'log', run_log, 'make a bag from a measured log, CSV or white space',
         'import log ram.csv --rig my_rig.yaml --out ram',
-        'import log monday.csv tuesday.csv --rig my_rig.yaml --out bags',
+        'import log monday.csv tuesday.csv --rig my_rig.yaml --out bags --work build/import',
     )  # fmt: skip
     log.add_argument('logs', type=cli.place, nargs='+', metavar='LOG', help='log file, or URL of fsspec')
     cli.add_file(log, '--rig', 'rigs', 'rig file', required=True)
@@ -47,6 +47,7 @@ def add_parser(commands: Any) -> None:
         help_text = f'bag to make; of several {what} a folder with a bag each, by their names'
         cli.add_target(source, '--out', BAG, required=True, metavar='BAG', help=help_text)
         cli.add_workers(source, what)
+        cli.add_work(source)
 
 
 def run_log(arguments: argparse.Namespace) -> int:
@@ -55,15 +56,16 @@ def run_log(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.bags.import_log import convert_log, read_rig
 
     rig = read_rig(config_path('rigs', arguments.rig))
-    return _run(arguments, arguments.logs, partial(convert_log, rig=rig), _of_log)
+    return _run(arguments, arguments.logs, partial(convert_log, rig=rig), _of_log, [rig])
 
 
 def run_bag(arguments: argparse.Namespace) -> int:
     """Import a bag with standard messages, or several in parallel."""
     from seal_friction_ros.offline.bags.import_bag import convert_bag, read_mapping
 
-    convert = partial(convert_bag, mapping=read_mapping(arguments.mapping), also=arguments.also)
-    return _run(arguments, arguments.bags, convert, _of_bag)
+    mapping = read_mapping(arguments.mapping)
+    convert = partial(convert_bag, mapping=mapping, also=arguments.also)
+    return _run(arguments, arguments.bags, convert, _of_bag, [mapping, arguments.also])
 
 
 def _of_log(summary: 'ImportSummary', _: Path) -> tuple[dict[str, Any], str]:
@@ -89,27 +91,33 @@ def _run(
     sources: 'list[Place]',
     convert: Callable[[Path, Path], Any],
     told: Callable[[Any, Path], tuple[dict[str, Any], str]],
+    settings: list[Any],
 ) -> int:
     """Import one source, or several: a bag for each, and one line for each that cannot be imported."""
     from seal_friction_ros.offline.bags.import_many import bag_names, import_many
     from seal_friction_ros.offline.work.places import as_path
 
-    out = arguments.out
-    if len(sources) == 1 and not arguments.scheduler:
+    out, kept = arguments.out, cli.kept_in(arguments)
+    if len(sources) == 1 and not arguments.scheduler and not arguments.work:
         with as_path(sources[0]) as path:
             return cli.print_result(arguments, *told(convert(path, out), out))
-    outcomes = import_many(convert, sources, out, cli.workers_of(arguments))
     targets = [out / name for name in bag_names(sources)] if len(sources) > 1 else [out]
+    shown = {target.name: target for target in targets}
+
+    def convert_and_tell(source: Path, bag: Path) -> tuple[dict[str, Any], str]:
+        """Convert a source; what is said names the bag as it will be called."""
+        return told(convert(source, bag), shown[bag.name])
+
+    outcomes = import_many(convert_and_tell, sources, out, cli.workers_of(arguments), kept, [*settings, str(out)])
     found: list[dict[str, Any]] = []
     lines, errors = [], []
     for source, target, (result, error) in zip(sources, targets, outcomes, strict=True):
-        if error:
+        if error or result is None:
             found.append({'source': source, 'error': error})
             errors.append(error)
         else:
-            numbers, text = told(result, target)
-            found.append({'source': source, 'out': target, 'imported': numbers})
-            lines.append(f'{source}: {text}')
+            found.append({'source': source, 'out': target, 'imported': result['numbers']})
+            lines.append(f'{source}: {result["text"]}')
     return cli.print_result(
         arguments, {'sources': found}, '\n'.join(lines), cli.UNUSABLE if errors else cli.SUCCESS, errors
     )

@@ -31,6 +31,8 @@ class Part(NamedTuple):
     names: tuple[str, ...]  # of the values in the result
     call: Callable[[], Any]
     """picklable function that computes the part; returns `Values`, or a named tuple with these fields"""
+    output: Path | None = None
+    """folder that the call makes; without it the part is not finished"""
 
 
 class Kept(NamedTuple):
@@ -60,6 +62,8 @@ def content_of(value: Any) -> Any:
         return [list(value.shape), value.dtype.str, hashlib.sha256(value.tobytes()).hexdigest()]
     if is_dataclass(value):
         return [type(value).__name__, *(content_of(getattr(value, one.name)) for one in fields(value) if one.init)]
+    if isinstance(value, Mapping):
+        return {str(name): content_of(item) for name, item in value.items()}
     return [content_of(item) for item in value] if isinstance(value, list | tuple) else value
 
 
@@ -177,6 +181,6 @@ def _read(kept: Kept, part: Part) -> Outcome[Values] | None:
         return None
     if found.keys() == {_ERROR}:
         return None if kept.retry_failed else Outcome(None, str(found[_ERROR]))
-    if found.keys() != set(part.names):
+    if found.keys() != set(part.names) or (part.output is not None and not part.output.is_dir()):
         return None
     return Outcome({name: np.array(value) if isinstance(value, list) else value for name, value in found.items()})

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 from functools import partial
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from harness.example_bags import write_inputs
 from harness.standard_bags import MAPPING, write_standard
 from offline.bags.test_import_log import RIG, ROWS
 
+from seal_friction_ros.offline.bags import import_log
+from seal_friction_ros.offline.bags import import_many as import_many_module
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
 from seal_friction_ros.offline.bags.import_log import convert_log, read_rig
 from seal_friction_ros.offline.bags.import_many import import_many
@@ -62,18 +65,44 @@ def test_without_one_good_source_and_after_a_refusal_nothing_is_left(words, caps
 
 
 def test_a_process_that_dies_costs_its_own_bag_only_and_leaves_no_part_of_it(words):
-    def dying(log: Path, out: Path) -> int:
+    def dying(log: Path, out: Path) -> tuple[dict[str, int], str]:
         out.mkdir(parents=True)
         (out / 'part').touch()
-        return os._exit(9) if log.name == 'a.csv' else 1
+        return os._exit(9) if log.name == 'a.csv' else ({'rows': 1}, 'done')
 
     dead, done = import_many(dying, [Path('a.csv'), Path('b.csv')], Path('bags'), 2)
     assert dead.error.startswith('a.csv: its process ended')
-    assert done.result == 1
+    assert done.result == {'numbers': {'rows': 1}, 'text': 'done'}
     assert [*contents(Path('bags'))] == [Path('b/part')]
     (alone,) = import_many(dying, [Path('b.csv')], Path('folder/alone'), 2)  # as on a cluster
-    assert (alone.result, [*contents(Path('folder'))]) == (1, [Path('alone/part')])
+    assert alone.result == done.result
+    assert [*contents(Path('folder'))] == [Path('alone/part')]
     assert not list(Path().glob('.*'))
+
+
+def test_an_interrupted_import_goes_on_and_says_and_makes_the_same(words, capsys, monkeypatch):
+    asked = [*words, '--out', 'bags', '--work', 'work', '--workers', '1', '--json']
+    assert main([*words, '--out', 'plain', '--json']) == 2
+    plain = capsys.readouterr()
+    convert, log_of_calls = import_log.convert_log, Path('calls')
+
+    def counted(log: Path, out: Path, rig: object) -> object:
+        with log_of_calls.open('a') as calls:
+            calls.write(f'{log.name} ')
+        return convert(log, out, rig)
+
+    monkeypatch.setattr(import_log, 'convert_log', counted)
+    with monkeypatch.context() as patch:
+        patch.setattr(import_many_module.shutil, 'move', lambda *_: signal.raise_signal(signal.SIGINT))
+        assert main(asked) == 130
+    assert not Path('bags').exists()
+    assert main(asked) == 2
+    assert log_of_calls.read_text() == 'a.csv bad.csv b.csv '  # once each; also the failure was kept
+    assert capsys.readouterr().out == plain.out.replace('plain', 'bags')
+    assert contents(Path('bags')) == contents(Path('plain'))
+    assert not list(Path('work').glob('*.bag'))
+    assert main([*words, '--out', 'again', '--work', 'work']) == 2
+    assert contents(Path('again')) == contents(Path('plain'))
 
 
 def test_bags_with_standard_messages_get_a_bag_for_each_actuator(tmp_path, capsys):
@@ -83,7 +112,8 @@ def test_bags_with_standard_messages_get_a_bag_for_each_actuator(tmp_path, capsy
     for count, text in ((1, ''), (2, MAPPING.partition('actuators:\n')[2].replace('  axis:', '  twin:'))):
         mapping.write_text(MAPPING + text)
         out = tmp_path / f'bags {count}'
-        assert main(['import', 'bag', *runs, '--mapping', str(mapping), '--out', str(out), '--json']) == 0
+        work = ['--work', str(tmp_path / 'work')] if count == 2 else []
+        assert main(['import', 'bag', *runs, '--mapping', str(mapping), '--out', str(out), '--json', *work]) == 0
         found = json.loads(capsys.readouterr().out)['sources']
         bags = [Path(actuator['bag']) for one in found for actuator in one['imported'].values()]
         assert [one['out'] for one in found] == [str(out / 'monday'), str(out / 'tuesday')]
