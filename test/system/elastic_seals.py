@@ -37,10 +37,12 @@ from seal_friction_ros.core.identification.presliding_fit import PreslidingFit, 
 from seal_friction_ros.core.servo.closed_loop import Axis, run_closed_loop
 from seal_friction_ros.core.servo.elastic_plant import ElasticSeals
 from seal_friction_ros.core.servo.motions import Sine
+from seal_friction_ros.core.servo.plant import Load
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, simulate
 from seal_friction_ros.core.servo.tracking import tracking_rms
 from seal_friction_ros.files import read_yaml
 
+LIGHT = 5.0  # [kg] load of the simulated servo
 ENCODER_STEP = 1e-6  # [m]
 ENCODER_NOISE = 0.3  # [-] of a step, for the estimate
 FORCE_NOISE = 1.0  # [N]
@@ -119,9 +121,11 @@ class EstimateErrors(NamedTuple):
     rms_shearing: float  # [-] of the samples with PRESLIDING; NaN: none
 
 
-def estimate_errors(elastic: ElasticSeals, model: Presliding | None, wave: Sine, duration: float) -> EstimateErrors:
+def estimate_errors(
+    elastic: ElasticSeals, model: Presliding | None, wave: Sine, duration: float, mass: float = LIGHT
+) -> EstimateErrors:
     """Errors over ``duration`` [s] of a motion, the first quarter left out; ``model`` None: rigid seals."""
-    servo = ServoParameters(seals=SEALS, elastic=elastic)
+    servo = ServoParameters(seals=SEALS, elastic=elastic, load=Load(mass=mass))
     samples, period = round(duration / servo.control_period), round(1e9 * servo.control_period)
     _, rows = simulate(servo, init(servo), [wave.at(i * servo.control_period) for i in range(samples)])
     rng = np.random.default_rng(20)
@@ -158,12 +162,12 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values * values))) if len(values) else math.nan
 
 
-def print_estimates(name: str, model: Presliding) -> float:
+def print_estimates(name: str, model: Presliding, mass: float) -> float:
     """A line for each motion and each model; the least share of good samples in the band with the elastic one."""
     least = 1.0
     for wave, duration in MOTIONS:
         for words, seals in (('rigid', None), ('elastic', model)):
-            found = estimate_errors(PLANTS[name], seals, wave, duration)
+            found = estimate_errors(PLANTS[name], seals, wave, duration, mass)
             print(
                 f'{name}, {1e3 * wave.amplitude:g} mm at {wave.frequency:g} Hz, {words}: RMS error {found.rms:.1%} of '
                 f'the friction; status 0 {found.good:.1%}, RMS {found.rms_good:.1%}, in the band {found.in_band:.1%}; '
@@ -180,9 +184,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--plants', nargs='*', choices=sorted(PLANTS), default=list(PLANTS))
     parser.add_argument('--estimate', action='store_true', help='the friction of the estimate instead')
+    parser.add_argument('--mass', type=float, default=LIGHT, help='of the load [kg], for the estimate')
     options = parser.parse_args()
     if options.estimate:
-        shares = [print_estimates(name, identified(PLANTS[name]).presliding) for name in options.plants]
+        shares = [print_estimates(name, identified(PLANTS[name]).presliding, options.mass) for name in options.plants]
         return 1 if min(shares) < 0.95 else 0
     worst = -math.inf
     for name in options.plants:

@@ -1,7 +1,8 @@
 """The estimate after the reversals of measured seals, with rigid and with elastic seals.
 
 ``python test/system/reversals_on_logs.py FOLDER`` with the logs of the Delft rig in FOLDER. Law and elasticity are
-identified on some logs and used on others, adaptation on, by the commands a user has. The friction force over the first
+identified on some logs and used on others, adaptation on, by the commands a user has. The moving mass of the rig, not
+in its data, is assumed as 1 kg. The friction force over the first
 0.5 mm after each reversal is compared with the force sum, less the offset of the log: half the sum of the mean
 residuals of the two directions, beyond 2 mm. No friction of the log itself is used.
 """
@@ -20,7 +21,10 @@ from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.commands.main import main as command
 
 NEAR, FAR = 0.5e-3, 2e-3  # [m] of travel after a reversal
-PARAMETERS = "/**: {{ros__parameters: {{adaptation.mode: 'on', stamp_age_max: 0.0, use_presliding: {}}}}}\n"
+PARAMETERS = (
+    "/**: {{ros__parameters: {{adaptation.mode: 'on', adaptation.moving_mass: 1.0, stamp_age_max: 0.0, "
+    'use_presliding: {}}}}}\n'
+)
 
 
 class Errors(NamedTuple):

@@ -6,10 +6,11 @@ Time is the stamp of the samples: the same samples give the same estimates, live
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
 
 from seal_friction_ros.core.estimation.adaptation import (
+    LARGEST_INERTIA,
     NOT_ADAPTED,
     AdaptationSettings,
     AdaptationState,
@@ -239,7 +240,8 @@ class EstimatorParameters:
         followed = None
         if elasticity is not None and self.settings.use_presliding:
             softened = math.fsum(seal.stiffness * seal.relative_std for seal in elastic)
-            followed = followed_elasticity(elasticity, softened / elasticity.stiffness)
+            unlike = _unlike_yield(self.seals, self.settings.pressure_max)
+            followed = followed_elasticity(elasticity, softened / elasticity.stiffness, unlike)
         derived = {
             'seal_numbers': numbers_of_seals(self.seals),
             'depends_on_velocity': any(seal.depends_on_velocity for seal in seals),
@@ -256,6 +258,31 @@ class EstimatorParameters:
         }
         for name, value in derived.items():
             object.__setattr__(self, name, value)
+
+
+def _unlike_yield(seals: tuple[MountedSeal, ...], pressure_max: float) -> float:
+    """Way until one of some elastic seals slides over that until all together do, at worst [-]; 1 in one chamber.
+
+    At worst it is at its highest identified pressure, at most ``pressure_max`` [Pa], and the others have none.
+    """
+    if len({mounted.chamber for mounted in seals}) < 2:
+        return 1.0
+    elastic = [(mounted, mounted.seal.presliding.stiffness) for mounted in seals if mounted.seal.presliding]
+    total = math.fsum(stiffness for _, stiffness in elastic)
+    lowest, highest = (
+        [
+            friction_of_seals(numbers_of_seals((replace(mounted, chamber='a'),)), pressure, 0.0, 0.0).coulomb_friction
+            for mounted, _ in elastic
+            for pressure in [end(0.0, min(mounted.seal.pressure_max, pressure_max))]
+        ]
+        for end in (min, max)
+    )
+    unlike = 1.0
+    for low, high, (_, stiffness) in zip(lowest, highest, elastic, strict=True):
+        together = (math.fsum(lowest) - low + high) / total
+        if together > 0.0:
+            unlike = max(unlike, high / stiffness / together)
+    return unlike
 
 
 class Speed(NamedTuple):
@@ -377,7 +404,9 @@ def step(
         seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
     if not parameters.adapts:
         estimate = estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
-        return _with_sheared_seals(parameters.followed_elasticity, state, seen, friction, estimate)
+        return _with_sheared_seals(
+            parameters.adaptation, parameters.followed_elasticity, state, seen, friction, estimate
+        )
     return _adapted_step(parameters, state, seen, friction)
 
 
@@ -431,7 +460,7 @@ def _adapted_step(
         if not uses_scale:
             left += (learnt.scale - 1.0) * law * (1.0 if velocity > 0.0 else -1.0)
     estimate = estimate_of(parameters, seen, adapted, learnt.scale, scale_std, learnt.offset, left)
-    state, estimate = _with_sheared_seals(parameters.followed_elasticity, state, seen, adapted, estimate)
+    state, estimate = _with_sheared_seals(settings, parameters.followed_elasticity, state, seen, adapted, estimate)
     if not is_due(known, stamp):
         return state, estimate
     status = estimate.status & ~_MODEL_DISAGREES
@@ -455,17 +484,19 @@ def _adapted_step(
 
 @compilable
 def _with_sheared_seals(
+    settings: AdaptationSettings,
     elasticity: FollowedElasticity | None,
     state: EstimatorState,
     seen: Observation,
     friction: ActuatorFriction,
     estimate: FrictionEstimate,
 ) -> tuple[EstimatorState, FrictionEstimate]:
-    """Estimate with the friction of seals that shear, while the rod moves; at rest it is that of rigid seals.
+    """Estimate with the friction of seals that shear, while the rod moves and just after; at rest as with rigid seals.
 
-    Without a usable velocity or pressure the seals are not followed: after a short gap the way over it counts.
+    Without a usable velocity or pressure the seals are not followed: over a short gap the way counts.
 
     Args:
+        settings: With the moving mass; the acceleration is that of adaptation.
         elasticity: Of the seals; None: rigid.
         state: With the shear of the sample before.
         seen: The sample.
@@ -477,27 +508,32 @@ def _with_sheared_seals(
     stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left = estimate
     if status & _NO_STATE:
         return state, estimate
+    known = state.adaptation
+    inertia = settings.moving_mass * known.acceleration
     moment = Moment(
         stamp,
         state.velocity.velocity,
         sign(seen.velocity),
-        seen.force_sum,
+        seen.force_sum - offset - inertia,
         not status & _NO_FORCE_SUM,
+        settings.moving_mass > 0.0 and abs(inertia) <= LARGEST_INERTIA * coulomb and known.stamp != NEVER,
         coulomb,
         friction.velocity_friction,
         breakaway - coulomb,
     )
     shear, sheared = follow(elasticity, state.shear, moment)
-    if seen.velocity != 0.0:
-        if left != 0.0:
+    if sheared.is_followed and acting != UNKNOWN:
+        if left != 0.0:  # there is a residual
             left += force - sheared.force
         force, std = sheared.force, math.sqrt(std * std + sheared.std * sheared.std)
-        if not sheared.slides:
+        if seen.velocity == 0.0:
+            direction = sign(force)
+        if seen.velocity == 0.0 or not sheared.slides:
             status |= _PRESLIDING
         estimate = FrictionEstimate(
             stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left
         )
-    last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, _ = state
+    last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, _ = state
     return EstimatorState(
         last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear
     ), estimate

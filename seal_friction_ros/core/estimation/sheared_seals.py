@@ -3,16 +3,19 @@ r"""Friction of seals that still shear: the elastic state that the estimate foll
 ``state = NOT_FOLLOWED``, then ``state, friction = follow(elasticity, state, moment)`` for every sample.
 
 - **The rod moves**: its seals shear by its way, :math:`\Delta x = \tfrac12 (v_0 + v)\,\Delta t`, as in
-  `presliding.shear`, with the velocities as measured: those of an encoder add up to its positions.
-- **The rod rests**: nothing accelerates, so the friction is the force sum, up to breakaway. That tells more than any
-  way, which noise and a bias make: the elements shear until they bear it.
-- **Uncertainty**: the same way also shears seals that are softer by two standard deviations of the stiffness. Half the
-  difference of the two forces is the standard deviation that elasticity adds. The rod counts as sliding when both have
-  come within 5 % of the sliding friction.
+  `presliding.shear`, with the velocities as measured: those of an encoder add up to its positions. While the seals
+  slide, a way back is kept until the direction turns: it may be noise.
+- **The rod rests**: after `REST` nothing accelerates any more, so the friction is the force sum, up to breakaway. That
+  tells more than any way: the elements shear until they bear it. Before that, as in a reversal, the way still counts;
+  with a known inertia the seals bear the force sum at once, but the softer ones, below, still follow the way.
+- **Uncertainty**: the same way also shears seals that are softer, by two standard deviations of the stiffness and by
+  what one set of elements may miss of seals under unlike pressures. Half the difference of the two forces is the
+  standard deviation that elasticity adds. The rod counts as sliding when both have come within 5 % of their sliding
+  friction.
 - **Unknown shear**: at the start, after a gap, and after a rest without a force sum the seals may be sheared in any
-  way. The force is then a guess: sliding friction at the start, that of before after a gap. The softer ones begin
-  fully sheared against the motion. A displacement keeps the order of the forces of an
-  element, so when these slide, any seals of their stiffness do.
+  way. The force is then a guess: sliding friction at the start, that of before after a gap. The softer seals begin
+  fully sheared against the motion, with all of their stiction. A way keeps the order of the forces of an element, so
+  when these slide, any seals do.
 
 Source: the elements are those of `presliding`; all else is our choice.
 """
@@ -36,12 +39,16 @@ from seal_friction_ros.core.friction.presliding import (
     shear,
 )
 
-LONGEST_STEP = 0.05  # [s] after a longer gap nobody knows how far the rod went
+REST = 100_000_000  # [ns] after which a rod at rest does not accelerate
+SHORT_GAP = 0.01  # [s] over which the way is that of the velocities at both ends,
+PERIODS = 3.0  # or so many times the last sample period, if that is longer,
+LONGEST_GAP = 0.1  # [s] but no longer gap
 SETTLED = 0.95  # [-] of the sliding friction, from which on the rod counts as sliding
 BAND = 2.0  # [-] standard deviations by which the softer seals are softer
 LEAST_STD = 0.15  # [-] of the stiffness: elements of one power law miss a seal of another structure by as much
+LEAST_SOFTNESS = 0.1  # [-] stiffness of the softer seals over that of the file, at least
 NOISE = 0.01  # [-] of the friction, to which the seals of a rod at rest bear the force sum
-LEAST_SOFTNESS = 0.2  # [-] stiffness of the softer seals over that of the file, at least
+EQUAL = 1e-3  # [-] of the friction, to which seals and softer seals that slide are the same
 
 
 class FollowedElasticity(NamedTuple):
@@ -57,14 +64,17 @@ class FollowedShear(NamedTuple):
 
     stamp: int  # [ns] of the last sample; `NEVER` before the first
     velocity: float  # [m/s] of the last sample, as measured
-    shear: Shear  # of the seals
-    softer: Elements  # [N] of softer ones
+    elapsed: float  # [s] between the last two samples
+    seals: Shear
+    softer: Shear
     is_known: bool  # whether no other shear is possible
-    direction: int  # -1 or 1: of the motion since the shear was not known; 0: no motion since then
+    direction: int  # -1 or 1 of the last motion; 0: none since the shear was not known, or since a rest
+    rest_since: int  # [ns] stamp; `NEVER` while the rod moves
     fully_sheared: float  # [N] with sign: sliding friction that all elements bear, which are 0 here; 0.0: not all yield
+    way_back: float  # [m] of seals that slide, against their direction
 
 
-NOT_FOLLOWED = FollowedShear(NEVER, 0.0, NOT_SHEARED, NO_ELEMENTS, False, 0, 0.0)
+NOT_FOLLOWED = FollowedShear(NEVER, 0.0, 0.0, NOT_SHEARED, NOT_SHEARED, False, 0, NEVER, 0.0, 0.0)
 """State before the first sample."""
 
 
@@ -74,32 +84,35 @@ class Moment(NamedTuple):
     stamp: int  # [ns]
     velocity: float  # [m/s] as measured
     direction: int  # -1 or 1 of the motion; 0: the rod rests
-    force_sum: float  # [N]
+    force_sum: float  # [N] without what is known not to be friction
     knows_force_sum: bool
+    knows_inertia: bool  # whether the force sum is without inertia, so that it is the friction also in a reversal
     coulomb_friction: float  # [N]
     velocity_friction: float  # [N] that sliding adds to it
     stiction: float  # [N] that breakaway adds to it
 
 
 class ShearedFriction(NamedTuple):
-    """Friction of the seals while the rod moves."""
+    """Friction of the seals of a rod that moves, or that moved just now."""
 
+    is_followed: bool  # False: the rod rests, and the force sum tells the friction
     force: float  # [N] with its sign
     std: float  # [N] of the force, from the stiffness
     slides: bool  # whether the seals slide, all but 5 %, also softer ones
 
 
-NO_FRICTION = ShearedFriction(0.0, 0.0, False)
+AT_REST = ShearedFriction(False, 0.0, 0.0, False)
 
 
-def followed_elasticity(seals: PreslidingNumbers, relative_std: float) -> FollowedElasticity:
+def followed_elasticity(seals: PreslidingNumbers, relative_std: float, unlike: float = 1.0) -> FollowedElasticity:
     """Elasticity to follow.
 
     Args:
         seals: Of all seals together.
         relative_std: Relative standard deviation of their stiffness.
+        unlike: How much later than all together one of the seals may slide [-], as its pressure is unlike the others'.
     """
-    softness = max(1.0 - BAND * max(relative_std, LEAST_STD), LEAST_SOFTNESS)
+    softness = max((1.0 - BAND * max(relative_std, LEAST_STD)) / unlike, LEAST_SOFTNESS)
     softer = seals._replace(
         stiffness=softness * seals.stiffness, stiffnesses=Elements(*(softness * k for k in seals.stiffnesses))
     )
@@ -111,78 +124,133 @@ def followed_elasticity(seals: PreslidingNumbers, relative_std: float) -> Follow
 def follow(
     elasticity: FollowedElasticity, state: FollowedShear, moment: Moment
 ) -> tuple[FollowedShear, ShearedFriction]:
-    """Friction at one sample; `NO_FRICTION` at rest, where the force sum tells it.
+    """Friction at one sample.
 
     Args:
         elasticity: Of the seals.
         state: `NOT_FOLLOWED` or the state before.
         moment: The sample.
     """
-    last_stamp, last_velocity, sheared, softer, is_known, last_direction, full = state
-    stamp, velocity, direction, _, knows_force_sum, coulomb, velocity_friction, stiction = moment
+    last_stamp, last_velocity, period, seals, softer, is_known, last_direction, rest_since, full, way_back = state
+    stamp, velocity, direction, _, knows_force_sum, knows_inertia, coulomb, velocity_friction, _ = moment
     elapsed = (stamp - last_stamp) * 1e-9 if last_stamp != NEVER else 0.0
+    way = 0.5 * (last_velocity + velocity) * elapsed + way_back
     if last_stamp == NEVER:
-        full, sheared = direction * (coulomb + velocity_friction), Shear(NO_ELEMENTS, velocity_friction)
-    elif not 0.0 <= elapsed <= LONGEST_STEP:
-        is_known, last_direction, elapsed = False, 0, 0.0
-    displacement = 0.5 * (last_velocity + velocity) * elapsed
-    if is_known and full * direction > 0.0 and displacement * direction > 0.0:  # most samples: three times as fast
-        excess = sheared.excess
-        stretch = (coulomb + excess - abs(full)) * elasticity.seals.shares.last / elasticity.seals.stiffnesses.last
-        length = between(0.0, abs(displacement) - stretch, abs(displacement))  # as `presliding.gross_sliding`
-        excess = relaxed(excess, velocity_friction, length, elasticity.seals.memory_length)
+        full = direction * between(0.0, coulomb + velocity_friction, math.inf)
+        seals = Shear(NO_ELEMENTS, velocity_friction)
+    elif not 0.0 <= elapsed <= _longest_gap(period):
+        is_known, last_direction, way = False, 0, 0.0
+    elapsed = between(0.0, elapsed, LONGEST_GAP)
+    rest_since, direction = _rest(stamp, direction, rest_since, last_direction)
+    bears = rest_since != NEVER and knows_inertia and knows_force_sum
+    if is_known and full * direction > 0.0 and not bears:
+        excess, way_left = _sliding_on(elasticity, moment, seals.excess, full, way * direction)
         sliding = between(0.0, coulomb + excess, math.inf)
-        if (sliding - abs(full)) * elasticity.yield_compliance <= abs(displacement):
-            full = direction * sliding
-            state = FollowedShear(stamp, velocity, Shear(NO_ELEMENTS, excess), NO_ELEMENTS, True, direction, full)
-            return state, ShearedFriction(full, 0.0, True)
+        if (sliding - abs(full)) * elasticity.yield_compliance <= abs(way):  # most samples: three times as fast
+            full, seals = direction * sliding, Shear(NO_ELEMENTS, excess)
+            way_left *= direction
+            state = FollowedShear(stamp, velocity, elapsed, seals, seals, True, direction, rest_since, full, way_left)
+            return state, ShearedFriction(True, full, 0.0, True)
     if full != 0.0:
-        sheared = Shear(_fully_sheared(elasticity.seals, full), sheared.excess)
-        softer = _fully_sheared(elasticity.softer, full)
+        softer = Shear(_fully_sheared(elasticity.softer, full), seals.excess)
+        seals = Shear(_fully_sheared(elasticity.seals, full), seals.excess)
     if direction == 0:
-        sheared, softer = _held(elasticity, sheared, softer, moment, elapsed)
-        return FollowedShear(stamp, velocity, sheared, softer, is_known and knows_force_sum, 0, 0.0), NO_FRICTION
-    slide = Slide(displacement, elapsed, coulomb, velocity_friction, stiction)
-    sheared, force = shear(elasticity.seals, sheared, slide)
-    sliding = between(0.0, coulomb + sheared.excess, math.inf)
+        seals = _held(elasticity.seals, seals, moment, elapsed)
+        softer = _held(elasticity.softer, softer, moment, elapsed)
+        is_known = is_known and knows_force_sum
+        return FollowedShear(stamp, velocity, elapsed, seals, softer, is_known, 0, rest_since, 0.0, 0.0), AT_REST
     if not is_known and direction != last_direction:
-        softer = _fully_sheared(elasticity.softer, -direction * sliding)
-    softer, softer_force = element_forces(elasticity.softer, softer, displacement, sliding)
-    slides = force * direction >= SETTLED * sliding and softer_force * direction >= SETTLED * sliding
-    is_known = is_known or slides
-    full = 0.0
-    if is_known and force == softer_force and abs(force) == sliding:
-        full, sheared, softer = force, Shear(NO_ELEMENTS, sheared.excess), NO_ELEMENTS
-    state = FollowedShear(stamp, velocity, sheared, softer, is_known, direction, full)
-    return state, ShearedFriction(force, 0.5 * abs(force - softer_force), slides)
+        softer = _sheared_against(elasticity.softer, moment, direction)
+    seals, softer, sheared = _moved(elasticity, seals, softer, Slide(way, elapsed, *moment[6:]), direction)
+    if bears:
+        seals = _held(elasticity.seals, seals, moment, 0.0)
+        sheared = _bearing(seals, softer)
+    is_known, full = is_known or sheared.slides, 0.0
+    if is_known and abs(sheared.force) == coulomb + seals.excess and sheared.std <= EQUAL * abs(sheared.force):
+        full, seals = sheared.force, Shear(NO_ELEMENTS, seals.excess)
+        softer = seals
+    return FollowedShear(stamp, velocity, elapsed, seals, softer, is_known, direction, rest_since, full, 0.0), sheared
 
 
 @compilable
-def _held(
-    elasticity: FollowedElasticity, sheared: Shear, softer: Elements, moment: Moment, elapsed: float
-) -> tuple[Shear, Elements]:
+def _rest(stamp: int, direction: int, since: int, last_direction: int) -> tuple[int, int]:
+    """Stamp [ns] since which the rod rests, `NEVER` if it moves, and the direction: the last one for `REST`."""
+    if direction != 0:
+        return NEVER, direction
+    if since == NEVER:
+        since = stamp
+    return since, last_direction if 0 <= stamp - since < REST else 0
+
+
+@compilable
+def _sliding_on(
+    elasticity: FollowedElasticity, moment: Moment, excess: float, full: float, way: float
+) -> tuple[float, float]:
+    """Excess [N] of seals that slide with a friction ``full`` [N] and go on by ``way`` [m], and what is left of it."""
+    if way <= 0.0:
+        return excess, way
+    stretch = (moment.coulomb_friction + excess - abs(full)) * elasticity.seals.shares.last
+    length = between(0.0, way - stretch / elasticity.seals.stiffnesses.last, way)  # as `presliding.gross_sliding`
+    return relaxed(excess, moment.velocity_friction, length, elasticity.seals.memory_length), 0.0
+
+
+@compilable
+def _moved(
+    elasticity: FollowedElasticity, seals: Shear, softer: Shear, slide: Slide, direction: int
+) -> tuple[Shear, Shear, ShearedFriction]:
+    """Seals and softer seals after a way of the rod, and their friction.
+
+    They slide if each has come within 5 % of its own sliding friction, which may hold stiction, and they agree.
+    """
+    seals, force = shear(elasticity.seals, seals, slide)
+    softer, softer_force = shear(elasticity.softer, softer, slide)
+    sliding = between(0.0, slide.coulomb_friction + seals.excess, math.inf)
+    of_softer = between(0.0, slide.coulomb_friction + softer.excess, math.inf)
+    apart = abs(force - softer_force)
+    slides = force * direction >= SETTLED * sliding and softer_force * direction >= SETTLED * of_softer
+    return seals, softer, ShearedFriction(True, force, 0.5 * apart, slides and apart <= (1.0 - SETTLED) * sliding)
+
+
+@compilable
+def _longest_gap(period: float) -> float:
+    """Longest time [s] over which the way is known, after samples ``period`` [s] apart."""
+    longest = PERIODS * period if PERIODS * period > SHORT_GAP else SHORT_GAP
+    return longest if longest < LONGEST_GAP else LONGEST_GAP
+
+
+@compilable
+def _held(elasticity: PreslidingNumbers, sheared: Shear, moment: Moment, elapsed: float) -> Shear:
     """Seals of a rod at rest, ``elapsed`` [s] after the sample before, sheared until they bear the force sum.
 
     They stay as they are while the force sum is within `NOISE` of what they bear. Each pass shears them as far as the
     elements that do not yield need, so one more may yield in each.
     """
     forces, excess = sheared
-    excess = relaxed(excess, moment.stiction, elapsed, elasticity.seals.dwell_time)
+    excess = relaxed(excess, moment.stiction, between(0.0, elapsed, math.inf), elasticity.dwell_time)
     f1, f2, f3, f4, f5, f6 = forces
-    breakaway = moment.coulomb_friction + moment.stiction
-    further = between(-breakaway, moment.force_sum, breakaway) - (f1 + f2 + f3 + f4 + f5 + f6)
+    breakaway = between(0.0, moment.coulomb_friction + moment.stiction, math.inf)
+    wanted = between(-breakaway, moment.force_sum, breakaway)
+    further = wanted - (f1 + f2 + f3 + f4 + f5 + f6)
     if not moment.knows_force_sum or abs(further) <= NOISE * breakaway:
-        return Shear(forces, excess), softer
-    sliding, wanted = moment.coulomb_friction + excess, f1 + f2 + f3 + f4 + f5 + f6 + further
-    share = elasticity.seals.stiffness / elasticity.softer.stiffness  # the same force
+        return Shear(forces, excess)
+    sliding = between(0.0, moment.coulomb_friction + excess, math.inf)
     for _ in range(SLOTS):
-        stiffness = _stiffness(elasticity.seals, forces, further, sliding)
+        stiffness = _stiffness(elasticity, forces, further, sliding)
         if stiffness == 0.0 or abs(further) <= 1e-9 * breakaway:
             break
-        forces, force = element_forces(elasticity.seals, forces, further / stiffness, sliding)
-        softer, _ = element_forces(elasticity.softer, softer, share * further / stiffness, sliding)
+        forces, force = element_forces(elasticity, forces, further / stiffness, sliding)
         further = wanted - force
-    return Shear(forces, excess), softer
+    return Shear(forces, excess)
+
+
+@compilable
+def _bearing(seals: Shear, softer: Shear) -> ShearedFriction:
+    """Friction of seals that bear the force sum in a reversal, while softer ones follow the way."""
+    force, softer_force = 0.0, 0.0
+    for i in range(SLOTS):
+        force += seals.forces[i]
+        softer_force += softer.forces[i]
+    return ShearedFriction(True, force, 0.5 * abs(force - softer_force), False)
 
 
 @compilable
@@ -194,6 +262,13 @@ def _stiffness(elasticity: PreslidingNumbers, forces: Elements, direction: float
         if force < (1.0 - 1e-9) * elasticity.shares[i] * friction:
             stiffness += elasticity.stiffnesses[i]
     return stiffness
+
+
+@compilable
+def _sheared_against(elasticity: PreslidingNumbers, moment: Moment, direction: int) -> Shear:
+    """Seals that are fully sheared against a motion, with all of their stiction: none slide later."""
+    most = between(0.0, moment.coulomb_friction + moment.stiction, math.inf)
+    return Shear(_fully_sheared(elasticity, -direction * most), moment.stiction)
 
 
 @compilable

@@ -99,7 +99,7 @@ def _kind(text: str) -> tuple[str, tuple[str, ...]]:
 
 
 NOT_FOR_KINDS = (
-    'report', 'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',
+    'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',
     'scheduler', 'work',
 )  # fmt: skip
 """options that several kinds of seals do not take"""
@@ -130,9 +130,15 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
         result = kinds.identify_kinds(arguments.sources, options, each, name, arguments.run_to_run)
         for kind, path in files.items():
             write_seal(result.documents[kind], path, f'Seal file, {mark("identify")}.')
-    numbers = kinds.kinds_numbers(result) | {'seal_files': {kind: str(path) for kind, path in files.items()}}
-    written = ', '.join(str(path) for path in files.values())
-    return cli.print_result(arguments, numbers, f'{kinds.kinds_summary(result)}\n{written}: written')
+        written: dict[str, Any] = {}
+        if arguments.report:
+            from seal_friction_ros.offline.reports.kinds_report import write_kinds_report
+
+            figures = write_kinds_report(result, files, arguments.report)
+            written = {'report': arguments.report, 'figures': figures}
+    numbers = kinds.kinds_numbers(result) | {'seal_files': {kind: str(path) for kind, path in files.items()}} | written
+    names_written = ', '.join(map(str, files.values()))
+    return cli.print_result(arguments, numbers, f'{kinds.kinds_summary(result)}\n{names_written}: written')
 
 
 def run(arguments: argparse.Namespace) -> int:

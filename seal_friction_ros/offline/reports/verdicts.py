@@ -121,6 +121,24 @@ def of_identification(found: IdentificationNumbers) -> Verdict:
     return Verdict(level, '; '.join([text, *reasons]) + '.', after)
 
 
+def of_kinds(error: float, shares: Sequence[tuple[str, float, float]], files: Sequence[str]) -> Verdict:
+    """Verdict on several kinds of seals that were identified together.
+
+    Args:
+        error: Of left-out readings, relative [-].
+        shares: Name of each kind, its share in the friction and the standard deviation of the share [-].
+        files: Their seal files.
+    """
+    apart = LOOK if max(std for _, _, std in shares) > WIDE_BAND else GOOD
+    level = _worst([_between(error, SMALL_ERROR, LARGE_ERROR), apart])
+    each = ', '.join(f'{name} {_percent(share)} (standard deviation {_percent(std)})' for name, share, std in shares)
+    text = f'Shares of the friction: {each}. Readings that the fit did not see are off by {_percent(error)} on average.'
+    after = f'use the seal files together: seals: [{", ".join(files)}].'
+    if level != GOOD:
+        after = f'drive the pressures that are proposed below; until then {after}'
+    return Verdict(level, text, after)
+
+
 def of_seal(
     name: str, friction: float, pressure: float, std: float, *, is_placeholder: bool, off: float | None
 ) -> Verdict:

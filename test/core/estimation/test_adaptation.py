@@ -196,6 +196,37 @@ def test_a_frozen_force_sum_does_not_take_the_friction_away():
     assert estimates[-1].status & Status.MODEL_DISAGREES
 
 
+def test_a_spike_moves_the_offset_by_no_more_than_four_deviations():
+    known = parameters()
+
+    def offset(spike: float) -> float:
+        """Offset [N] after a stroke with one spike near its end."""
+        state = estimator.init(known)
+        for sample in samples(DAY, 20.0, 0):
+            extra = spike if sample.stamp == START + 19_400_000_000 else 0.0
+            force = sample.force._replace(force=sample.force.force + extra)
+            state, _ = step(known, state, sample._replace(force=force))
+            if sample.stamp == START + 19_420_000_000:
+                return state.adaptation.learnt.offset
+        raise AssertionError
+
+    clean, noise = offset(0.0), run(DAY, 19.0)[0][-1].coulomb_friction_std
+    moved = abs(offset(1e3 * noise) - clean)
+    assert 0.0 < moved <= 4.0 * noise  # as a spike of that size, not one of a thousand deviations
+
+
+def test_a_stroke_knows_the_mean_pressures_it_was_made_at():
+    known, state = parameters(), estimator.init(parameters())
+    for sample in samples(DAY, 3.0, 0):
+        far = 1e5 * math.sin(1e-9 * sample.stamp)
+        pressure = sample.pressure._replace(chamber_a=2e6 + far, chamber_b=5e5 - far)
+        state, _ = step(known, state, sample._replace(pressure=pressure))
+    level = state.adaptation.learnt.before
+    assert level.pressure_a == pytest.approx(2e6, abs=1e5)
+    assert level.pressure_b == pytest.approx(5e5, abs=1e5)
+    assert level.pressure_a + level.pressure_b == pytest.approx(2.5e6)
+
+
 def test_spikes_are_not_learnt():
     def spiked(sample):
         return sample._replace(force=Force(sample.stamp, 900.0)) if sample.stamp % 370_000_000 == 0 else sample

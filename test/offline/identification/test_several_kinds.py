@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness.identify_run import Run
+from harness.report_page import checked_page
 from harness.two_kinds import BAR, held, piston_friction, rod_friction, swept, write_log
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
@@ -127,11 +128,25 @@ def test_equal_kinds_of_names_and_options_of_one_kind_are_refused(tmp_path):
     for more, word in (
         (('--seal-kind', 'rod=a'), 'two kinds'),
         ((*KINDS, '--seal-chambers', 'a,b'), '--seal-chambers'),
-        ((*KINDS, '--report', str(tmp_path / 'page.html')), '--report'),
+        ((*KINDS, '--next', str(tmp_path / 'next.csv')), '--next'),
     ):
         run = Run(tmp_path, *log, *more)
         assert run.code == 2
         assert word in run.errors
+
+
+def test_the_page_has_the_share_of_each_kind_and_every_pressure_left_out(tmp_path):
+    log, out = write_log(tmp_path, held(GRID, rng())), tmp_path / 'page.html'
+    run = Run(tmp_path, *log, *KINDS, '--report', str(out))
+    assert run.code == 0, run.errors
+    assert run.figures['report'] == str(out)
+    page = checked_page(out)
+    assert set(page.figures) == {'friction_of_kinds', 'measured_over_left_out'}
+    for kind in run.figures['kinds']:
+        assert f'{100.0 * kind["share"]:.1f}' in page.prose
+    assert 'use the seal files together: seals: [seal_rod.yaml, seal_piston.yaml]' in page.prose
+    assert len(run.figures['left_out_N']) == len(GRID)
+    assert page.texts['td'].count('difference') == 1
 
 
 def test_a_seal_file_that_another_made_is_not_overwritten(tmp_path):
