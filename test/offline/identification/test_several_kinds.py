@@ -146,7 +146,7 @@ def test_the_page_has_the_share_of_each_kind_and_every_pressure_left_out(tmp_pat
         assert f'{100.0 * kind["share"]:.1f}' in page.prose
     assert 'use the seal files together: seals: [seal_rod.yaml, seal_piston.yaml]' in page.prose
     assert len(run.figures['left_out_N']) == len(GRID)
-    assert page.texts['td'].count('difference') == 1
+    assert 'difference' in page.prose
 
 
 def test_a_seal_file_that_another_made_is_not_overwritten(tmp_path):
