@@ -211,8 +211,9 @@ def test_a_spike_moves_the_offset_by_no_more_than_four_deviations():
         raise AssertionError
 
     clean, noise = offset(0.0), run(DAY, 19.0)[0][-1].coulomb_friction_std
-    moved = abs(offset(1e3 * noise) - clean)
-    assert 0.0 < moved <= 4.0 * noise  # as a spike of that size, not one of a thousand deviations
+    up, down = offset(1e3 * noise) - clean, offset(-1e3 * noise) - clean
+    assert 0.0 < up <= 4.0 * noise  # as a spike of that size, not one of a thousand deviations
+    assert down == pytest.approx(-up, rel=0.4)
 
 
 def test_a_stroke_knows_the_mean_pressures_it_was_made_at():
