@@ -29,6 +29,7 @@ from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Status
 from seal_friction_ros.core.foundation.arrays import FloatArray
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
@@ -117,8 +118,9 @@ class EstimateErrors(NamedTuple):
     rms: float  # [-] of all samples whose state is known, over the Coulomb friction
     good: float  # [-] share of samples with status 0
     rms_good: float  # [-] of these; NaN: none
-    in_band: float  # [-] share of these within 1.96 standard deviations; NaN: none
+    in_band: float  # [-] share of these in their 95 % band; NaN: none
     rms_shearing: float  # [-] of the samples with PRESLIDING; NaN: none
+    shearing_in_band: float  # [-] share of these; NaN: none
 
 
 def estimate_errors(
@@ -148,13 +150,14 @@ def estimate_errors(
     known, good = states != FrictionState.UNKNOWN, status == 0
     shearing = status.astype(int) & int(Status.PRESLIDING) != 0
     size = float(rows.coulomb_friction.mean())
-    in_band = np.abs(error) <= 1.96 * std
+    in_band = np.abs(error) <= BAND_95 * std
     return EstimateErrors(
         _rms(error[known]) / size,
         float(good.mean()),
         _rms(error[good]) / size,
         float(in_band[good].mean()) if good.any() else math.nan,
         _rms(error[shearing]) / size,
+        float(in_band[shearing].mean()) if shearing.any() else math.nan,
     )
 
 
@@ -171,7 +174,7 @@ def print_estimates(name: str, model: Presliding, mass: float) -> float:
             print(
                 f'{name}, {1e3 * wave.amplitude:g} mm at {wave.frequency:g} Hz, {words}: RMS error {found.rms:.1%} of '
                 f'the friction; status 0 {found.good:.1%}, RMS {found.rms_good:.1%}, in the band {found.in_band:.1%}; '
-                f'PRESLIDING: RMS {found.rms_shearing:.1%}',
+                f'PRESLIDING: RMS {found.rms_shearing:.1%}, in the band {found.shearing_in_band:.1%}',
                 flush=True,
             )
         if not math.isnan(found.in_band):

@@ -1,10 +1,10 @@
 """The estimate after the reversals of measured seals, with rigid and with elastic seals.
 
 ``python test/system/reversals_on_logs.py FOLDER`` with the logs of the Delft rig in FOLDER. Law and elasticity are
-identified on some logs and used on others, adaptation on, by the commands a user has. The moving mass of the rig, not
-in its data, is assumed as 1 kg. The friction force over the first
-0.5 mm after each reversal is compared with the force sum, less the offset of the log: half the sum of the mean
-residuals of the two directions, beyond 2 mm. No friction of the log itself is used.
+identified on some logs and used on others, by the commands a user has; adaptation is on, so what the log shows up to a
+sample counts, too. The moving mass of the rig, not in its data, is assumed (``--mass``). The friction force over the
+first 0.5 mm after each reversal is compared with the force sum less the offset of the log: half the sum of the mean
+residuals of the two directions, beyond 2 mm.
 """
 
 import argparse
@@ -16,13 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, VELOCITY_TYPE, decode
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.commands.main import main as command
 
+MASS = 1.0  # [kg] assumed
 NEAR, FAR = 0.5e-3, 2e-3  # [m] of travel after a reversal
 PARAMETERS = (
-    "/**: {{ros__parameters: {{adaptation.mode: 'on', adaptation.moving_mass: 1.0, stamp_age_max: 0.0, "
+    "/**: {{ros__parameters: {{adaptation.mode: 'on', adaptation.moving_mass: {}, stamp_age_max: 0.0, "
     'use_presliding: {}}}}}\n'
 )
 
@@ -33,6 +35,7 @@ class Errors(NamedTuple):
     rms: float  # [N]
     samples: int
     good: int  # of them with status 0
+    in_band: int  # of these in their 95 % band
 
 
 def logs(folder: Path, names: str) -> list[Path]:
@@ -50,7 +53,7 @@ def seal_pairs(folder: Path) -> dict[str, tuple[list[Path], list[Path]]]:
     return pairs
 
 
-def errors(work: Path, learnt_on: list[Path], used_on: list[Path]) -> tuple[Errors, Errors]:
+def errors(work: Path, learnt_on: list[Path], used_on: list[Path], mass: float = MASS) -> tuple[Errors, Errors]:
     """With rigid and with elastic seals; ``work`` is a new folder."""
     work.mkdir()
     seal = work / 'seal.yaml'
@@ -61,25 +64,26 @@ def errors(work: Path, learnt_on: list[Path], used_on: list[Path]) -> tuple[Erro
     found = []
     for name in ('false', 'true'):
         parameters = work / f'{name}.yaml'
-        parameters.write_text(PARAMETERS.format(name))
+        parameters.write_text(PARAMETERS.format(mass, name))
         parts = []
         for bag in bags:
             out = work / f'{bag.name}_{name}'
             _run('replay', bag, '--seal', seal, '--params', parameters, '--out', out)
             parts.append(_near_reversals(out))
-        error, good = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-        found.append(Errors(float(np.sqrt(np.mean(error**2))), len(error), int(good.sum())))
+        error, good, in_band = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+        rms = float(np.sqrt(np.mean(error**2)))
+        found.append(Errors(rms, len(error), int(good.sum()), int((good & in_band).sum())))
     return found[0], found[1]
 
 
-def _near_reversals(bag: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Error of the friction force near the reversals, and whether the status is 0."""
+def _near_reversals(bag: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Error of the friction force near the reversals [N], whether the status is 0, and whether the band holds it."""
     messages = list(read_messages(bag))
     estimates = np.array([decode(ESTIMATE_TYPE, m.data)[:13] for m in messages if m.type_name == ESTIMATE_TYPE], float)
     velocities = [decode(VELOCITY_TYPE, m.data)[:2] for m in messages if m.type_name == VELOCITY_TYPE]
     stamp, velocity = np.array(velocities, float).T
     way = np.abs(velocity) * np.diff(stamp, prepend=stamp[0]) * 1e-9
-    state, direction, status, offset, residual = estimates[:, [5, 6, 7, 11, 12]].T
+    std, state, direction, status, offset, residual = estimates[:, [2, 5, 6, 7, 11, 12]].T
     travel, last, since = np.zeros(len(way)), 0.0, 0.0
     slides = state == FrictionState.SLIDING
     for i in np.flatnonzero(slides):
@@ -89,7 +93,7 @@ def _near_reversals(bag: Path) -> tuple[np.ndarray, np.ndarray]:
     far = slides & (travel > FAR)
     error -= 0.5 * (error[far & (direction > 0.0)].mean() + error[far & (direction < 0.0)].mean())
     near = slides & (travel < NEAR)
-    return error[near], status[near] == 0
+    return error[near], status[near] == 0, np.abs(error[near]) <= BAND_95 * std[near]
 
 
 def _run(*words: object) -> None:
@@ -101,12 +105,14 @@ def main() -> int:
     """Print a line for each seal."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('folder', type=Path, help='with the logs of the Delft rig')
+    parser.add_argument('--mass', type=float, default=MASS, help='of what moves [kg]; 0.0: unknown')
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as work:
-        for number, (name, (learnt_on, used_on)) in enumerate(seal_pairs(parser.parse_args().folder).items()):
-            rigid, elastic = errors(Path(work) / str(number), learnt_on, used_on)
+        for number, (name, (learnt_on, used_on)) in enumerate(seal_pairs(options.folder).items()):
+            rigid, elastic = errors(Path(work) / str(number), learnt_on, used_on, options.mass)
             print(
-                f'{name}: rigid {rigid.rms:.1f} N, status 0 in {rigid.good} of {rigid.samples} samples; '
-                f'elastic {elastic.rms:.1f} N, {elastic.good} of {elastic.samples}',
+                f'{name}: rigid {rigid.rms:.1f} N, status 0 in {rigid.good} of {rigid.samples} samples, '
+                f'{rigid.in_band} in the band; elastic {elastic.rms:.1f} N, {elastic.good}, {elastic.in_band}',
                 flush=True,
             )
     return 0

@@ -265,23 +265,21 @@ def _unlike_yield(seals: tuple[MountedSeal, ...], pressure_max: float) -> float:
 
     At worst it is at its highest identified pressure, at most ``pressure_max`` [Pa], and the others have none.
     """
+
+    def alone(mounted: MountedSeal, pressure: float) -> float:
+        """Friction of one seal [N] that sees this pressure."""
+        return friction_of_seals((replace(mounted, chamber='a').numbers,), pressure, 0.0, 0.0).coulomb_friction
+
     if len({mounted.chamber for mounted in seals}) < 2:
         return 1.0
-    elastic = [(mounted, mounted.seal.presliding.stiffness) for mounted in seals if mounted.seal.presliding]
-    total = math.fsum(stiffness for _, stiffness in elastic)
-    lowest, highest = (
-        [
-            friction_of_seals(numbers_of_seals((replace(mounted, chamber='a'),)), pressure, 0.0, 0.0).coulomb_friction
-            for mounted, _ in elastic
-            for pressure in [end(0.0, min(mounted.seal.pressure_max, pressure_max))]
-        ]
-        for end in (min, max)
-    )
+    stiffnesses = [mounted.seal.presliding.stiffness if mounted.seal.presliding else math.inf for mounted in seals]
+    without = [alone(mounted, 0.0) for mounted in seals]
     unlike = 1.0
-    for low, high, (_, stiffness) in zip(lowest, highest, elastic, strict=True):
-        together = (math.fsum(lowest) - low + high) / total
+    for mounted, stiffness, least in zip(seals, stiffnesses, without, strict=True):
+        most = max(least, alone(mounted, min(mounted.seal.pressure_max, pressure_max)))
+        together = (math.fsum(without) - least + most) / math.fsum(stiffnesses)
         if together > 0.0:
-            unlike = max(unlike, high / stiffness / together)
+            unlike = max(unlike, most / stiffness / together)
     return unlike
 
 
@@ -523,7 +521,7 @@ def _with_sheared_seals(
     )
     shear, sheared = follow(elasticity, state.shear, moment)
     if sheared.is_followed and acting != UNKNOWN:
-        if left != 0.0:  # there is a residual
+        if left != 0.0:  # 0.0: adaptation is off, or there is no residual of this sample
             left += force - sheared.force
         force, std = sheared.force, math.sqrt(std * std + sheared.std * sheared.std)
         if seen.velocity == 0.0:

@@ -197,6 +197,22 @@ def elastic_compensation(settings: FeedForwardSettings, friction_force: float, v
 
 
 @compilable
+def _sheared(
+    settings: FeedForwardSettings,
+    elasticity: PreslidingNumbers | None,
+    elements: Elements,
+    displacement: float,
+    friction: float,
+) -> tuple[Elements, float]:
+    """Seals after a wanted displacement [m], and their friction force [N]; NaN for rigid ones."""
+    if elasticity is None:
+        return elements, math.nan
+    if not settings.presliding or friction < 0.0:
+        return elements, math.nan
+    return element_forces(elasticity, elements, displacement, friction)
+
+
+@compilable
 def step(
     settings: FeedForwardSettings,
     state: FeedForwardState,
@@ -250,10 +266,9 @@ def elastic_step(
 
     limited = _FADE if fade < 1.0 or not valid else 0
     wanted = compensation(settings, friction, velocity)
-    if elasticity is not None:  # noqa: SIM102  compiled code drops the branch only for a bare None
-        if settings.presliding and friction >= 0.0:
-            elements, friction_force = element_forces(elasticity, elements, 0.5 * (last_led + led) * short, friction)
-            wanted = elastic_compensation(settings, friction_force, present)
+    elements, friction_force = _sheared(settings, elasticity, elements, 0.5 * (last_led + led) * short, friction)
+    if not math.isnan(friction_force):
+        wanted = elastic_compensation(settings, friction_force, present)
     clamped = between(-settings.force_limit, wanted, settings.force_limit)
     if clamped != wanted:
         limited |= _CLAMP

@@ -200,7 +200,8 @@ def _moved(
 ) -> tuple[Shear, Shear, ShearedFriction]:
     """Seals and softer seals after a way of the rod, and their friction.
 
-    They slide if each has come within 5 % of its own sliding friction, which may hold stiction, and they agree.
+    They slide if each has come within 5 % of its own sliding friction, they agree, and no stiction is left to break:
+    stiffer seals may have lost it already.
     """
     seals, force = shear(elasticity.seals, seals, slide)
     softer, softer_force = shear(elasticity.softer, softer, slide)
@@ -208,7 +209,10 @@ def _moved(
     of_softer = between(0.0, slide.coulomb_friction + softer.excess, math.inf)
     apart = abs(force - softer_force)
     slides = force * direction >= SETTLED * sliding and softer_force * direction >= SETTLED * of_softer
-    return seals, softer, ShearedFriction(True, force, 0.5 * apart, slides and apart <= (1.0 - SETTLED) * sliding)
+    slides = slides and apart <= (1.0 - SETTLED) * sliding
+    if abs(force) < sliding and seals.excess - slide.sliding_excess > (1.0 - SETTLED) * sliding:
+        slides = False
+    return seals, softer, ShearedFriction(True, force, 0.5 * apart, slides)
 
 
 @compilable
@@ -220,13 +224,14 @@ def _longest_gap(period: float) -> float:
 
 @compilable
 def _held(elasticity: PreslidingNumbers, sheared: Shear, moment: Moment, elapsed: float) -> Shear:
-    """Seals of a rod at rest, ``elapsed`` [s] after the sample before, sheared until they bear the force sum.
+    """Seals of a rod at rest, for ``elapsed`` [s] since the sample before, sheared until they bear the force sum.
 
     They stay as they are while the force sum is within `NOISE` of what they bear. Each pass shears them as far as the
     elements that do not yield need, so one more may yield in each.
     """
     forces, excess = sheared
-    excess = relaxed(excess, moment.stiction, between(0.0, elapsed, math.inf), elasticity.dwell_time)
+    if elapsed > 0.0:
+        excess = relaxed(excess, moment.stiction, elapsed, elasticity.dwell_time)
     f1, f2, f3, f4, f5, f6 = forces
     breakaway = between(0.0, moment.coulomb_friction + moment.stiction, math.inf)
     wanted = between(-breakaway, moment.force_sum, breakaway)

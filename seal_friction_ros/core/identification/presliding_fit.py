@@ -424,6 +424,7 @@ def _with_lag(samples: _Samples, found: _Solution, errors: FloatArray, length: f
         new_errors = _standard_errors(richer, samples)
         told = abs(richer.parameters[2]) > 2.0 * new_errors[2]
         told = told and (new_errors[[0, *added[1:]]] < LARGEST_RELATIVE_STD).all()
+        told = told and LAGS * math.exp(richer.parameters[3]) <= length  # else it is a slope over the whole curve
         if told and richer.cost < (1.0 - WORTHWHILE) * best.cost:
             best, best_errors = richer, new_errors
     return best, best_errors

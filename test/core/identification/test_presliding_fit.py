@@ -64,6 +64,15 @@ def test_stiffness_and_exponent_are_found_within_their_standard_errors(stiffness
     assert fit.presliding.memory_length == fit.presliding.dwell_time == 0.0  # there is none
 
 
+def test_friction_that_rises_over_the_whole_stroke_is_no_memory_length():
+    plain = log([Presliding(stiffness=1.5e5)])
+    outwards = np.sign(np.gradient(np.round(plain.position, 5)))
+    rising = 0.3 * FRICTION * outwards * (1.0 + outwards * plain.position / 8e-3)  # up to 60 % at the end of a stroke
+    fit = fit_presliding([plain._replace(force_sum=plain.force_sum + rising)])
+    assert 4.0 * fit.presliding.memory_length <= fit.length
+    assert fit.presliding.stiffness == pytest.approx(1.5e5, rel=0.25)
+
+
 def test_logs_at_several_pressures_share_the_elasticity():
     seal = Presliding(stiffness=2e5, yield_exponent=1.5)
     fit = fit_presliding([log([seal]), log([seal], friction=35.0, offset=4.0)])

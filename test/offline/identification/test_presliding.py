@@ -4,7 +4,7 @@ import pytest
 from harness.identify_run import Run, data
 
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.identification.presliding_fit import score_presliding
+from seal_friction_ros.core.identification.presliding_fit import fit_presliding, score_presliding
 from seal_friction_ros.offline.identification.presliding import reversal_log
 from seal_friction_ros.offline.identification.sources import SourceOptions, read_sources
 
@@ -24,6 +24,18 @@ def test_strokes_kept_back_are_predicted_nearly_as_well_as_they_repeat(ring):
     assert score.reversals >= 7 * len(logs)
     assert score.elastic < 1.5 * score.repeatability
     assert score.elastic < 0.7 * score.rigid
+
+
+def test_every_other_pressure_of_a_seal_tells_the_stiffness_that_all_tell():
+    logs = [
+        reversal_log(source.log)
+        for source in read_sources(
+            list(map(data, FILES['Stadium_lc'])), SourceOptions(rig='delft', chambers=('a',))
+        ).each
+    ]
+    every, some = (fit_presliding(chosen).presliding for chosen in (logs, logs[::2]))
+    assert some.stiffness == pytest.approx(every.stiffness, rel=0.2)  # 42 instead of 160 kN/m with a lag of 37 mm
+    assert some.memory_length < 1e-3
 
 
 def test_a_seal_file_gets_the_elasticity_with_standard_errors(tmp_path):
