@@ -11,6 +11,7 @@ map: {velocity_min: 1.0e-3, velocity_max: 1.0e-1, velocities: 3, pressure_max: 1
 """
 
 
+@pytest.mark.long
 def test_every_node_answers_round_trips():
     found = run_json('bench/live.py', '--seconds', '0.6', '--rates', '500')
     assert len(found['figures']) == 4
@@ -36,6 +37,7 @@ def test_what_the_live_view_costs_is_timed(case):
     assert min(value for name, value in found[case].items() if name != 'load of the machine') > 0.0
 
 
+@pytest.mark.long
 def test_the_start_is_timed():
     found = run_json('bench/start.py', '--times', '1')
     assert len(found) == 4
@@ -48,12 +50,14 @@ def test_a_sample_is_timed_stage_by_stage():
     assert min(found.values()) > 0.0
 
 
+@pytest.mark.long
 def test_files_are_timed_by_size():
     found = run_json('bench/offline.py', '--largest', '10000', '--tasks', 'import', 'replay, message by message')
     assert found['sizes'] == [10_000]
     assert [task['time [s]']['10000'] > 0.0 for task in found['tasks'].values()] == [True, True]
 
 
+@pytest.mark.long
 def test_the_servo_is_timed_by_inner_step():
     rows = run_json('bench/servo.py', '--seconds', '0.1')['rows']
     assert len(rows) == 4

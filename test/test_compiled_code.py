@@ -76,6 +76,7 @@ def test_a_folder_that_takes_no_file_is_as_good_as_none(tmp_path, wrong):
     assert not list(tmp_path.rglob('*.nbc'))
 
 
+@pytest.mark.long
 def test_processes_that_compile_at_once_mix_nothing_up(tmp_path):
     """Each for arguments of other types: numba alone may give the files of both the same name."""
     kinds = ['00000', '00001']

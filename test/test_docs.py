@@ -98,7 +98,7 @@ def wait_until(condition: Callable[[], object]) -> None:
         time.sleep(0.05)
 
 
-QUICK_SEARCH = ' --amplitude 5e-4 --frequency 10 --hold-time 0.1 --friction-error 0 --delay-error 0'
+QUICK_SEARCH = ' --amplitude 5e-4 --frequency 25 --hold-time 0.05 --friction-error 0 --delay-error 0'
 
 
 def shortened(command: str, folder: Path) -> str:

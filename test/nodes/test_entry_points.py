@@ -17,7 +17,7 @@ def has_default_action(pid: int, number: signal.Signals) -> bool:
 
 
 @pytest.mark.parametrize('node', ['friction_estimator', 'servo_simulator', 'friction_monitor'])
-@pytest.mark.parametrize('delay', [0.0, 0.2, 0.5, 1.0, 2.0])  # [s]
+@pytest.mark.parametrize('delay', [0.0, 0.2, 0.5, 1.0, pytest.param(2.0, marks=pytest.mark.long)])  # [s]
 def test_sigint_ends_a_node_that_starts_without_a_traceback(node: str, delay: float):
     code = f'from seal_friction_ros.nodes.entry_points import {node}; print(flush=True); {node}()'
     process = subprocess.Popen(

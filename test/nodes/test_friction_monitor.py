@@ -146,6 +146,7 @@ def test_a_slider_sets_the_parameter_and_shows_the_answer_of_the_node(axis: int,
         assert running.wait_for(lambda view: view['now']['settings']['scale'] == 0.4)
 
 
+@pytest.mark.long
 @NO_BROWSER
 def test_a_machine_of_three_shows_each_actuator_and_off_takes_out_all_forces(tmp_path: Path):
     domain, recording = free_domain(), {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}

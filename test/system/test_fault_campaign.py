@@ -9,6 +9,8 @@ from fault_stage import Stage, stage, try_row
 from faults import TRIALS, Trial, attempt
 from harness.commands import run_json
 
+LONG = ('disk nearly full, later with room again',)
+
 
 @pytest.fixture(scope='module')
 def place() -> Iterator[Stage]:
@@ -21,7 +23,10 @@ def test_a_signal_that_fails_does_what_the_table_says_and_comes_back(place: Stag
     assert try_row(place, row) == []
 
 
-@pytest.mark.parametrize('trial', TRIALS, ids=lambda trial: trial.fault)
+@pytest.mark.parametrize(
+    'trial',
+    [pytest.param(one, marks=[pytest.mark.long] if one.fault in LONG else [], id=one.fault) for one in TRIALS],
+)
 def test_graph_process_and_disk_do_what_the_table_says(trial: Trial):
     assert attempt(trial, seed=7) == []
 
@@ -41,6 +46,7 @@ def test_the_command_reports_a_fault_that_does_as_required():
     assert found == {'bytes that are no message': [[]], 'an input has no publisher at first': [[]]}
 
 
+@pytest.mark.long
 def test_the_command_measures_the_time_to_zero():
     found = run_json('test/system/time_to_zero.py', '--only', 'stops', '--times', '1')
     assert len(found) == 4 + 4  # stops; leaps, then stops

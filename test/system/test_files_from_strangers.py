@@ -50,7 +50,7 @@ def outcome(function: Callable, *arguments: object) -> tuple[object, str]:
         return None, str(error)
 
 
-@pytest.mark.parametrize('cases', [300, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize('cases', [100, pytest.param(1000, marks=pytest.mark.long)])
 def test_mutations_of_the_corpus_crash_no_reader(cases):
     readers = run_json('test/system/fuzz.py', 'all', '--cases', str(cases))['readers']
     assert len(readers) == 11
@@ -241,7 +241,7 @@ def configured(text: str) -> object:
     return parse_snapshot(text).configuration.parameters()
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(path=st.lists(st.integers(0, 9), min_size=1, max_size=4), twig=YAML)
 def test_any_part_of_a_good_document_may_be_anything(folder: Path, path: list[int], twig: object):
     readers = {

@@ -84,6 +84,7 @@ def share_left(folder: Path, terminals: Terminals) -> float:
     return compensated / without
 
 
+@pytest.mark.long
 def test_the_test_bench_tracks_after_the_first_hour(checkout: Path):
     terminals = Terminals(checkout)
     try:

@@ -27,6 +27,7 @@ def thesis():
     return beside(coarse('oring_ms28775_114'), (0.0, 2.07e6, 4.14e6, 6.9e6), 2)
 
 
+@pytest.mark.long
 def test_the_coefficient_of_the_thesis_falls_with_the_normal_force_as_computed_from_the_drawing(thesis):
     """Exponent within 0.1; docs/ehl.md has that of the full mesh."""
     assert thesis.exponent(thesis.computed) == pytest.approx(thesis.exponent(thesis.measured), abs=0.1)

@@ -121,6 +121,11 @@ class FrictionReadings:
             temperature=self.temperature[where] if len(self.temperature) else self.temperature,
         )
 
+    @cached_property
+    def splits(self) -> list[tuple['FrictionReadings', 'FrictionReadings']]:
+        """Of each group: the readings of all other groups, and its own. Every law is fitted to the same ones."""
+        return [(self.taken(~out), self.taken(out)) for out in self.groups]
+
     def without(self, out: BoolArray) -> 'FrictionReadings':
         """The readings that are not ``out``; levels, and groups that are levels, are numbered without a gap."""
         left = self.taken(~out)

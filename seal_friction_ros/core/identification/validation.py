@@ -56,8 +56,8 @@ def cross_validate(
     """
     predicted, deviation = np.empty(readings.count), np.empty(readings.count)
     parameters = []
-    for out in readings.groups:
-        values, predicted[out], deviation[out] = predict(law, readings.taken(~out), readings.taken(out), near)
+    for out, (others, left_out) in zip(readings.groups, readings.splits, strict=True):
+        values, predicted[out], deviation[out] = predict(law, others, left_out, near)
         parameters.append([values[p.name] for p in law.parameters])
         tick(1)
     return CrossValidation(predicted, deviation, group_losses(readings, deviation), np.array(parameters))

@@ -108,6 +108,7 @@ def test_without_the_sensor_it_is_far_off_and_every_estimate_says_that_the_tempe
     assert (np.abs(error * true) < 2.0 * std).all()
 
 
+@pytest.mark.long
 def test_adaptation_works_on_what_is_left():
     found, _ = a_day(parameters(mode='on'), with_sensor=True)
     scales = np.array([estimate.adaptation_scale for estimate in found])

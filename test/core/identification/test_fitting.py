@@ -130,6 +130,7 @@ def test_a_term_that_is_not_there_is_exactly_nothing():
     assert found.values['viscous_friction'] == 0.0  # friction falls with speed: a negative viscous term is no friction
 
 
+@pytest.mark.long
 def test_standard_errors_are_those_of_repeating_it_all():
     estimates, errors = [], []
     for seed in range(60):

@@ -63,7 +63,7 @@ def test_drift_is_the_change_over_the_run():
     assert [drift.change for drift in found] == pytest.approx([0.2 * 18 / 19 / 1.1] * 3, rel=0.02)
 
 
-@pytest.mark.parametrize('follows', [0.0, 0.6])
+@pytest.mark.parametrize('follows', [pytest.param(0.0, marks=pytest.mark.long), 0.6])
 def test_scatter_alone_is_no_evident_drift(follows):
     """Strokes that repeat within 5 %, also where neighbours go together, as on the rig."""
     alarms = [drifts(run(lambda s: 1.0 + 0.0 * s, scatter=0.05, seed=i, follows=follows), np.zeros(1))[0].is_evident

@@ -54,6 +54,7 @@ def test_solid_friction_falls_and_fluid_friction_rises_with_speed():
     assert found.fluid_fast > 2.0 * found.fluid_slow
 
 
+@pytest.mark.long
 def test_friction_rises_on_deceleration_by_more_than_step_and_grid_blur():
     found = findings(done(INNER))
     by_step, by_grid = discretisation_errors(INNER, found, run_transient)
@@ -77,6 +78,7 @@ def test_after_a_reversal_friction_pushes_along_for_as_long_as_elasticity_says()
     assert findings(done(softer)).assisted_length == pytest.approx(2.0 * found.assisted_length, rel=0.1)
 
 
+@pytest.mark.long
 def test_seal_that_may_lean_either_way_has_a_second_lobe_near_minus_1_4_mm():
     long_way = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=3e-3))
     bistable = dataclasses.replace(long_way, groove=GrooveSpring(half_clearance=0.14e-3))
@@ -128,6 +130,7 @@ def test_chamfer_gives_back_what_it_took_but_for_what_friction_changes():
     assert works[0] == pytest.approx(-works[1], rel=0.05)
 
 
+@pytest.mark.long
 def test_starved_film_removes_the_rise_on_deceleration():
     starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), motion=ConstantAcceleration(cycles=3))
     found, flooded = findings(done(starved)), findings(done(INNER))
@@ -176,6 +179,7 @@ def test_slow_decades_of_creep_raise_the_friction_after_a_control_edge_more():
     assert after[0] < after[1]
 
 
+@pytest.mark.long
 def test_viscoelastic_seal_rubs_more_after_a_control_edge_and_no_more_without_one():
     stiffer = Viscoelasticity(stiffening=1.0, relaxation_time=0.3)
     after_edge = [
@@ -240,6 +244,7 @@ def test_the_formula_of_second_order_follows_a_parabola_over_steps_of_any_length
         assert slope == pytest.approx(2e-6 * then)
 
 
+@pytest.mark.long
 def test_friction_is_of_nearly_second_order_in_the_time_step():
     """On slowing down; a scheme of first order would halve its error with the step."""
     one = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1))

@@ -156,6 +156,7 @@ def test_rubber_ten_times_less_compressible_keeps_its_volume_to_0_1_percent_and_
     assert stiff.rod.force == pytest.approx(usual.rod.force, rel=0.02)
 
 
+@pytest.mark.long
 def test_the_guide_against_rolling_hardly_changes_the_normal_force():
     case = from_file('ms28775_114')
     forces = []

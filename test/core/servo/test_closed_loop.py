@@ -79,6 +79,7 @@ def adapted_error(friction, adaptation, scale=None, law=1.0, seconds=12.0):
     return tracking_rms(run.reference[last], run.position[last])
 
 
+@pytest.mark.long
 def test_with_adaptation_a_seal_of_40_percent_more_friction_tracks_as_with_its_own_file():
     stronger = 1.4
     off = AdaptationSettings()

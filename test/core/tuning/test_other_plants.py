@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
@@ -26,6 +27,7 @@ def problem(seal):
     return TuningProblem(Axis(ServoParameters(seals=seals), pipeline), TuningSettings())
 
 
+@pytest.mark.long
 def test_a_rigid_feed_forward_is_worth_less_on_elastic_seals_and_an_elastic_one_more_than_it():
     rigid = FeedForwardSettings(scale=1.0, lead_time=2.5e-3, slew_limit=1e9)
     of_rigid, of_elements, of_lugre = on_plants(problem(SEAL), rigid)

@@ -5,6 +5,7 @@ import gc
 import os
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -174,7 +175,14 @@ def test_metadata_that_cannot_be_written_costs_no_message(tmp_path: Path, monkey
     for number in range(5000):
         record(recorder, number)
     wait_until(lambda: not recorder.waiting)
-    (tmp_path / 'bag' / 'metadata.yaml.partial').mkdir()  # in the way of the final one
+    obstacle = tmp_path / 'bag' / 'metadata.yaml.partial'  # in the way of the final one
+
+    def is_in_the_way() -> bool:
+        with suppress(FileExistsError):  # the recorder writes one each second
+            obstacle.mkdir()
+        return obstacle.is_dir()
+
+    wait_until(is_in_the_way)
     recorder.close()
     assert 'could not be finished' in recorder.error
     assert 'seal_friction recover' in recorder.error

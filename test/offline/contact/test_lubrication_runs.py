@@ -67,6 +67,7 @@ def test_run_gives_its_findings_with_their_errors(small, capsys):
     assert found['retried_steps'] == 0
 
 
+@pytest.mark.long
 def test_study_has_the_keys_of_the_paper_as_one_json_object_and_two_processes_find_what_one_does(tmp_path, capsys):
     """The processes do not compile, which would take them longer than the work."""
     tiny = tmp_path / 'tiny.yaml'

@@ -97,6 +97,7 @@ def test_friction_that_is_proportional_to_an_unknown_has_its_quantiles(dry, tmp_
     assert {path: path.stat().st_mtime_ns for path in work.iterdir()} == times
 
 
+@pytest.mark.long
 def test_one_and_two_workers_print_the_same_bytes(ring, tmp_path, capsys):
     said = []
     for workers in ('1', '2'):

@@ -21,7 +21,9 @@ from seal_friction_ros.offline.replay.replay import replay
 
 
 @pytest.mark.parametrize(
-    'law', ['constant_coulomb', 'pressure_power_law_2_3', 'physics_based', 'physics_based_asymmetric']
+    'law',
+    ['constant_coulomb', 'physics_based_asymmetric']
+    + [pytest.param(law, marks=pytest.mark.long) for law in ('pressure_power_law_2_3', 'physics_based')],
 )
 def test_the_node_says_what_was_fitted(law, run_of):
     run = run_of(str(THESIS), *THESIS_RIG, '--law', law)
@@ -98,6 +100,7 @@ def test_json_has_the_promised_keys_and_the_file_says_where_it_is_from(run_of):
     assert np.array(part['measured_N']) - np.array(part['fitted_N']) == pytest.approx(part['residual_N'], abs=1e-4)
 
 
+@pytest.mark.long
 def test_the_same_sources_give_the_same_bytes(tmp_path):
     few = str(few_of_the_thesis(tmp_path))
     one, two = (Run(tmp_path, few, *THESIS_RIG, '--name', 'x', name=n) for n in ('one', 'two'))

@@ -280,6 +280,7 @@ def readings_table(path, scatter, friction):
     return str(path)
 
 
+@pytest.mark.long
 def test_the_number_of_workers_changes_no_byte(tmp_path):
     table, files = readings_table(tmp_path / 'table.csv', 0.02, lambda bar, _: 2.0 + 0.1 * bar), []
     for workers in ('1', '2'):

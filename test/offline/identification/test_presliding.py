@@ -26,6 +26,7 @@ def test_strokes_kept_back_are_predicted_nearly_as_well_as_they_repeat(ring):
     assert score.elastic < 0.7 * score.rigid
 
 
+@pytest.mark.long
 def test_every_other_pressure_of_a_seal_tells_the_stiffness_that_all_tell():
     logs = [
         reversal_log(source.log)

@@ -66,7 +66,7 @@ def without_first(source: Path, out: Path, topic: str, count: int) -> Path:
     return rewrite(source, out, change)
 
 
-@pytest.mark.parametrize('count', [1, 10, 100])
+@pytest.mark.parametrize('count', [10, *(pytest.param(count, marks=pytest.mark.long) for count in (1, 100))])
 def test_a_recording_that_began_later_differs_in_nothing_from_the_whole_one(pair, count, tmp_path: Path, capsys):
     source, _ = pair
     for number, (topic, info) in enumerate(bag_topics(source).items()):

@@ -181,7 +181,6 @@ def test_nothing_is_written_for_a_bag_without_estimates(tmp_path):
     assert not (tmp_path / 'out').exists()
 
 
-@pytest.mark.renders
 def test_a_bag_in_which_nothing_slides_makes_a_page(tmp_path):
     with BagWriter(tmp_path / 'still_in') as writer:
         data = encode(Velocity(1, 0.0, b''))

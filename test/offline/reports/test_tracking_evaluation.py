@@ -309,6 +309,7 @@ def test_what_acted_is_what_was_recorded(tmp_path):
     assert (stretch.rms, stretch.dwell) == (recorded.stretches[0].rms, recorded.stretches[0].dwell)
 
 
+@pytest.mark.long
 def test_a_replay_without_feedforward_keeps_that_of_the_recording_also_when_replayed_again(tmp_path):
     one = evaluate_tracking(replayed_run(tmp_path, with_scale(0.0)))
     recorded = evaluate_tracking(read_run(tmp_path / 'recorded'))

@@ -250,6 +250,7 @@ def test_recording_has_the_inputs_of_the_pipeline(axis: Path):
     assert configuration == default_configuration()
 
 
+@pytest.mark.long
 @pytest.mark.renders
 def test_own_file_is_replaced_and_two_runs_write_the_same_bytes(axis: Path, tmp_path: Path):
     arguments = ['tune', '--bag', str(axis), '--out', str(tmp_path / 'f.yaml')]

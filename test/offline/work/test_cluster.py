@@ -149,7 +149,8 @@ def test_logs_are_imported_to_the_same_bytes_on_a_cluster(cluster, tmp_path, mon
     assert not list(tmp_path.glob('.*'))
 
 
-@pytest.mark.parametrize('words', [pytest.param(['study'], marks=pytest.mark.long), ['map', '--uncertain', '2']])
+@pytest.mark.long
+@pytest.mark.parametrize('words', [['study'], ['map', '--uncertain', '2']])
 def test_a_study_and_a_map_are_the_same_on_a_cluster(words, cluster, tmp_path):
     case, seal = tmp_path / 'tiny.yaml', tmp_path / 'seal.yaml'
     case.write_text(CASE)
@@ -323,6 +324,7 @@ def test_options_that_make_no_sense_are_one_line_and_load_no_dask(options, said)
     assert said in last_line(errors)
 
 
+@pytest.mark.long
 def test_a_worker_of_another_version_or_with_threads_or_none_at_all_is_one_line(tmp_path):
     other = tmp_path / 'other'
     shutil.copytree(
@@ -342,6 +344,7 @@ def test_a_worker_of_another_version_or_with_threads_or_none_at_all_is_one_line(
         assert 'it has no worker after 2 s' in refused(cluster.address, tmp_path)
 
 
+@pytest.mark.long
 def test_a_worker_without_the_package_or_with_threads_of_linear_algebra_is_one_line(tmp_path):
     (tmp_path / 'empty').mkdir()
     (tmp_path / 'empty' / 'seal_friction_ros.py').touch()
@@ -362,6 +365,7 @@ def test_a_path_that_only_the_client_has_is_one_line(cluster, tmp_path):
     assert '/proc/self/fd/77 is on the machine of the command, and not where worker tcp://127.0' in last_line(errors)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which('openssl') is None, reason='certificates are made by openssl')
 def test_with_certificates_everything_is_encrypted_and_a_foreign_authority_is_refused(tmp_path):
     for name in ('ours', 'theirs'):
