@@ -1,11 +1,11 @@
-"""What a fleet costs: ``python bench/scale.py [--seconds 600] [--bags 20 200] [--json]``.
+"""What a fleet costs: ``python bench/scale.py [--seconds 600] [--bags 20 200] [--bag-seconds 2] [--json]``.
 
 One cylinder (pressure, force sum and velocity at 1 kHz) is recorded for some time, without and with the answers of the
 estimator. Each step over the bag runs in a process of its own; figures are scaled to an hour of recording. Times are
 those of the processor, so that others on the machine count less; what is loaded and compiled first is left out and has
-a column of its own. Then ``fleet`` runs over numbers of small bags, by processes of this machine, which compile first,
-and by a Dask cluster of as many workers on the loopback interface, which have compiled before (if distributed is
-installed): wall time, and the memory of the command.
+a column of its own. Then ``fleet`` runs over numbers of small bags, by one and by two processes of this machine, and by
+a Dask cluster of one and of two workers on the loopback interface (if distributed is installed), all of which have
+compiled before: wall time, and the memory of the command.
 """
 
 import argparse
@@ -31,7 +31,6 @@ from harness.dask_cluster import dask_cluster
 HOUR = 3600.0  # [s]
 YEAR = 365.0 * 24.0  # [h]
 MACHINES = 1000
-SMALL_BAG = 2.0  # [s]
 WORKERS = 2
 COMMAND = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main']
 
@@ -142,22 +141,28 @@ def of_an_hour(folder: Path, seconds: float) -> dict[str, Any]:
 
 
 def of_bags(source: Path, folder: Path, counts: list[int]) -> dict[str, dict[str, dict[str, float]]]:
-    """Wall time [s] and memory of the command [MB] of ``fleet`` over so many copies of a small bag."""
-    found: dict[str, dict[str, dict[str, float]]] = {'processes': {}}
+    """Wall time [s] and memory of the command [MB] of ``fleet`` over so many copies of a small bag.
+
+    One worker alone takes the first number of bags only.
+    """
     for count in counts:
-        bags = folder / f'{count}'
         for number in range(count):
-            target = bags / f'rig{number % 10}' / f'bag{number}'
+            target = folder / f'{count}' / f'rig{number % 10}' / f'bag{number}'
             target.mkdir(parents=True)
             for file in source.iterdir():
                 (target / file.name).write_bytes(file.read_bytes())
-        found['processes'][f'{count}'] = timed_fleet(bags, ['--workers', f'{WORKERS}'])
-    if find_spec('distributed'):
-        found['Dask'] = {}
-        with dask_cluster(folder / 'cluster', WORKERS) as cluster:
-            timed_fleet(folder / f'{counts[0]}', ['--scheduler', cluster.address])  # each worker compiles, once
-            for count in counts:
-                found['Dask'][f'{count}'] = timed_fleet(folder / f'{count}', ['--scheduler', cluster.address])
+
+    def timed(workers: int, options: list[str]) -> dict[str, dict[str, float]]:
+        return {f'{n}': timed_fleet(folder / f'{n}', options) for n in (counts if workers == WORKERS else counts[:1])}
+
+    found = {}
+    for workers, name in ((1, '1 {}'), (WORKERS, f'{WORKERS} {{}}s')):
+        timed(1, ['--workers', f'{workers}'])  # compiles, if nothing is kept
+        found[name.format('forked worker')] = timed(workers, ['--workers', f'{workers}'])
+        if find_spec('distributed'):
+            with dask_cluster(folder / f'cluster {workers}', workers) as cluster:
+                timed(1, ['--scheduler', cluster.address])  # each worker compiles, once
+                found[name.format('Dask worker')] = timed(workers, ['--scheduler', cluster.address])
     return found
 
 
@@ -183,10 +188,10 @@ def _status(process: int) -> list[str]:
         return []
 
 
-def measure(seconds: float, counts: list[int], folder: Path) -> dict[str, Any]:
+def measure(seconds: float, counts: list[int], bag_seconds: float, folder: Path) -> dict[str, Any]:
     """All figures."""
     make_bag(folder / 'long', seconds)
-    small = make_bag(folder / 'small', SMALL_BAG)
+    small = make_bag(folder / 'small', bag_seconds)
     hour = of_an_hour(folder / 'long', seconds)
     size = hour['bytes [MB/h]']['recorded'] * YEAR * MACHINES / 1e6
     work = hour['steps']['fleet: verify and health']['time [s/h]'] * YEAR * MACHINES / HOUR
@@ -209,7 +214,7 @@ def show(figures: dict[str, Any]) -> None:
     print(f'{year}: ' + ', '.join(f'{name} {value:.3g}' for name, value in figures[year].items()))
     for kind, rows in figures['bags'].items():
         for count, row in rows.items():
-            print(f'fleet over {count} bags by {WORKERS} {kind}: {row["time [s]"]:.1f} s, {row["memory [MB]"]:.0f} MB')
+            print(f'fleet over {count} bags by {kind}: {row["time [s]"]:.1f} s, {row["memory [MB]"]:.0f} MB')
 
 
 def main() -> int:
@@ -217,6 +222,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--seconds', type=float, default=600.0, help='of the long bag, default 600')
     parser.add_argument('--bags', type=int, nargs='+', default=[20, 200], metavar='N', help='numbers of small bags')
+    parser.add_argument('--bag-seconds', type=float, default=2.0, help='of a small bag, default 2')
     parser.add_argument('--json', action='store_true')
     parser.add_argument('--step', nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
@@ -224,7 +230,7 @@ def main() -> int:
         print(json.dumps(run_step(arguments.step[0], Path(arguments.step[1]))))
         return 0
     with tempfile.TemporaryDirectory() as name:
-        figures = measure(arguments.seconds, arguments.bags, Path(name))
+        figures = measure(arguments.seconds, arguments.bags, arguments.bag_seconds, Path(name))
     if arguments.json:
         print(json.dumps(figures))
     else:

@@ -2,8 +2,9 @@
 
 import math
 from dataclasses import replace
-from statistics import fmean
+from statistics import fmean, pstdev
 
+import numpy as np
 import pytest
 from harness.simulated_day import SECOND, START, Day, samples
 from hypothesis import given
@@ -17,6 +18,7 @@ from seal_friction_ros.core.estimation.adaptation import (
     NOTHING_LEARNT,
     AdaptationSettings,
     Ratios,
+    _learnt_scale,
     _median,
     disagrees,
     is_due,
@@ -286,6 +288,18 @@ def test_the_median_is_that_of_sorting(values, known):
     assert _median(Ratios(*values), known) == expected
 
 
+def test_the_deviation_of_the_scale_is_that_of_a_median_of_six_and_of_what_it_lags_behind():
+    chance, medians, variances = np.random.default_rng(5), [], []
+    for _ in range(3000):
+        scale, std, ratios = 1.0, 0.0, NOTHING_LEARNT.ratios
+        for number in range(6):
+            ratio = float(chance.normal(1.0, 0.05))
+            scale, std, median, ratios = _learnt_scale(AdaptationSettings('on'), scale, std, ratios, number, ratio)
+        medians.append(median)
+        variances.append(std**2 - (median - scale) ** 2)
+    assert math.sqrt(fmean(variances)) == pytest.approx(pstdev(medians), rel=0.15)
+
+
 def test_the_feed_forward_follows_a_drift_of_20_percent_over_200_reversals_within_5():
     estimates, reversals = run(replace(DAY, scale=lambda time: 1.0 + 0.001 * time), 201.0)
     late = estimates[20_000]
@@ -329,6 +343,8 @@ WRONG = {
     'sign of the force sum': (DAY, lambda s: s._replace(force=Force(s.stamp, -s.force.force)), 'sign'),
     'psi as Pa': (DAY, in_unit(6894.757), 'psi'),
     'bar as Pa': (DAY, in_unit(1e5), 'bar'),
+    'kPa as Pa': (DAY, in_unit(1e3), 'kPa'),
+    'MPa as Pa': (DAY, in_unit(1e6), 'MPa'),
     'frozen force': (DAY, lambda sample: sample._replace(force=Force(sample.stamp, 12.0)), 'frozen'),
     'halved area': (DAY, lambda s: s._replace(force=Force(s.stamp, 0.5 * s.force.force)), 'area'),
     'another seal': (replace(DAY, scale=lambda _: 1.6), lambda sample: sample, '1.6'),

@@ -15,10 +15,12 @@ from paths import ROOT
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings, AdaptationState
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, ConditionedVelocity
 from seal_friction_ros.core.estimation.configuration import (
+    MOUNTING,
     Configuration,
     Recorded,
     SealSelection,
     Snapshot,
+    mounted,
     parse_snapshot,
     snapshot_text,
 )
@@ -343,3 +345,17 @@ def test_a_snapshot_from_before_the_elastic_seals_begins_with_seals_not_sheared(
     known = parse_snapshot(json.dumps(document))
     assert known.state.feedforward == SNAPSHOT.state.feedforward
     assert not known.configuration.feedforward.presliding
+
+
+# --- the mounting ---
+
+
+def test_a_file_that_is_named_once_stands_for_every_seal_of_its_mounting():
+    rods, piston = (
+        {'name': name, 'mounting': {'chambers': on}} for name, on in (('rod', ['a', 'a']), ('piston', ['difference']))
+    )
+    selection = SealSelection(('rod.yaml', 'piston.yaml'), MOUNTING)
+    found, documents = mounted(selection, (rods, piston))
+    assert found.seals == ('rod.yaml', 'rod.yaml', 'piston.yaml')
+    assert found.seal_chambers == ('a', 'a', 'difference')
+    assert documents == (rods, rods, piston)
