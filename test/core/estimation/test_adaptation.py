@@ -29,6 +29,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorParameters, Est
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Status
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import read_yaml
@@ -367,3 +368,11 @@ def test_an_area_error_is_told_from_an_offset_that_follows_the_pressure():
         Reversal(i, 1.0, 40.0, 20e-6 * pressure, pressure, 0.0) for i, pressure in enumerate((1e6, 3e6, 5e6) * 2)
     ]
     assert 'off by 20 mm2' in likely_reason(parameters().seal_numbers, reversals)
+
+
+def test_below_the_identified_pressures_a_unit_is_named_that_does_not_contradict_the_friction():
+    """The friction of this seal is the same at any pressure, so it tells no unit."""
+    law = ConstantCoulomb(coulomb_friction_at_any_pressure=40.0)
+    seal = replace(SEAL, coulomb_law=law, pressure_min=1e6, pressure_max=7e6)
+    reversals = [Reversal(i, 1.0, 40.0, 0.0, 30.0 + i, 0.0) for i in range(8)]  # 30 bar as Pa
+    assert 'bar' in likely_reason((MountedSeal(seal, 'a').numbers,), reversals)

@@ -276,6 +276,21 @@ def test_a_rod_that_was_held_near_breakaway_does_not_count_as_sliding_before_it_
     assert found.slides
 
 
+@pytest.mark.parametrize(
+    ('mode', 'mass', 'bears'), [('observe', 1.0, True), ('observe', 0.0, False), ('off', 1.0, False)]
+)
+def test_with_the_moving_mass_the_force_sum_counts_as_soon_as_the_rod_stops(mode, mass, bears):
+    """Only adaptation knows the acceleration; else it may be inertia, and the way counts for 0.1 s."""
+    known = parameters(mode=mode)
+    known = dataclasses.replace(known, adaptation=dataclasses.replace(known.adaptation, moving_mass=mass))
+    force = np.concatenate([np.full(400, 30.0), np.full(50, -5.0)])
+    *_, sliding, _ = estimates(known, np.full(401, 0.01), force[:401])
+    stopped = estimates(known, np.concatenate([np.full(400, 0.01), np.zeros(50)]), force)[-1]
+    assert stopped.status == Status.PRESLIDING
+    expected = -5.0 - stopped.adaptation_offset if bears else sliding.friction_force
+    assert stopped.friction_force == pytest.approx(expected, abs=1.0)
+
+
 def test_a_heavy_rod_that_reverses_does_not_shear_its_seals_by_its_inertia():
     elasticity = followed_elasticity(presliding_numbers([SOFT, SOFT]), LEAST_STD)
     velocities = [*[0.02] * 700, *(0.02 - 1e-3 * i for i in range(41)), *[-0.02] * 300]
