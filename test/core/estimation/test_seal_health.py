@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from statistics import median
 
 import pytest
 from harness.simulated_day import Day, samples
@@ -52,12 +53,17 @@ def test_one_start_has_no_standard_deviation():
     assert math.isnan(starts_of([1.5], rest=1000).std)
 
 
-def values_after(day, seconds):
-    state, health = estimator.init(PARAMETERS), SealHealth()
+def health_after(day, seconds, parameters=PARAMETERS):
+    state, health = estimator.init(parameters), SealHealth()
     for sample in samples(day, seconds, 0):
         before = state
-        state, _ = step(PARAMETERS, state, sample)
-        health = followed(health, PARAMETERS, before, state)
+        state, _ = step(parameters, state, sample)
+        health = followed(health, parameters, before, state)
+    return state, health
+
+
+def values_after(day, seconds):
+    state, health = health_after(day, seconds)
     return health_values(PARAMETERS, state.adaptation, health, Starts())
 
 
@@ -70,3 +76,11 @@ def test_the_offset_is_given_as_a_share_of_the_friction(share):
 def test_a_friction_that_rises_after_the_first_reversals_is_told_as_a_ratio_to_them():
     told = values_after(replace(Day(FRICTION), scale=lambda time: 1.0 + 0.1 * (time > 25.0)), 35.0)
     assert float(told['scale over that of the first reversals']) == pytest.approx(1.1, abs=0.03)
+
+
+def test_beyond_the_identified_pressures_nothing_is_learnt_but_reversals_are_seen():
+    beyond = tuple(replace(mounted, seal=replace(mounted.seal, pressure_max=1e6)) for mounted in SEALS)
+    state, health = health_after(replace(Day(FRICTION), scale=lambda _: 1.3), 12.0, replace(PARAMETERS, seals=beyond))
+    assert state.adaptation.learnt.reversals == 0
+    assert len(health.reversals) > 5
+    assert median(reversal.ratio for reversal in health.reversals) == pytest.approx(1.3, rel=0.05)
