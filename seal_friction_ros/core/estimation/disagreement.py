@@ -13,11 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.adaptation import FEWEST_REVERSALS, Learnt
+from seal_friction_ros.core.foundation.units import UNITS
 from seal_friction_ros.core.friction.actuator import SealNumbers, friction_of_seals
 from seal_friction_ros.core.friction.mounting import pressure_at_seal
 
 FROZEN = 0.05  # [-] a share of the friction below this is none
-PRESSURE_UNITS = {'psi': 6894.757, 'bar': 1e5, 'kPa': 1e3, 'MPa': 1e6}  # [Pa]
+PRESSURE_UNITS = {name: UNITS[name] for name in ('psi', 'bar', 'kPa', 'MPa')}  # [Pa]
 IMPLAUSIBLE = 0.01  # [-] of the highest identified pressure, below which a unit may be wrong
 EXPLAINED = 1.3  # [-] a unit explains the friction up to this factor: one day differs as much from another
 BEYOND = 1.5  # [-] of the highest identified pressure, up to which one below the lowest may be in another unit
