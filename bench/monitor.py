@@ -4,6 +4,8 @@ The same estimator runs without the monitor and with it and its page open, in tu
 beside the simulated servo, and a machine of three actuators, both at 1 kHz. Processor time is that of the whole process
 of the estimator; the p99 of its latency is what its diagnostics say, the median over the seconds of a round.
 
+In a third round a process without ROS computes as much as the monitor: what any neighbour costs.
+
 With ``--own-processor`` the estimator alone has the first processor, as on a machine that isolates its control loop.
 Without, simulator, monitor, page and estimator share all of them: on two, the p99 is mostly that of their queue.
 """
@@ -11,6 +13,7 @@ Without, simulator, monitor, page and estimator share all of them: on two, the p
 import argparse
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -37,6 +40,16 @@ CASES = ('one actuator', 'machine of three')
 PROCESSORS = os.sched_getaffinity(0)
 P99, RATE = 'latency p99 [us]', 'estimate rate [Hz]'
 
+SHARE = 0.15  # of a processor, of the process without ROS: what the monitor takes, see its column
+COMPUTE = f"""
+import time
+while True:
+    end = time.process_time() + {SHARE} * 0.05
+    while time.process_time() < end:
+        sum(range(1000))
+    time.sleep({1.0 - SHARE} * 0.05)
+"""
+
 
 class Times(NamedTuple):
     """Durations of a round [s]."""
@@ -51,6 +64,14 @@ class Round(NamedTuple):
     cpu: float  # [us] of the estimator per estimate
     p99: float  # [us]
     monitor_cpu: float  # [s] of the monitor per second; 0.0 without
+
+
+class Rounds(NamedTuple):
+    """Rounds in the order in which they were measured."""
+
+    alone: list[Round]
+    neighbour: list[Round]
+    monitor: list[Round]
 
 
 class Listener(Node):
@@ -110,9 +131,19 @@ def measure(pid: int, times: Times, spun: SpunNodes, listener: Listener, watchin
     return Round((cpu(pid) - own) / estimates * 1e6, median(listener.p99), used)
 
 
-def run(case: str, times: Times, rounds: int, *, with_browser: bool) -> dict[bool, list[Round]]:
-    """Rounds without and with the monitor, in turn."""
-    found: dict[bool, list[Round]] = {False: [], True: []}
+@contextmanager
+def computing() -> Iterator[None]:
+    """A process that computes as much as the monitor and talks to nobody."""
+    with subprocess.Popen([sys.executable, '-c', COMPUTE]) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+def run(case: str, times: Times, rounds: int, *, with_browser: bool) -> Rounds:
+    """Rounds without, beside a process that computes, and with the monitor, in turn."""
+    found = Rounds([], [], [])
     domain = free_domain()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -126,14 +157,21 @@ def run(case: str, times: Times, rounds: int, *, with_browser: bool) -> dict[boo
         if os.sched_getaffinity(0) != PROCESSORS:
             give_a_processor_to(pid)
         for _ in range(rounds):
-            found[False].append(measure(pid, times, spun, listener, 0))
+            found.alone.append(measure(pid, times, spun, listener, 0))
+            with computing():
+                found.neighbour.append(measure(pid, times, spun, listener, 0))
             with ExitStack() as page, monitor(domain) as (watching, url):
                 if with_browser:
                     page.enter_context(browser(folder)).open(url)
                 else:
                     Reader(url)
-                found[True].append(measure(pid, times, spun, listener, watching))
+                found.monitor.append(measure(pid, times, spun, listener, watching))
     return found
+
+
+def ratio(these: list[float], those: list[float]) -> float:
+    """Median of the ratios of rounds that followed each other."""
+    return round(median(one / other for one, other in zip(these, those, strict=True)), 3)
 
 
 def main() -> int:
@@ -158,15 +196,16 @@ def main() -> int:
     figures = {}
     for case in arguments.cases:
         found = run(case, Times(arguments.seconds, arguments.warm_up), arguments.rounds, with_browser=arguments.browser)
-        pairs = list(zip(found[False], found[True], strict=True))
         figures[case] = {
-            'processor per estimate, without [us]': round(median(one.cpu for one in found[False]), 1),
-            'processor, with [us]': round(median(one.cpu for one in found[True]), 1),
-            'ratio of processor time': round(median(b.cpu / a.cpu for a, b in pairs), 3),
-            'p99, without [us]': round(median(one.p99 for one in found[False]), 1),
-            'p99, with [us]': round(median(one.p99 for one in found[True]), 1),
-            'ratio of p99': round(median(b.p99 / a.p99 for a, b in pairs), 3),
-            'monitor itself [%]': round(100 * median(one.monitor_cpu for one in found[True]), 1),
+            'processor per estimate, without [us]': round(median(one.cpu for one in found.alone), 1),
+            'processor, with [us]': round(median(one.cpu for one in found.monitor), 1),
+            'ratio of processor time': ratio([one.cpu for one in found.monitor], [one.cpu for one in found.alone]),
+            'with a neighbour instead': ratio([one.cpu for one in found.neighbour], [one.cpu for one in found.alone]),
+            'p99, without [us]': round(median(one.p99 for one in found.alone), 1),
+            'p99, with [us]': round(median(one.p99 for one in found.monitor), 1),
+            'ratio of p99': ratio([one.p99 for one in found.monitor], [one.p99 for one in found.alone]),
+            'ratio of p99, neighbour': ratio([one.p99 for one in found.neighbour], [one.p99 for one in found.alone]),
+            'monitor itself [%]': round(100 * median(one.monitor_cpu for one in found.monitor), 1),
             'load of the machine': round(os.getloadavg()[0], 1),
         }
     if arguments.json:

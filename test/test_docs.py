@@ -110,12 +110,32 @@ def shortened(command: str, folder: Path) -> str:
     return command + QUICK_SEARCH if ' tune ' in command else command
 
 
-def test_every_command_of_the_readme_runs(checkout: Path):
-    assert len(PLAIN) >= 8
-    for command in PLAIN:
+SLOW = (' tune ', ' servo ', ' identify ', ' oring ')
+
+
+def is_slow(command: str) -> bool:
+    return any(name in command for name in SLOW)
+
+
+def check_commands(chosen: list[str], checkout: Path) -> None:
+    for command in chosen:
         result = run(shortened(command, checkout), checkout)
         expected = (0, 1) if ' compare ' in command else (0,)
         assert result.returncode in expected, f'{command}: {result.stderr}'
+
+
+def test_every_quick_command_of_the_readme_runs(checkout: Path):
+    quick = [command for command in PLAIN if not is_slow(command)]
+    assert len(quick) >= 8
+    check_commands(quick, checkout)
+
+
+@pytest.mark.long  # every one of these commands has tests of its own
+def test_every_slow_command_of_the_readme_runs(workspace: Path):
+    (workspace / 'build').mkdir()
+    chosen = [command for command in PLAIN if is_slow(command) or ' import thesis ' in command]
+    assert len(chosen) == len(SLOW) + 1
+    check_commands(chosen, workspace)
 
 
 def test_the_command_that_proposes_the_next_readings_runs(checkout: Path):

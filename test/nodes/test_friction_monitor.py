@@ -85,7 +85,7 @@ def axis(tmp_path_factory) -> Iterator[int]:
     domain, log = free_domain(), tmp_path_factory.mktemp('axis') / 'log'
     simulator = ROOT / 'config' / 'servo_simulator.yaml'
     with (
-        node_process('servo_simulator', domain, {}, log, parameter_file=simulator),
+        node_process('servo_simulator', domain, {'rate': 500.0}, log, parameter_file=simulator),
         node_process('friction_estimator', domain, {'adaptation.mode': 'observe'}, log),
     ):
         end = time.monotonic() + 2 * STOP_TIMEOUT

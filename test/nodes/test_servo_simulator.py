@@ -372,7 +372,7 @@ def test_an_effort_in_a_standard_message_pushes_the_rod_and_an_old_one_does_not(
         s.wait(lambda: s.simulator._recent['feed-forwards too old'] or s.simulator._counts['feed-forwards too old'])
 
 
-@pytest.mark.parametrize('name', ['pneumatic_axis', 'single_rod_cylinder'])
+@pytest.mark.parametrize('name', [pytest.param('pneumatic_axis', marks=pytest.mark.long), 'single_rod_cylinder'])
 def test_machine_of_a_parameter_file_runs(name):
     path = str(ROOT / 'config' / 'simulated_machines' / f'{name}.yaml')
     with ros_context() as context:

@@ -27,6 +27,7 @@ def test_the_fit_is_known():
     assert found.yield_exponent == pytest.approx(FOUND.yield_exponent, rel=0.02)
 
 
+@pytest.mark.long  # `test_sheared_seals` has other structures
 def test_on_another_structure_the_estimate_follows_the_shear_and_status_0_is_a_promise():
     wave, duration = MOTIONS[1]
     rigid, elastic = (estimate_errors(PLANTS['LuGre, 3e5 N/m'], model, wave, duration) for model in (None, FOUND))
@@ -36,6 +37,7 @@ def test_on_another_structure_the_estimate_follows_the_shear_and_status_0_is_a_p
     assert rigid.rms_good > 2.0 * elastic.rms_good
 
 
+@pytest.mark.long  # compiles the elastic plant; `test_sheared_seals` has heavy loads
 def test_a_heavy_load_does_not_break_the_promise():
     model = Presliding(stiffness=4e5, yield_exponent=1.0)
     found = estimate_errors(PLANTS['elements, 4e5 N/m'], model, Sine(5e-3, 2.0), 3.0, 100.0)

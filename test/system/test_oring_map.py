@@ -33,6 +33,7 @@ def test_the_coefficient_of_the_thesis_falls_with_the_normal_force_as_computed_f
     assert thesis.exponent(thesis.computed) == pytest.approx(thesis.exponent(thesis.measured), abs=0.1)
 
 
+@pytest.mark.long  # two maps
 def test_one_factor_is_what_is_missing_to_the_friction_of_the_thesis(thesis):
     """The unknown tau_c is such a factor. Without it the friction is up to four times too high: an extrapolation."""
     assert thesis.calibrated() < 0.3

@@ -208,6 +208,7 @@ def test_film_and_void_exclude_each_other_at_every_moment():
     assert result.gap.min() > 0.0
 
 
+@pytest.mark.long  # five runs
 def test_friction_over_solid_shear_stress_is_constant_within_15_percent_and_worst_at_the_smallest():
     one = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1))
     table = study_table([done(with_solid_shear_stress(one, stress)) for stress in (2.5e6, 0.5e6, 1.5e6)])
@@ -257,6 +258,7 @@ def test_friction_is_of_nearly_second_order_in_the_time_step():
     assert coarse < 1e-4  # [N] of 0.65 N
 
 
+@pytest.mark.long  # fine steps
 def test_steps_at_once_away_from_the_edge_leave_the_findings_as_they_are():
     once = dataclasses.replace(EDGE, motion=ConstantAcceleration(distance=2.7e-3, cycles=1))
     runs = [

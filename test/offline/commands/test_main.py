@@ -51,8 +51,8 @@ def test_a_difference_is_exit_code_1(other: str, tmp_path: Path):
         ['replay', PULL_TEST, '--verify'],
         ['compare', PULL_TEST, PULL_TEST],
         ['import', 'thesis', '--out', 'BAG'],
-        ['report', PULL_TEST, '--out', 'PAGE.html'],
-        ['charts', 'ms28775_114', '--out', 'PAGE.html'],
+        pytest.param(['report', PULL_TEST, '--out', 'PAGE.html'], marks=pytest.mark.long),
+        pytest.param(['charts', 'ms28775_114', '--out', 'PAGE.html'], marks=pytest.mark.long),
     ],
     ids=lambda arguments: arguments[0],
 )

@@ -84,6 +84,7 @@ def test_the_filled_sheet_gives_the_law_of_the_tables(tmp_path, capsys):
     assert any(rung['law'] == 'physics_based' for rung in sheet['ladder'])  # the dimensions are on the sheet
 
 
+@pytest.mark.long  # an identification more
 def test_a_dash_is_a_reading_that_was_not_to_be_had(tmp_path, capsys):
     changes = {(300.0, 'test 2 dynamic extend'): '-', (300.0, 'test 2 static extend'): '-'}
     code, figures = identified(tmp_path, capsys, filled(changes.items()))

@@ -22,8 +22,11 @@ from seal_friction_ros.offline.replay.replay import replay
 
 @pytest.mark.parametrize(
     'law',
-    ['constant_coulomb', 'physics_based_asymmetric']
-    + [pytest.param(law, marks=pytest.mark.long) for law in ('pressure_power_law_2_3', 'physics_based')],
+    ['constant_coulomb']
+    + [
+        pytest.param(law, marks=pytest.mark.long)
+        for law in ('pressure_power_law_2_3', 'physics_based', 'physics_based_asymmetric')
+    ],
 )
 def test_the_node_says_what_was_fitted(law, run_of):
     run = run_of(str(THESIS), *THESIS_RIG, '--law', law)
@@ -74,6 +77,7 @@ def test_no_geometry_is_taken_from_the_placeholder_seals_of_a_bag(tmp_path, vers
     assert '--seal' in run.errors
 
 
+@pytest.mark.long  # two identifications
 def test_a_log_and_the_bag_imported_from_it_give_the_same_law(tmp_path, run_of):
     bags = []
     for bar in BARS:

@@ -54,7 +54,9 @@ def write_boom(path, log):
     return path
 
 
-@pytest.mark.parametrize('mapping', [MAPPING, WITHOUT_VELOCITY], ids=['velocity', 'position'])
+@pytest.mark.parametrize(
+    'mapping', [pytest.param(MAPPING, marks=pytest.mark.long), WITHOUT_VELOCITY], ids=['velocity', 'position']
+)
 def test_friction_and_load_are_those_of_the_machine(tmp_path, mapping):
     simulated = boom.simulate(Boom(), 'sines')
     foreign = write_boom(tmp_path / 'foreign', boom.measured(simulated, 0))

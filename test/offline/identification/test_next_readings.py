@@ -77,6 +77,7 @@ def test_the_filled_sheet_is_read_with_its_speeds(proposed, tmp_path):
     assert np.column_stack((found.dynamic.pressure, found.dynamic.velocity)) == pytest.approx(np.array(expected))
 
 
+@pytest.mark.long  # two identifications
 def test_the_table_and_the_filled_sheet_give_the_viscous_friction(proposed, tmp_path):
     table, sheet, _ = proposed
     (tmp_path / 'filled.csv').write_text(filled(sheet.read_text()))

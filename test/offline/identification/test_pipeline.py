@@ -20,7 +20,7 @@ from seal_friction_ros.offline.identification.sources import SourceOptions, read
 # --- thesis ---
 
 
-@pytest.fixture(scope='module', params=['physics_based', 'pressure_power_law'])
+@pytest.fixture(scope='module', params=['physics_based', pytest.param('pressure_power_law', marks=pytest.mark.long)])
 def thesis(request, run_of):
     return run_of(str(THESIS), *THESIS_RIG, '--law', request.param)
 
@@ -77,6 +77,7 @@ def test_thesis_physics_based_law_is_that_of_the_shipped_seal(run_of):
     assert run.has_warning('coefficient and exponent trade off')
 
 
+@pytest.mark.long  # an identification more
 def test_thesis_as_a_bag_gives_the_same_law_as_the_table(tmp_path, run_of):
     import_thesis(tmp_path / 'bag')
     bag = Run(tmp_path, str(tmp_path / 'bag'), *THESIS_RIG, '--law', 'physics_based', name='of_bag')
@@ -292,6 +293,7 @@ def test_the_number_of_workers_changes_no_byte(tmp_path):
     assert files[0] == files[1] != []
 
 
+@pytest.mark.long  # two identifications
 def test_a_level_at_which_the_law_of_the_others_gives_no_friction_is_no_outlier(tmp_path):
     """The power law fitted to the other pressures gives 0 N at 0 bar, where no relative deviation exists."""
     table = readings_table(

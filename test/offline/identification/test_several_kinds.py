@@ -36,7 +36,7 @@ def mounted_friction(run: Run, a: float, b: float, speed: float):
     return found.coulomb_friction + found.velocity_friction, found.coulomb_friction_std
 
 
-@pytest.fixture(scope='module', params=['held', 'swept'])
+@pytest.fixture(scope='module', params=['held', pytest.param('swept', marks=pytest.mark.long)])
 def told_apart(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp(request.param)
     motion = held(GRID, rng()) if request.param == 'held' else swept(240.0)

@@ -99,6 +99,7 @@ def test_a_column_in_celsius_is_read_in_kelvin_and_a_pressure_is_no_temperature(
         read_rig(wrong)
 
 
+@pytest.mark.long  # five bags
 def test_the_column_goes_into_the_bag_and_identify_finds_the_same_coefficient_there(logs, tmp_path, capsys):
     from_logs, _ = identified(logs, 'with.yaml', tmp_path / 'logs.yaml', capsys)
     names = [f'{celsius:.0f}' for celsius in CELSIUS]

@@ -121,6 +121,7 @@ def closed_loop(tmp_path_factory):
     return write_closed_loop(tmp_path_factory.mktemp('bag') / 'closed_loop', seconds=1.5)
 
 
+@pytest.mark.long  # `test_tracking_evaluation` has the numbers
 @pytest.mark.renders
 def test_a_closed_loop_is_shown_with_its_numbers(closed_loop, tmp_path):
     summary = write_report(closed_loop, tmp_path / 'report.html')

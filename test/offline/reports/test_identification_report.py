@@ -33,6 +33,7 @@ def thesis(tmp_path_factory):
     return page
 
 
+@pytest.mark.long  # renders every figure
 def test_the_thesis_has_every_figure_as_png_and_svg_and_in_the_page(thesis):
     assert set(checked_page(thesis).figures) == ALL
 

@@ -210,6 +210,7 @@ def test_a_worker_that_is_killed_amid_work_costs_time_only(tmp_path):
     assert again != killed[1]
 
 
+@pytest.mark.long  # `test_a_worker_that_is_killed_amid_work_costs_time_only` is its short form
 def test_a_call_that_ends_every_worker_has_crashed_and_costs_its_own_result_only(tmp_path):
     environment = {**ENVIRONMENT, 'DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES': '0'}
     with dask_cluster(tmp_path, environment=environment) as cluster:
