@@ -1,6 +1,7 @@
 """The figures of README and docs, from the data in this repository: ``make figures``."""
 
 import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -95,6 +96,8 @@ def main() -> int:
     FIGURES.mkdir(parents=True, exist_ok=True)
     draw_architecture(FIGURES / 'architecture.png')
     draw_monitor(FIGURES / 'monitor.png')
+    rings = Path(__file__).parents[1] / 'test' / 'system' / 'oring_map.py'
+    subprocess.run([sys.executable, str(rings), '--figure', str(FIGURES / 'ehl_oring.png')], check=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         import_thesis(folder / 'inputs')

@@ -10,9 +10,11 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
+from seal_friction_ros.core.estimation.messages import OUTPUTS, encode, type_of
 from seal_friction_ros.core.estimation.node_options import InputOptions, RecordingOptions
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
-from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
+from seal_friction_ros.core.machine.answers_together import NamedAnswer
+from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE, TopicMessage, encode_newest
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
@@ -29,6 +31,7 @@ LAST_FORCES = (
     10  # number of forces of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
 )
 _HEALTH, _MONITOR = 'health', 'monitor'  # keys of their publishers
+_TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
 
 
 class EstimatorNode(ManagedNode):
@@ -49,6 +52,8 @@ class EstimatorNode(ManagedNode):
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[Any, Any] = {}
         self._topics: dict[Any, str] = {}
+        self._newest_inputs: dict[str, TopicMessage] = {}
+        self.is_watched = False  # by a live view
         self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
         self._recording = Recording(self.get_fully_qualified_name())
@@ -126,9 +131,10 @@ class EstimatorNode(ManagedNode):
         """Timers of the graph, the watchdog and the health, and the publisher of the health."""
         self._outputs[_HEALTH] = self.create_publisher(DiagnosticArray, '~/health', 10)
         self._outputs[_MONITOR] = self.create_publisher(
-            message_class(MACHINE_TYPE), '~/monitor', qos.best_effort(qos.STREAM)
+            message_class(NEWEST_TYPE), '~/monitor', qos.best_effort(qos.STREAM)
         )
-        self._is_watched = False
+        self.is_watched = False
+        self._newest_inputs.clear()
         self._timers = [
             self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
             self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog_timer),
@@ -179,10 +185,22 @@ class EstimatorNode(ManagedNode):
         self.on_watchdog()
         self.publish_newest()
 
+    def keep_for_view(self, topic: str, type_name: str, data: bytes) -> None:
+        """Keep a message of an input for the live view; to be called while `is_watched`."""
+        self._newest_inputs[topic] = TopicMessage(topic, type_name, data)
+
     def publish_newest(self) -> None:
-        """Publish the newest answers for the live view, if there is one: 100 messages a second and not thousands."""
-        if self._is_watched and (newest := self.newest_answers()):
-            self._outputs[_MONITOR].publish(encode_together(newest))
+        """Publish the newest messages for the live view, if there is one: 100 a second and not thousands."""
+        if not self.is_watched:
+            return
+        newest = list(self._newest_inputs.values())
+        self._newest_inputs.clear()
+        for actuator, answer, frame_id in self.newest_answers():
+            type_name = type_of(answer)
+            topic = f'{actuator}/{_TOPIC_OF[type_name]}'
+            newest.append(TopicMessage(topic, type_name, encode(answer, frame_id)))
+        if newest:
+            self._outputs[_MONITOR].publish(encode_newest(newest))
 
     # --- clock and graph ---
 
@@ -191,7 +209,7 @@ class EstimatorNode(ManagedNode):
 
         If the next bag is due, let it begin with a snapshot.
         """
-        self._is_watched = self._outputs[_MONITOR].get_subscription_count() > 0
+        self.is_watched = self._outputs[_MONITOR].get_subscription_count() > 0
         if self._watch.has_changed():
             self.publish_diagnostics()
         following = self._recording.continue_in_next_bag()

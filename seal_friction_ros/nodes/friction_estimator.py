@@ -153,6 +153,8 @@ class FrictionEstimator(EstimatorNode):
 
         # Nobody waits for what follows.
         self._recording.record(self._topics[name], type_name, received, data)
+        if self.is_watched:
+            self.keep_for_view(self._topics[name], type_name, data)
         self._statistics.on_input(name, message.stamp)
         self._record_answers(done - taken)
         if name == 'rod_velocity':

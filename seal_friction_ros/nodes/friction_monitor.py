@@ -1,7 +1,8 @@
 """Listens to every estimator of the graph for the web page of ``seal_friction monitor``; it publishes nothing.
 
-It is a process of its own and listens with best effort: no estimator waits for it. The middleware keeps the last
-messages of each topic and this node takes them at the pace of the view: it does not wake for every message.
+It is a process of its own and listens with best effort to one topic of each estimator, which has the newest inputs,
+too: no estimator waits for it, and no driver has one more reader. The middleware keeps the last messages and this node
+takes them at the pace of the view: it does not wake for every message.
 """
 
 import argparse
@@ -22,8 +23,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE
 from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition
+from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.managed_node import message_class
@@ -35,9 +37,8 @@ from seal_friction_ros.offline.monitor.server import MonitorServer
 ANSWER_TIMEOUT = 3.0  # [s] until a node that does not answer counts as one that did not change
 NICENESS = 10  # where processors are short, an estimator has nine times the share of the monitor (our choice)
 _SEARCH_PERIOD = 1.0  # [s] between two looks for new estimators
-_CONFIGURATION, _ANSWERS = '/configuration', '/monitor'  # ends of topics of a node
-_DEPTHS = {True: 8, False: 1}
-"""Of the queue of answers, whose bits must not be lost, and of an input, of which the newest is shown."""
+_CONFIGURATION, _NEWEST = '/configuration', '/monitor'  # ends of topics of a node
+_DEPTH = 8  # of the queue: the bits of every answer are shown
 
 
 class _Asked(NamedTuple):
@@ -70,7 +71,7 @@ class FrictionMonitor(Node):
         self._clock_offset = time.time_ns() - time.monotonic_ns()
         self.view = LiveView(self._received(), self._change if allow_changes else None)
         self._nodes: dict[str, NodeView] = {}
-        self._topics: dict[str, dict[str, Any]] = {}
+        self._newest: dict[str, Any] = {}
         self._asked: queue.SimpleQueue[_Asked] = queue.SimpleQueue()
         self._waiting: list[_Asked] = []
         self._clients_by_node: dict[str, tuple[Any, Any]] = {}
@@ -93,12 +94,11 @@ class FrictionMonitor(Node):
     # --- what is there ---
 
     def _search(self) -> None:
-        """Listen to estimators that have appeared, by their configurations, and to topics that they have added."""
+        """Listen to estimators that have appeared, by their configurations."""
         for topic, types in self.get_topic_names_and_types():
             node = topic.removesuffix(_CONFIGURATION)
             if types == [CONFIGURATION_TYPE] and node != topic and node not in self._nodes:
                 self._nodes[node] = view = NodeView(node, _definitions)
-                self._topics[node] = {}
                 self.view.add(view)
                 self.create_subscription(
                     message_class(CONFIGURATION_TYPE),
@@ -107,39 +107,15 @@ class FrictionMonitor(Node):
                     qos.LATCHED,
                     raw=True,
                 )
+                self._newest[node] = self._listener.create_subscription(
+                    message_class(NEWEST_TYPE), node + _NEWEST, _never_called, _best_effort(_DEPTH), raw=True
+                )
                 if self._allow_changes:
                     self._clients_of(node)  # so that they are found before somebody presses OFF
-        for view in self._nodes.values():
-            if view.known:
-                self._listen(view)
 
     def _on_configuration(self, view: NodeView, data: bytes) -> None:
         with self.view.lock:
             view.take(view.node + _CONFIGURATION, CONFIGURATION_TYPE, data, self._received())
-        self._listen(view)
-
-    def _listen(self, view: NodeView) -> None:
-        """Subscribe to what an estimator publishes and takes."""
-        namespace, _, name = view.node.rpartition('/')
-        found = self._topics[view.node]
-        wanted = {topic: full_name(kind) for topic, kind in view.input_topics.items()}
-        try:
-            answers = self.get_publisher_names_and_types_by_node(name, namespace or '/')
-            inputs = self.get_subscriber_names_and_types_by_node(name, namespace or '/')
-        except RuntimeError:  # NodeNameNonExistentError: it has gone, or its name is not known yet
-            return
-        wanted |= {topic: types[0] for topic, types in answers if topic == view.node + _ANSWERS}
-        if view.machine is None:
-            wanted |= {topic: types[0] for topic, types in inputs if types[0] in DECODERS}
-        for topic, type_name in wanted.items():
-            if topic not in found:
-                depth = _DEPTHS[topic == view.node + _ANSWERS]
-                found[topic] = (
-                    type_name,
-                    self._listener.create_subscription(
-                        message_class(type_name), topic, _never_called, _best_effort(depth), raw=True
-                    ),
-                )
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         with self.view.lock:
@@ -158,10 +134,9 @@ class FrictionMonitor(Node):
         """Take the messages that have come, and add a row; send what the page asks for."""
         now = self._received()
         with self.view.lock:
-            for node, topics in self._topics.items():
-                for topic, (type_name, subscription) in topics.items():
-                    for data in _taken(subscription):
-                        self._nodes[node].take(topic, type_name, data, now)
+            for node, subscription in self._newest.items():
+                for data in _taken(subscription):
+                    self._nodes[node].take_newest(data, now)
         self.view.sample(now)
         self._send_changes()
 

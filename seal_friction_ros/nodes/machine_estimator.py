@@ -58,8 +58,6 @@ from seal_friction_ros.nodes.graph_watch import GraphWatch
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import message_definition
 
-_TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
-
 
 class MachineEstimator(EstimatorNode):
     """Lifecycle node around `core.machine.machine`.
@@ -187,6 +185,8 @@ class MachineEstimator(EstimatorNode):
         # Nobody waits for what follows.
         self._recording.record(name, self._types[name], received, data)  # by its name in the mapping file
         self._newest[name] = data
+        if self.is_watched:
+            self.keep_for_view(name, self._types[name], data)
         for listener in self._listeners[name]:
             self._statistics[listener].on_received(name)
         for number in self._pressures_on.get(name, ()):

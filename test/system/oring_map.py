@@ -1,4 +1,6 @@
-"""Friction map of an O-ring from its drawing beside its readings: ``python test/system/oring_map.py [--influence]``.
+"""Friction map of an O-ring from its drawing beside its readings.
+
+``python test/system/oring_map.py [--influence] [--figure FILE.png]``.
 
 The readings are those in the O-ring case file (``measured``); nothing of the map was chosen for them. The exponent is
 that of friction over the normal force of the dry ring, from a straight line through the logarithms, less 1: of the
@@ -8,21 +10,26 @@ coefficient of friction. With ``--influence`` each number that the drawing does 
 import argparse
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.lubrication.friction_map import steady_friction
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction, parse_oring_case
 from seal_friction_ros.core.oring_contact.results import oring_results
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.contact.lubrication_runs import single_case
+from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.work.executor import available_cores, run_all
 
 CASES = ('oring_ms28775_114', 'oring_delft')
+TITLES = {'oring_ms28775_114': 'ring of the thesis', 'oring_delft': 'O-ring of Delft'}
 UNKNOWN = {  # part, field, and two factors: half and double, as far as a slope can belong to a height and a length
     'tau_c': ('seal', 'solid_shear_stress', (0.5, 2.0)),
     'rms height': ('topography', 'rms_height', (0.5, 1.19)),
@@ -52,10 +59,14 @@ class Beside(NamedTuple):
             return float('nan')
         return float(np.polyfit(np.log(self.normal_forces), np.log(friction), 1)[0]) - 1.0
 
+    @property
+    def factor(self) -> float:
+        """The factor on the computed friction that suits the readings best: a calibration."""
+        return float(np.exp(-np.log(self.errors + 1.0).mean()))
+
     def calibrated(self) -> float:
         """Largest error that is left when one factor on the friction is chosen for the readings."""
-        ratio = self.errors + 1.0
-        return float(np.abs(ratio / np.exp(np.log(ratio).mean()) - 1.0).max())
+        return float(np.abs((self.errors + 1.0) * self.factor - 1.0).max())
 
 
 def measured_of(case: LubricationCase) -> MeasuredFriction:
@@ -84,6 +95,24 @@ def varied(case: LubricationCase, part: str, field: str, factor: float) -> Lubri
     return dataclasses.replace(case, **{part: dataclasses.replace(record, **{field: factor * getattr(record, field)})})
 
 
+def draw(every: Mapping[str, Beside], path: Path) -> None:
+    """Picture of computed and measured friction over the pressure, a ring each."""
+    with style.house_style():
+        figure = Figure(figsize=(4.4, 2.3 * len(every)), layout='constrained')
+        for ax, (name, found) in zip(figure.subplots(len(every), squeeze=False)[:, 0], every.items(), strict=True):
+            bar = np.divide(found.pressures, BAR)
+            ax.plot(bar, found.computed, '-s', color=style.VERMILLION, label='from the drawing, nothing chosen')
+            scaled = np.multiply(found.computed, found.factor)
+            ax.plot(bar, scaled, ':', color=style.VERMILLION, label=f'the same times {found.factor:.2f}, chosen')
+            ax.plot(bar, found.measured, 'o', color=style.BLACK, label='measured')
+            ax.set(
+                title=TITLES.get(name, name), ylabel='friction of one seal [N]', ylim=(0.0, 1.5 * max(found.computed))
+            )
+            ax.legend(loc='upper left')
+        ax.set_xlabel('pressure [bar]')
+        figure.savefig(path, dpi=220, metadata={'Software': None})
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
@@ -91,16 +120,18 @@ def main() -> None:
     parser.add_argument('--readings', type=int, default=6, help='pressures of the readings that are computed')
     parser.add_argument('--influence', action='store_true', help='vary what the drawing does not give')
     parser.add_argument('--cells', type=int, help='cells of the film in the place of those of the case')
+    parser.add_argument('--figure', type=Path, help='PNG of computed and measured friction over the pressure')
     parser.add_argument('--json', action='store_true')
     wanted = parser.parse_args()
     said: dict[str, Any] = {}
+    every: dict[str, Beside] = {}
     for name in wanted.cases:
         case = single_case(name, 'O-ring map')
         if wanted.cells:
             case = dataclasses.replace(case, numerics=dataclasses.replace(case.numerics, cells=wanted.cells))
         readings = measured_of(case).pressures
         pressures = np.linspace(readings[0], readings[-1], wanted.readings)
-        found = beside(case, pressures, available_cores())
+        found = every[name] = beside(case, pressures, available_cores())
         rows: dict[str, Any] = {'as it is': _numbers(found)}
         if wanted.influence:
             few = (pressures[0], pressures[len(pressures) // 2], pressures[-1])
@@ -112,6 +143,8 @@ def main() -> None:
         said[name] = {'readings': found._asdict(), 'rows': rows}
         if not wanted.json:
             _print(name, found, rows)
+    if wanted.figure:
+        draw(every, wanted.figure)
     if wanted.json:
         print(json.dumps(said))
 

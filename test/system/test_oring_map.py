@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import oring_map
 import pytest
-from oring_map import UNKNOWN, beside, varied
+from oring_map import UNKNOWN, Beside, beside, draw, varied
 
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.offline.contact.lubrication_runs import single_case
@@ -44,6 +44,14 @@ def test_one_factor_is_what_is_missing_to_the_friction_of_the_thesis(thesis):
 def test_the_ring_of_delft_is_within_a_factor_of_two_of_its_readings_with_nothing_chosen_for_it():
     found = beside(coarse('oring_delft', 113, 17), (1e5, 7e5), 2)
     assert np.abs(found.errors).max() < 0.9
+
+
+def test_the_picture_shows_what_was_chosen_apart_from_what_was_not(tmp_path):
+    found = Beside([1e5, 5e5], [5.0, 10.0], [10.0, 20.0], [1.0, 2.0])
+    assert found.factor == pytest.approx(0.5)
+    assert found.calibrated() == pytest.approx(0.0, abs=1e-12)
+    draw({'oring_delft': found}, tmp_path / 'one.png')
+    assert (tmp_path / 'one.png').stat().st_size > 10_000
 
 
 @pytest.mark.parametrize('label', UNKNOWN)

@@ -13,6 +13,7 @@ from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode
 from seal_friction_ros.core.machine.machine import Machine, Memory, first_memory, records_of
 from seal_friction_ros.core.machine.machine_snapshot import is_machine_text, machine_of_text, parse_machine_text
 from seal_friction_ros.core.machine.message_fields import Definition
+from seal_friction_ros.core.machine.newest_messages import decode_newest
 from seal_friction_ros.offline.monitor.actuator_view import (
     NOTHING_HELD,
     NOTHING_SAID,
@@ -55,11 +56,6 @@ class NodeView:
         """The machine of a ``machine_estimator``."""
         return self._machine
 
-    @property
-    def input_topics(self) -> dict[str, str]:
-        """Topics of a machine that its mapping file names, and their types; empty for one actuator."""
-        return dict(self._machine.file.topics) if self._machine else {}
-
     def label(self, actuator: str) -> str:
         """Name of an actuator on the page: unique as long as node names and actuators are."""
         if self._machine is not None:
@@ -101,6 +97,16 @@ class NodeView:
         """Show the answers of an estimator whose configuration is not known."""
         if not self.known:
             self.known, self.held = {'': UNKNOWN_CONFIGURATION}, {'': NOTHING_HELD}
+
+    def take_newest(self, data: bytes, received: int) -> None:
+        """Take the newest messages of the estimator, received at ``received`` [ns]."""
+        try:
+            newest = decode_newest(data)
+        except ValueError:
+            self.malformed += 1
+            return
+        for message in newest:
+            self.take(*message, received)
 
     def take(self, topic: str, type_name: str, data: bytes, received: int) -> None:
         """Take one message, received at ``received`` [ns]; one that cannot be read is counted."""
