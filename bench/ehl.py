@@ -28,10 +28,14 @@ STEPS = (1e-3, 5e-4, 2.5e-4)  # [s]
 CALLS = 5_000  # of a function in one timing
 
 
-def one_cycle(case: LubricationCase, cells: int, time_step: float) -> float:
-    """Processor time of one cycle of 1.8 mm [s]; the better of two."""
-    numerics = dataclasses.replace(case.numerics, cells=cells, time_step=time_step)
-    once = dataclasses.replace(case, numerics=numerics, motion=dataclasses.replace(case.motion, cycles=1))
+def of_grid(case: LubricationCase, cells: int, time_step: float) -> LubricationCase:
+    """The case with another grid."""
+    return dataclasses.replace(case, numerics=dataclasses.replace(case.numerics, cells=cells, time_step=time_step))
+
+
+def one_cycle(case: LubricationCase) -> float:
+    """Processor time of one cycle [s]; the better of two."""
+    once = dataclasses.replace(case, motion=dataclasses.replace(case.motion, cycles=1))
     times = []
     for _ in range(2):
         start = processor_time()
@@ -40,11 +44,13 @@ def one_cycle(case: LubricationCase, cells: int, time_step: float) -> float:
     return min(times)
 
 
-def times(case: LubricationCase, cells: Sequence[int], steps: Sequence[float], calls: int) -> dict[str, float]:
+def times(
+    case: LubricationCase, cells: Sequence[int], steps: Sequence[float], calls: int, edge: LubricationCase
+) -> dict[str, float]:
     """All times [s], and the exponents of the time in cells and in steps."""
-    one_cycle(case, 64, 5e-3)  # compiles
-    by_cells = [one_cycle(case, count, steps[len(steps) // 2]) for count in cells]
-    by_steps = [one_cycle(case, cells[0], step) for step in steps]
+    one_cycle(of_grid(case, 64, 5e-3))  # compiles
+    by_cells = [one_cycle(of_grid(case, count, steps[len(steps) // 2])) for count in cells]
+    by_steps = [one_cycle(of_grid(case, cells[0], step)) for step in steps]
     start = processor_time()
     rows = [steady_friction(case, float(pressure)) for pressure in map_pressures(case.map)]
     law = friction_map(case, rows, memory_length(case).length)
@@ -54,6 +60,7 @@ def times(case: LubricationCase, cells: Sequence[int], steps: Sequence[float], c
         'exponent in cells': _exponent(by_cells, cells),
         **{f'cycle, step {step} s [s]': value for step, value in zip(steps, by_steps, strict=True)},
         'exponent in steps': _exponent(by_steps, [1.0 / step for step in steps]),
+        f'cycle of {edge.name}, {edge.numerics.cells} cells [s]': one_cycle(edge),
         f'map, {len(law.speeds)} x {len(law.pressures)} [s]': map_time,
         'look-up in the map [us]': 1e6 * _fastest(lambda: law.sliding_friction(3e4, 0.034), calls),
         **{f'estimator step, {name} [us]': value for name, value in estimator_steps(law, calls).items()},
@@ -91,16 +98,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--json', action='store_true', help='print JSON')
     parser.add_argument('--case', default='inner_seal', help='name or path of the case file')
+    parser.add_argument('--edge', default='inner_seal_control_edge', help='a case of whose own grid a cycle is timed')
     parser.add_argument('--cells', type=int, nargs='+', default=CELLS, help='cells of the grids')
     parser.add_argument('--steps', type=float, nargs='+', default=STEPS, help='time steps [s]')
     parser.add_argument('--calls', type=int, default=CALLS, help='of a short function in one timing')
     arguments = parser.parse_args()
-    figures = times(single_case(arguments.case, 'bench'), arguments.cells, arguments.steps, arguments.calls)
+    case, edge = (single_case(name, 'bench') for name in (arguments.case, arguments.edge))
+    figures = times(case, arguments.cells, arguments.steps, arguments.calls, edge)
     if arguments.json:
         print(json.dumps(figures))
         return
     for name, value in figures.items():
-        print(f'{name:36} {value:8.3f}')
+        print(f'{name:46} {value:8.3f}')
 
 
 if __name__ == '__main__':

@@ -75,7 +75,8 @@ def test_the_o_ring_is_timed_by_mesh():
 def test_the_lubricated_contact_is_timed_by_grid_and_step(tmp_path):
     (tmp_path / 'small.yaml').write_text(SMALL_CASE)
     grid = ('--cells', '32', '48', '--steps', '8e-3', '4e-3', '--calls', '200')
-    found = run_json('bench/ehl.py', '--case', str(tmp_path / 'small.yaml'), *grid)
+    small = str(tmp_path / 'small.yaml')
+    found = run_json('bench/ehl.py', '--case', small, '--edge', small, *grid)
     assert {'cycle, 32 cells [s]', 'exponent in steps', 'map, 3 x 2 [s]'} <= set(found)
     assert found['estimator step, friction_map [us]'] > 0.0
 

@@ -41,6 +41,8 @@ _LIMIT_MESSAGES = {
 }
 _MOST_REVERSALS = 50  # [1/s] of the force; faster motion is not compensated, so this is chatter
 _LARGEST_DELAY = 1_000_000_000  # [ns] a stamp further back than this means that its clock was set
+_LARGEST_LATENESS = 50_000_000  # [ns] of a velocity: controllers are to refuse what is older (docs/interfaces.md)
+_LATENESS_MEMORY = 60  # intervals in which the quickest velocity is looked for
 
 
 class MissingSamples:
@@ -85,6 +87,39 @@ class MissingSamples:
         return round(step / self._period) - 1 if step > 1.5 * self._period else 0
 
 
+class Lateness:
+    """How much later than the quickest one of the last minute velocities came, from receipt minus stamp (our choice).
+
+    So it does not matter whether the clocks agree. A node that is too slow takes messages that have waited in the
+    middleware, up to the length of its queue: their estimates are right for their stamps, and late.
+    """
+
+    def __init__(self) -> None:
+        self._least: deque[int] = deque(maxlen=_LATENESS_MEMORY)  # of each interval before
+        self._ages: list[int] = []
+
+    def on_velocity(self, age: int) -> None:
+        """Add receipt minus stamp [ns] of a velocity."""
+        self._ages.append(age)
+
+    def start_interval(self) -> None:
+        """Start a new interval."""
+        if self._ages:
+            self._least.append(min(self._ages))
+        self._ages = []
+
+    @property
+    def largest(self) -> int:
+        """The latest of this interval [ns]; 0 if a clock was set meanwhile."""
+        if not self._ages:
+            return 0
+        late = max(self._ages) - min(*self._ages, *self._least, max(self._ages))
+        if late <= _LARGEST_DELAY:
+            return late
+        self._least.clear()
+        return 0
+
+
 class EstimatorDiagnostics:
     """Counts since activation, and rates, ages and latencies of the present interval.
 
@@ -102,6 +137,7 @@ class EstimatorDiagnostics:
         self._feedforward_force = self._feedforward_sign = 0.0
         self._estimate = NO_ESTIMATE
         self._latencies: list[int] = []
+        self._lateness = Lateness()
         self._health, self._starts = SealHealth(), Starts()
         self._adaptation = NOT_ADAPTED
         self._newest: dict[type, FrictionEstimate | FeedForward] = {}
@@ -118,6 +154,7 @@ class EstimatorDiagnostics:
         self._limits_before = self._feedforwards_by_limit.copy()
         self._reversals, self._travel = 0, 0.0
         self._latencies = []
+        self._lateness.start_interval()
 
     def on_input(self, name: str, stamp: int) -> None:
         """Count one message of an input with its stamp [ns]."""
@@ -132,10 +169,17 @@ class EstimatorDiagnostics:
         """Count one message of an input that cannot be decoded."""
         self._malformed[name] += 1
 
-    def on_estimate(self, estimate: FrictionEstimate, latency: int) -> None:
-        """Count one estimate; ``latency`` [ns] is the time since its velocity sample was taken."""
+    def on_estimate(self, estimate: FrictionEstimate, latency: int, received: int) -> None:
+        """Count one estimate.
+
+        Args:
+            estimate: With the stamp of its velocity.
+            latency: [ns] since its velocity was taken.
+            received: When the velocity was taken [ns], on the clock of the stamps.
+        """
         self._by_status[estimate.status] += 1
         self._latencies.append(latency)
+        self._lateness.on_velocity(received - estimate.stamp)
         self._estimate = self._newest[FrictionEstimate] = estimate
         self._status |= estimate.status
 
@@ -231,6 +275,9 @@ class EstimatorDiagnostics:
         said: list[str] = []
         if parameters is not None:
             said = findings(parameters, self._health, status)
+        if self._lateness.largest > _LARGEST_LATENESS:
+            late = self._lateness.largest * 1e-6
+            said.append(f'rod_velocity comes up to {late:.0f} ms late: this node is too slow, or its machine too busy')
         if status:
             return DiagnosticStatus.WARN, '; '.join([str(Status(status).name), *said])
         if self._malformed != self._malformed_before:
@@ -281,6 +328,7 @@ class EstimatorDiagnostics:
             'feed-forward travel [N/s]': f'{self._travel / seconds:.0f}',
             'feed-forward [N]': f'{self._feedforward_force:.3f}',
             'input age [s]': f'{self._estimate.input_age:.4f}',
+            'velocity late [ms]': f'{self._lateness.largest * 1e-6:.1f}',
             **latency_values(self._latencies),
         }
 

@@ -18,11 +18,12 @@ from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE, TopicMes
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
-from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
+from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 
 _WATCH_PERIOD = 0.05  # [s]
 _WATCHDOG_PERIOD = 0.01  # [s] more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
+STARVED = round(_WATCHDOG_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog, after which the timers are looked after
 _HEALTH_PERIOD = 60.0  # [s]
 _INPUT_PERIOD = 0.5  # [s]
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
@@ -54,6 +55,7 @@ class EstimatorNode(ManagedNode):
         self._topics: dict[Any, str] = {}
         self._newest_inputs: dict[str, TopicMessage] = {}
         self.is_watched = False  # by a live view
+        self.watched = 0  # [ns] of `time.perf_counter_ns`, when the watchdog looked last
         self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
         self._recording = Recording(self.get_fully_qualified_name())
@@ -145,6 +147,7 @@ class EstimatorNode(ManagedNode):
     def begin(self) -> None:
         """Begin to record if ``record`` is set; at the end of `start`."""
         self._logged_errors.clear()
+        self.watched = time.perf_counter_ns()
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
         self._received = 0
         self._now = self._receipt_clock()
@@ -182,6 +185,7 @@ class EstimatorNode(ManagedNode):
         self._topics[name] = self._inputs[name].topic_name
 
     def _on_watchdog_timer(self) -> None:
+        self.watched = time.perf_counter_ns()
         self.on_watchdog()
         self.publish_newest()
 

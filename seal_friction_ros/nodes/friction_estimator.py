@@ -41,7 +41,7 @@ from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
-from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STOP_PERIOD, EstimatorNode
+from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STARVED, STOP_PERIOD, EstimatorNode
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.graph_watch import GraphWatch
 from seal_friction_ros.nodes.managed_node import message_class
@@ -156,19 +156,21 @@ class FrictionEstimator(EstimatorNode):
         if self.is_watched:
             self.keep_for_view(self._topics[name], type_name, data)
         self._statistics.on_input(name, message.stamp)
-        self._record_answers(done - taken)
+        self._record_answers(done - taken, received)
         if name == 'rod_velocity':
             if self._known.estimator.adapts:
                 state = self._state
                 self._statistics.on_adaptation(self._known.estimator, before, state.estimator, state.temperature)
             self._recording.flush_if_idle()
+        if done - self.watched > STARVED:
+            self.call_overdue_timers()
 
-    def _record_answers(self, latency: int = 0) -> None:
-        """Record and count what was sent, ``latency`` [ns] after its input was taken."""
+    def _record_answers(self, latency: int = 0, received: int = 0) -> None:
+        """Record and count what was sent, ``latency`` [ns] after its input was taken at ``received`` [ns]."""
         for answer_type, answer, answer_data in self._sent:
             self._recording.record(self._topics[answer_type], answer_type, self._now(), answer_data)
             if answer_type == ESTIMATE_TYPE:
-                self._statistics.on_estimate(answer, latency)
+                self._statistics.on_estimate(answer, latency, received + self._state.clock_offset)
             else:
                 self._statistics.on_feedforward(answer)
 

@@ -51,7 +51,7 @@ from seal_friction_ros.core.machine.outputs import Command, due_commands
 from seal_friction_ros.files import load_configuration, read_machine, read_machine_document
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
-from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STOP_PERIOD, EstimatorNode
+from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STARVED, STOP_PERIOD, EstimatorNode
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.friction_estimator import SWITCH_INTERVAL
 from seal_friction_ros.nodes.graph_watch import GraphWatch
@@ -192,9 +192,11 @@ class MachineEstimator(EstimatorNode):
         for number in self._pressures_on.get(name, ()):
             self._lowest[number] = self._lowest[number].after(self._state.actuators[number].pipeline.pressure)
         if self._sent:
-            self._record_answers(made, done - taken)
+            self._record_answers(made, done - taken, received)
             self._follow_adaptation(before)
             self._recording.flush_if_idle()
+        if done - self.watched > STARVED:
+            self.call_overdue_timers()
 
     def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once, if it is a message of its own; the rest waits until all answers are out."""
@@ -219,14 +221,14 @@ class MachineEstimator(EstimatorNode):
             self._outputs['', command.topic].publish(command.data)
         return made
 
-    def _record_answers(self, made: list[Command], latency: int = 0) -> None:
-        """Record and count what was sent, ``latency`` [ns] after its input was taken."""
+    def _record_answers(self, made: list[Command], latency: int = 0, received: int = 0) -> None:
+        """Record and count what was sent, ``latency`` [ns] after its input was taken at ``received`` [ns]."""
         for name, answer, data in self._sent:
             kind, statistics = type_of(answer), self._statistics[name]
             if not self._together:
                 self._recording.record(self._topics[name, kind], kind, self._now(), data)
             if kind == ESTIMATE_TYPE:
-                statistics.on_estimate(answer, latency)
+                statistics.on_estimate(answer, latency, received + self.clock_offset)
             else:
                 statistics.on_feedforward(answer)
         if self._together:

@@ -1,5 +1,6 @@
 """Base class of the nodes: lifecycle, parameters from dataclasses, diagnostics once a second."""
 
+import time
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any, TypeVar
@@ -20,6 +21,7 @@ from seal_friction_ros.nodes.realtime import take_realtime_priority
 Record = TypeVar('Record')
 
 _DIAGNOSTICS_PERIOD = 1.0  # [s]
+OVERDUE = 50_000_000  # [ns] by which a timer may be late
 
 
 def message_class(type_name: str) -> Any:
@@ -33,6 +35,32 @@ def message_class(type_name: str) -> Any:
         return getattr(import_module(f'{package}.msg'), name)
     except (ImportError, AttributeError):
         raise ValueError(f'{type_name} is not installed: install the package {package}') from None
+
+
+class _SteadyTimer:
+    """When a timer was called last.
+
+    Args:
+        callback: What it calls.
+        period: [ns]
+        now: [ns] of the steady clock.
+    """
+
+    def __init__(self, callback: Callable[[], None], period: int, now: int) -> None:
+        self._callback, self._period, self._called = callback, period, now
+
+    def call(self) -> None:
+        """Call it now."""
+        self._called = time.monotonic_ns()
+        self._callback()
+
+    def was_just_called(self, now: int) -> bool:
+        """Whether less than half a period has passed: after a call out of turn."""
+        return 2 * (now - self._called) < self._period
+
+    def is_overdue(self, now: int) -> bool:
+        """Whether the executor is late."""
+        return now - self._called > self._period + OVERDUE
 
 
 class ManagedNode(LifecycleNode):
@@ -56,6 +84,7 @@ class ManagedNode(LifecycleNode):
         self.configured = False
         self._groups = groups
         self._diagnostics_timer: Any = None
+        self._steady_timers: list[_SteadyTimer] = []
         self._diagnostics_publisher: Any = None
         try:
             for group in groups:
@@ -217,6 +246,7 @@ class ManagedNode(LifecycleNode):
         if self._diagnostics_publisher is not None:
             self.destroy_publisher(self._diagnostics_publisher)
         self._diagnostics_timer = self._diagnostics_publisher = None
+        self._steady_timers.clear()
         self.release()
 
     def create_steady_timer(self, period: float, callback: Callable[[], None]) -> Any:
@@ -224,12 +254,25 @@ class ManagedNode(LifecycleNode):
 
         An executor may call a timer that was due just before its destruction: unconfigured, the node ignores the call.
         """
+        made = _SteadyTimer(callback, round(period * 1e9), time.monotonic_ns())
+        self._steady_timers.append(made)
 
         def call() -> None:
-            if self.configured:
-                callback()
+            if self.configured and not made.was_just_called(time.monotonic_ns()):
+                made.call()
 
         return self.create_timer(period, call, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def call_overdue_timers(self) -> None:
+        """Call the timers that the executor has not called in time.
+
+        An executor that is behind with messages takes these first: on a machine that is too busy a timer comes seconds
+        late. A node calls this after a message.
+        """
+        now = time.monotonic_ns()
+        for timer in self._steady_timers:
+            if self.configured and timer.is_overdue(now):
+                timer.call()
 
     def _on_timer(self) -> None:
         self.publish_diagnostics()

@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.messages import INPUTS
 from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
-from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, MissingSamples
+from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, Lateness, MissingSamples
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 PERIOD = 1_000_000  # [ns]
@@ -32,7 +32,7 @@ def level_of(bit: Status, share: float) -> tuple[bytes, str]:
     """Level and message of a second in which this share of the estimates had the bit."""
     diagnostics = EstimatorDiagnostics()
     for i in range(100):
-        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(bit) if i < 100 * share else 0), 1000)
+        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(bit) if i < 100 * share else 0), 1000, 0)
     report = diagnostics.report(True, False, GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {}))
     return report.level, report.message
 
@@ -54,11 +54,46 @@ def test_who_looks_on_gets_the_newest_answers_with_the_bits_of_all_since_the_las
     statistics = EstimatorDiagnostics()
     assert statistics.take_newest('boom') == []
     for number, (status, limited) in enumerate([(0, 0), (int(Status.FORCE_STALE), int(Limited.CLAMP)), (0, 0)]):
-        statistics.on_estimate(NO_ESTIMATE._replace(stamp=number, status=status), 1)
+        statistics.on_estimate(NO_ESTIMATE._replace(stamp=number, status=status), 1, number)
         statistics.on_feedforward(FeedForward(number, float(number), 0.9, limited))
     estimate, feedforward = statistics.take_newest('boom')
     assert (estimate.actuator, estimate.record.stamp, estimate.record.status) == ('boom', 2, Status.FORCE_STALE)
     assert (feedforward.record.force, feedforward.record.limited) == (2.0, Limited.CLAMP)
     assert statistics.take_newest('boom') == []
-    statistics.on_estimate(NO_ESTIMATE, 1)
+    statistics.on_estimate(NO_ESTIMATE, 1, 0)
     assert [answer.record.status for answer in statistics.take_newest('boom')] == [0]
+
+
+def message_of(ages: list[int]) -> tuple[bytes, str]:
+    """Level and message of a second whose velocities were received so long [ns] after their stamps."""
+    diagnostics = EstimatorDiagnostics()
+    for number, age in enumerate(ages):
+        diagnostics.on_estimate(NO_ESTIMATE._replace(stamp=number * PERIOD), 1000, number * PERIOD + age)
+    report = diagnostics.report(True, False, GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {}))
+    return report.level, report.message
+
+
+@pytest.mark.parametrize('clock', [-(10**12), 0, 10**12])
+def test_velocities_that_waited_are_a_warning_whatever_their_clock_shows(clock):
+    assert message_of([clock + i % 40 * PERIOD for i in range(100)]) == (DiagnosticStatus.OK, 'estimating')
+    level, message = message_of([clock + i * PERIOD for i in range(100)])
+    assert level == DiagnosticStatus.WARN
+    assert message.startswith('rod_velocity comes up to 99 ms late')
+
+
+def test_late_is_later_than_the_quickest_of_a_minute_and_a_clock_that_was_set_is_not():
+    late = Lateness()
+    for age in (5, *[70] * 59):
+        late.on_velocity(age * PERIOD)
+        late.start_interval()
+    late.on_velocity(70 * PERIOD)
+    assert late.largest == 65 * PERIOD
+    for _ in range(2):
+        late.start_interval()
+        late.on_velocity(70 * PERIOD)
+    assert late.largest == 0
+    late.start_interval()
+    late.on_velocity(5000 * PERIOD)
+    assert late.largest == 0
+    late.on_velocity(5020 * PERIOD)
+    assert late.largest == 20 * PERIOD

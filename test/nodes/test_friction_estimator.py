@@ -3,12 +3,15 @@
 import json
 import math
 import time
+from functools import partial
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import yaml
 from harness.live_graph import graph
+from harness.processes import STOP_TIMEOUT
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from paths import ROOT
@@ -23,7 +26,9 @@ from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, Adaptation
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.messages import encode
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, ROS_PARAMETERS
+from seal_friction_ros.core.estimation.records import Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import default_configuration, load_parameter_file
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
@@ -60,6 +65,21 @@ def test_stamps_of_1970_are_marked_and_warned_of():
         assert g.spin_until(lambda: g.probe.values('estimate').get('message') == 'STAMP_AGE')
         assert g.probe.values('estimate')['level'] == '1'
         assert g.estimate(time.time_ns(), 0.1).status == 0
+
+
+def test_timers_for_which_the_executor_has_no_time_are_called_after_a_message(monkeypatch: pytest.MonkeyPatch):
+    """It takes the messages that wait first, so nobody spins here."""
+    called: list[str] = []
+    with graph() as g:
+        g.connect()
+        for name in ('publish_diagnostics', 'on_watchdog'):
+            monkeypatch.setattr(g.estimator, name, partial(called.append, name))
+        end = time.monotonic() + STOP_TIMEOUT
+        for number in count(1):
+            g.estimator.on_input('rod_velocity', encode(Velocity(number * 10**6, 0.0, b'rod')))
+            if called.count('publish_diagnostics') >= 2 and called.count('on_watchdog') >= 5:
+                break
+            assert time.monotonic() < end, called
 
 
 def test_a_clock_that_is_set_changes_no_time_of_receipt_and_what_was_recorded_verifies(
