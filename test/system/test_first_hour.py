@@ -12,9 +12,12 @@ from harness.pages import Terminals, blocks_of
 from paths import ROOT
 from test_docs import link_tree
 
+from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import decode
 from seal_friction_ros.core.estimation.records import Position, ServoReference
-from seal_friction_ros.files import read_machine
+from seal_friction_ros.core.friction.actuator import ActuatorFriction, actuator_friction
+from seal_friction_ros.files import load_configuration, read_machine
 from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.replay.replay import replay
 
@@ -23,6 +26,14 @@ STROKES_SECONDS, SINE_SECONDS = 10.0, 3.5  # shorter than on the page
 CLOSED_LOOP_PACE = 0.25  # [-] slower: on a busy machine the feed-forward comes in time, too
 MOST_LINES = 25  # of a mapping file
 LARGEST_SHARE = 0.4  # of the tracking error that may be left
+
+SPRINGS = (
+    ('weak', '6.0e+6', '8.0e+4', '0.06'),
+    ('strong', '1.8e+7', '8.0e+4', '0.06'),
+    ('pushing', '1.8e+7', '1.0e+5', '0.0'),
+    ('pulling', '1.8e+7', '6.0e+4', '0.14'),
+)
+"""Recording, supply pressure [Pa], stiffness of the load spring [N/m] and where it is slack [m]."""
 
 PNEUMATIC = """name: pneumatic
 topics:
@@ -69,6 +80,12 @@ def tracking_error(bag: Path) -> float:
     error = measured[:, 1] - np.interp(measured[:, 0], wanted[:, 0], wanted[:, 1])
     second = np.floor(measured[:, 0] - measured[0, 0])
     return float(np.median([np.sqrt(np.mean(error[second == k] ** 2)) for k in range(int(second[-1]))]))
+
+
+def friction_of(selection: SealSelection, a: float, b: float) -> ActuatorFriction:
+    """Friction of seals at two chamber pressures [Pa] and 50 mm/s."""
+    seals = load_configuration(selection, EstimatorSettings()).parameters().estimator.seals
+    return actuator_friction(seals, a, b, 0.05)
 
 
 def share_left(folder: Path, terminals: Terminals) -> float:
@@ -139,3 +156,47 @@ def test_a_pneumatic_axis_without_force_sensor_and_velocity_tracks(checkout: Pat
     finally:
         terminals.stop_machine()
     assert share_left(checkout, terminals) < LARGEST_SHARE
+
+
+@pytest.mark.long  # five recordings
+def test_a_bench_with_rod_and_piston_seals_of_different_kinds_tracks(checkout: Path):
+    (checkout / 'build' / 'robot.yaml').write_text(
+        next(block.text for block in blocks_of(PAGE) if block.kind == 'robot')
+    )
+    plant = (
+        '.venv/bin/servo_simulator --ros-args --params-file config/simulated_machines/single_rod_cylinder.yaml '
+        '--params-file config/programs/strokes_against_spring.yaml '
+        '-p seals:=[ms28775_114@b,ms28775_114@b,delft_o_ring@difference]'
+    )
+    sine = '-p wave:=sine -p load.spring_stiffness:=0.0'
+    node = (
+        '.venv/bin/machine_estimator --ros-args -p machine:=build/robot.yaml -p record:=true -p record_directory:=build'
+    )
+    off, tool = '-p boom.feedforward.scale:=0.0', '.venv/bin/seal_friction'
+    terminals = Terminals(checkout)
+    try:
+        for name, supply, stiffness, position in SPRINGS:
+            spring = f'-p load.spring_stiffness:={stiffness} -p load.spring_position:={position}'
+            terminals.start_machine(f'{plant} {spring} -p valve.supply_pressure:={supply}')
+            terminals.run_node(f'{node} {off} -p record_name:={name}', 14.0)
+            terminals.run(f'{tool} import bag build/{name} --mapping build/robot.yaml --out build/run_{name}')
+        runs = ' '.join(f'build/run_{name}' for name, *_ in SPRINGS)
+        kinds = '--seal-kind rod=b,b --seal-kind piston=difference --largest-kind-error 0.5'
+        terminals.run(f'{tool} identify {runs} {kinds} --out build/seal.yaml')
+        assert 'use the seal files in this cylinder only' in terminals.said[-1]
+        terminals.run("sed -i 's|seals: .*|seals: [build/seal_rod.yaml, build/seal_piston.yaml]|' build/robot.yaml")
+        terminals.start_machine(f'{plant} {sine}')
+        terminals.run_node(f'{node} {off} -p record_name:=without', SINE_SECONDS)
+        terminals.run(f'{tool} import bag build/without --mapping build/robot.yaml --out build/run_without')
+        terminals.run(f'{tool} tune --bag build/run_without --actuator boom --out build/feedforward.yaml')
+        terminals.start_machine(f'{plant} {sine}', CLOSED_LOOP_PACE)
+        terminals.run_node(f'{node} --params-file build/feedforward.yaml -p record_name:=with', SINE_SECONDS)
+    finally:
+        terminals.stop_machine()
+    assert share_left(checkout, terminals) < LARGEST_SHARE
+    bench = {'seals': ('ms28775_114', 'ms28775_114', 'delft_o_ring'), 'seal_chambers': ('b', 'b', 'difference')}
+    files = {'seals': tuple(str(checkout / 'build' / f'seal_{kind}.yaml') for kind in ('rod', 'piston'))}
+    for a, b in ((3e6, 6e6), (8e6, 4e6), (12e6, 12e6)):  # [Pa]
+        truth, found = (friction_of(SealSelection(**chosen), a, b) for chosen in (bench, files))
+        assert found.coulomb_friction == pytest.approx(truth.coulomb_friction, rel=0.1)
+        assert abs(found.coulomb_friction - truth.coulomb_friction) < found.coulomb_friction_std

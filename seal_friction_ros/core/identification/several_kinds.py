@@ -8,6 +8,7 @@ only where their pressures are varied independently. The friction at no pressure
 over all kinds at every pressure: no log of the cylinder divides them.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
@@ -30,7 +31,7 @@ EXPONENTS = (ELASTIC_EXPONENT, 0.75, 0.85, 1.0, 1.15, 1.3, 1.5, 1.75, 2.0)
 """of the pressure, tried for each kind: a coarse row would put the misfit of one kind on the other (our choice)"""
 COARSE = (ELASTIC_EXPONENT, 0.85, 1.0, 1.5)  # where there are more than two kinds (our choice)
 TOGETHER = 0.98  # correlation of the pressures of the kinds above which they moved together (our choice)
-LARGEST_ERROR = 0.10  # of the friction of a kind: standard error up to which it is told apart (our choice)
+LARGEST_KIND_ERROR = 0.10  # of the friction of a kind: standard error up to which it is told apart (our choice)
 SMALL_ERROR = 0.05  # of the friction of all seals: a standard error that is as small does no harm (our choice)
 SPEEDS_DIFFER = 1.5  # fast over slow readings from which viscous friction is tried (our choice)
 HELD = 0.02  # of the highest pressure: standard deviation of one that did not change (our choice)
@@ -280,11 +281,15 @@ def _rungs(data: KindsReadings) -> list[KindsRung]:
     ]
 
 
-def fit_kinds(data: KindsReadings) -> KindsIdentification:
+def fit_kinds(data: KindsReadings, largest_error: float = LARGEST_KIND_ERROR) -> KindsIdentification:
     """Fit every combination of laws, and take the simplest that is not beaten on readings left out.
 
     Standard errors are the larger of those of least squares, whose residuals are white, and those of the jackknife over
     the groups, whose readings go together.
+
+    Args:
+        data: Readings of the cylinder.
+        largest_error: Standard error up to which a kind is told apart, a share of its friction [-].
 
     Raises:
         ValueError: The pressures moved together, or the friction of a kind is lost in the noise; what to measure.
@@ -318,7 +323,7 @@ def fit_kinds(data: KindsReadings) -> KindsIdentification:
         together=moved_together(data),
         tried=len(results),
     )
-    _check_told_apart(result)
+    _check_told_apart(result, largest_error)
     return result
 
 
@@ -500,19 +505,35 @@ def _check_not_by_one(data: KindsReadings, where: str) -> None:
             )
 
 
-def _check_told_apart(found: KindsIdentification) -> None:
+def poorly_told_apart(
+    found: KindsIdentification, largest_error: float = LARGEST_KIND_ERROR
+) -> list[tuple[str, float, float]]:
+    """Kinds whose standard error is larger than that share of their friction, and not small beside all friction.
+
+    Returns:
+        Name, friction [N] and its standard error [N] of each.
+    """
+    frictions = found.fit.frictions(found.fit.data.readings.at).mean(axis=0).tolist()
+    errors = np.hypot(found.errors, found.spread).tolist()
+    return [
+        (kind.name, friction, error)
+        for kind, friction, error in zip(found.fit.data.kinds, frictions, errors, strict=True)
+        if error > largest_error * friction and error > SMALL_ERROR * sum(frictions)
+    ]
+
+
+def _check_told_apart(found: KindsIdentification, largest_error: float) -> None:
     """Check the standard error of each kind.
 
     Raises:
         ValueError: It is too large; what to measure.
     """
-    data = found.fit.data
-    frictions = found.fit.frictions(data.readings.at).mean(axis=0)
-    for kind, friction, error in zip(
-        data.kinds, frictions.tolist(), np.hypot(found.errors, found.spread).tolist(), strict=True
-    ):
-        if error > LARGEST_ERROR * friction and error > SMALL_ERROR * float(frictions.sum()):
-            raise ValueError(
-                f'{", ".join(data.readings.names)}: the friction of {kind.name} cannot be told from that of the '
-                f'others: {friction:.3g} N with a standard error of {error:.2g} N: {advice(data, found.rivals)}'
-            )
+    poor = poorly_told_apart(found, largest_error)
+    if poor:
+        name, friction, error = poor[0]
+        share = max(error / friction for _, friction, error in poor)
+        raise ValueError(
+            f'{", ".join(found.fit.data.readings.names)}: the friction of {name} cannot be told from that of the '
+            f'others: {friction:.3g} N with a standard error of {error:.2g} N: {advice(found.fit.data, found.rivals)}; '
+            f'or take it with that error: --largest-kind-error {math.ceil(20.0 * share) / 20.0:.2f}'
+        )

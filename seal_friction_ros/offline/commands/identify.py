@@ -58,6 +58,12 @@ def _add_what_is_known(parser: argparse.ArgumentParser) -> None:
         metavar='NAME=a,b',
         help='one of several kinds of seals in the cylinder and what each of its seals sees; one file a kind',
     )
+    parser.add_argument(
+        '--largest-kind-error',
+        type=cli.non_negative,
+        metavar='SHARE',
+        help='standard error of a kind up to which it is told from the others, a share of its friction (0.1)',
+    )
     parser.add_argument('--law', help='law to save instead of the recommended one')
     parser.add_argument(
         '--run-to-run',
@@ -107,7 +113,7 @@ NOT_FOR_KINDS = (
 
 def _run_kinds(arguments: argparse.Namespace) -> int:
     """Identify several kinds of seals together, and write a seal file for each."""
-    from seal_friction_ros.core.identification.several_kinds import SealKind
+    from seal_friction_ros.core.identification.several_kinds import LARGEST_KIND_ERROR, SealKind
     from seal_friction_ros.offline.identification import kinds
     from seal_friction_ros.offline.identification.sources import SourceOptions
     from seal_friction_ros.offline.work.seal_writer import write_seal
@@ -127,7 +133,9 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
         options = SourceOptions(**cli.options_from(arguments, SourceOptions))
         each = [SealKind(*kind) for kind in arguments.kinds]
         name = arguments.name or arguments.out.stem
-        result = kinds.identify_kinds(arguments.sources, options, each, name, arguments.run_to_run)
+        error = arguments.largest_kind_error
+        accepted = LARGEST_KIND_ERROR if error is None else error
+        result = kinds.identify_kinds(arguments.sources, options, each, name, arguments.run_to_run, accepted)
         for kind, path in files.items():
             write_seal(result.documents[kind], path, f'Seal file, {mark("identify")}.')
         written: dict[str, Any] = {}
@@ -145,6 +153,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Identify, and write seal file, page and data sheet."""
     if arguments.kinds:
         return _run_kinds(arguments)
+    if arguments.largest_kind_error is not None:
+        raise ValueError('--largest-kind-error is for several kinds of seals: give them with --seal-kind')
     from seal_friction_ros.offline.identification import next_readings
     from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, identify
     from seal_friction_ros.offline.identification.results import identification_numbers

@@ -17,11 +17,13 @@ from seal_friction_ros.core.identification.breakaway import BreakawayFit, fit_br
 from seal_friction_ros.core.identification.force_correction import NOTICED
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.several_kinds import (
+    LARGEST_KIND_ERROR,
     KindsFit,
     KindsIdentification,
     SealKind,
     fit_kinds,
     kinds_readings,
+    poorly_told_apart,
     proposed_conditions,
 )
 from seal_friction_ros.core.identification.validation import PredictionUncertainty, prediction_uncertainty
@@ -56,7 +58,12 @@ def _error(found: KindsIdentification) -> float:
 
 
 def identify_kinds(
-    paths: Sequence[Path], options: SourceOptions, kinds: Sequence[SealKind], name: str, run_to_run: float | None = None
+    paths: Sequence[Path],
+    options: SourceOptions,
+    kinds: Sequence[SealKind],
+    name: str,
+    run_to_run: float | None = None,
+    largest_error: float = LARGEST_KIND_ERROR,
 ) -> SeveralKinds:
     """Read bags or logs, fit all kinds together, and make a seal file for each.
 
@@ -66,6 +73,7 @@ def identify_kinds(
         kinds: At least two, with different names.
         name: Of the seals; that of the kind is added.
         run_to_run: Relative standard deviation between runs, if it is known [-].
+        largest_error: Standard error up to which a kind is told apart, a share of its friction [-].
 
     Raises:
         ValueError: The data are unfit, or they do not tell the kinds apart; one line with what to measure.
@@ -79,7 +87,7 @@ def identify_kinds(
         )
     prepared = sources.prepare()
     data = kinds_readings(prepared.readings, prepared.chamber_pressures, kinds)
-    found = fit_kinds(data)
+    found = fit_kinds(data, largest_error)
     if not _error(found) <= LARGEST_ERROR:
         raise ValueError(
             f'{", ".join(data.readings.names)}: no laws predict these readings: they are off by '
@@ -209,6 +217,11 @@ def _warnings_of(result: SeveralKinds) -> Iterator[str]:
             f'the friction at no pressure, {fit.constant:.3g} N of all seals ({100.0 * fit.constant / mean:.0f} % of '
             f'the friction),{viscous} cannot be divided between {names} by any pressure of this cylinder: it is '
             'divided as the rest is, and the standard deviation of each kind holds that: use the seal files together'
+        )
+    for name, friction, error in poorly_told_apart(found):
+        yield (
+            f'{name}: {friction:.3g} N with a standard error of {error:.2g} N, which --largest-kind-error lets pass: '
+            'the sum of all kinds is better known than each: use the seal files in this cylinder only'
         )
     for kind, part in zip(fit.data.kinds, fit.rises.tolist(), strict=True):
         if part == 0.0:

@@ -104,6 +104,26 @@ def test_kinds_that_cannot_be_told_apart_are_refused_with_the_pressures_to_drive
     assert not list(tmp_path.glob('seal*.yaml'))
 
 
+def test_kinds_that_are_poorly_told_apart_are_taken_if_asked_and_their_deviations_say_so(tmp_path):
+    motion = held([(20, 5), (60, 25), (100, 35), (60, 5), (100, 70)], rng())
+    logs = write_log(tmp_path, motion)
+    refused = Run(tmp_path, *logs, *KINDS)
+    assert refused.code == 2
+    assert 'the friction of rod cannot be told from that of the others: 60.7 N with a standard error' in refused.errors
+    asked = refused.errors.strip().rpartition('or take it with that error: ')[2].split()
+    run = Run(tmp_path, *logs, *KINDS, *asked)
+    assert run.code == 0, run.errors
+    assert run.has_warning('rod: 60.7 N', '--largest-kind-error', 'use the seal files in this cylinder only')
+    off = np.array(run.figures['fitted_N']) / np.array(run.figures['measured_N']) - 1.0
+    assert np.abs(off).max() < 0.05  # the sum of both is known
+    rod, piston = (read_yaml(Path(path)) for path in run.figures['seal_files'].values())
+    assert min(rod['uncertainty']['relative_std'], piston['uncertainty']['relative_std']) > 0.2
+    for a, b in ((100.0, 100.0), (0.0, 60.0)):  # not driven
+        truth = rod_friction(a * BAR) + piston_friction((a - b) * BAR) + 150.0 * 0.03
+        friction, std = mounted_friction(run, a, b, 0.03)
+        assert abs(friction - truth) < 1.96 * std
+
+
 def test_the_proposed_pressures_make_the_kinds_tell_apart(tmp_path):
     vented = [(a, 0.0) for a in (0, 20, 40, 60, 80, 100)]
     refused = Run(tmp_path, *write_log(tmp_path, held(vented, rng())), *KINDS)
@@ -129,6 +149,7 @@ def test_equal_kinds_of_names_and_options_of_one_kind_are_refused(tmp_path):
         (('--seal-kind', 'rod=a'), 'two kinds'),
         ((*KINDS, '--seal-chambers', 'a,b'), '--seal-chambers'),
         ((*KINDS, '--next', str(tmp_path / 'next.csv')), '--next'),
+        (('--largest-kind-error', '0.2'), '--seal-kind'),
     ):
         run = Run(tmp_path, *log, *more)
         assert run.code == 2
