@@ -113,7 +113,7 @@ class Lateness:
         """The latest of this interval [ns]; 0 if a clock was set meanwhile."""
         if not self._ages:
             return 0
-        late = max(self._ages) - min(*self._ages, *self._least, max(self._ages))
+        late = max(self._ages) - min([min(self._ages), *self._least])
         if late <= _LARGEST_DELAY:
             return late
         self._least.clear()

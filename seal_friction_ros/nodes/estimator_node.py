@@ -23,7 +23,7 @@ from seal_friction_ros.nodes.recording import Recording
 
 _WATCH_PERIOD = 0.05  # [s]
 _WATCHDOG_PERIOD = 0.01  # [s] more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
-STARVED = round(_WATCHDOG_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog, after which the timers are looked after
+_STARVED = round(_WATCHDOG_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog
 _HEALTH_PERIOD = 60.0  # [s]
 _INPUT_PERIOD = 0.5  # [s]
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
@@ -54,8 +54,8 @@ class EstimatorNode(ManagedNode):
         self._outputs: dict[Any, Any] = {}
         self._topics: dict[Any, str] = {}
         self._newest_inputs: dict[str, TopicMessage] = {}
-        self.is_watched = False  # by a live view
-        self.watched = 0  # [ns] of `time.perf_counter_ns`, when the watchdog looked last
+        self.has_viewer = False  # by a live view
+        self._watchdog_called = 0  # [ns] of `time.perf_counter_ns`
         self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
         self._recording = Recording(self.get_fully_qualified_name())
@@ -135,7 +135,7 @@ class EstimatorNode(ManagedNode):
         self._outputs[_MONITOR] = self.create_publisher(
             message_class(NEWEST_TYPE), '~/monitor', qos.best_effort(qos.STREAM)
         )
-        self.is_watched = False
+        self.has_viewer = False
         self._newest_inputs.clear()
         self._timers = [
             self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
@@ -147,7 +147,7 @@ class EstimatorNode(ManagedNode):
     def begin(self) -> None:
         """Begin to record if ``record`` is set; at the end of `start`."""
         self._logged_errors.clear()
-        self.watched = time.perf_counter_ns()
+        self._watchdog_called = time.perf_counter_ns()
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
         self._received = 0
         self._now = self._receipt_clock()
@@ -185,17 +185,26 @@ class EstimatorNode(ManagedNode):
         self._topics[name] = self._inputs[name].topic_name
 
     def _on_watchdog_timer(self) -> None:
-        self.watched = time.perf_counter_ns()
+        self._watchdog_called = time.perf_counter_ns()
         self.on_watchdog()
         self.publish_newest()
 
+    def look_after_timers(self, now: int) -> None:
+        """Call what is overdue, if the watchdog was not called for long; after a message, at ``now`` [ns].
+
+        Args:
+            now: Of `time.perf_counter_ns`.
+        """
+        if now - self._watchdog_called > _STARVED:
+            self.call_overdue_timers()
+
     def keep_for_view(self, topic: str, type_name: str, data: bytes) -> None:
-        """Keep a message of an input for the live view; to be called while `is_watched`."""
+        """Keep a message of an input for the live view; to be called while `has_viewer`."""
         self._newest_inputs[topic] = TopicMessage(topic, type_name, data)
 
     def publish_newest(self) -> None:
         """Publish the newest messages for the live view, if there is one: 100 a second and not thousands."""
-        if not self.is_watched:
+        if not self.has_viewer:
             return
         newest = list(self._newest_inputs.values())
         self._newest_inputs.clear()
@@ -213,7 +222,7 @@ class EstimatorNode(ManagedNode):
 
         If the next bag is due, let it begin with a snapshot.
         """
-        self.is_watched = self._outputs[_MONITOR].get_subscription_count() > 0
+        self.has_viewer = self._outputs[_MONITOR].get_subscription_count() > 0
         if self._watch.has_changed():
             self.publish_diagnostics()
         following = self._recording.continue_in_next_bag()

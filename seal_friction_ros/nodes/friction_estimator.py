@@ -41,7 +41,7 @@ from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
-from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STARVED, STOP_PERIOD, EstimatorNode
+from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STOP_PERIOD, EstimatorNode
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.graph_watch import GraphWatch
 from seal_friction_ros.nodes.managed_node import message_class
@@ -144,6 +144,7 @@ class FrictionEstimator(EstimatorNode):
         except ValueError as error:
             self._statistics.on_malformed(name)
             self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
+            self.look_after_timers(taken)
             return
         received = self._now()
         self._sent.clear()
@@ -153,7 +154,7 @@ class FrictionEstimator(EstimatorNode):
 
         # Nobody waits for what follows.
         self._recording.record(self._topics[name], type_name, received, data)
-        if self.is_watched:
+        if self.has_viewer:
             self.keep_for_view(self._topics[name], type_name, data)
         self._statistics.on_input(name, message.stamp)
         self._record_answers(done - taken, received)
@@ -162,8 +163,7 @@ class FrictionEstimator(EstimatorNode):
                 state = self._state
                 self._statistics.on_adaptation(self._known.estimator, before, state.estimator, state.temperature)
             self._recording.flush_if_idle()
-        if done - self.watched > STARVED:
-            self.call_overdue_timers()
+        self.look_after_timers(done)
 
     def _record_answers(self, latency: int = 0, received: int = 0) -> None:
         """Record and count what was sent, ``latency`` [ns] after its input was taken at ``received`` [ns]."""

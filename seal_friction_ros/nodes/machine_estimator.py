@@ -51,7 +51,7 @@ from seal_friction_ros.core.machine.outputs import Command, due_commands
 from seal_friction_ros.files import load_configuration, read_machine, read_machine_document
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
-from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STARVED, STOP_PERIOD, EstimatorNode
+from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STOP_PERIOD, EstimatorNode
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.friction_estimator import SWITCH_INTERVAL
 from seal_friction_ros.nodes.graph_watch import GraphWatch
@@ -177,6 +177,7 @@ class MachineEstimator(EstimatorNode):
             for listener in self._listeners[name]:
                 self._statistics[listener].on_malformed(name)
             self.get_logger().error(f'{name}: {error}', throttle_duration_sec=1.0)
+            self.look_after_timers(taken)
             return
         self._send_together()
         made = self._command(received)
@@ -185,7 +186,7 @@ class MachineEstimator(EstimatorNode):
         # Nobody waits for what follows.
         self._recording.record(name, self._types[name], received, data)  # by its name in the mapping file
         self._newest[name] = data
-        if self.is_watched:
+        if self.has_viewer:
             self.keep_for_view(name, self._types[name], data)
         for listener in self._listeners[name]:
             self._statistics[listener].on_received(name)
@@ -195,8 +196,7 @@ class MachineEstimator(EstimatorNode):
             self._record_answers(made, done - taken, received)
             self._follow_adaptation(before)
             self._recording.flush_if_idle()
-        if done - self.watched > STARVED:
-            self.call_overdue_timers()
+        self.look_after_timers(done)
 
     def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once, if it is a message of its own; the rest waits until all answers are out."""

@@ -67,7 +67,10 @@ def test_stamps_of_1970_are_marked_and_warned_of():
         assert g.estimate(time.time_ns(), 0.1).status == 0
 
 
-def test_timers_for_which_the_executor_has_no_time_are_called_after_a_message(monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize('malformed', [False, True])
+def test_timers_for_which_the_executor_has_no_time_are_called_after_a_message(
+    malformed: bool, monkeypatch: pytest.MonkeyPatch
+):
     """It takes the messages that wait first, so nobody spins here."""
     called: list[str] = []
     with graph() as g:
@@ -76,7 +79,8 @@ def test_timers_for_which_the_executor_has_no_time_are_called_after_a_message(mo
             monkeypatch.setattr(g.estimator, name, partial(called.append, name))
         end = time.monotonic() + STOP_TIMEOUT
         for number in count(1):
-            g.estimator.on_input('rod_velocity', encode(Velocity(number * 10**6, 0.0, b'rod')))
+            data = b'' if malformed else encode(Velocity(number * 10**6, 0.0, b'rod'))
+            g.estimator.on_input('rod_velocity', data)
             if called.count('publish_diagnostics') >= 2 and called.count('on_watchdog') >= 5:
                 break
             assert time.monotonic() < end, called
