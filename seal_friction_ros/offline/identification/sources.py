@@ -7,7 +7,7 @@ import csv
 import hashlib
 import math
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -76,6 +76,7 @@ class Source(NamedTuple):
     log: RecordedLog | None = None
     manual: tuple[ManualReadings, ManualReadings] | None = None  # running and breakaway friction
     seal_document: Mapping[str, Any] | None = None  # seal file inside a bag or a data sheet
+    has_placeholder: bool = False  # a bag that was recorded with the placeholder seals, whose chambers are assumed
     pressure_area: float | None = None  # by which the rig file turns pressure into force [m^2]; None if unknown
     remarks: tuple[str, ...] = ()  # assumptions that neither the source nor an option states
     load_position: FloatArray | None = None  # [m] of each sample, if the force sum holds a load that follows it
@@ -156,7 +157,8 @@ def read_sources(paths: Sequence[Place], options: SourceOptions, workers: Worker
         raise ValueError('manual readings and recorded signals cannot be fitted together: identify each separately')
     chambers, remark = _chambers(each, options)
     each = tuple(without_load_of(source, chambers, options) for source in each)
-    return Sources(each, chambers, tuple(dict.fromkeys([*(r for source in each for r in source.remarks), *remark])))
+    remarks = [*(r for source in each for r in source.remarks), *_placeholder_remarks(each), *remark]
+    return Sources(each, chambers, tuple(dict.fromkeys(remarks)))
 
 
 def _chambers(each: Sequence[Source], options: SourceOptions) -> tuple[tuple[str, ...], list[str]]:
@@ -309,7 +311,7 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     newest: dict[str, tuple[float, ...]] = {topics.pressure: (math.nan, math.nan), topics.force: (math.nan,)}
     newest |= {topics.position or 'no position': (math.nan,), topics.temperature or 'none': (math.nan, math.nan)}
     chambers, document, holds_load = None, None, False
-    remarks: tuple[str, ...] = ()
+    has_placeholder = False
     total = sum(info.message_count for info in bag_topics(path).values())
     with progress(f'read {path.name}', total) as advance:
         for count, message in enumerate(read_messages(path), start=1):
@@ -323,9 +325,8 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
                 elif message.topic == topics.configuration:
                     configuration = parse_snapshot(decode_text(message.data)).configuration
                     holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
-                    chambers, document = configuration.selection.seal_chambers, configuration.seal_documents[0]
-                    if configuration.has_placeholder:
-                        document, remarks = None, (_placeholder_remark(path, chambers),)
+                    has_placeholder, chambers = configuration.has_placeholder, configuration.selection.seal_chambers
+                    document = None if has_placeholder else configuration.seal_documents[0]
             except ValueError as error:
                 raise ValueError(f'{path}: message on {message.topic} at {message.log_time} ns: {error}') from None
             if count % 1000 == 0:
@@ -340,7 +341,9 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     position = columns[4][kept] if topics.position else None
     log = RecordedLog(path.resolve().name, signals, _sliding(Sliding(), options), temperature, position)
     places = position if holds_load else None
-    return Source(_data_file(path), chambers, log, seal_document=document, remarks=remarks, load_position=places)
+    return Source(
+        _data_file(path), chambers, log, seal_document=document, has_placeholder=has_placeholder, load_position=places
+    )
 
 
 def _from_the_first(temperature: FloatArray) -> FloatArray:
@@ -351,11 +354,19 @@ def _from_the_first(temperature: FloatArray) -> FloatArray:
     return temperature
 
 
-def _placeholder_remark(path: Path, chambers: Sequence[str]) -> str:
-    return (
-        f'{path.resolve().name} was recorded with the placeholder seals of the default configuration: their geometry '
-        f'is not used, give that of your ring with --seal; seals on the chambers {",".join(chambers)} are assumed'
-    )
+def _placeholder_remarks(each: Sequence[Source]) -> Iterator[str]:
+    """What is assumed of bags that were recorded with the placeholder seals."""
+    names: dict[tuple[str, ...], list[str]] = {}
+    for source in each:
+        if source.has_placeholder and source.chambers is not None and source.log is not None:
+            names.setdefault(source.chambers, []).append(source.log.name)
+    for chambers, bags in names.items():
+        were = 'was' if len(bags) == 1 else 'were'
+        yield (
+            f'{", ".join(bags)} {were} recorded with the placeholder seals of the default configuration: their '
+            'geometry is not used, give that of your ring with --seal; seals on the chambers '
+            f'{",".join(chambers)} are assumed'
+        )
 
 
 def read_table(path: Path) -> tuple[ManualReadings, ManualReadings]:

@@ -77,6 +77,15 @@ def test_no_geometry_is_taken_from_the_placeholder_seals_of_a_bag(tmp_path, vers
     assert '--seal' in run.errors
 
 
+def test_one_note_names_all_bags_with_placeholder_seals(tmp_path):
+    bags = [ROOT / 'test' / 'corpus' / 'version_1' / 'pull_test', tmp_path / 'new']
+    replay(ROOT / 'bags' / 'pull_test', default_configuration(), bags[1])
+    run = Run(tmp_path, *map(str, bags))
+    assert run.code == 0, run.errors
+    assert run.errors.count('recorded with the placeholder seals') == 1
+    assert 'pull_test, new were recorded with the placeholder seals of the default configuration' in run.errors
+
+
 @pytest.mark.long  # two identifications
 def test_a_log_and_the_bag_imported_from_it_give_the_same_law(tmp_path, run_of):
     bags = []
