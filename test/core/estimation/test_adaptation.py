@@ -271,6 +271,17 @@ def test_nothing_learnt_leaves_friction_and_deviation_as_the_file_has_them():
     assert with_scale(friction, NOTHING_LEARNT, 0, True) == friction
 
 
+@pytest.mark.parametrize('velocity_friction', [-6.0, 0.0, 6.0])
+def test_deviation_and_missed_friction_are_shares_of_the_sliding_friction(velocity_friction):
+    friction, sliding = ActuatorFriction(40.0, 4.0, 10.0, True, velocity_friction), 40.0 + velocity_friction
+    learnt = NOTHING_LEARNT._replace(scale=1.2, scale_std=0.05, noise=0.0, before=NO_LEVEL._replace(stamp=0))
+    used, observed = (with_scale(friction, learnt, 0, uses_scale) for uses_scale in (True, False))
+    assert used.coulomb_friction_std == pytest.approx(0.05 * sliding)
+    assert used.coulomb_friction + used.velocity_friction == pytest.approx(1.2 * sliding)
+    # 5 % of the readings are below the friction of the file: 95 % within 1.96 deviations of it.
+    assert 1.96 * observed.coulomb_friction_std == pytest.approx(0.2 * sliding + 1.645 * 0.05 * sliding, rel=1e-3)
+
+
 def test_an_hour_without_a_reversal_brings_the_uncertainty_of_the_seal_file_back():
     friction = ActuatorFriction(40.0, 4.0, 10.0, True, 0.0)
     known = NOTHING_LEARNT._replace(scale=1.2, scale_std=0.01, noise=0.3, before=NO_LEVEL._replace(stamp=0))
