@@ -3,6 +3,7 @@
 import time
 from collections import Counter, deque
 from collections.abc import Collection
+from statistics import median_high
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -42,7 +43,7 @@ _LIMIT_MESSAGES = {
 _MOST_REVERSALS = 50  # [1/s] of the force; faster motion is not compensated, so this is chatter
 _LARGEST_DELAY = 1_000_000_000  # [ns] a stamp further back than this means that its clock was set
 _LARGEST_LATENESS = 50_000_000  # [ns] of a velocity: controllers are to refuse what is older (docs/interfaces.md)
-_LATENESS_MEMORY = 60  # intervals in which the quickest velocity is looked for
+_LATENESS_MEMORY = 60  # intervals that tell what is usual
 
 
 class MissingSamples:
@@ -88,14 +89,15 @@ class MissingSamples:
 
 
 class Lateness:
-    """How much later than the quickest one of the last minute velocities came, from receipt minus stamp (our choice).
+    """How much later than usual velocities came, from receipt minus stamp (our choice).
 
-    So it does not matter whether the clocks agree. A node that is too slow takes messages that have waited in the
-    middleware, up to the length of its queue: their estimates are right for their stamps, and late.
+    Usual is the median of the quickest velocity of each interval of the last minute: so it does not matter whether the
+    clocks agree, and wrong stamps for a moment are not taken for it. A node that is too slow takes messages that have
+    waited in the middleware, up to the length of its queue: their estimates are right for their stamps, and late.
     """
 
     def __init__(self) -> None:
-        self._least: deque[int] = deque(maxlen=_LATENESS_MEMORY)  # of each interval before
+        self._quickest: deque[int] = deque(maxlen=_LATENESS_MEMORY)  # of each interval before
         self._ages: list[int] = []
 
     def on_velocity(self, age: int) -> None:
@@ -105,18 +107,18 @@ class Lateness:
     def start_interval(self) -> None:
         """Start a new interval."""
         if self._ages:
-            self._least.append(min(self._ages))
+            self._quickest.append(min(self._ages))
         self._ages = []
 
     @property
     def largest(self) -> int:
-        """The latest of this interval [ns]; 0 if a clock was set meanwhile."""
+        """The latest of this interval [ns], >= 0; 0 if a clock was set meanwhile."""
         if not self._ages:
             return 0
-        late = max(self._ages) - min([min(self._ages), *self._least])
+        late = max(max(self._ages) - median_high([*self._quickest, min(self._ages)]), 0)
         if late <= _LARGEST_DELAY:
             return late
-        self._least.clear()
+        self._quickest.clear()
         return 0
 
 

@@ -81,19 +81,28 @@ def test_velocities_that_waited_are_a_warning_whatever_their_clock_shows(clock):
     assert message.startswith('rod_velocity comes up to 99 ms late')
 
 
-def test_late_is_later_than_the_quickest_of_a_minute_and_a_clock_that_was_set_is_not():
-    late = Lateness()
-    for age in (5, *[70] * 59):
-        late.on_velocity(age * PERIOD)
+def lateness_of(intervals: list[list[int]]) -> list[int]:
+    """Lateness [ms] of each interval of velocities that came so long [ms] after their stamps."""
+    late, found = Lateness(), []
+    for ages in intervals:
         late.start_interval()
-    late.on_velocity(70 * PERIOD)
-    assert late.largest == 65 * PERIOD
-    for _ in range(2):
-        late.start_interval()
-        late.on_velocity(70 * PERIOD)
-    assert late.largest == 0
-    late.start_interval()
-    late.on_velocity(5000 * PERIOD)
-    assert late.largest == 0
-    late.on_velocity(5020 * PERIOD)
-    assert late.largest == 20 * PERIOD
+        for age in ages:
+            late.on_velocity(age * PERIOD)
+        found.append(late.largest // PERIOD)
+    return found
+
+
+def test_late_is_later_than_usual_in_the_last_minute():
+    slow = lateness_of([[5, 6]] * 20 + [[40, 70]] * 100)
+    assert slow[:20] == [1] * 20
+    assert slow[20:39] == [65] * 19  # as long as most of the last minute was quicker
+    assert slow[39:] == [30] * 81
+
+
+def test_wrong_stamps_for_a_moment_do_not_make_the_others_late():
+    assert lateness_of([[0, 1], [-500, 0, 1], [0, 1], [0, 1]]) == [1, 1, 1, 1]
+
+
+def test_a_clock_that_was_set_is_not_late():
+    assert lateness_of([[0, 1], [0, 5000, 5001], [5000, 5020], [5000, 5001]]) == [1, 0, 20, 1]
+    assert lateness_of([[0, 1], [0, -5000], [-5000, -4980], [-5000, -4999]])[-1] == 1
