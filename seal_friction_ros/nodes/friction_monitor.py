@@ -2,7 +2,8 @@
 
 It is a process of its own and listens with best effort to one topic of each estimator, which has the newest inputs,
 too: no estimator waits for it, and no driver has one more reader. The middleware keeps the last messages and this node
-takes them at the pace of the view: it does not wake for every message.
+takes them at the pace of the view: it does not wake for every message. It takes the configurations likewise: such a
+message comes once, and rmw_fastrtps does not announce one that comes just when an events executor begins to listen.
 """
 
 import argparse
@@ -71,6 +72,7 @@ class FrictionMonitor(Node):
         self._clock_offset = time.time_ns() - time.monotonic_ns()
         self.view = LiveView(self._received(), self._change if allow_changes else None)
         self._nodes: dict[str, NodeView] = {}
+        self._configurations: dict[str, Any] = {}
         self._newest: dict[str, Any] = {}
         self._asked: queue.SimpleQueue[_Asked] = queue.SimpleQueue()
         self._waiting: list[_Asked] = []
@@ -98,24 +100,16 @@ class FrictionMonitor(Node):
         for topic, types in self.get_topic_names_and_types():
             node = topic.removesuffix(_CONFIGURATION)
             if types == [CONFIGURATION_TYPE] and node != topic and node not in self._nodes:
-                self._nodes[node] = view = NodeView(node, _definitions)
-                self.view.add(view)
-                self.create_subscription(
-                    message_class(CONFIGURATION_TYPE),
-                    topic,
-                    partial(self._on_configuration, view),
-                    qos.LATCHED,
-                    raw=True,
+                self._nodes[node] = NodeView(node, _definitions)
+                self.view.add(self._nodes[node])
+                self._configurations[node] = self._listener.create_subscription(
+                    message_class(CONFIGURATION_TYPE), topic, _never_called, qos.LATCHED, raw=True
                 )
                 self._newest[node] = self._listener.create_subscription(
                     message_class(NEWEST_TYPE), node + _NEWEST, _never_called, _best_effort(_DEPTH), raw=True
                 )
                 if self._allow_changes:
                     self._clients_of(node)  # so that they are found before somebody presses OFF
-
-    def _on_configuration(self, view: NodeView, data: bytes) -> None:
-        with self.view.lock:
-            view.take(view.node + _CONFIGURATION, CONFIGURATION_TYPE, data, self._received())
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         with self.view.lock:
@@ -134,6 +128,9 @@ class FrictionMonitor(Node):
         """Take the messages that have come, and add a row; send what the page asks for."""
         now = self._received()
         with self.view.lock:
+            for node, subscription in self._configurations.items():
+                for data in _taken(subscription):
+                    self._nodes[node].take(node + _CONFIGURATION, CONFIGURATION_TYPE, data, now)
             for node, subscription in self._newest.items():
                 for data in _taken(subscription):
                     self._nodes[node].take_newest(data, now)

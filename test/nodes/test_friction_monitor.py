@@ -248,6 +248,20 @@ def test_remapped_topics_in_a_namespace_are_found_by_their_types():
         assert set(view['now']['ages']) >= {'velocity', 'pressures', 'force sum'}
 
 
+def test_a_configuration_is_read_also_if_the_middleware_announces_no_message():
+    with in_process((FrictionEstimator, {'parameter_overrides': overrides()})) as (watching, spun, _):
+        spun.spin(0.1)
+        watching._search()
+        end = time.monotonic() + STOP_TIMEOUT
+        while not watching.view.view('', -1.0)['label']:  # nothing is spun: no event reaches the monitor
+            nodes = watching.view.view('', -1.0)['nodes']
+            assert time.monotonic() < end, nodes
+            watching._search()
+            watching._on_timer()
+            time.sleep(0.05)
+        assert watching.view.view('', -1.0)['label'] == '/friction_estimator'
+
+
 def test_a_node_that_does_not_answer_is_not_confirmed():
     with in_process() as (watching, spun, _):
         asked: list[Any] = []
@@ -335,6 +349,7 @@ def test_the_estimator_sends_to_one_slow_reader_alone_and_no_driver_has_one_more
             every = ((topic, info) for topic in topics for info in probe.get_subscriptions_info_by_topic(topic))
             return {t: info.qos_profile.reliability.name for t, info in every if info.node_name == LISTENER}
 
-        assert spun.spin_until(heard)
-        assert heard() == {'/friction_estimator/monitor': 'BEST_EFFORT'}
+        once = {'/friction_estimator/configuration': 'RELIABLE'}  # read once, when the monitor starts
+        assert spun.spin_until(lambda: len(heard()) > len(once))
+        assert heard() == {'/friction_estimator/monitor': 'BEST_EFFORT', **once}
         probe.destroy_node()

@@ -85,7 +85,7 @@ class LiveView:
         with self._lock:
             found = {view.label(name): (view, name) for view in self._nodes.values() for name in view.known}
             if not found:
-                return {'label': '', 'rows': [], 'actuators': [], 'diagnostics': []}
+                return {'label': '', 'rows': [], 'actuators': [], 'diagnostics': [], 'nodes': list(self._nodes)}
             label = label if label in found else next(iter(found))
             shown, actuator = found[label]
             every = {name: self._situation(view, key) for name, (view, key) in found.items()}

@@ -235,7 +235,9 @@ function clearRows() {
 function takeFrame(frame) {
   lastFrame = performance.now();
   if (!frame.label) {
-    verdict('waiting', 'waiting', 'for an estimator: start friction_estimator or machine_estimator, check ROS_DOMAIN_ID');
+    verdict('waiting', 'waiting', frame.nodes.length
+      ? `for the configuration of ${frame.nodes.join(', ')}`
+      : 'for an estimator: start friction_estimator or machine_estimator, check ROS_DOMAIN_ID');
     return;
   }
   const hadAdaptation = now && now.adaptation !== 'off', isOther = frame.label !== label;
