@@ -191,7 +191,7 @@ def keep(value: Any) -> Any:
 
     Compiled code gets the record as one pointer, so a call from Python costs the same however large the value is.
     """
-    return Kept(value) if _runs_as_python() else _kept_type()(value)
+    return Kept(value) if _runs_as_python() else _maker_of_kept()(value)
 
 
 @cache
@@ -207,12 +207,22 @@ def _kept_type() -> Any:
             return tuple((name, unliteral(kind)) for name, kind in fields)
 
     class KeptProxy(untyped.StructRefProxy):
-        def __new__(cls, value: Any) -> Any:
-            return structref.StructRefProxy.__new__(cls, value)
+        """What Python holds of a kept record."""
 
     structref.register(_named(KeptStruct, 'KeptStruct'))
     structref.define_proxy(_named(KeptProxy, 'KeptProxy'), KeptStruct, ['value'])
     return KeptProxy
+
+
+@cache
+def _maker_of_kept() -> Callable[[Any], Any]:
+    """Function of a value that makes its `KeptProxy`. numba's own function is compiled anew in each process."""
+    kind = _kept_type()
+
+    def make(value: Any) -> Any:
+        return kind(value)
+
+    return compiled(make)
 
 
 @cache
