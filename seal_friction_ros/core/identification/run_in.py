@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.identification.fitting import LawFit, fit, offsets_of, root_mean_square
+from seal_friction_ros.core.identification.fitting import LawFit, root_mean_square
 from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.validation import CrossValidation
 
 FEWEST_STROKES = 6  # for a drift term (our choice)
 LARGEST_ERROR = 0.03  # relative standard error below which an asymptote is determined (our choice)
@@ -146,6 +147,49 @@ def _settled(found: Sequence[_Approach], strokes: int) -> tuple[float, float]:
     return settled, math.sqrt(variance)
 
 
+class SettledReadings(NamedTuple):
+    """Readings as the settled seal would have given them."""
+
+    readings: FrictionReadings
+    share: FloatArray  # [-] friction of the settled seal over that of the run, of each reading, shape (n,)
+    relative_std: float  # [-] of the friction, because that of the settled seal is extrapolated
+
+
+def settled_readings(readings: FrictionReadings, offsets: FloatArray) -> SettledReadings | None:
+    """Readings of the settled seal: the friction of each run with an evident drift, times its settled share.
+
+    The standard deviation of the settled shares counts as common to all pressures: they are extrapolated by one model
+    (our choice).
+
+    Args:
+        readings: As measured.
+        offsets: Of the force sum of each source [N], shape (sources,).
+
+    Returns:
+        None for swept logs, and where no drift is evident.
+    """
+    of_runs = [] if readings.are_samples else drifts(readings, offsets)
+    if not any(drift.is_evident for drift in of_runs):
+        return None
+    share = np.ones(readings.count)
+    for drift in of_runs:
+        share[(readings.source == drift.source) & (readings.level == drift.level)] = drift.settled_share
+    offset = offsets[readings.source]
+    force = offset + share * (readings.force - offset)
+    rows = zip(readings.samples, offset.tolist(), share.tolist(), strict=True) if readings.samples else ()
+    settled = replace(readings, force=force, samples=tuple(zero + one * (part - zero) for part, zero, one in rows))
+    return SettledReadings(settled, share, root_mean_square(np.array([drift.settled_std for drift in of_runs])))
+
+
+def as_measured(found: CrossValidation, share: FloatArray) -> CrossValidation:
+    """Prediction of readings as measured, from one of settled readings: by the share of the run that is predicted.
+
+    The share of a run comes from the course of its own strokes, as its offset comes from its two directions; its level
+    does not enter.
+    """
+    return replace(found, predicted=found.predicted / share, deviation=found.deviation / share)
+
+
 @dataclass(frozen=True, eq=False)
 class SettledLaw:
     """Law of the settled seal."""
@@ -153,38 +197,3 @@ class SettledLaw:
     fit: LawFit  # the law, fitted to the settled readings
     relative_std: float  # [-] of its friction, because the friction of the settled seal is extrapolated
     readings: FrictionReadings  # as the settled seal would have given them
-
-
-def settled_readings(readings: FrictionReadings, offsets: FloatArray, found: Sequence[Drift]) -> FrictionReadings:
-    """Readings of the settled seal: the friction of each run with an evident drift, times its settled share.
-
-    Args:
-        readings: As measured.
-        offsets: Of the force sum of each source [N], shape (sources,).
-        found: Drifts of these readings; others are ignored.
-    """
-    share = np.ones(readings.count)
-    for drift in found:
-        share[(readings.source == drift.source) & (readings.level == drift.level)] = drift.settled_share
-    offset = offsets[readings.source]
-    force = offset + share * (readings.force - offset)
-    rows = zip(readings.samples, offset.tolist(), share.tolist(), strict=True) if readings.samples else ()
-    return replace(readings, force=force, samples=tuple(zero + one * (part - zero) for part, zero, one in rows))
-
-
-def settled_law(found: LawFit, readings: FrictionReadings) -> SettledLaw | None:
-    """The law ``found``, fitted again to the readings of the settled seal; None if no drift is evident.
-
-    The standard deviation of the settled shares counts as common to all pressures: they are extrapolated by one model
-    (our choice).
-
-    Raises:
-        ValueError: The fit fails.
-    """
-    offsets = offsets_of(readings, found.friction(readings.at))
-    of_runs = drifts(readings, offsets)
-    if readings.are_samples or not any(drift.is_evident for drift in of_runs):
-        return None
-    settled = settled_readings(readings, offsets, of_runs)
-    again = fit(found.law, settled, found.values, is_close=True)
-    return SettledLaw(again, root_mean_square(np.array([drift.settled_std for drift in of_runs])), settled)

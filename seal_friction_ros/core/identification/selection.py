@@ -163,7 +163,7 @@ def score_ladder(
     if not scored:
         return scores
     sound = [score for score in scored if score.fit is not None and not score.fit.why_unsound]
-    best = min(sound or scored, key=_mean_loss)
+    best = min(sound or scored, key=mean_loss)
     return (*scores, *score_laws(with_velocity_terms(best.law, variation), readings, tick))
 
 
@@ -233,21 +233,22 @@ def recommended(scores: Sequence[LawScore], rise: Rise | None = None) -> LawScor
     rising = [score for score in scored if score.law.depends_on_pressure or score.law.velocity_terms]
     if rise is not None and rise.is_significant and rising:
         scored = rising
-    least = min(map(_mean_loss, scored))
+    least = min(map(mean_loss, scored))
     sound = [score for score in scored if score.fit is not None and not score.fit.why_unsound]
-    if sound and min(map(_mean_loss, sound)) <= NEAR * least:
+    if sound and min(map(mean_loss, sound)) <= NEAR * least:
         scored = sound
-    best = min(scored, key=_mean_loss)
+    best = min(scored, key=mean_loss)
     left = [score for score in scored if not is_beaten(_losses(score), _losses(best), many_times=rise is None)]
     fewest = min(len(score.law.parameters) for score in left)
-    return min((score for score in left if len(score.law.parameters) == fewest), key=_mean_loss)
+    return min((score for score in left if len(score.law.parameters) == fewest), key=mean_loss)
 
 
 def _losses(score: LawScore) -> FloatArray:
     return np.zeros(0) if score.losses is None else score.losses
 
 
-def _mean_loss(score: LawScore) -> float:
+def mean_loss(score: LawScore) -> float:
+    """Mean loss of a scored law over the groups [-]."""
     return float(_losses(score).mean())
 
 

@@ -33,11 +33,13 @@ from seal_friction_ros.core.identification.force_correction import force_correct
 from seal_friction_ros.core.identification.prepare_readings import with_predictable_groups
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.selection import (
+    WORTHWHILE,
     ChosenAnew,
     LawScore,
     LeftOut,
     choose_anew,
     collinear_spread,
+    mean_loss,
     recommended,
     rise_over_pressures,
     score_ladder,
@@ -66,6 +68,7 @@ from seal_friction_ros.offline.work.places import Place
 from seal_friction_ros.offline.work.progress import progress
 
 MOST_EXTENSIONS = 3  # of a law by velocity terms
+FEWEST_TO_COMPARE = 4  # pressures by which the settled seal is compared with the readings as measured (our choice)
 LARGEST_ERROR = 0.5  # out-of-sample error above which a law is not saved (our choice)
 REFERENCE_SEAL = 'ms28775_114'  # its area deformation gain (finite elements) is used if no other is known
 
@@ -110,8 +113,8 @@ def identify(
     as_measured = seal_document(data, selection, quality, options.name or name, presliding=elastic)
     levels = _levels(data, selection, quality, as_measured)
     document = as_measured
-    if quality.settled is not None:
-        document = seal_document(data, selection, quality, options.name or name, quality.settled, elastic)
+    if selection.settled is not None:
+        document = seal_document(data, selection, quality, options.name or name, selection.settled, elastic)
     warnings = tuple(warnings_of(data, selection, quality, levels))
     remarks = (*data.sources.remarks, *remarks_on(data, selection))
     document['identification'] = identification_section(data, selection, quality, levels, warnings, elastic)
@@ -220,6 +223,14 @@ def select_law(
     with progress('fit and leave out', len(_candidates(data.used, data.ring)) + MOST_EXTENSIONS) as advance:
         scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)
     best = recommended(scores, rise_over_pressures(data.used))
+    settled, readings, share = _settled(data, best), data.used, np.ones(data.used.count)
+    if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
+        of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
+        best_settled = recommended(of_settled, rise_over_pressures(settled.readings))
+        if mean_loss(best_settled) <= (1.0 + WORTHWHILE) * mean_loss(best):
+            scores, best, (readings, share, _) = of_settled, best_settled, settled
+        else:  # corrected for the drift the pressures agree less: it was no run-in
+            settled = None
     by_name = {None: best} | {score.law.name: score for score in scores}
     if name not in by_name:
         raise ValueError(f'law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
@@ -233,25 +244,47 @@ def select_law(
             'in both directions, with a settled seal'
         )
     anew = None
-    if name is None and not data.used.are_samples:  # a swept log would take minutes
-        anew = _choose_anew(data, workers, work)
-    return LawSelection(scores, best, selected.fit, selected.validation, validation.plain_mean(data.used), anew)
+    if name is None and not readings.are_samples:  # a swept log would take minutes
+        anew = _choose_anew(data, readings, workers, work)
+        anew = anew._replace(predicted=anew.predicted / share)
+    fit, settled_law = selected.fit, None
+    if settled is not None:
+        fit, of_settled_seal = (fitting.fit(fit.law, each, fit.values) for each in (data.used, settled.readings))
+        settled_law = run_in.SettledLaw(of_settled_seal, settled.relative_std, settled.readings)
+    return LawSelection(
+        scores=scores,
+        best=best,
+        fit=fit,
+        settled=settled_law,
+        validation=run_in.as_measured(selected.validation, share),
+        reference=validation.plain_mean(data.used),
+        chosen_anew=anew,
+    )
 
 
-def _choose_anew(data: IdentificationData, workers: Workers, work: Path | None) -> ChosenAnew:
+def _settled(data: IdentificationData, best: LawScore) -> run_in.SettledReadings | None:
+    """Readings of the settled seal; None if no drift is evident. The ``best`` law tells the offset of the force sum."""
+    if best.fit is None:
+        return None
+    return run_in.settled_readings(data.used, fitting.offsets_of(data.used, best.fit.friction(data.used.at)))
+
+
+def _choose_anew(
+    data: IdentificationData, readings: FrictionReadings, workers: Workers, work: Path | None
+) -> ChosenAnew:
     """Prediction of each group by a law chosen without it; the groups are parts of the work."""
     ring, has_fitted_load = data.ring, data.sources.has_fitted_load
-    known = content_of([data.used, ring, has_fitted_load])
+    known = content_of([readings, ring, has_fitted_load])
 
     def run(calls: Sequence[Callable[[], LeftOut]]) -> list[LeftOut]:
         """Results of the calls, one for each group, kept in the work folder."""
         parts = [
             Part(part_key('choose without', [known, content_of(out)]), LeftOut._fields, call)
-            for out, call in zip(data.used.groups, calls, strict=True)
+            for out, call in zip(readings.groups, calls, strict=True)
         ]
         return [LeftOut(**found) for found in run_parts('choose without', parts, workers, work)]
 
-    return choose_anew(data.used, partial(_recommended, ring=ring, has_fitted_load=has_fitted_load), run)
+    return choose_anew(readings, partial(_recommended, ring=ring, has_fitted_load=has_fitted_load), run)
 
 
 def _recommended(readings: FrictionReadings, ring: Ring | None, has_fitted_load: bool) -> LawScore:
@@ -285,9 +318,10 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
     else:
         of_band = between.of_band
     told_apart = collinear_spread(selection.scores, found, used)
+    readings = used if selection.settled is None else selection.settled.readings
     in_addition = math.hypot(of_band, told_apart)
     with progress('test the band', groups * (groups - 1)) as advance:
-        coverage = validation.band_coverage(selection.law, used, found.values, advance)
+        coverage = validation.band_coverage(selection.law, readings, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]
     return LawQuality(
         uncertainty=validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, in_addition),
@@ -296,10 +330,9 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
         changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),
         told_apart=told_apart,
         coverage=coverage,
-        calibration=calibration(selection.law, used, found.values, run_to_run),
+        calibration=calibration(selection.law, readings, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
         drifts=[] if used.are_samples else run_in.drifts(everything, offsets),
-        settled=run_in.settled_law(found, used),
         breakaway=_breakaway(data, found),
         standard_errors=dict(zip(names, validation.jackknife_errors(left_out.parameters).tolist(), strict=True)),
     )

@@ -63,10 +63,11 @@ class IdentificationData:
 class LawSelection:
     """All candidate laws with their scores, and the law that is saved."""
 
-    scores: tuple[LawScore, ...]
+    scores: tuple[LawScore, ...]  # on readings of the settled seal, if the law is that of the settled seal
     best: LawScore  # recommended: the simplest law that no other law beats beyond the noise
-    fit: fitting.LawFit
-    validation: CrossValidation
+    fit: fitting.LawFit  # to the readings as measured
+    settled: SettledLaw | None  # that the seal file holds; None: that of the readings as measured
+    validation: CrossValidation  # of the readings as measured
     reference: CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
     chosen_anew: ChosenAnew | None
@@ -92,7 +93,6 @@ class LawQuality:
     calibration: Calibration  # share inside the band at each nominal share, within and between runs
     repeatability: float  # [-] scatter of repeated readings
     drifts: list[Drift]  # of the friction over each run
-    settled: SettledLaw | None  # law of the settled seal, which the seal file holds; None if no drift is evident
     breakaway: BreakawayFit | None  # None if no stroke starts from rest
     standard_errors: dict[str, float]  # of the parameters, by name
 
@@ -253,7 +253,7 @@ def identification_section(
         {
             'law': selection.law.name,
             'recommended_law': selection.best.law.name,
-            'parameters': (quality.settled or selection).fit.values,
+            'parameters': (selection.settled or selection).fit.values,
             'standard_errors': quality.standard_errors,
             'as_measured': {'parameters': selection.fit.values, 'relative_std': quality.uncertainty.relative},
             'seal_chambers': data.sources.chambers,
@@ -304,7 +304,7 @@ def identification_numbers(found: Identification) -> dict[str, Any]:
             'told_apart_std': quality.told_apart,
             'calibration': {name: getattr(quality.calibration, name).tolist() for name in Calibration._fields[:3]},
             'drift': [level.drift for level in levels],
-            'settled': quality.settled and _settled_numbers(quality.settled, quality),
+            'settled': selection.settled and _settled_numbers(selection.settled, quality),
             'run_in': [
                 {
                     'source': data.sources.files[drift.source].name,

@@ -161,8 +161,13 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
             f'laws that fit these data nearly as well differ by {100.0 * quality.told_apart:.0f} % where speed and '
             'pressure do not go together as here: that is in the standard deviation'
         )
-    if quality.settled is not None:
-        yield _settled_text(quality.settled, selection)
+    if selection.settled is not None:
+        yield _settled_text(selection.settled, selection)
+    elif any(drift.is_evident for drift in quality.drifts):
+        yield (
+            'run-in: the friction drifts over the runs beyond the scatter of the strokes, but corrected for that the '
+            'pressures agree less: the seal file holds the law of the readings as measured; let the seal settle first'
+        )
     drifted = [level for level in levels if level.is_used and abs(level.drift) > diagnostics.SETTLED]
     if drifted:
         at = ', '.join(f'{100.0 * level.drift:+.0f} % at {level.pressure / BAR:.3g} bar' for level in drifted)
@@ -240,7 +245,7 @@ def summary(found: Identification) -> str:
     for p in selection.law.parameters:
         value, error = selection.fit.values[p.name], quality.standard_errors[p.name]
         settled = (
-            '' if quality.settled is None else f'; settled seal: {quality.settled.fit.values[p.name]:.4g} {p.unit}'
+            '' if selection.settled is None else f'; settled seal: {selection.settled.fit.values[p.name]:.4g} {p.unit}'
         )
         lines.append(f'  {p.name} = {value:.4g} {p.unit}, standard error {error:.2g}{settled}')
     lines += ['  pressure [bar]  measured [N]  fitted [N]  std [N]']

@@ -115,7 +115,7 @@ def _ladder_table(found: Identification) -> Table:
         if score.validation is None or score.fit is None:
             rows.append((*cells, *4 * [DASH], score.why_not))
             continue
-        marks = {'recommended': score is selection.best, 'saved': score.fit is selection.fit}
+        marks = {'recommended': score is selection.best, 'saved': score.law is selection.law}
         mark = ', '.join(name for name, holds in marks.items() if holds)
         rows.append((*cells, *errors(score.validation), number(score.fit.condition_number, 1), mark))
     if selection.reference is not None:
@@ -131,7 +131,7 @@ def _parameter_table(found: Identification) -> Table:
         for p in selection.law.parameters
     ]
     rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in selection.law.fixed.items()]
-    settled = found.quality.settled
+    settled = found.selection.settled
     if settled is not None:
         rows += [
             (f'{p.name}, settled seal', p.symbol, f'{settled.fit.values[p.name]:.5g}', DASH, p.unit)
@@ -247,7 +247,7 @@ def fitted_law_figure(shown: _FittedReadings) -> Plot:
         style.fill_band(ax, pressure / BAR, fitted / size, BAND_95 * std / size, label='95 % band')
         at_speed = f' at {shown.curve_speed / MM:.3g} mm/s' if np.isfinite(shown.curve_speed) else ''
         ax.plot(pressure / BAR, fitted / size, color=style.BLACK, lw=1.8, label=f'law{at_speed}')
-        if shown.found.quality.settled is not None:
+        if shown.found.selection.settled is not None:
             settled = tuple(MountedSeal(parse_seal(shown.found.document), one.chamber) for one in shown.mounted)
             look = {'color': style.BLACK, 'lw': 1.2, 'ls': '--', 'label': 'law of the settled seal'}
             ax.plot(pressure / BAR, shown.curve(pressure, settled)[0] / size, **look)

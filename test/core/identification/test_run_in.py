@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, Variation, candidate_laws
-from seal_friction_ros.core.identification.fitting import fit
+from seal_friction_ros.core.identification.fitting import fit, offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.run_in import drifts, settled_law
+from seal_friction_ros.core.identification.run_in import as_measured, drifts, settled_readings
+from seal_friction_ros.core.identification.validation import cross_validate
 
 STROKE = 0.04  # [m]
 SETTLED = 10.0  # [N]
@@ -106,8 +107,11 @@ def test_the_extrapolation_is_bounded_by_the_change_that_was_seen():
 def test_readings_without_travel_and_swept_samples_stay_as_they_are():
     noted = run(approach(-0.3, 0.2), pressures=4, travel=False)
     assert not any(drift.is_evident for drift in drifts(noted, np.zeros(4)))
-    line = next(law for law in candidate_laws(Variation(speeds=False)) if law.name == 'pressure_power_law_1')
-    assert settled_law(fit(line, noted), noted) is None
+    assert settled_readings(noted, np.zeros(4)) is None
+
+
+def settled_of(readings, as_run):
+    return settled_readings(readings, offsets_of(readings, as_run.friction(readings.at)))
 
 
 def test_the_law_is_that_of_the_settled_seal_whatever_the_offset_of_the_force():
@@ -115,9 +119,26 @@ def test_the_law_is_that_of_the_settled_seal_whatever_the_offset_of_the_force():
     line = next(law for law in candidate_laws(Variation(speeds=False)) if law.name == 'pressure_power_law_1')
     for offset in (0.0, -7.0):
         readings = run(approach(-0.25, 0.15), pressures=4, count=30, offset=offset)
-        as_measured = fit(line, readings)
-        settled = settled_law(as_measured, readings)
-        assert as_measured.values['friction_at_one_bar'] < 9.8
-        assert settled.fit.values['friction_at_one_bar'] == pytest.approx(10.0, rel=0.02)
-        assert settled.fit.offsets == pytest.approx([offset] * 4, abs=0.3)
+        as_run = fit(line, readings)
+        settled = settled_of(readings, as_run)
+        law = fit(line, settled.readings)
+        assert as_run.values['friction_at_one_bar'] < 9.8
+        assert law.values['friction_at_one_bar'] == pytest.approx(10.0, rel=0.02)
+        assert law.offsets == pytest.approx([offset] * 4, abs=0.3)
         assert 0.0 < settled.relative_std < 0.05
+
+
+def test_a_run_that_ran_in_alone_is_predicted_as_it_was_measured():
+    """Its readings are lower than those of the settled seal: the law of the other pressures knows by how much."""
+    line = next(law for law in candidate_laws(Variation(speeds=False)) if law.name == 'pressure_power_law_1')
+    readings = run(np.ones_like, pressures=4, count=30, scatter=0.002)
+    course = np.where(readings.source == 3, approach(-0.4, 0.15)(readings.travel), 1.0)
+    one_ran_in = FrictionReadings(**{**vars(readings), 'force': readings.force * course})
+    settled = settled_of(one_ran_in, fit(line, one_ran_in))
+    left_out = as_measured(cross_validate(line, settled.readings, fit(line, settled.readings).values), settled.share)
+    for level, inside in one_ran_in.levels.items():
+        mean = np.abs(one_ran_in.force[inside]).mean()
+        assert left_out.predicted[inside].mean() == pytest.approx(mean, rel=0.02), level
+        assert left_out.deviation[inside].mean() == pytest.approx(mean - left_out.predicted[inside].mean(), abs=0.01)
+    plain = cross_validate(line, one_ran_in, fit(line, one_ran_in).values)
+    assert np.abs(plain.deviation).max() > 3.0 * np.abs(left_out.deviation[one_ran_in.source < 3]).max()

@@ -187,30 +187,30 @@ def test_delft_x_ring_at_7_bar_is_an_outlier_with_a_reason_to_look(run_of):
     assert run.document['identified_pressure'][1] < 5.2e5  # nothing is claimed up there
 
 
-@pytest.mark.parametrize('seal', DELFT)
-def test_delft_a_left_out_pressure_is_predicted_within_15_percent(seal, run_of):
-    """Outliers aside, one a seal; runs of that rig repeat no better. The law rises where the friction does."""
+@pytest.mark.parametrize('seal', [*DELFT, 'O-ring257_run2'])
+def test_delft_a_left_out_pressure_is_predicted_within_12_percent(seal, run_of):
+    """Outliers aside, one a seal. The law rises where the friction does."""
     bars = range(1, 6) if seal == 'Stadium_lc' else BARS
     run = run_of(*(str(data(f'delft/{seal}_{bar}bar.csv')) for bar in bars))
     off = np.array(run.figures['left_out_N']) / np.array(run.figures['measured_N']) - 1.0
     used = ~np.array(run.figures['is_outlier'])
     assert np.count_nonzero(~used) <= 1
-    assert np.abs(off[used]).max() <= 0.15
+    assert np.abs(off[used]).max() <= 0.12
     assert run.figures['fitted_N'] == sorted(run.figures['fitted_N'])
     assert run.figures['fitted_N'][-1] > 1.3 * run.figures['fitted_N'][0]
     nested = np.array(run.figures['left_out_nested_N']) / np.array(run.figures['measured_N']) - 1.0
-    worst = 0.22 if seal == 'X-ring257' else 0.15  # two pressures are left of three: the prior exponent stands in
-    assert np.abs(nested[used]).max() <= worst
+    worst = {'X-ring257': 0.22, 'O-ring257_run2': 0.2}  # X-ring: two pressures are left of three, a prior stands in
+    assert np.abs(nested[used]).max() <= worst.get(seal, 0.15)
     same = np.array(run.figures['left_out_nested_laws']) == run.figures['law']
     assert nested[used][same] == pytest.approx(off[used][same], abs=1e-6)
 
 
-def test_without_its_lowest_pressure_another_law_is_chosen_and_the_nested_error_says_so(run_of):
+def test_without_its_highest_pressure_another_law_is_chosen_and_the_nested_error_says_so(run_of):
     run = run_of(*delft('O-ring257_run2'))
     assert run.figures['law'].startswith('pressure_power_law')
-    assert run.figures['left_out_nested_laws'][0] == 'constant_coulomb'
+    assert run.figures['left_out_nested_laws'][3] == 'pressure_power_law_3_2'
     off, nested = (
-        run.figures[key][0] / run.figures['measured_N'][0] - 1.0 for key in ('left_out_N', 'left_out_nested_N')
+        run.figures[key][3] / run.figures['measured_N'][3] - 1.0 for key in ('left_out_N', 'left_out_nested_N')
     )
     assert nested > off + 0.05
     named = run_of(*delft('O-ring257_run2'), '--law', run.figures['law'])

@@ -16,7 +16,8 @@ def settled_friction(bar):
 def logs(folder, course, noise=0.05):
     """One log per pressure of a simulated pneumatic rig, ten strokes out and back; own friction, encoder of 10 um.
 
-    ``course`` is the friction over that of the settled seal, by the travel since the seal was mounted [m].
+    ``course`` is the friction over that of the settled seal, by the travel since the seal was mounted [m] and the
+    pressure [bar].
     """
     rng = np.random.default_rng(5)
     paths = []
@@ -24,7 +25,9 @@ def logs(folder, course, noise=0.05):
         sides = [side for _ in range(10) for side in (1.0, -1.0)]
         velocity = np.concatenate([np.r_[np.full(400, 0.01 * side), np.zeros(40)] for side in sides])
         travel = np.cumsum(np.abs(velocity)) * STEP
-        force = np.sign(velocity) * settled_friction(bar) * course(travel) - 1.5 + noise * rng.normal(size=len(travel))
+        force = (
+            np.sign(velocity) * settled_friction(bar) * course(travel, bar) - 1.5 + noise * rng.normal(size=len(travel))
+        )
         position = np.round((0.1 + np.cumsum(velocity) * STEP) / 1e-5) * 1e-5 + 1e-7 * rng.normal(size=len(travel))
         pressure = bar * (1.0 + 0.003 * rng.normal(size=len(travel)))
         columns = (np.arange(len(travel)) * STEP, 1e3 * position, pressure, 0.0 * pressure, force)
@@ -37,7 +40,7 @@ def logs(folder, course, noise=0.05):
 
 @pytest.fixture(
     scope='module',
-    params=[lambda s: 1.0 - 0.2 * np.exp(-s / 0.25), lambda s: 1.0 + 0.25 / (1.0 + s / 0.1)],
+    params=[lambda s, _: 1.0 - 0.2 * np.exp(-s / 0.25), lambda s, _: 1.0 + 0.25 / (1.0 + s / 0.1)],
     ids=['rising', 'falling hyperbola'],
 )
 def ran_in(request, tmp_path_factory):
@@ -69,13 +72,32 @@ def test_the_numbers_beside_it_are_of_the_readings_as_measured(ran_in):
 
 
 def test_without_a_drift_nothing_is_corrected(tmp_path):
-    run = Run(tmp_path, *logs(tmp_path, np.ones_like))
+    run = Run(tmp_path, *logs(tmp_path, lambda s, _: np.ones_like(s)))
     assert run.figures['settled'] is None
     assert run.figures['parameters'] == run.figures['as_measured']['parameters']
     assert not run.has_warning('run-in')
     assert not any(row['is_evident'] for row in run.figures['run_in'])
     for bar, fitted in zip(PRESSURES, run.figures['fitted_N'], strict=True):
         assert estimates_of(run, bar * BAR, 0.01).coulomb_friction == pytest.approx(fitted, rel=0.01)
+
+
+def test_the_law_is_chosen_on_the_settled_seal(tmp_path):
+    """Two of four pressures run in: as measured, friction hardly rises between them and the others."""
+    run = Run(tmp_path, *logs(tmp_path, lambda s, bar: 1.0 - (0.3 if bar > 3.0 else 0.0) * np.exp(-s / 0.4)))
+    measured, left_out = (np.array(run.figures[name]) for name in ('measured_N', 'left_out_N'))
+    assert measured[2] / settled_friction(PRESSURES[2]) < 0.95
+    assert left_out == pytest.approx(measured, rel=0.06)
+    for bar in PRESSURES:
+        assert estimates_of(run, bar * BAR, 0.01).coulomb_friction == pytest.approx(settled_friction(bar), rel=0.05)
+
+
+def test_a_drift_that_is_no_run_in_is_not_extrapolated(tmp_path):
+    """Friction fell over one run, as a leak or a warmer day does: the readings as measured fit one law, others not."""
+    run = Run(tmp_path, *logs(tmp_path, lambda s, bar: 1.0 + (0.12 - 0.3 * s if bar == 2.5 else 0.0)))
+    assert run.figures['settled'] is None
+    assert run.has_warning('run-in', 'the pressures agree less', 'as measured')
+    assert any(row['is_evident'] for row in run.figures['run_in'])
+    assert run.figures['parameters'] == run.figures['as_measured']['parameters']
 
 
 def test_delft_two_days_of_one_ring_agree_better_once_settled(tmp_path):
