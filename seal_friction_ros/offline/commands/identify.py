@@ -105,7 +105,7 @@ def _kind(text: str) -> tuple[str, tuple[str, ...]]:
 
 
 NOT_FOR_KINDS = (
-    'next', 'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',
+    'seal', 'squeeze_force', 'chambers', 'law', 'refuse_changed', 'presliding', 'workers',
     'scheduler', 'work',
 )  # fmt: skip
 """options that several kinds of seals do not take"""
@@ -115,6 +115,7 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
     """Identify several kinds of seals together, and write a seal file for each."""
     from seal_friction_ros.core.identification.several_kinds import LARGEST_KIND_ERROR, SealKind
     from seal_friction_ros.offline.identification import kinds
+    from seal_friction_ros.offline.identification.data_sheet import write_new_csv
     from seal_friction_ros.offline.identification.sources import SourceOptions
     from seal_friction_ros.offline.work.seal_writer import write_seal
     from seal_friction_ros.offline.work.targets import checked_targets
@@ -144,6 +145,9 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
 
             figures = write_kinds_report(result, files, arguments.report)
             written = {'report': arguments.report, 'figures': figures}
+        if arguments.next:
+            write_new_csv(kinds.next_runs_text(result), arguments.next)
+            written |= {'sheet': arguments.next}
     numbers = kinds.kinds_numbers(result) | {'seal_files': {kind: str(path) for kind, path in files.items()}} | written
     names_written = ', '.join(map(str, files.values()))
     return cli.print_result(arguments, numbers, f'{kinds.kinds_summary(result)}\n{names_written}: written')

@@ -182,16 +182,26 @@ def sheet_text(plan: FrictionTestPlan) -> str:
 
 
 def write_sheet(plan: FrictionTestPlan, out: Path) -> None:
-    """Write an empty sheet as CSV.
+    """Write an empty sheet as CSV; raises what `write_new_csv` raises."""
+    write_new_csv(sheet_text(plan), out, 'the page to print goes beside it as .html')
+
+
+def write_new_csv(text: str, out: Path, hint: str = '') -> None:
+    """Write a CSV file that a person works on.
+
+    Args:
+        text: The file.
+        out: Where; it does not exist yet.
+        hint: What the error about another suffix adds.
 
     Raises:
         ValueError: ``out`` exists already and may be filled in, or it cannot be written.
     """
     if out.suffix != '.csv':
-        raise ValueError(f'{out}: name it .csv; the page to print goes beside it as .html')
+        raise ValueError(f'{out}: name it .csv{hint and f"; {hint}"}')
     try:
         with out.open('x', encoding='utf-8') as file:
-            file.write(sheet_text(plan))
+            file.write(text)
     except FileExistsError:
         raise ValueError(f'{out} exists already and may be filled in: not overwriting') from None
     except OSError as error:

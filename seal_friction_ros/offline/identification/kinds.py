@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.units import BAR
+from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification import runs
@@ -333,6 +333,26 @@ def kinds_summary(result: SeveralKinds) -> str:
     lines += [f'note: {remark}' for remark in result.sources.remarks]
     lines += [f'warning: {warning}' for warning in result.warnings]
     return '\n'.join(lines)
+
+
+def next_runs_text(result: SeveralKinds) -> str:
+    """CSV of the chamber pressures to drive next, one row each, at the mean speed of the readings.
+
+    A log holds the readings of several kinds, so the rows are driven while recording, and nothing is filled in.
+    """
+    found, readings = result.found, result.found.fit.data.readings
+    conditions, correlation = proposed_conditions(found.fit.data, found.rivals)
+    before = float(found.together.max())
+    speed = float(np.nan_to_num(np.abs(readings.at.velocity)).mean()) / MM
+    lines = [
+        '# Next runs of a cylinder with several kinds of seals: hold both pressures, drive ten strokes in each',
+        '# direction, and record each row; then give these and all earlier logs to identify.',
+        f'# Correlation of the pressures of the kinds: {before:.2f} now, {min(correlation, before):.2f} with these.',
+    ]
+    if not conditions:
+        lines.append('# The pressures tell the kinds apart as well as this cylinder can: repeat runs on another day.')
+    rows = [f'{c.a / BAR:.6g},{c.b / BAR:.6g},{speed:.3g}' for c in conditions]
+    return '\n'.join([*lines, 'pressure_a_bar,pressure_b_bar,speed_mm_per_s', *rows]) + '\n'
 
 
 def seal_files(out: Path, kinds: Sequence[str]) -> dict[str, Path]:

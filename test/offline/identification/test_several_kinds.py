@@ -1,5 +1,6 @@
 """Rod seals on one chamber and a piston seal on the difference, in one cylinder that is not the package's plant."""
 
+import csv
 import itertools
 from pathlib import Path
 
@@ -135,6 +136,30 @@ def test_the_proposed_pressures_make_the_kinds_tell_apart(tmp_path):
     assert max(kind['pressure_correlation'] for kind in run.figures['kinds']) < 0.9
 
 
+def test_the_runs_of_the_next_sheet_tell_the_kinds_apart_better(tmp_path):
+    """Few pressures of chamber b at first; the sheet is driven, and both are given to the same command."""
+    first = [*((a, 0.0) for a in (0, 30, 60, 90, 120)), (60.0, 30.0), (120.0, 60.0), (90.0, 90.0)]
+    sheet = tmp_path / 'next.csv'
+    before = Run(tmp_path, *write_log(tmp_path, held(first, rng())), *KINDS, '--next', str(sheet))
+    assert before.code == 0, before.errors
+    lines = sheet.read_text().splitlines()
+    notes = [line for line in lines if line.startswith('#')]
+    rows = [{name: float(cell) for name, cell in row.items()} for row in csv.DictReader(lines[len(notes) :])]
+    assert before.figures['sheet'] == str(sheet)
+    assert [row['pressure_a_Pa'] / BAR for row in before.figures['next']] == pytest.approx(
+        [row['pressure_a_bar'] for row in rows]
+    )
+    assert all(row['speed_mm_per_s'] > 0.0 for row in rows)
+    driven = [(row['pressure_a_bar'], row['pressure_b_bar']) for row in rows]
+    after = Run(tmp_path, *write_log(tmp_path, held([*first, *driven], rng())), *KINDS, name='after')
+    together = [max(kind['pressure_correlation'] for kind in run.figures['kinds']) for run in (before, after)]
+    assert f'{together[0]:.2f} now' in notes[-1]
+    assert together[1] < together[0] - 0.2
+    again = Run(tmp_path, *write_log(tmp_path, held(first, rng())), *KINDS, '--next', str(sheet), name='again')
+    assert again.code == 2
+    assert 'not overwriting' in again.errors
+
+
 def test_friction_of_one_kind_alone_is_not_given_to_the_other(tmp_path):
     motion = held(GRID, rng())
     run = Run(tmp_path, *write_log(tmp_path, motion, kinds=lambda a, _: 40.0 + 2.0 * a / BAR), *KINDS)
@@ -148,7 +173,7 @@ def test_equal_kinds_of_names_and_options_of_one_kind_are_refused(tmp_path):
     for more, word in (
         (('--seal-kind', 'rod=a'), 'two kinds'),
         ((*KINDS, '--seal-chambers', 'a,b'), '--seal-chambers'),
-        ((*KINDS, '--next', str(tmp_path / 'next.csv')), '--next'),
+        ((*KINDS, '--law', 'constant_coulomb'), '--law'),
         (('--largest-kind-error', '0.2'), '--seal-kind'),
     ):
         run = Run(tmp_path, *log, *more)
