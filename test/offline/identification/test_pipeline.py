@@ -10,11 +10,12 @@ from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.units import LBF, PSI
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.identification.fitting import offsets_of
+from seal_friction_ros.core.identification.fitting import offsets_of, root_mean_square
+from seal_friction_ros.core.identification.selection import NEAR
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
-from seal_friction_ros.offline.identification.pipeline import fitted_readings
+from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, fitted_readings, gather, select_law
 from seal_friction_ros.offline.identification.sources import SourceOptions, read_sources
 
 # --- thesis ---
@@ -361,6 +362,27 @@ def test_mbari_the_law_of_one_log_is_sound_and_its_band_holds_the_other(friction
     deviation = signed - signed.mean()
     assert np.sqrt(np.mean(deviation**2)) < 460.0  # [N] the laws with a constant or a free exponent leave 418 to 560 N
     assert np.mean(np.abs(deviation) <= BAND_95 * std) >= 0.9
+
+
+@pytest.mark.long  # the ladder on both logs: 8 s
+@pytest.mark.parametrize(('known', 'new'), [(FRICTION_ID, OTHER), (OTHER, FRICTION_ID)])
+def test_mbari_the_recommended_law_is_on_the_other_log_as_good_as_any_that_predicts_its_own(known, new):
+    """Of the laws whose loss on their own log is below twice the least, none is better by a tenth on the other log.
+
+    A law that misses its own log may be better on the other by chance: nothing in the log recommends it.
+    """
+    rig = IdentifyOptions(sources=SourceOptions(rig='mbari'))
+    tested = gather([data(f'mbari/{new}')], rig).used
+    selection = select_law(gather([data(f'mbari/{known}')], rig), None)
+    least = min(score.losses.mean() for score in selection.scores)
+
+    def missed(fit):
+        friction = fit.friction(tested.at)
+        return root_mean_square(tested.magnitudes(offsets_of(tested, friction)) - friction)
+
+    near = [missed(score.fit) for score in selection.scores if score.losses.mean() < NEAR * least]
+    assert len(near) >= 3
+    assert missed(selection.fit) <= 1.1 * min(near)
 
 
 @pytest.mark.long  # a fit of 29 000 samples with every log left out
