@@ -25,6 +25,7 @@ WORTHWHILE = 0.02  # [-] smallest difference of the settled seal from the run th
 LENGTHS = 15  # lengths of travel that are tried, of `SHORTEST` to all of the travel (our choice)
 SHORTEST = 0.05
 OTHER_FORM = 0.15  # of the height: standard deviation since the approach may be no exponential (our choice)
+UNSURE = 0.3  # of the settled friction: standard deviation up to which the end of the drift is told (our choice)
 UNSEEN = 0.5  # standard deviation of what is extrapolated, as a share of it (our choice)
 
 
@@ -34,7 +35,7 @@ class Drift(NamedTuple):
     source: int
     level: int
     change: float  # [-] from the first stroke to the last, relative to the mean
-    is_evident: bool  # beyond the scatter of the strokes
+    is_evident: bool  # beyond the scatter of the strokes, with an end that can be told
     asymptote: float  # [N] friction of the settled seal; NaN if the strokes alone do not determine it
     length: float  # [m] travel over which the difference falls to 37 %; likewise
     settled_share: float  # [-] friction of the settled seal over the mean of the run; 1 if no drift is evident
@@ -46,7 +47,8 @@ def drifts(readings: FrictionReadings, offsets: FloatArray) -> list[Drift]:
 
     The change is the slope of a line over the strokes, mean of the two directions. The drift is evident if the height
     of the approach that fits best is above `EVIDENT` of its standard errors from the scatter about it (a lag-one
-    autocorrelation of the scatter counts), and the settled friction differs from the mean by more than `WORTHWHILE`.
+    autocorrelation of the scatter counts), and the settled friction differs from the mean by more than `WORTHWHILE` and
+    is told within `UNSURE`.
     Readings without travel have no evident drift.
     """
     measured, found = readings.magnitudes(offsets), []
@@ -74,6 +76,8 @@ def _drift(travel: FloatArray, friction: FloatArray, direction: FloatArray) -> D
     best = min(approaches, key=lambda one: one.square)
     settled, std = _settled(approaches, len(friction))
     if abs(best.height) < EVIDENT * best.height_error or abs(settled / mean - 1.0) < WORTHWHILE:
+        return found
+    if not std <= UNSURE * settled:  # also a friction below 0
         return found
     return found._replace(is_evident=True, settled_share=settled / mean, settled_std=std / mean)
 
@@ -178,7 +182,8 @@ def settled_readings(readings: FrictionReadings, offsets: FloatArray) -> Settled
     force = offset + share * (readings.force - offset)
     rows = zip(readings.samples, offset.tolist(), share.tolist(), strict=True) if readings.samples else ()
     settled = replace(readings, force=force, samples=tuple(zero + one * (part - zero) for part, zero, one in rows))
-    return SettledReadings(settled, share, root_mean_square(np.array([drift.settled_std for drift in of_runs])))
+    unsure = np.array([drift.settled_std / drift.settled_share for drift in of_runs])
+    return SettledReadings(settled, share, root_mean_square(unsure))
 
 
 def as_measured(found: CrossValidation, share: FloatArray) -> CrossValidation:

@@ -104,6 +104,29 @@ def test_the_extrapolation_is_bounded_by_the_change_that_was_seen():
         assert drift.settled_std > 0.02
 
 
+@pytest.mark.parametrize('share', [-0.95, -0.9, -0.6, 0.6, 3.0, 9.0])
+def test_a_run_that_hardly_began_to_settle_is_not_extrapolated(share):
+    """A friction that falls steadily to a tenth would end below zero."""
+    for seed in range(10):
+        (drift,) = drifts(run(lambda s: 1.0 + share * s / s.max(), seed=seed), np.zeros(1))
+        assert drift.settled_share > 0.0
+        assert drift.settled_std <= 0.3 * drift.settled_share
+        assert drift.is_evident == (drift.settled_share != 1.0)
+    (fallen,) = drifts(run(lambda s: 1.0 - 0.9 * s / s.max()), np.zeros(1))
+    assert not fallen.is_evident
+
+
+def test_the_deviation_of_the_settled_seal_is_a_share_of_its_own_friction():
+    """Friction that falls to a half in the run: what the extrapolation may be off by is a larger share of it."""
+    readings = run(approach(1.2, 0.3), pressures=3, count=30)
+    settled = settled_readings(readings, np.zeros(3))
+    of_runs = drifts(readings, np.zeros(3))
+    assert max(drift.settled_share for drift in of_runs) < 0.85
+    assert settled.relative_std == pytest.approx(
+        np.sqrt(np.mean([(drift.settled_std / drift.settled_share) ** 2 for drift in of_runs]))
+    )
+
+
 def test_readings_without_travel_and_swept_samples_stay_as_they_are():
     noted = run(approach(-0.3, 0.2), pressures=4, travel=False)
     assert not any(drift.is_evident for drift in drifts(noted, np.zeros(4)))
