@@ -242,17 +242,17 @@ def summary(found: Identification) -> str:
     """The result for a person: law, numbers at each pressure, ladder, remarks and warnings."""
     selection, quality = found.selection, found.quality
     lines = [f'law: {selection.law.name} ({selection.law.formula})']
+    saved, as_measured = (selection.settled or selection).fit.values, selection.fit.values
     for p in selection.law.parameters:
-        value, error = selection.fit.values[p.name], quality.standard_errors[p.name]
-        settled = (
-            '' if selection.settled is None else f'; settled seal: {selection.settled.fit.values[p.name]:.4g} {p.unit}'
-        )
-        lines.append(f'  {p.name} = {value:.4g} {p.unit}, standard error {error:.2g}{settled}')
+        also = '' if selection.settled is None else f' (settled seal; {as_measured[p.name]:.4g} as measured)'
+        error = quality.standard_errors[p.name]
+        lines.append(f'  {p.name} = {saved[p.name]:.4g} {p.unit}, standard error {error:.2g}{also}')
     lines += ['  pressure [bar]  measured [N]  fitted [N]  std [N]']
     for level in found.levels:
         numbers = f'{level.pressure / BAR:14.4g}  {level.measured:12.4g}  {level.fitted:10.4g}  {level.std:7.4g}'
         lines.append(f'  {numbers}{"" if level.is_used else "  outlier, not used"}')
-    lines += [f'laws on left-out readings (left out by {found.data.used.left_out_by}):']
+    of_settled = 'of the settled seal, ' if selection.settled is not None else ''
+    lines += [f'laws on left-out readings ({of_settled}left out by {found.data.used.left_out_by}):']
     rows = [(score.law.name, score.validation, score.why_not) for score in selection.scores]
     for name, validation, why_not in [*rows, ('mean of the other readings', selection.reference, '')]:
         if validation is not None:

@@ -126,15 +126,14 @@ def _ladder_table(found: Identification) -> Table:
 
 def _parameter_table(found: Identification) -> Table:
     selection, errors, breakaway = found.selection, found.quality.standard_errors, found.quality.breakaway
+    saved = (selection.settled or selection).fit.values
     rows = [
-        (p.name, p.symbol, f'{selection.fit.values[p.name]:.5g}', f'{errors[p.name]:.2g}', p.unit)
-        for p in selection.law.parameters
+        (p.name, p.symbol, f'{saved[p.name]:.5g}', f'{errors[p.name]:.2g}', p.unit) for p in selection.law.parameters
     ]
     rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in selection.law.fixed.items()]
-    settled = found.selection.settled
-    if settled is not None:
+    if selection.settled is not None:
         rows += [
-            (f'{p.name}, settled seal', p.symbol, f'{settled.fit.values[p.name]:.5g}', DASH, p.unit)
+            (f'{p.name}, as measured', p.symbol, f'{selection.fit.values[p.name]:.5g}', DASH, p.unit)
             for p in selection.law.parameters
         ]
     if breakaway is not None:

@@ -5,6 +5,9 @@ import pytest
 from harness.identify_run import Run, delft, estimates_of
 from harness.two_kinds import BAR, RIG
 
+from seal_friction_ros.files import read_yaml
+from seal_friction_ros.offline.commands.main import main
+
 PRESSURES = (1.0, 2.5, 4.0, 6.0)
 STEP = 0.01  # [s]
 
@@ -69,6 +72,20 @@ def test_the_numbers_beside_it_are_of_the_readings_as_measured(ran_in):
     assert ran_in.figures['parameters'] != ran_in.figures['as_measured']['parameters']
     assert ran_in.has_warning('run-in', 'the law of the settled seal', 'as measured')
     assert all(row['is_evident'] for row in ran_in.figures['run_in'])
+
+
+def test_the_summary_and_the_page_say_which_numbers_are_of_the_settled_seal(tmp_path, capsys):
+    out, page = tmp_path / 'seal.yaml', tmp_path / 'page.html'
+    arguments = logs(tmp_path, lambda s, _: 1.0 - 0.2 * np.exp(-s / 0.25))
+    assert main(['identify', *arguments, '--out', str(out), '--report', str(page)]) == 0
+    text, found = capsys.readouterr().out, read_yaml(out)['identification']
+    for name, error in found['standard_errors'].items():
+        saved, measured = (where['parameters'][name] for where in (found, found['as_measured']))
+        assert saved != measured
+        assert f'{name} = {saved:.4g} N, standard error {error:.2g} (settled seal; {measured:.4g} as measured)' in text
+    assert 'laws on left-out readings (of the settled seal, left out by pressure)' in text
+    assert 'The readings here are those of the settled seal.' in page.read_text()
+    assert 'friction_at_one_bar, as measured' in page.read_text()
 
 
 def test_without_a_drift_nothing_is_corrected(tmp_path):
