@@ -29,7 +29,7 @@ from seal_friction_ros.core.identification.diagnostics import CorrelatedPair
 from seal_friction_ros.core.identification.fitting import LawFit
 from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart
 from seal_friction_ros.core.identification.runs import PRIOR_FREEDOM, BetweenRuns
-from seal_friction_ros.core.identification.selection import LawScore, is_beaten
+from seal_friction_ros.core.identification.selection import LawScore, is_beaten, mean_loss
 from seal_friction_ros.core.identification.validation import jackknife_errors
 
 READINGS = 8  # pressures and speeds that are proposed, each in both directions (our choice)
@@ -274,7 +274,7 @@ def laws_not_beaten(scores: Sequence[LawScore]) -> list[LawScore]:
     scored = [score for score in scores if score.fit is not None and score.losses is not None]
     if not scored:
         raise ValueError('no law was fitted, so there is nothing to design readings for')
-    best = min(scored, key=_mean_loss)
+    best = min(scored, key=mean_loss)
     left = [s for s in scored if s is best or not is_beaten(_losses(s), _losses(best), many_times=True)]
     return [s for s in left if s.fit is not None and math.isfinite(s.fit.condition_number)] or [best]
 
@@ -296,17 +296,13 @@ def _losses(score: LawScore) -> FloatArray:
     return np.zeros(0) if score.losses is None else score.losses
 
 
-def _mean_loss(score: LawScore) -> float:
-    return float(_losses(score).mean())
-
-
 def _richest(near: Sequence[LawScore]) -> LawScore:
     """The law with the most parameters, of equally many the one with the smallest mean loss.
 
     A law with a parameter at its upper bound does not count where there are others.
     """
     inside = [score for score in near if score.fit is not None and not _is_at_upper_bound(score.fit)]
-    return min(inside or near, key=lambda score: (-len(score.law.parameters), _mean_loss(score)))
+    return min(inside or near, key=lambda score: (-len(score.law.parameters), mean_loss(score)))
 
 
 def _is_at_upper_bound(fit: LawFit) -> bool:

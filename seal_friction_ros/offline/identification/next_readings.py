@@ -25,7 +25,7 @@ LIMITS = {
 
 def design_for(found: Identification) -> ExperimentDesign:
     """The design of the next readings for the ladder and the readings of an identification."""
-    used, quality = found.data.used, found.quality
+    used, quality = found.selection.readings, found.quality
     runs_are_left_out = used.left_out_by in ('test', 'file') and not quality.is_stated
     between = None if quality.is_stated or runs_are_left_out else quality.between_runs
     of_band = between.of_band if between is not None else quality.between_runs.std

@@ -224,13 +224,14 @@ def select_law(
         scores = _scored(data.used, data.ring, data.sources.has_fitted_load, advance)
     best = recommended(scores, rise_over_pressures(data.used))
     settled, readings, share = _settled(data, best), data.used, np.ones(data.used.count)
+    is_no_run_in = False
     if settled is not None and len(data.used.levels) >= FEWEST_TO_COMPARE:
         of_settled = _scored(settled.readings, data.ring, data.sources.has_fitted_load)
         best_settled = recommended(of_settled, rise_over_pressures(settled.readings))
         if mean_loss(best_settled) <= (1.0 + WORTHWHILE) * mean_loss(best):
             scores, best, (readings, share, _) = of_settled, best_settled, settled
-        else:  # corrected for the drift the pressures agree less: it was no run-in
-            settled = None
+        else:
+            settled, is_no_run_in = None, True
     by_name = {None: best} | {score.law.name: score for score in scores}
     if name not in by_name:
         raise ValueError(f'law {name!r} is not one of {", ".join(score.law.name for score in scores)}')
@@ -252,10 +253,12 @@ def select_law(
         fit, of_settled_seal = (fitting.fit(fit.law, each, fit.values) for each in (data.used, settled.readings))
         settled_law = run_in.SettledLaw(of_settled_seal, settled.relative_std, settled.readings)
     return LawSelection(
+        readings=readings,
         scores=scores,
         best=best,
         fit=fit,
         settled=settled_law,
+        is_no_run_in=is_no_run_in,
         validation=run_in.as_measured(selected.validation, share),
         reference=validation.plain_mean(data.used),
         chosen_anew=anew,
@@ -318,10 +321,9 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
     else:
         of_band = between.of_band
     told_apart = collinear_spread(selection.scores, found, used)
-    readings = used if selection.settled is None else selection.settled.readings
     in_addition = math.hypot(of_band, told_apart)
     with progress('test the band', groups * (groups - 1)) as advance:
-        coverage = validation.band_coverage(selection.law, readings, found.values, advance)
+        coverage = validation.band_coverage(selection.law, selection.readings, found.values, advance)
     names = [parameter.name for parameter in selection.law.parameters]
     return LawQuality(
         uncertainty=validation.prediction_uncertainty(left_out.predicted, left_out.deviation, groups, in_addition),
@@ -330,7 +332,7 @@ def assess(data: IdentificationData, selection: LawSelection, run_to_run: float 
         changes=diagnostics.shared_levels(everything) + diagnostics.swept_logs_compared(used, found),
         told_apart=told_apart,
         coverage=coverage,
-        calibration=calibration(selection.law, readings, found.values, run_to_run),
+        calibration=calibration(selection.law, selection.readings, found.values, run_to_run),
         repeatability=diagnostics.repeatability(used, found.offsets),
         drifts=[] if used.are_samples else run_in.drifts(everything, offsets),
         breakaway=_breakaway(data, found),

@@ -63,10 +63,12 @@ class IdentificationData:
 class LawSelection:
     """All candidate laws with their scores, and the law that is saved."""
 
-    scores: tuple[LawScore, ...]  # on readings of the settled seal, if the law is that of the settled seal
+    readings: FrictionReadings  # that laws are chosen, left out and scored on: as measured, or of the settled seal
+    scores: tuple[LawScore, ...]  # on these readings
     best: LawScore  # recommended: the simplest law that no other law beats beyond the noise
     fit: fitting.LawFit  # to the readings as measured
     settled: SettledLaw | None  # that the seal file holds; None: that of the readings as measured
+    is_no_run_in: bool  # whether a drift is evident, but the pressures agree less once corrected for it
     validation: CrossValidation  # of the readings as measured
     reference: CrossValidation | None
     """prediction by the mean of the other readings at the same pressure, without a law"""
@@ -77,6 +79,19 @@ class LawSelection:
     def law(self) -> CandidateLaw:
         """The law that is saved."""
         return self.fit.law
+
+    @property
+    def is_chosen_on_settled_seal(self) -> bool:
+        """Whether scores and standard errors are of the settled seal."""
+        return self.settled is not None and self.readings is self.settled.readings
+
+    @property
+    def fits_by_name(self) -> dict[str, fitting.LawFit]:
+        """Fits of the saved law by what they are fitted to; the standard errors are those of the first."""
+        if self.settled is None:
+            return {'as measured': self.fit}
+        both = [('settled seal', self.settled.fit), ('as measured', self.fit)]
+        return dict(both if self.is_chosen_on_settled_seal else both[::-1])
 
 
 @dataclass(frozen=True, eq=False)

@@ -163,7 +163,7 @@ def _scatter_texts(selection: LawSelection, quality: LawQuality, levels: Sequenc
         )
     if selection.settled is not None:
         yield _settled_text(selection.settled, selection)
-    elif any(drift.is_evident for drift in quality.drifts):
+    elif selection.is_no_run_in:
         yield (
             'run-in: the friction drifts over the runs beyond the scatter of the strokes, but corrected for that the '
             'pressures agree less: the seal file holds the law of the readings as measured; let the seal settle first'
@@ -242,16 +242,16 @@ def summary(found: Identification) -> str:
     """The result for a person: law, numbers at each pressure, ladder, remarks and warnings."""
     selection, quality = found.selection, found.quality
     lines = [f'law: {selection.law.name} ({selection.law.formula})']
-    saved, as_measured = (selection.settled or selection).fit.values, selection.fit.values
+    (first, fit), *others = selection.fits_by_name.items()
     for p in selection.law.parameters:
-        also = '' if selection.settled is None else f' (settled seal; {as_measured[p.name]:.4g} as measured)'
+        also = ''.join(f' ({first}; {other.values[p.name]:.4g} {name})' for name, other in others)
         error = quality.standard_errors[p.name]
-        lines.append(f'  {p.name} = {saved[p.name]:.4g} {p.unit}, standard error {error:.2g}{also}')
+        lines.append(f'  {p.name} = {fit.values[p.name]:.4g} {p.unit}, standard error {error:.2g}{also}')
     lines += ['  pressure [bar]  measured [N]  fitted [N]  std [N]']
     for level in found.levels:
         numbers = f'{level.pressure / BAR:14.4g}  {level.measured:12.4g}  {level.fitted:10.4g}  {level.std:7.4g}'
         lines.append(f'  {numbers}{"" if level.is_used else "  outlier, not used"}')
-    of_settled = 'of the settled seal, ' if selection.settled is not None else ''
+    of_settled = 'of the settled seal, ' if selection.is_chosen_on_settled_seal else ''
     lines += [f'laws on left-out readings ({of_settled}left out by {found.data.used.left_out_by}):']
     rows = [(score.law.name, score.validation, score.why_not) for score in selection.scores]
     for name, validation, why_not in [*rows, ('mean of the other readings', selection.reference, '')]:

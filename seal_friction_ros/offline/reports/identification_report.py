@@ -126,16 +126,23 @@ def _ladder_table(found: Identification) -> Table:
 
 def _parameter_table(found: Identification) -> Table:
     selection, errors, breakaway = found.selection, found.quality.standard_errors, found.quality.breakaway
-    saved = (selection.settled or selection).fit.values
+    (first, fit), *others = selection.fits_by_name.items()
     rows = [
-        (p.name, p.symbol, f'{saved[p.name]:.5g}', f'{errors[p.name]:.2g}', p.unit) for p in selection.law.parameters
+        (
+            f'{p.name}, {first}' if others else p.name,
+            p.symbol,
+            f'{fit.values[p.name]:.5g}',
+            f'{errors[p.name]:.2g}',
+            p.unit,
+        )
+        for p in selection.law.parameters
     ]
     rows += [(name, '', f'{value:.5g}', 'not fitted', '') for name, value in selection.law.fixed.items()]
-    if selection.settled is not None:
-        rows += [
-            (f'{p.name}, as measured', p.symbol, f'{selection.fit.values[p.name]:.5g}', DASH, p.unit)
-            for p in selection.law.parameters
-        ]
+    rows += [
+        (f'{p.name}, {name}', p.symbol, f'{other.values[p.name]:.5g}', DASH, p.unit)
+        for name, other in others
+        for p in selection.law.parameters
+    ]
     if breakaway is not None:
         values = zip(('constant', 'share'), breakaway[1:3], breakaway.standard_errors, ('N', '1'), strict=True)
         rows += [

@@ -1,5 +1,7 @@
 """Run-in of a seal: what is evident over the strokes of one run, and the friction of the settled seal."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -156,7 +158,7 @@ def test_a_run_that_ran_in_alone_is_predicted_as_it_was_measured():
     line = next(law for law in candidate_laws(Variation(speeds=False)) if law.name == 'pressure_power_law_1')
     readings = run(np.ones_like, pressures=4, count=30, scatter=0.002)
     course = np.where(readings.source == 3, approach(-0.4, 0.15)(readings.travel), 1.0)
-    one_ran_in = FrictionReadings(**{**vars(readings), 'force': readings.force * course})
+    one_ran_in = replace(readings, force=readings.force * course)
     settled = settled_of(one_ran_in, fit(line, one_ran_in))
     left_out = as_measured(cross_validate(line, settled.readings, fit(line, settled.readings).values), settled.share)
     for level, inside in one_ran_in.levels.items():

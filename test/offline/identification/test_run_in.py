@@ -16,7 +16,7 @@ def settled_friction(bar):
     return 3.0 + 1.1 * bar
 
 
-def logs(folder, course, noise=0.05):
+def logs(folder, course, noise=0.05, pressures=PRESSURES):
     """One log per pressure of a simulated pneumatic rig, ten strokes out and back; own friction, encoder of 10 um.
 
     ``course`` is the friction over that of the settled seal, by the travel since the seal was mounted [m] and the
@@ -24,7 +24,7 @@ def logs(folder, course, noise=0.05):
     """
     rng = np.random.default_rng(5)
     paths = []
-    for bar in PRESSURES:
+    for bar in pressures:
         sides = [side for _ in range(10) for side in (1.0, -1.0)]
         velocity = np.concatenate([np.r_[np.full(400, 0.01 * side), np.zeros(40)] for side in sides])
         travel = np.cumsum(np.abs(velocity)) * STEP
@@ -86,6 +86,31 @@ def test_the_summary_and_the_page_say_which_numbers_are_of_the_settled_seal(tmp_
     assert 'laws on left-out readings (of the settled seal, left out by pressure)' in text
     assert 'The readings here are those of the settled seal.' in page.read_text()
     assert 'friction_at_one_bar, as measured' in page.read_text()
+
+
+def test_with_three_pressures_ladder_and_errors_are_of_the_readings_as_measured(tmp_path, capsys):
+    """Two numbers would decide whether the pressures agree better: so the law is chosen as measured."""
+    out, page = tmp_path / 'seal.yaml', tmp_path / 'page.html'
+    arguments = logs(tmp_path, lambda s, _: 1.0 - 0.2 * np.exp(-s / 0.25), pressures=PRESSURES[:3])
+    assert main(['identify', *arguments, '--out', str(out), '--report', str(page)]) == 0
+    text, found = capsys.readouterr().out, read_yaml(out)['identification']
+    for name, error in found['standard_errors'].items():
+        saved, measured = (where['parameters'][name] for where in (found, found['as_measured']))
+        assert saved != measured
+        assert f'{name} = {measured:.4g} N, standard error {error:.2g} (as measured; {saved:.4g} settled seal)' in text
+    assert 'laws on left-out readings (left out by pressure)' in text
+    assert 'The readings here are those of the settled seal.' not in page.read_text()
+    assert 'friction_at_one_bar, settled seal' in page.read_text()
+
+
+def test_the_next_readings_are_designed_by_the_readings_that_the_law_was_chosen_on(tmp_path):
+    """Against the law of the settled seal, readings as measured would be off by the run-in, as if they scattered."""
+    run = Run(tmp_path, *logs(tmp_path, lambda s, _: 1.0 - 0.3 * np.exp(-s / 0.4)), '--next', str(tmp_path / 'n.csv'))
+    parts = run.figures['next_effect']['parts']
+    way = np.linspace(0.0, 0.8, 21)
+    course = 1.0 - 0.3 * np.exp(-way / 0.4)
+    drifting = course.std() / course.mean()
+    assert parts['scatter'] < 1.3 * drifting < 1.0 / course.mean() - 1.0
 
 
 def test_without_a_drift_nothing_is_corrected(tmp_path):
