@@ -188,13 +188,13 @@ def main() -> int:
         simulator = ROOT / 'config' / 'servo_simulator.yaml'
         recorded.append((LOOP_BAG, record_closed_loop(LOOP_BAG, free_domain(), LOOP_TIME, simulator, priority())))
         findings.append(examined(LOOP_BAG))
-        console.print(f'running a machine with standard messages for {2 * MACHINE_TIME:.0f} s ...')
-        machine_bags = record_machine(OUT, free_domain(), MACHINE_TIME, SIMULATED_MACHINE, MACHINE)
         runs = [
             Run(bag, figures, same.result(), report.result())
             for (bag, figures), (same, report) in zip(recorded, findings, strict=True)
         ]
         charts.result()
+    console.print(f'running a machine with standard messages for {2 * MACHINE_TIME:.0f} s ...')
+    machine_bags = record_machine(OUT, free_domain(), MACHINE_TIME, SIMULATED_MACHINE, MACHINE)  # nothing beside it
     *played, loop = runs
     if len(played) == 1:
         console.print(f'no rig logs at {RIG_LOGS.relative_to(ROOT.parent)}: only the pull test was played')
