@@ -40,6 +40,9 @@ _LIMIT_MESSAGES = {
     Limited.SLEW: 'held back by slew_limit',
     Limited.FADE: 'faded: an input or the reference is not usable',
 }
+_ESTIMATES = {f'estimates {bit.name}': int(bit) for bit in Status}  # whole numbers: flags cost ten times as much
+_FEEDFORWARDS = {f'feed-forwards {bit.name}': int(bit) for bit in Limited}
+_FEEDFORWARD_SHARES = {f'feed-forward {bit.name} share': int(bit) for bit in Limited}
 _MOST_REVERSALS = 50  # [1/s] of the force; faster motion is not compensated, so this is chatter
 _LARGEST_DELAY = 1_000_000_000  # [ns] a stamp further back than this means that its clock was set
 _LARGEST_LATENESS = 50_000_000  # [ns] of a velocity: controllers are to refuse what is older (docs/interfaces.md)
@@ -322,10 +325,10 @@ class EstimatorDiagnostics:
             'estimate rate [Hz]': f'{len(self._latencies) / seconds:.1f}',
             'estimates': str(self._by_status.total()),
             'estimates all good': str(self._by_status[0]),
-            **{f'estimates {bit.name}': str(_count(self._by_status, bit)) for bit in Status},
+            **{key: str(_count(self._by_status, bit)) for key, bit in _ESTIMATES.items()},
             'feed-forwards': str(self._feedforwards_by_limit.total()),
-            **{f'feed-forwards {bit.name}': str(_count(self._feedforwards_by_limit, bit)) for bit in Limited},
-            **{f'feed-forward {bit.name} share': f'{_share(recent, bit):.3f}' for bit in Limited},
+            **{key: str(_count(self._feedforwards_by_limit, bit)) for key, bit in _FEEDFORWARDS.items()},
+            **{key: f'{_share(recent, bit):.3f}' for key, bit in _FEEDFORWARD_SHARES.items()},
             'feed-forward reversals [1/s]': f'{self._reversals / seconds:.1f}',
             'feed-forward travel [N/s]': f'{self._travel / seconds:.0f}',
             'feed-forward [N]': f'{self._feedforward_force:.3f}',
