@@ -22,8 +22,10 @@ from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_c
 from seal_friction_ros.nodes.recording import Recording
 
 _WATCH_PERIOD = 0.05  # [s]
-_WATCHDOG_PERIOD = 0.01  # [s] more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
-_STARVED = round(_WATCHDOG_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog
+_WATCHDOG_PERIOD = 0.025  # [s] less than the timeouts of the feed-forward; each call wakes the process for 0.2 ms
+_TICK_PERIOD = 0.01  # [s] while ticks keep a force up; more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
+_TICKING = 1_000_000_000  # [ns] after the last tick: inputs slower than the ticks need them again and again
+_STARVED = round(_TICK_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog
 _HEALTH_PERIOD = 60.0  # [s]
 _INPUT_PERIOD = 0.5  # [s]
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
@@ -55,7 +57,8 @@ class EstimatorNode(ManagedNode):
         self._topics: dict[Any, str] = {}
         self._newest_inputs: dict[str, TopicMessage] = {}
         self.has_viewer = False  # by a live view
-        self._watchdog_called = 0  # [ns] of `time.perf_counter_ns`
+        self._watchdog_called = self._ticked = 0  # [ns] of `time.perf_counter_ns`
+        self._is_ticking = False
         self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
         self._recording = Recording(self.get_fully_qualified_name())
@@ -99,8 +102,8 @@ class EstimatorNode(ManagedNode):
         """Messages of each input since activation."""
         raise NotImplementedError
 
-    def on_watchdog(self) -> None:
-        """Renew each feed-forward that no sample renews, so that it fades out; every `_WATCHDOG_PERIOD`."""
+    def on_watchdog(self) -> bool:
+        """Renew each feed-forward that no sample renews, so that it fades out; whether there was one."""
         raise NotImplementedError
 
     def fade_out(self) -> None:
@@ -137,7 +140,11 @@ class EstimatorNode(ManagedNode):
         )
         self.has_viewer = False
         self._newest_inputs.clear()
+        self._tick_timer = self.create_steady_timer(_TICK_PERIOD, self._on_watchdog_timer)
+        self._tick_timer.cancel()
+        self._is_ticking = False
         self._timers = [
+            self._tick_timer,
             self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
             self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog_timer),
             self.create_steady_timer(_HEALTH_PERIOD, self._on_health_timer),
@@ -185,9 +192,15 @@ class EstimatorNode(ManagedNode):
         self._topics[name] = self._inputs[name].topic_name
 
     def _on_watchdog_timer(self) -> None:
-        self._watchdog_called = time.perf_counter_ns()
-        self.on_watchdog()
+        """Let the watchdog act; every `_TICK_PERIOD` while it has to or somebody looks on, else seldom."""
+        now = self._watchdog_called = time.perf_counter_ns()
+        if self.on_watchdog():
+            self._ticked = now
         self.publish_newest()
+        is_ticking = self.has_viewer or now - self._ticked < _TICKING
+        if is_ticking != self._is_ticking:
+            self._is_ticking = is_ticking
+            (self._tick_timer.reset if is_ticking else self._tick_timer.cancel)()
 
     def look_after_timers(self, now: int) -> None:
         """Call what is overdue, if the watchdog was not called for long; after a message, at ``now`` [ns].

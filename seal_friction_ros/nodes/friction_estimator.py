@@ -174,10 +174,12 @@ class FrictionEstimator(EstimatorNode):
             else:
                 self._statistics.on_feedforward(answer)
 
-    def on_watchdog(self) -> None:
+    def on_watchdog(self) -> bool:
         """Renew the feed-forward while no velocity sample does, so that it fades out."""
-        if self.active and is_tick_due(self._state, self._now()):
-            self._tick(self._now())
+        if not self.active or not is_tick_due(self._state, self._now()):
+            return False
+        self._tick(self._now())
+        return True
 
     def _tick(self, received: int) -> None:
         tick = WatchdogTick(received + self._state.clock_offset, (received - self._state.feedforward.received) * 1e-9)

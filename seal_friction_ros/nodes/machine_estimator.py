@@ -244,11 +244,14 @@ class MachineEstimator(EstimatorNode):
                 last, state = known.pipeline.estimator, newest.pipeline.estimator
                 self._statistics[actuator.name].on_adaptation(parameters, last, state, newest.pipeline.temperature)
 
-    def on_watchdog(self) -> None:
+    def on_watchdog(self) -> bool:
         """Renew each feed-forward that no velocity sample renews, so that it fades out."""
-        if self.active:
-            for number in due(self._state, self._now()):
-                self._tick(number, self._now())  # a bag holds each message at a time of its own
+        if not self.active:
+            return False
+        numbers = due(self._state, self._now())
+        for number in numbers:
+            self._tick(number, self._now())  # a bag holds each message at a time of its own
+        return bool(numbers)
 
     def _tick(self, number: int, received: int) -> None:
         made = self._state.actuators[number].pipeline.feedforward.received
