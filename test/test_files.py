@@ -382,7 +382,7 @@ def test_a_file_that_is_not_a_parameter_file_is_rejected(written, content):
         ('{seals: [x@a, y]}', 'give every seal its chamber (NAME@CHAMBER), or none'),
         ('{seals: [x@top]}', "'top' is not a, b, difference or ambient"),
         ('{realtime_priority: 100}', 'StartOptions.realtime_priority = 100  is above its upper bound 99'),
-        ('{record_split_size: 5}', 'record_split_size = 5 makes too many files'),
+        ('{record_split_size: 5}', 'record_split_size = 5 is too small'),
         ('{refuse_second_publisher: 1}', 'refuse_second_publisher = 1 is not true or false'),
     ],
 )

@@ -10,7 +10,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.estimation.messages import OUTPUTS, encode, type_of
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, OUTPUTS, encode, encode_text, type_of
 from seal_friction_ros.core.estimation.node_options import InputOptions, RecordingOptions
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
@@ -20,6 +20,7 @@ from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
 from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
+from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 
 _WATCH_PERIOD = 0.05  # [s]
 _WATCHDOG_PERIOD = 0.025  # [s] less than the timeouts of the feed-forward; each call wakes the process for 0.2 ms
@@ -77,8 +78,8 @@ class EstimatorNode(ManagedNode):
         """Use another offset [ns] from now on."""
         raise NotImplementedError
 
-    def publish_configuration(self) -> None:
-        """Publish and record all that the next answer depends on."""
+    def snapshot(self) -> str:
+        """All that the next answer depends on, as text."""
         raise NotImplementedError
 
     def reset_adaptation(self) -> None:
@@ -140,6 +141,7 @@ class EstimatorNode(ManagedNode):
         )
         self.has_viewer = False
         self._newest_inputs.clear()
+        self._state_topic = self.resolve_topic_name(f'~/{STATE_NAME}')
         self._tick_timer = self.create_steady_timer(_TICK_PERIOD, self._on_watchdog_timer)
         self._tick_timer.cancel()
         self._is_ticking = False
@@ -242,6 +244,8 @@ class EstimatorNode(ManagedNode):
         if following:
             self.publish_configuration()
             self.get_logger().info(f'recording to {following}')
+        if self.active and self._recording.is_state_due(time.monotonic()):
+            self._recording.record(self._state_topic, STATE_TYPE, self._now(), encode_text(self.snapshot()))
         if self.active and self._now == self._steady_time:
             offset = time.time_ns() - self._now()
             if abs(offset - self.clock_offset) > _LARGEST_CLOCK_STEP:
@@ -279,6 +283,10 @@ class EstimatorNode(ManagedNode):
         return time.monotonic_ns() + self._receipt_offset
 
     # --- recording ---
+
+    def publish_configuration(self) -> None:
+        """Publish and record all that the next answer depends on."""
+        self.publish_recorded(CONFIGURATION_TYPE, CONFIGURATION_TYPE, encode_text(self.snapshot()))
 
     def publish_recorded(self, key: Any, type_name: str, data: bytes) -> None:
         """Publish a message by the publisher ``key``, and record it."""

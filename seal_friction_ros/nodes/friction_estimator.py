@@ -29,7 +29,6 @@ from seal_friction_ros.core.estimation.messages import (
     TICK_TYPE,
     Output,
     encode,
-    encode_text,
     type_of,
 )
 from seal_friction_ros.core.estimation.node_options import (
@@ -225,10 +224,9 @@ class FrictionEstimator(EstimatorNode):
             self._known = changed.parameters()
             self.publish_configuration()
 
-    def publish_configuration(self) -> None:
-        """Publish and record all that the next answer depends on."""
-        text = snapshot_text(Snapshot(self._configuration, self._state))
-        self.publish_recorded(CONFIGURATION_TYPE, CONFIGURATION_TYPE, encode_text(text))
+    def snapshot(self) -> str:
+        """All that the next answer depends on, as text."""
+        return snapshot_text(Snapshot(self._configuration, self._state))
 
     def reset_adaptation(self) -> None:
         """Forget what the adaptation has learnt."""

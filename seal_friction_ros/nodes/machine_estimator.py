@@ -21,7 +21,6 @@ from seal_friction_ros.core.estimation.messages import (
     TICK_TYPE,
     Output,
     encode,
-    encode_text,
     type_of,
 )
 from seal_friction_ros.core.estimation.node_options import (
@@ -315,10 +314,9 @@ class MachineEstimator(EstimatorNode):
         if self.active:
             self.publish_configuration()
 
-    def publish_configuration(self) -> None:
-        """Publish and record all that the next answer depends on."""
-        text = machine_text(self._document, self._machine, self._state)
-        self.publish_recorded(CONFIGURATION_TYPE, CONFIGURATION_TYPE, encode_text(text))
+    def snapshot(self) -> str:
+        """All that the next answer depends on, as text."""
+        return machine_text(self._document, self._machine, self._state)
 
     def reset_adaptation(self) -> None:
         """Forget what the adaptation of every actuator has learnt."""

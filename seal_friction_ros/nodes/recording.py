@@ -20,6 +20,8 @@ class Recording:
         self._owner = owner
         self._recorder: Recorder | None = None
         self._finishing: list[Recorder] = []
+        self._state_period = 0.0  # [s] 0.0: no states amid the bag
+        self._next_state = 0.0  # [s] of the steady clock; 0.0: not known
         self.failure = ''
         """Why the last bag could not be created or finished; empty without an error."""
 
@@ -33,6 +35,7 @@ class Recording:
         if self._recorder is not None and not self._recorder.error:
             raise BagError(f'recording to {self._recorder.path} already: stop that first')
         self.stop()
+        self._state_period, self._next_state = options.record_state_period, 0.0
         directory, name = options.record_directory, options.record_name
         try:
             folder = Path(directory).expanduser()
@@ -57,6 +60,15 @@ class Recording:
         if self._recorder is None or not self._recorder.is_next_due:
             return None
         return self._recorder.begin_next()
+
+    def is_state_due(self, now: float) -> bool:
+        """Whether to record a state ``now`` [s of the steady clock]; once for each period since the bag began."""
+        if self._recorder is None or self._recorder.error or not self._state_period:
+            return False
+        is_due = 0.0 < self._next_state <= now
+        if is_due or not self._next_state:
+            self._next_state = now + self._state_period
+        return is_due
 
     def record(self, topic: str, type_name: str, log_time: int, data: bytes) -> None:
         """Record one message, if a bag is being recorded."""

@@ -33,7 +33,9 @@ from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import default_configuration, load_parameter_file
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
+from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.replay.shared_replay import stretches_of, verify_stretches
 
 SECOND = 10**9  # [ns]
 INTEGER, DOUBLE, STRING_ARRAY = 2, 3, 9  # rcl_interfaces/ParameterType
@@ -181,7 +183,7 @@ def test_lifecycle_services_start_and_stop_it():
 def test_a_timer_that_was_due_before_a_cleanup_does_nothing_after_it():
     with graph() as g:
         due = [timer.callback for timer in g.estimator.timers]
-        assert len(due) == 5  # diagnostics, graph, watchdog, health, monitor
+        assert len(due) == 6  # diagnostics, graph, watchdog, ticks, health, monitor
         g.estimator.trigger_deactivate()
         g.estimator.trigger_cleanup()
         for callback in due:
@@ -357,6 +359,32 @@ def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Pat
         g.estimator.finish()
     assert bag_topics(tmp_path / 'bag')['/friction_estimator/configuration'].message_count == 2
     assert replay(tmp_path / 'bag').identical
+
+
+def test_a_recording_holds_states_between_which_it_verifies_by_itself(tmp_path: Path):
+    with graph(
+        {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag', 'record_state_period': 0.5}
+    ) as g:
+        g.connect()
+        bag, number = tmp_path / 'bag', 0
+        recorded = g.estimator._recording.record
+        states = []
+
+        def record(topic: str, *rest) -> None:
+            states.extend([topic] * topic.endswith('/state'))
+            recorded(topic, *rest)
+
+        g.estimator._recording.record = record
+        while len(states) < 3:
+            g.estimate(SECOND + number * 10**6, 0.003 * (1 if number // 50 % 2 else -1), force=3.0)
+            number += 1
+        g.estimate(SECOND + number * 10**6, 0.003)
+        g.estimator.finish()
+    assert states == ['/friction_estimator/state'] * 3
+    assert bag_topics(bag)['/friction_estimator/state'].message_count == 3
+    assert len(stretches_of(bag, find_topics(bag), 8)) == 4
+    assert verify_stretches(bag, find_topics(bag), 2) == replay(bag)
+    assert replay(bag).identical
 
 
 def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path, capfd):

@@ -78,6 +78,7 @@ class Kind(IntEnum):
     CONFIGURATION = 9
     OTHER_ESTIMATE = 10
     """of another estimator"""
+    POSITION = 11
 
 
 _FORCE, _PRESSURE, _REFERENCE, _TEMPERATURE, _TICK, _VELOCITY = (

@@ -15,6 +15,7 @@ from seal_friction_ros.core.foundation.parameters import ParameterGroup, check, 
 _SMALLEST = {  # besides 0
     'record_split_size': 1_000_000,  # [bytes]
     'record_split_duration': 10.0,  # [s]
+    'record_state_period': 0.5,  # [s]
     'record_keep_size': 10_000_000,  # [bytes]
 }
 
@@ -58,8 +59,8 @@ class RecordingOptions:
     """Recording, one ROS parameter per field.
 
     Raises:
-        ValueError: A value is out of bounds, the name of the bag could lead out of the folder, or bags or their files
-            would be so small that there are thousands of them.
+        ValueError: A value is out of bounds, the name of the bag could lead out of the folder, or bags, their files
+            or the time between two states would be so small that there are thousands of them.
     """
 
     record: bool = parameter(False, unit='', live=False, description='Start recording at activation.')
@@ -72,6 +73,14 @@ class RecordingOptions:
     )
     record_split_duration: float = parameter(
         0.0, unit='s', lower=0.0, upper=1e9, description='Longest duration of one file of the bag; 0: no limit.'
+    )
+    record_state_period: float = parameter(
+        60.0,
+        unit='s',
+        lower=0.0,
+        upper=1e9,
+        description='Time between two snapshots of configuration and state in a bag, between which it can be replayed '
+        'by several workers; 0: only at its beginning.',
     )
     record_free_space: int = parameter(
         1_000_000_000,
@@ -95,7 +104,7 @@ class RecordingOptions:
         for name, least in _SMALLEST.items():
             value = getattr(self, name)
             if 0 < value < least:
-                raise ValueError(f'RecordingOptions.{name} = {value} makes too many files: 0 or at least {least}')
+                raise ValueError(f'RecordingOptions.{name} = {value} is too small: 0 or at least {least}')
         if '/' in self.record_name or not self.record_name.isprintable() or self.record_name in ('.', '..'):
             raise ValueError(f'RecordingOptions.record_name = {self.record_name!r} is not a plain name of a folder')
 

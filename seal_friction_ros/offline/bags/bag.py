@@ -37,6 +37,9 @@ REFERENCE_TOPIC = '/servo_reference'
 ESTIMATE_TOPIC = '/friction_estimate'
 FEEDFORWARD_TOPIC = '/friction_feedforward'
 CONFIGURATION_TOPIC = '/friction_estimator/configuration'
+STATE_NAME = 'state'  # last part of the name of the topic of states, beside ``configuration``: snapshots amid a bag
+STATE_TYPE = 'std_msgs/msg/String'  # laid out as a configuration, and not taken for one
+STATE_PERIOD = 60.0  # [s] of log time between two of them in a bag that is written here
 
 START_IN_NAME = re.compile(r'_[0-9]{8}_[0-9]{6}_[0-9]{6}\Z')
 """Time of the start at the end of the name of a bag."""

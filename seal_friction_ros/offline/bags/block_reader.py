@@ -8,7 +8,7 @@ import heapq
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,22 @@ from seal_friction_ros.offline.bags.mcap_records import Opcode
 KindOf = Callable[[str, str], Kind]
 """Topic and message type -> kind of its messages."""
 
+
+class Stretch(NamedTuple):
+    """Part of a bag: the messages from one place to before another; a place is the number of a file and a log time."""
+
+    file: int
+    first: int  # [ns] in that file
+    last_file: int
+    end: int  # [ns] in the last file
+
+    def in_file(self, number: int) -> tuple[int, int] | None:
+        """First log time [ns] in a file and that which is not in it any more; None if nothing of the file is."""
+        if not self.file <= number <= self.last_file:
+            return None
+        return self.first if number == self.file else 0, self.end if number == self.last_file else _LAST_TIME + 1
+
+
 _AT_ONCE = 1 << 21  # [bytes] read at a time: about 20 000 messages
 _UNKNOWN = 255  # instead of a `Kind`: channel without description
 _SMALLEST = 31  # [bytes] of the record of an empty message
@@ -37,8 +53,10 @@ _MESSAGE, _SCHEMA, _CHANNEL = int(Opcode.MESSAGE), int(Opcode.SCHEMA), int(Opcod
 _LAST_TIME = mcap_reader.LAST_TIME
 
 
-def read_in_bulk(path: Path, kind_of: KindOf) -> Iterator[Messages]:
-    """Messages of a bag in the order of `bag.read_messages`, at most `MOST_MESSAGES` at a time.
+def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch | None = None) -> Iterator[Messages]:
+    """Messages of a bag, or of a part of it, in the order of `bag.read_messages`, at most `MOST_MESSAGES` at a time.
+
+    Of a part only the chunks with such messages are read.
 
     Raises:
         UnsuitedError: The bag is unusual.
@@ -48,12 +66,34 @@ def read_in_bulk(path: Path, kind_of: KindOf) -> Iterator[Messages]:
     if not files.is_plain_mcap:
         yield from _gathered(read_messages(path), kind_of)
         return
-    for file_path in files.files:
+    for number, file_path in enumerate(files.files):
+        span = (0, _LAST_TIME + 1) if stretch is None else stretch.in_file(number)
+        if span is None:
+            continue
         with file_path.open('rb') as file:
             layout = mcap_reader.scan_finished(file)
-            for messages in _of_file(file, layout, kind_of):
+            for messages in _of_file(file, layout, kind_of, span):
                 for first in range(0, len(messages.kinds), MOST_MESSAGES):
                     yield messages.taken(first, first + MOST_MESSAGES)
+
+
+def times_of(path: Path, topic: str) -> list[tuple[int, int]]:
+    """Number of the file and log time [ns] of each message of a topic, in order, without reading the messages.
+
+    Empty for a bag whose chunks have no index, and for one that `read_in_bulk` reads by the general reader.
+
+    Raises:
+        BagError: The bag cannot be read.
+        ValueError: A file is damaged or unfinished.
+    """
+    files = storage(path)
+    times: list[tuple[int, int]] = []
+    for number, file_path in enumerate(files.files if files.is_plain_mcap else ()):
+        with file_path.open('rb') as file:
+            channels = mcap_reader.scan_finished(file).channels
+            wanted = [key for key, channel in channels.items() if channel.topic == topic]
+            times += [(number, time) for time in mcap_reader.indexed_times(file, wanted)] if wanted else []
+    return times
 
 
 def compile_now() -> None:
@@ -81,8 +121,17 @@ def _room_for(data: bytes, count: int) -> Messages:
 _NONE = _room_for(b'', 0)
 
 
-def _of_file(file: BinaryIO, layout: Layout, kind_of: KindOf) -> Iterator[Messages]:
-    """Messages in order of log time; equal times in the order of the file."""
+def _of_file(file: BinaryIO, layout: Layout, kind_of: KindOf, span: tuple[int, int]) -> Iterator[Messages]:
+    """Messages in order of log time; equal times in the order of the file.
+
+    Those before ``span`` [ns] and from its end on are not among them.
+    """
+    if span != (0, _LAST_TIME + 1):
+        inside = tuple(block for block in layout.blocks if block.first < span[1] and block.last >= span[0])
+        for messages in _of_file(file, layout._replace(blocks=inside), kind_of, (0, _LAST_TIME + 1)):
+            first, end = np.searchsorted(messages.received, span)
+            yield messages.taken(int(first), int(end))
+        return
     channels = _Channels(layout, kind_of)
     blocks = sorted(layout.blocks, key=lambda block: block.first) if layout.channels else layout.blocks
     earliest = mcap_reader.earliest_times(blocks)

@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.offline.bags.bag import (
+    CONFIGURATION_TOPIC,
     ESTIMATE_TOPIC,
     FEEDFORWARD_TOPIC,
+    STATE_NAME,
     TEMPERATURE_TOPIC,
     BagError,
     TopicInfo,
@@ -40,6 +42,11 @@ class Topics(NamedTuple):
     def answers(self) -> dict[str, str]:
         """Message type of an answer -> its topic; empty if there is no such topic."""
         return {messages.ESTIMATE_TYPE: self.estimate, messages.FEEDFORWARD_TYPE: self.feedforward}
+
+    @property
+    def state(self) -> str:
+        """Topic of the states amid the bag, if there are any."""
+        return f'{(self.configuration or CONFIGURATION_TOPIC).rpartition("/")[0]}/{STATE_NAME}'
 
 
 TYPES = Topics(

@@ -15,7 +15,7 @@ def add_parser(commands: Any) -> None:
         'replay bags/pull_test --seal my_seal.yaml --out with_my_seal',
     )  # fmt: skip
     parser.add_argument('bags', type=cli.place, nargs='+', metavar='BAG', help='path, or URL of fsspec')
-    cli.add_workers(parser, 'bags')
+    cli.add_workers(parser, 'bags, or stretches of one bag,')
     cli.add_work(parser)
     cli.add_configuration(parser)
     cli.add_target(parser, '--out', BAG, metavar='BAG', help='write inputs and new estimates to this bag')
@@ -25,7 +25,7 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay one bag, or several in parallel."""
-    from seal_friction_ros.offline.replay.parallel_replay import verify
+    from seal_friction_ros.offline.replay.parallel_replay import verify, verify_shared
     from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
     from seal_friction_ros.offline.work.places import as_path
 
@@ -34,7 +34,11 @@ def run(arguments: argparse.Namespace) -> int:
         return _run_many(arguments, override)
     namespace = arguments.namespace
     with as_path(arguments.bags[0]) as bag:
-        result = replay(bag, override, arguments.out, namespace) if arguments.out else verify(bag, override, namespace)
+        if arguments.out:
+            result = replay(bag, override, arguments.out, namespace)
+        else:
+            shared = verify_shared(bag, namespace, cli.workers_of(arguments)) if override is None else None
+            result = shared or verify(bag, override, namespace)
     code = cli.DIFFERENT if arguments.verify and not result.identical else cli.SUCCESS
     return cli.print_result(arguments, result.numbers(), result.summary(verified=arguments.verify), code)
 

@@ -5,19 +5,14 @@ The kind of a source follows from the file itself, so a command accepts any of t
 
 import csv
 import hashlib
-import math
-from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.configuration import parse_snapshot
-from seal_friction_ros.core.estimation.messages import VELOCITY_TYPE, decode, decode_text
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.units import UNITS, ZEROS
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
@@ -32,14 +27,13 @@ from seal_friction_ros.core.identification.prepare_readings import prepare_logs,
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
-from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_samples
 from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.bags.velocity_rows import read_velocity_rows
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.identification.load_numbers import load_text
 from seal_friction_ros.offline.work.executor import Workers, run_all
 from seal_friction_ros.offline.work.places import Place, as_path
-from seal_friction_ros.offline.work.progress import progress
 
 LARGEST_ACCELERATION = 1.0  # [m/s2] limit with known inertia (our choice)
 DIRECTIONS = {'extend': 1, 'ext': 1, '1': 1, '+1': 1, 'retract': -1, 'ret': -1, '-1': -1}
@@ -307,35 +301,14 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     missing = [name for name in ('pressure', 'force') if not getattr(topics, name)]
     if missing:
         raise ValueError(f'{path}: no {" and no ".join(missing)} messages: they are needed to identify friction')
-    rows, stamps = array('d'), array('q')  # numbers side by side: an hour at 1 kHz is 202 MB
-    newest: dict[str, tuple[float, ...]] = {topics.pressure: (math.nan, math.nan), topics.force: (math.nan,)}
-    newest |= {topics.position or 'no position': (math.nan,), topics.temperature or 'none': (math.nan, math.nan)}
-    chambers, document, holds_load = None, None, False
-    has_placeholder = False
-    total = sum(info.message_count for info in bag_topics(path).values())
-    with progress(f'read {path.name}', total) as advance:
-        for count, message in enumerate(read_messages(path), start=1):
-            try:
-                if message.topic == topics.velocity:
-                    sample = decode(VELOCITY_TYPE, message.data)
-                    stamps.append(sample.stamp)
-                    rows.extend((sample.velocity, *chain.from_iterable(newest.values())))
-                elif message.topic in newest:
-                    newest[message.topic] = decode(message.type_name, message.data)[1:]
-                elif message.topic == topics.configuration:
-                    configuration = parse_snapshot(decode_text(message.data)).configuration
-                    holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
-                    has_placeholder, chambers = configuration.has_placeholder, configuration.selection.seal_chambers
-                    document = None if has_placeholder else configuration.seal_documents[0]
-            except ValueError as error:
-                raise ValueError(f'{path}: message on {message.topic} at {message.log_time} ns: {error}') from None
-            if count % 1000 == 0:
-                advance(1000)
-    stamp = np.frombuffer(stamps, dtype=np.int64)
+    stamp, columns, configuration = read_velocity_rows(path, topics)
+    chambers, document, holds_load, has_placeholder = None, None, False, False
+    if configuration is not None:
+        holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
+        has_placeholder, chambers = configuration.has_placeholder, configuration.selection.seal_chambers
+        document = None if has_placeholder else configuration.seal_documents[0]
     kept = np.diff(np.maximum.accumulate(stamp), prepend=stamp[:1] - 1) > 0  # stamps above all stamps before
-    columns = np.frombuffer(rows, dtype=np.float64).reshape(-1, 7).T.copy()
     columns[~(np.abs(columns) < 1e15)] = np.nan  # [SI] no measurement is as large
-    del rows
     signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns[:4]).taken(kept)
     temperature = _from_the_first(columns[5] + ZEROS['degC'])[kept] if topics.temperature else None
     position = columns[4][kept] if topics.position else None

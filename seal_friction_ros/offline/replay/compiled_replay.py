@@ -27,7 +27,7 @@ from seal_friction_ros.core.estimation.messages import (
     GROWN,
     decode_text,
 )
-from seal_friction_ros.core.estimation.pipeline import init
+from seal_friction_ros.core.estimation.pipeline import PipelineState, init
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import block_reader
@@ -70,21 +70,63 @@ def replay_in_bulk(
 
 
 def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]) -> ReplayResult:
-    velocities, is_cut = 0, False
-    versions: set[int] = set()
-    streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in topics.answers.items() if topic}
-    for messages, answers in _answered(read_in_bulk(bag, kinds_of_topics(topics)), override):
-        kinds = messages.kinds
-        velocities += int(np.count_nonzero(kinds == Kind.VELOCITY))
-        for type_name, stream in streams.items():
-            stream.compare_block(messages, answers, _RECORDED[type_name])
-        if len(kinds):
-            if kinds[0] == Kind.CONFIGURATION and override is None:
-                versions.add(snapshot_version(decode_text(messages.message(0))))
-            answered = answers.estimate_sizes[-1] or answers.feedforward_sizes[-1]
-            is_cut = bool(answered) or int(kinds[-1]) in (Kind.ESTIMATE, Kind.OTHER_ESTIMATE)
-        advance(len(kinds))
-    return replay_result(velocities, streams, versions, is_cut=is_cut)
+    run = Run(override or default_configuration(), has_override=override is not None)
+    return run.compared(read_in_bulk(bag, kinds_of_topics(topics)), topics, advance)
+
+
+class Run:
+    """The estimator on its way through blocks of messages.
+
+    Args:
+        configuration: At the beginning.
+        state: Likewise; None: before any message.
+        has_override: Whether the configuration stays, whatever the bag says.
+    """
+
+    def __init__(
+        self, configuration: Configuration, state: PipelineState | None = None, *, has_override: bool = False
+    ) -> None:
+        self.configuration, self._has_override = configuration, has_override
+        self._parameters = configuration.parameters()
+        self.state = init(self._parameters) if state is None else state
+
+    def compared(
+        self, blocks: Iterable[Messages], topics: Topics, advance: Callable[[int], None] = lambda _: None
+    ) -> ReplayResult:
+        """Answers to the blocks, compared with the recorded ones.
+
+        Raises:
+            UnsuitedError: As `receive_all`.
+        """
+        velocities, is_cut = 0, False
+        versions: set[int] = set()
+        streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in topics.answers.items() if topic}
+        for messages, answers in self.answered(blocks):
+            kinds = messages.kinds
+            velocities += int(np.count_nonzero(kinds == Kind.VELOCITY))
+            for type_name, stream in streams.items():
+                stream.compare_block(messages, answers, _RECORDED[type_name])
+            if len(kinds):
+                if kinds[0] == Kind.CONFIGURATION and not self._has_override:
+                    versions.add(snapshot_version(decode_text(messages.message(0))))
+                answered = answers.estimate_sizes[-1] or answers.feedforward_sizes[-1]
+                is_cut = bool(answered) or int(kinds[-1]) in (Kind.ESTIMATE, Kind.OTHER_ESTIMATE)
+            advance(len(kinds))
+        return replay_result(velocities, streams, versions, is_cut=is_cut)
+
+    def answered(self, blocks: Iterable[Messages]) -> Iterator[tuple[Messages, Answers]]:
+        """Blocks of messages and the answers to them; a block ends before each configuration."""
+        for block in blocks:
+            changes = np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist()
+            ends = sorted({0, *changes, len(block.kinds)})  # no empty ones, which would compile, too
+            for first, end in pairwise(ends):
+                messages = block.taken(first, end)
+                if messages.kinds[0] == Kind.CONFIGURATION:
+                    configuration, self.state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))[:2]
+                    if not self._has_override:
+                        self.configuration, self._parameters = configuration, configuration.parameters()
+                self.state, answers = receive_all(self._parameters, self.state, messages)
+                yield messages, answers
 
 
 def compile_now(configurations: Iterable[Configuration] = ()) -> None:
@@ -148,21 +190,6 @@ def kinds_of_topics(topics: Topics) -> KindOf:
         return kind
 
     return kind_of
-
-
-def _answered(blocks: Iterator[Messages], override: Configuration | None) -> Iterator[tuple[Messages, Answers]]:
-    """Blocks of messages and the answers to them; a block ends before each configuration."""
-    parameters = (override or default_configuration()).parameters()
-    state = init(parameters)
-    for block in blocks:
-        changes = np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist()
-        for first, end in pairwise(sorted({0, *changes, len(block.kinds)})):  # no empty ones, which would compile too
-            messages = block.taken(first, end)
-            if messages.kinds[0] == Kind.CONFIGURATION:
-                configuration, state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))[:2]
-                parameters = parameters if override else configuration.parameters()
-            state, answers = receive_all(parameters, state, messages)
-            yield messages, answers
 
 
 class _BulkAnswerStream(AnswerStream):

@@ -1,6 +1,7 @@
 """Replay of long bags, compiled, and of several bags in parallel."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.foundation.compiled import has_compiler
-from seal_friction_ros.offline.bags.bag import bag_topics
+from seal_friction_ros.offline.bags.bag import BagError, bag_topics
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.bag_parts import try_bags
@@ -48,6 +49,27 @@ def verify(
     return replay(bag, override, namespace=namespace)
 
 
+def verify_shared(
+    bag: Path, namespace: str = '', workers: Workers = 1, *, bulk_from: int = BULK_FROM
+) -> ReplayResult | None:
+    """Result of `verify` with the bag's own configuration, by several workers.
+
+    Returns:
+        None: the bag is too short to share, of a machine, without states between which it can be shared, or it is not
+        identical, so that it has to be replayed in one go.
+
+    Raises:
+        BagError: The bag cannot be read.
+        ValueError: The cluster cannot be used.
+    """
+    known = bag_topics(bag)
+    if workers == 1 or count_messages(known) < bulk_from or not has_compiler() or is_machine_bag(bag, known):
+        return None
+    from seal_friction_ros.offline.replay.shared_replay import verify_stretches  # noqa: PLC0415  loads the compiler
+
+    return verify_stretches(bag, find_topics(bag, namespace, known), workers)
+
+
 def replay_many(
     bags: Sequence[Place],
     override: Configuration | None = None,
@@ -55,7 +77,7 @@ def replay_many(
     workers: Workers = 1,
     kept: Kept = NOWHERE,
 ) -> list[Outcome[ReplayResult]]:
-    """`verify` bags, ``workers`` of them at a time; outcomes in the order of the bags.
+    """`verify` bags, ``workers`` of them at a time; outcomes in the order of the bags. A single one is shared by them.
 
     If the bags together are long, the estimator is compiled before the worker processes begin, so that all of them
     inherit it. A cluster compiles once for each of its workers.
@@ -63,6 +85,11 @@ def replay_many(
     Raises:
         ValueError: The work folder or the cluster cannot be used.
     """
+    if len(bags) == 1 and isinstance(bags[0], Path) and override is None and kept == NOWHERE:
+        with suppress(BagError, OSError):  # `verify` below says what is wrong with the bag
+            shared = verify_shared(bags[0], namespace, workers)
+            if shared is not None:
+                return [Outcome(shared)]
     bulk_from, prepare = BULK_FROM, nothing
     if sum(map(_size, bags)) > _INPUT_SIZE * BULK_FROM and has_compiler():
         bulk_from, prepare = 0, partial(_compile, bags, namespace, override)

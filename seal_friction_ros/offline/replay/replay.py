@@ -25,9 +25,12 @@ from seal_friction_ros.core.estimation.messages import (
     encode_text,
 )
 from seal_friction_ros.core.estimation.pipeline import answered, init
+from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file, with_seal
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
+    STATE_PERIOD,
+    STATE_TYPE,
     BagError,
     BagMessage,
     BagWriter,
@@ -72,7 +75,8 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
 
     The estimator uses ``override``, or else the newest configuration in the bag, or else the default configuration. The
     configuration messages that are returned hold the configuration used: ``override`` replaces recorded ones, and if
-    the bag has none, one is inserted at the start. They are marked as replayed, with the settings that acted.
+    the bag has none, one is inserted at the start. They are marked as replayed, with the settings that acted. Every
+    `STATE_PERIOD` there is the state, too, in place of those in the bag.
 
     Raises:
         BagError: A message does not match its type.
@@ -84,7 +88,16 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
     if not topics.configuration:
         data = encode_text(snapshot_text(first_snapshot(configuration)._replace(recorded=Recorded(None))))
         yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, data), ())
+    newest, due = NEVER, NEVER  # [ns] log time of the message before, and of the next state
     for message in messages:
+        if message.topic == topics.state:
+            continue
+        if due <= message.log_time > newest:  # of messages of one time none is before a state and another after it
+            if due != NEVER:
+                data = encode_text(snapshot_text(Snapshot(configuration, state)))
+                yield Step(BagMessage(topics.state, STATE_TYPE, message.log_time, data), ())
+            due = message.log_time + round(STATE_PERIOD * 1e9)
+        newest = message.log_time
         answers: list[tuple[str, bytes]] = []
         used = message
         try:
@@ -98,7 +111,8 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
                 if override:
                     snapshot = Snapshot(override, state)
                 else:
-                    parameters = snapshot.configuration.parameters()
+                    configuration = snapshot.configuration
+                    parameters = configuration.parameters()
                 used = message._replace(data=encode_text(snapshot_text(snapshot._replace(recorded=recorded))))
         except ValueError as error:
             raise BagError(f'message on {message.topic} at {message.log_time} ns: {error}') from None
@@ -168,7 +182,7 @@ def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter, acted:
     answered, kept = topics.answers, topics.feedforward + RECORDED
     for step in replayed:
         message = step.message
-        is_used = message.topic in topics or message.type_name == CONFIGURATION_TYPE
+        is_used = message.topic in (*topics, topics.state) or message.type_name == CONFIGURATION_TYPE
         if is_used and message.type_name not in answered:
             log_time = writer.write(*_of_this_version(message))
             for type_name, data in step.answers:

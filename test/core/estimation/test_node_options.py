@@ -42,7 +42,7 @@ def test_a_split_into_thousands_of_files_is_rejected(name: str, least: float, be
     for good in (0, least):
         assert getattr(RecordingOptions(**{name: type(least)(good)}), name) == good
     for bad in (below, type(least)(1)):
-        with pytest.raises(ValueError, match=f'{name} = {bad} makes too many files: 0 or at least {least}'):
+        with pytest.raises(ValueError, match=f'{name} = {bad} is too small: 0 or at least {least}'):
             RecordingOptions(**{name: bad})
 
 

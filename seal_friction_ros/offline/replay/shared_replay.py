@@ -1,0 +1,116 @@
+"""Verified replay of one long bag by several workers: each takes a stretch between two recorded states.
+
+The node records a snapshot every ``record_state_period`` on ``~/state``. A worker begins with one of them, compares the
+answers up to another, and then its own snapshot with that one. If every stretch is identical and ends in the state in
+which the next one begins, the replay in one go is identical, too: that is what is proven. In any other case nothing is
+concluded, and the bag is to be replayed in one go, which finds the first difference.
+"""
+
+from dataclasses import asdict
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from seal_friction_ros.core.estimation.compiled_pipeline import Kind, UnsuitedError
+from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION, Snapshot, parse_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.messages import decode_text
+from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.bags.block_reader import Stretch, read_in_bulk, times_of
+from seal_friction_ros.offline.bags.mcap_reader import ERRORS, LAST_TIME
+from seal_friction_ros.offline.bags.topics import Topics
+from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
+from seal_friction_ros.offline.replay.compiled_replay import Run, compile_now, first_configurations, kinds_of_topics
+from seal_friction_ros.offline.work.cluster import Cluster
+from seal_friction_ros.offline.work.executor import Workers, try_all
+
+STRETCHES = 4  # for each worker (our choice): so the last one to finish keeps the others waiting a little only
+_OF_A_CLUSTER = 64  # stretches: how many workers it has may change
+_BEGIN, _END = (0, 0), (1 << 30, LAST_TIME + 1)  # before and after every message: number of the file, log time [ns]
+
+
+def stretches_of(bag: Path, topics: Topics, most: int) -> list[Stretch]:
+    """At most so many stretches, of about as many recorded states each; one if the bag has none.
+
+    Raises:
+        BagError: The bag cannot be read.
+        ValueError: A file is damaged or unfinished.
+    """
+    states = times_of(bag, topics.state)
+    step = -(-(len(states) + 1) // most)
+    places = [_BEGIN, *states[step - 1 :: step], _END]
+    return [Stretch(*first, *end) for first, end in pairwise(places)]
+
+
+def verify_stretches(bag: Path, topics: Topics, workers: Workers) -> ReplayResult | None:
+    """Result of `replay` of a long bag with its own configuration, if it is identical; computed by several workers.
+
+    Returns:
+        None: nothing is known, the bag is to be replayed in one go.
+
+    Raises:
+        ValueError: The cluster cannot be used.
+    """
+    if not topics.configuration:
+        return None
+    try:
+        stretches = stretches_of(bag, topics, _OF_A_CLUSTER if isinstance(workers, Cluster) else STRETCHES * workers)
+    except (OSError, *ERRORS):
+        return None
+    if len(stretches) == 1:
+        return None
+    calls = [partial(_verified, bag, topics, stretch) for stretch in stretches]
+    label = f'replay {bag.name} in {len(calls)} stretches'
+    outcomes = try_all(label, calls, workers, prepare=lambda: compile_now(first_configurations([bag], '', None)))
+    results = [ReplayResult(**outcome.result) if outcome.result else None for outcome in outcomes]
+    found = [result for result in results if result is not None]
+    if len(found) < len(stretches):
+        return None
+    return ReplayResult(
+        sum(result.velocity_samples for result in found),
+        sum(result.recorded_estimates for result in found),
+        sum(result.recorded_feedforwards for result in found),
+        0,
+        '',
+        min(result.recorded_version for result in found),
+    )
+
+
+def _verified(bag: Path, topics: Topics, stretch: Stretch) -> dict[str, Any] | None:
+    """Result of a stretch as a mapping; None if it is not identical, or does not end in the recorded state."""
+    kind_of = kinds_of_topics(topics)
+    try:
+        run = Run(default_configuration())
+        if (stretch.file, stretch.first) != _BEGIN:
+            known = parse_snapshot(_state_at(bag, topics, stretch.file, stretch.first))
+            if known.version != ALGORITHM_VERSION:
+                return None
+            run = Run(known.configuration, known.state)
+        result = run.compared(read_in_bulk(bag, kind_of, stretch), topics)
+        if result.differing:
+            return None
+        if (stretch.last_file, stretch.end) != _END:
+            recorded = _state_at(bag, topics, stretch.last_file, stretch.end)
+            if snapshot_text(Snapshot(run.configuration, run.state)) != recorded:
+                return None
+    except (UnsuitedError, OSError, *ERRORS):
+        return None
+    return asdict(result)
+
+
+def _state_at(bag: Path, topics: Topics, file: int, time: int) -> str:
+    """Text of the state that was recorded at a log time [ns].
+
+    Raises:
+        ValueError: There is none.
+    """
+    topic = topics.state
+
+    def kind_of(name: str, _: str) -> Kind:
+        return Kind.CONFIGURATION if name == topic else Kind.OTHER
+
+    for messages in read_in_bulk(bag, kind_of, Stretch(file, time, file, time + 1)):
+        for number in range(len(messages.kinds)):
+            if messages.kinds[number] == Kind.CONFIGURATION:
+                return decode_text(messages.message(number))
+    raise ValueError(f'{bag}: no message on {topic} at {time} ns')
