@@ -40,7 +40,9 @@ _LIMIT_MESSAGES = {
     Limited.SLEW: 'held back by slew_limit',
     Limited.FADE: 'faded: an input or the reference is not usable',
 }
-_ESTIMATES = {f'estimates {bit.name}': int(bit) for bit in Status}  # whole numbers: flags cost ten times as much
+_ESTIMATES = {
+    f'estimates {bit.name}': int(bit) for bit in Status
+}  # whole numbers: with flags a report takes twice as long
 _FEEDFORWARDS = {f'feed-forwards {bit.name}': int(bit) for bit in Limited}
 _FEEDFORWARD_SHARES = {f'feed-forward {bit.name} share': int(bit) for bit in Limited}
 _MOST_REVERSALS = 50  # [1/s] of the force; faster motion is not compensated, so this is chatter

@@ -5,7 +5,7 @@ import time
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks
@@ -59,6 +59,8 @@ class FrictionEstimator(EstimatorNode):
     Raises:
         ValueError: A parameter has the wrong type or is out of bounds.
     """
+
+    RECORDS_STATES: ClassVar = True
 
     def __init__(self, **kwargs: Any) -> None:
         self._configuration: Configuration | None = None

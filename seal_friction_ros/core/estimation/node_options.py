@@ -80,7 +80,7 @@ class RecordingOptions:
         lower=0.0,
         upper=1e9,
         description='Time between two snapshots of configuration and state in a bag, between which it can be replayed '
-        'by several workers; 0: only at its beginning.',
+        'by several workers; 0: only at its beginning. Of friction_estimator, from the next recording on.',
     )
     record_free_space: int = parameter(
         1_000_000_000,

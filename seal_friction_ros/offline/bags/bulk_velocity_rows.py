@@ -54,7 +54,7 @@ def _rows(path: Path, topics: Topics) -> VelocityRows:
     for block in read_in_bulk(path, kind_of):
         for number in np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist():
             configuration = parse_snapshot(decode_text(block.message(number))).configuration
-        found = {name: _found(block, kind, layouts[getattr(TYPES, name)]) for name, kind in _KINDS.items()}
+        found = {name: numbers_of(block, kind, layouts[getattr(TYPES, name)]) for name, kind in _KINDS.items()}
         velocities = found['velocity'].places
         stamps.append(found['velocity'].stamps)
         parts = []
@@ -66,7 +66,7 @@ def _rows(path: Path, topics: Topics) -> VelocityRows:
     return VelocityRows(np.concatenate(stamps), np.concatenate(columns, axis=1), configuration)
 
 
-class _Found(NamedTuple):
+class NumbersOf(NamedTuple):
     """Messages of one kind in a block."""
 
     places: IntArray  # numbers in the block
@@ -74,7 +74,7 @@ class _Found(NamedTuple):
     numbers: FloatArray  # shape (fields, n)
 
 
-def _found(block: Messages, kind: Kind, layout: Layout) -> _Found:
+def numbers_of(block: Messages, kind: Kind, layout: Layout) -> NumbersOf:
     """All messages of a kind, whose numbers are float64.
 
     Raises:
@@ -94,6 +94,6 @@ def _found(block: Messages, kind: Kind, layout: Layout) -> _Found:
         raise UnsuitedError(f'a message that is no {layout.message_type}')
     starts = offsets + begin
     numbers = [block.data[(starts + at)[:, None] + np.arange(8)].view('<f8')[:, 0] for at in layout.offsets]
-    return _Found(
+    return NumbersOf(
         places, seconds * SECOND + nanoseconds, np.array(numbers, np.float64).reshape(len(layout.offsets), len(places))
     )

@@ -14,6 +14,7 @@ from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
+from seal_friction_ros.offline.bags.bulk_velocity_rows import numbers_of
 from seal_friction_ros.offline.replay.bag_health import bag_health
 from seal_friction_ros.offline.replay.bag_parts import try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
@@ -164,9 +165,7 @@ class _Levels:
 def _pressures(messages: Messages) -> tuple[Any, FloatArray]:
     """Numbers of the pressure messages of a block, and the larger chamber pressure [Pa] of each."""
     layout = next(one for one in LAYOUTS if one.message_type == PRESSURE_TYPE)
-    places = np.flatnonzero(messages.kinds == Kind.PRESSURE)
-    begin = messages.offsets[places] + messages.sizes[places] - layout.size
-    chambers = [messages.data[(begin + offset)[:, None] + np.arange(8)].view('<f8')[:, 0] for offset in layout.offsets]
+    places, _, chambers = numbers_of(messages, Kind.PRESSURE, layout)
     larger: FloatArray = np.maximum(*chambers)
     return places, larger
 

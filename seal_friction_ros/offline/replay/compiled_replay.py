@@ -91,9 +91,20 @@ class Run:
         self.state = init(self._parameters) if state is None else state
 
     def compared(
-        self, blocks: Iterable[Messages], topics: Topics, advance: Callable[[int], None] = lambda _: None
+        self,
+        blocks: Iterable[Messages],
+        topics: Topics,
+        advance: Callable[[int], None] = lambda _: None,
+        *,
+        may_be_cut: bool = True,
     ) -> ReplayResult:
         """Answers to the blocks, compared with the recorded ones.
+
+        Args:
+            blocks: In order.
+            topics: The estimator's topics.
+            advance: Called with the number of messages of each block.
+            may_be_cut: Whether the recording may have stopped between the last message and its answer.
 
         Raises:
             UnsuitedError: As `receive_all`.
@@ -112,7 +123,7 @@ class Run:
                 answered = answers.estimate_sizes[-1] or answers.feedforward_sizes[-1]
                 is_cut = bool(answered) or int(kinds[-1]) in (Kind.ESTIMATE, Kind.OTHER_ESTIMATE)
             advance(len(kinds))
-        return replay_result(velocities, streams, versions, is_cut=is_cut)
+        return replay_result(velocities, streams, versions, is_cut=is_cut and may_be_cut)
 
     def answered(self, blocks: Iterable[Messages]) -> Iterator[tuple[Messages, Answers]]:
         """Blocks of messages and the answers to them; a block ends before each configuration."""

@@ -12,7 +12,13 @@ from mcap.writer import Writer
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.compiled_pipeline import Kind
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FORCE_TYPE, decode_text, encode_text
+from seal_friction_ros.core.estimation.messages import (
+    ESTIMATE_TYPE,
+    FORCE_TYPE,
+    VELOCITY_TYPE,
+    decode_text,
+    encode_text,
+)
 from seal_friction_ros.offline.bags.bag import (
     STATE_TYPE,
     BagMessage,
@@ -144,6 +150,21 @@ def test_an_answer_beyond_a_state_is_no_answer_to_its_stretch(recorded: Path, tm
     assert replay(tmp_path / 'bag').identical
     monkeypatch.setattr(shared_replay, 'STRETCHES', 20)
     assert shared(tmp_path / 'bag') is None
+
+
+def test_answers_that_lack_just_before_a_state_is_a_difference(recorded: Path, tmp_path: Path, monkeypatch):
+    """At the end of a bag the last answer may lack, since a recording may stop there; amid a bag it may not."""
+    messages = list(read_messages(recorded))
+    place = [i for i, message in enumerate(messages) if message.topic == STATE][5]
+    velocity = max(i for i in range(place) if messages[i].type_name == VELOCITY_TYPE)
+    assert place - velocity == 3  # estimate and feed-forward
+    del messages[velocity + 1 : place]
+    with BagWriter(tmp_path / 'bag') as writer:
+        for message in messages:
+            writer.write(*message)
+    monkeypatch.setattr(shared_replay, 'STRETCHES', 20)
+    assert shared(tmp_path / 'bag') is None
+    assert replay(tmp_path / 'bag').differing == 2
 
 
 def test_a_bag_of_several_files_is_shared_too(recorded: Path, tmp_path: Path):

@@ -15,7 +15,12 @@ from harness.dask_cluster import ENVIRONMENT, DaskCluster, begun, dask_cluster, 
 from harness.example_bags import default_configuration, write_inputs, write_recorded
 from paths import ROOT
 
+from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.commands.main import main
+from seal_friction_ros.offline.replay import replay as replay_module
+from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.replay.shared_replay import verify_stretches
+from seal_friction_ros.offline.work.cluster import Cluster
 
 pytest.importorskip('distributed')
 COMMAND = [sys.executable, '-m', 'seal_friction_ros']
@@ -93,6 +98,15 @@ def test_bags_are_replayed_to_the_same_bytes_on_a_cluster_also_by_relative_paths
     assert here == done(*words, '--scheduler', cluster.address, folder=tmp_path)
     assert (here[0], here[2].count('nothing: not a rosbag2 bag')) == (2, 1)
     assert [bag.get('identical') for bag in json.loads(here[1])['bags']] == [False] * 5 + [True, None]
+
+
+def test_one_bag_is_shared_by_the_workers_of_a_cluster(cluster, tmp_path, monkeypatch):
+    monkeypatch.setattr(replay_module, 'STATE_PERIOD', 0.5)
+    replay(write_inputs(tmp_path / 'inputs', 300, default_configuration()), out=tmp_path / 'bag')
+    monkeypatch.chdir(tmp_path)
+    shared = verify_stretches(Path('bag'), find_topics(Path('bag')), Cluster(cluster.address))
+    assert shared == replay(tmp_path / 'bag')
+    assert shared.identical
 
 
 @pytest.mark.long
