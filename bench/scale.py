@@ -150,7 +150,7 @@ def of_bags(source: Path, folder: Path, counts: list[int]) -> dict[str, dict[str
             target = folder / f'{count}' / f'rig{number % 10}' / f'bag{number}'
             target.mkdir(parents=True)
             for file in source.iterdir():
-                (target / file.name).write_bytes(file.read_bytes())
+                (target / file.name).hardlink_to(file)
 
     def timed(workers: int, options: list[str]) -> dict[str, dict[str, float]]:
         return {f'{n}': timed_fleet(folder / f'{n}', options) for n in (counts if workers == WORKERS else counts[:1])}

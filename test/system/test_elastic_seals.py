@@ -7,12 +7,17 @@ from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.servo.motions import Sine
 
 
-@pytest.mark.parametrize(('plant', 'less'), [('elements, 4e5 N/m', 0.80), ('LuGre, 3e5 N/m', 0.65)])
+@pytest.mark.parametrize(
+    ('plant', 'less', 'against'),
+    [('elements, 1e5 N/m', 0.60, 0.80), ('elements, 4e5 N/m', 0.80, 0.90), ('LuGre, 3e5 N/m', 0.65, 0.90)],
+)
 @pytest.mark.long  # `core/tuning/test_other_plants.py` has a shorter form
-def test_the_elastic_feed_forward_reduces_the_tracking_error(plant, less):
+def test_the_elastic_feed_forward_reduces_the_tracking_error(plant, less, against):
     found = result(PLANTS[plant], identified(PLANTS[plant]).presliding)
     assert found.elastic < (1.0 - less) * found.without
-    assert max(found.softer, found.stiffer) < 0.4 * found.without
+    assert found.against < (1.0 - against) * found.without
+    assert max(found.softer, found.stiffer) < 0.45 * found.without
+    assert max(found.against_softer, found.against_stiffer) < 0.4 * found.without
     assert found.elastic < 0.5 * found.rigid
 
 

@@ -271,9 +271,9 @@ def _state(configuration: Configuration, document: Any, version: int) -> Pipelin
         return init(configuration.parameters())._replace(
             pressure=pressure, force=force, refused=bool(document['refused'])
         )
-    # Older bags are without adaptation, temperature, sheared seals and elements of the feed-forward.
-    new = {'adaptation': _encoded_record(NOT_ADAPTED), 'shear': _encoded_record(NOT_FOLLOWED)}
-    estimator = new | document['estimator']
+    # Older bags are without adaptation, temperature, sheared seals, a field of these and elements of the feed-forward.
+    estimator = {'adaptation': _encoded_record(NOT_ADAPTED)} | document['estimator']
+    estimator['shear'] = _encoded_record(NOT_FOLLOWED) | estimator.get('shear', {})
     guided = _encoded_record(FADED_OUT) | document['feedforward']
     document = {'temperature': _encoded_record(NO_TEMPERATURE)} | document
     state: PipelineState = _parsed(PipelineState, document | {'estimator': estimator, 'feedforward': guided})

@@ -17,7 +17,11 @@ displacement, `presliding.element_forces`, with f for the sliding friction:
 
 where v_l is the velocity ``lead_time`` ahead and v the present one. Just after a reversal the sheared seal still pushes
 the rod, now in the direction of motion. To cancel this push, the force would have to act against the wanted motion: it
-is 0 N instead until the seal resists, which leaves the push to the controller.
+is 0 N instead until the seal resists, which leaves the push to the controller. Only ``presliding_against_motion`` lets
+it act against the motion there:
+
+.. math::
+    F = s\,F_f\,|\tanh(v / w)|
 
 The velocity comes from the reference and not from the rod, so the feed-forward closes no loop: too large a force makes
 an error, but no limit cycle. A gain below 1 leaves some friction to the controller, which a wrong model needs. tanh is
@@ -96,6 +100,12 @@ class FeedForwardSettings:
         False,
         unit='',
         description='At a reversal the force follows the elasticity of the seals, where their seal files have it.',
+    )
+    presliding_against_motion: bool = parameter(
+        False,
+        unit='',
+        description='With presliding: just after a reversal the force may act against the wanted motion, to hold the '
+        'push of the sheared seals.',
     )
     use_measured_velocity: bool = parameter(
         False, unit='', description='From the rod instead of the reference; closes a loop, so it can limit-cycle.'
@@ -191,9 +201,9 @@ def compensation(settings: FeedForwardSettings, friction: float, velocity: float
 @compilable
 def elastic_compensation(settings: FeedForwardSettings, friction_force: float, velocity: float) -> float:
     """Force [N] for a friction force F_f [N] of sheared seals and the present wanted velocity [m/s]."""
-    if not friction_force * velocity > 0.0:
+    if not (friction_force * velocity > 0.0 or settings.presliding_against_motion):
         return 0.0
-    return settings.scale * abs(friction_force) * math.tanh(velocity / settings.smoothing_velocity)
+    return settings.scale * friction_force * abs(math.tanh(velocity / settings.smoothing_velocity))
 
 
 @compilable

@@ -13,9 +13,11 @@ r"""Friction of seals that still shear: the elastic state that the estimate foll
   standard deviation that elasticity adds. The rod counts as sliding when both have come within 5 % of their sliding
   friction.
 - **Unknown shear**: at the start, after a gap, and after a rest without a force sum the seals may be sheared in any
-  way. The force is then a guess: sliding friction at the start, that of before after a gap. The softer seals begin
-  fully sheared against the motion, with all of their stiction. A way keeps the order of the forces of an element, so
-  when these slide, any seals do.
+  way. So they may after a rest without a known inertia, since part of the force sum accelerates a rod that is about to
+  start, and after one that began while they sheared: the force sum does not tell which element bears it. The force is
+  then a guess: sliding friction at the start, the force sum after a rest, that of before after a gap. The softer seals
+  begin fully sheared against the motion, with all of their stiction. A way keeps the order of the forces of an element,
+  so when these slide, any seals do.
 
 Source: the elements are those of `presliding`; all else is our choice.
 """
@@ -48,7 +50,7 @@ BAND = 2.0  # [-] standard deviations by which the softer seals are softer
 LEAST_STD = 0.15  # [-] of the stiffness: elements of one power law miss a seal of another structure by as much
 LEAST_SOFTNESS = 0.1  # [-] stiffness of the softer seals over that of the file, at least
 NOISE = 0.01  # [-] of the friction, to which the seals of a rod at rest bear the force sum
-EQUAL = 1e-3  # [-] of the friction, to which seals and softer seals that slide are the same
+EQUAL = 1e-3  # [-] of the friction, to which seals and softer seals are the same
 
 
 class FollowedElasticity(NamedTuple):
@@ -72,9 +74,10 @@ class FollowedShear(NamedTuple):
     rest_since: int  # [ns] stamp; `NEVER` while the rod moves
     fully_sheared: float  # [N] with sign: sliding friction that all elements bear, which are 0 here; 0.0: not all yield
     way_back: float  # [m] of seals that slide, against their direction
+    rests_alike: bool = False  # whether seals and softer seals were sheared alike when the rest began
 
 
-NOT_FOLLOWED = FollowedShear(NEVER, 0.0, 0.0, NOT_SHEARED, NOT_SHEARED, False, 0, NEVER, 0.0, 0.0)
+NOT_FOLLOWED = FollowedShear(NEVER, 0.0, 0.0, NOT_SHEARED, NOT_SHEARED, False, 0, NEVER, 0.0, 0.0, False)
 """State before the first sample."""
 
 
@@ -131,7 +134,9 @@ def follow(
         state: `NOT_FOLLOWED` or the state before.
         moment: The sample.
     """
-    last_stamp, last_velocity, period, seals, softer, is_known, last_direction, rest_since, full, way_back = state
+    last_stamp, last_velocity, period, seals, softer, is_known, last_direction, rest_since, full, way_back, alike = (
+        state
+    )
     stamp, velocity, direction, _, knows_force_sum, knows_inertia, coulomb, velocity_friction, _ = moment
     elapsed = (stamp - last_stamp) * 1e-9 if last_stamp != NEVER else 0.0
     way = 0.5 * (last_velocity + velocity) * elapsed + way_back
@@ -149,16 +154,18 @@ def follow(
         if (sliding - abs(full)) * elasticity.yield_compliance <= abs(way):  # most samples: three times as fast
             full, seals = direction * sliding, Shear(NO_ELEMENTS, excess)
             way_left *= direction
-            state = FollowedShear(stamp, velocity, elapsed, seals, seals, True, direction, rest_since, full, way_left)
+            state = FollowedShear(
+                stamp, velocity, elapsed, seals, seals, True, direction, rest_since, full, way_left, True
+            )
             return state, ShearedFriction(True, full, 0.0, True)
-    if full != 0.0:
-        softer = Shear(_fully_sheared(elasticity.softer, full), seals.excess)
-        seals = Shear(_fully_sheared(elasticity.seals, full), seals.excess)
+    seals, softer = _with_elements(elasticity, seals, softer, full)
+    if rest_since == stamp:
+        alike = _are_alike(seals, softer, EQUAL * coulomb)
     if direction == 0:
         seals = _held(elasticity.seals, seals, moment, elapsed)
         softer = _held(elasticity.softer, softer, moment, elapsed)
-        is_known = is_known and knows_force_sum
-        return FollowedShear(stamp, velocity, elapsed, seals, softer, is_known, 0, rest_since, 0.0, 0.0), AT_REST
+        is_known = is_known and knows_force_sum and knows_inertia and alike
+        return FollowedShear(stamp, velocity, elapsed, seals, softer, is_known, 0, rest_since, 0.0, 0.0, alike), AT_REST
     if not is_known and direction != last_direction:
         softer = _sheared_against(elasticity.softer, moment, direction)
     seals, softer, sheared = _moved(elasticity, seals, softer, Slide(way, elapsed, *moment[6:]), direction)
@@ -166,10 +173,11 @@ def follow(
         seals = _held(elasticity.seals, seals, moment, 0.0)
         sheared = _bearing(seals, softer)
     is_known, full = is_known or sheared.slides, 0.0
-    if is_known and abs(sheared.force) == coulomb + seals.excess and sheared.std <= EQUAL * abs(sheared.force):
+    if sheared.slides and abs(sheared.force) == coulomb + seals.excess and sheared.std <= EQUAL * abs(sheared.force):
         full, seals = sheared.force, Shear(NO_ELEMENTS, seals.excess)
         softer = seals
-    return FollowedShear(stamp, velocity, elapsed, seals, softer, is_known, direction, rest_since, full, 0.0), sheared
+    state = FollowedShear(stamp, velocity, elapsed, seals, softer, is_known, direction, rest_since, full, 0.0, alike)
+    return state, sheared
 
 
 @compilable
@@ -256,6 +264,24 @@ def _bearing(seals: Shear, softer: Shear) -> ShearedFriction:
         force += seals.forces[i]
         softer_force += softer.forces[i]
     return ShearedFriction(True, force, 0.5 * abs(force - softer_force), False)
+
+
+@compilable
+def _with_elements(elasticity: FollowedElasticity, seals: Shear, softer: Shear, full: float) -> tuple[Shear, Shear]:
+    """Seals and softer seals with the forces of their elements, which are not kept where all bear ``full`` [N]."""
+    if full == 0.0:
+        return seals, softer
+    excess = seals.excess
+    return Shear(_fully_sheared(elasticity.seals, full), excess), Shear(_fully_sheared(elasticity.softer, full), excess)
+
+
+@compilable
+def _are_alike(seals: Shear, softer: Shear, most: float) -> bool:
+    """Whether each element of seals and softer seals bears the same force, to ``most`` [N]."""
+    apart = 0.0
+    for i in range(SLOTS):
+        apart = max(apart, abs(seals.forces[i] - softer.forces[i]))
+    return apart <= most
 
 
 @compilable

@@ -247,6 +247,7 @@ changes = st.fixed_dictionaries(
         'slew_limit': st.floats(1e-3, 1e6),
         'use_stiction': st.booleans(),
         'presliding': st.booleans(),
+        'presliding_against_motion': st.booleans(),
         'stick_velocity': st.just(0.0),
         'pressure_rate_max': st.floats(1e6, 1e10),
         'force_rate_max': st.floats(1e2, 1e8),

@@ -236,6 +236,29 @@ def test_after_a_reversal_the_force_is_0_until_the_seal_resists_and_then_follows
     assert forces[-1] == -42.0
 
 
+def test_against_the_motion_the_force_holds_the_push_of_the_sheared_seal_and_nothing_else():
+    allowed = dataclasses.replace(ELASTIC, presliding_against_motion=True)
+    velocities = [0.01] * 400 + [-0.01] * 400 + [0.0] * 5
+    forces, cautious = run_elastic(allowed, SPRINGS, velocities), run_elastic(ELASTIC, SPRINGS, velocities)
+    way = (np.arange(401, 801) - 401) * 1e-5  # [m] since the reversal, in the middle between two velocities
+    spring = np.array([42.0 - 2.0 * initial_loading(SPRINGS, s / 2.0, 42.0) for s in way])
+    np.testing.assert_allclose(forces[400:800], spring, atol=1e-9)
+    same = forces * velocities >= 0.0
+    assert forces[same].tolist() == cautious[same].tolist()  # differs only where it acts against the motion
+    assert np.count_nonzero(~same) > 20
+    assert not forces[800:].any()  # 0 N at rest
+
+
+@given(st.lists(st.floats(-0.2, 0.2), max_size=40), st.floats(0.0, 2.0), st.floats(1e3, 1e7))
+def test_against_the_motion_the_force_is_never_more_than_the_friction(velocities, scale, stiffness):
+    settings = dataclasses.replace(ELASTIC, scale=scale, presliding_against_motion=True)
+    forces = run_elastic(settings, presliding_numbers([Presliding(stiffness=stiffness)]), velocities)
+    assert all(np.abs(forces) <= scale * 42.0 * (1.0 + 1e-12))
+    off = dataclasses.replace(settings, presliding=False)
+    rigid = run_elastic(off, SPRINGS, velocities)
+    assert all(force * velocity >= 0.0 for force, velocity in zip(rigid.tolist(), velocities, strict=True))
+
+
 @given(st.lists(st.floats(-0.2, 0.2), max_size=20))
 def test_rigid_seals_and_presliding_off_are_one_force_to_the_bit(velocities):
     off = dataclasses.replace(ELASTIC, presliding=False)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from paths import ROOT
@@ -194,26 +194,30 @@ def test_the_force_is_that_of_the_law_of_elastic_seals_but_for_rounding(velociti
             last, stamp = velocity, stamp + MS
 
 
-def test_a_rest_without_a_force_sum_leaves_the_shear_unknown():
+def test_after_a_rest_the_shear_is_known_by_a_force_sum_without_inertia_alone():
     elasticity = followed_elasticity(presliding_numbers([SOFT, SOFT]), 0.1)
     state = NOT_FOLLOWED
     moment = Moment(START, 0.01, 1, 0.0, True, False, 40.0, 0.0, 0.0)
     for i in range(500):
         state, _ = follow(elasticity, state, moment._replace(stamp=START + i * MS))
-    known = unknown = state
-    for i in range(1, 102):
-        at_rest = moment._replace(velocity=0.0, direction=0, stamp=state.stamp + i * MS)
-        assert unknown.is_known
-        known, _ = follow(elasticity, known, at_rest)
-        unknown, _ = follow(elasticity, unknown, at_rest._replace(knows_force_sum=False))
-    assert known.is_known
-    assert not unknown.is_known
+    for knows_force_sum, knows_inertia in ((True, True), (True, False), (False, True)):
+        after = state
+        for i in range(1, 102):
+            assert after.is_known
+            at_rest = Moment(state.stamp + i * MS, 0.0, 0, 0.0, knows_force_sum, knows_inertia, 40.0, 0.0, 0.0)
+            after, _ = follow(elasticity, after, at_rest)
+        assert after.is_known == (knows_force_sum and knows_inertia)
 
 
 STIFFNESS, COULOMB = 1e5, 40.0  # [N/m], [N]
 
 
 @hypothesis_settings(max_examples=300)
+@example([0.0] * 6, 0.15, 0.0, [(-1, 286), (0, 106), (1, 2)], 0.0039, 0.0, 0.0, 100.0, False)  # a heavy rod starts
+@example([0.0] * 6, 0.3, -1.5, [(1, 177), (-1, 113)], 0.0496, 3.0, 15.0, 0.0, False)  # stiction that is not broken yet
+@example(  # a rest while the seals shear
+    [0.0] * 6, 0.15, -2.0, [(-1, 212), (0, 112), (-1, 23), (0, 148), (-1, 25)], 0.0137, 1.0, 15.0, 0.0, True
+)
 @given(
     start=st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6),
     stiffness_std=st.sampled_from([LEAST_STD, 0.3]),
