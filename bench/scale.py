@@ -141,11 +141,11 @@ def of_an_hour(folder: Path, seconds: float) -> dict[str, Any]:
 
 
 def of_bags(source: Path, folder: Path, counts: list[int]) -> dict[str, dict[str, dict[str, float]]]:
-    """Wall time [s] and memory of the command [MB] of ``fleet`` over so many copies of a small bag.
+    """Wall time [s] and memory of the command [MB] of ``fleet`` over so many links to a small bag.
 
     One worker alone takes the first number of bags only.
     """
-    for count in counts:
+    for count in {WORKERS, *counts}:
         for number in range(count):
             target = folder / f'{count}' / f'rig{number % 10}' / f'bag{number}'
             target.mkdir(parents=True)
@@ -157,11 +157,11 @@ def of_bags(source: Path, folder: Path, counts: list[int]) -> dict[str, dict[str
 
     found = {}
     for workers, name in ((1, '1 {}'), (WORKERS, f'{WORKERS} {{}}s')):
-        timed(1, ['--workers', f'{workers}'])  # compiles, if nothing is kept
+        timed_fleet(folder / f'{WORKERS}', ['--workers', f'{workers}'])  # compiles, if nothing is kept
         found[name.format('forked worker')] = timed(workers, ['--workers', f'{workers}'])
         if find_spec('distributed'):
             with dask_cluster(folder / f'cluster {workers}', workers) as cluster:
-                timed(1, ['--scheduler', cluster.address])  # each worker compiles, once
+                timed_fleet(folder / f'{WORKERS}', ['--scheduler', cluster.address])  # each worker compiles, once
                 found[name.format('Dask worker')] = timed(workers, ['--scheduler', cluster.address])
     return found
 

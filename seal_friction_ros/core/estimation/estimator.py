@@ -46,6 +46,7 @@ from seal_friction_ros.core.estimation.sheared_seals import (
     Moment,
     follow,
     followed_elasticity,
+    slide_on,
 )
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import check, parameter
@@ -506,12 +507,22 @@ def _with_sheared_seals(
     stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left = estimate
     if status & _NO_STATE:
         return state, estimate
-    known = state.adaptation
+    known, measured, moves = state.adaptation, state.velocity.velocity, sign(seen.velocity)
+    last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear = state
+    if moves != 0:
+        slides_on, shear = slide_on(
+            elasticity, shear, stamp, measured, moves, NEVER, coulomb, friction.velocity_friction
+        )
+        if slides_on and shear.fully_sheared == force:  # then nothing in the estimate changes
+            return EstimatorState(
+                last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known,
+                shear,
+            ), estimate  # fmt: skip
     inertia = settings.moving_mass * known.acceleration
     moment = Moment(
         stamp,
-        state.velocity.velocity,
-        sign(seen.velocity),
+        measured,
+        moves,
         seen.force_sum - offset - inertia,
         not status & _NO_FORCE_SUM,
         settings.moving_mass > 0.0 and abs(inertia) <= LARGEST_INERTIA * coulomb and known.stamp != NEVER,
@@ -531,7 +542,6 @@ def _with_sheared_seals(
         estimate = FrictionEstimate(
             stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left
         )
-    last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, _ = state
     return EstimatorState(
         last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear
     ), estimate

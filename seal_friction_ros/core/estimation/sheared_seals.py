@@ -148,16 +148,12 @@ def follow(
     elapsed = between(0.0, elapsed, LONGEST_GAP)
     rest_since, direction = _rest(stamp, direction, rest_since, last_direction)
     bears = rest_since != NEVER and knows_inertia and knows_force_sum
-    if is_known and full * direction > 0.0 and not bears:
-        excess, way_left = _sliding_on(elasticity, moment, seals.excess, full, way * direction)
-        sliding = between(0.0, coulomb + excess, math.inf)
-        if (sliding - abs(full)) * elasticity.yield_compliance <= abs(way):  # most samples: three times as fast
-            full, seals = direction * sliding, Shear(NO_ELEMENTS, excess)
-            way_left *= direction
-            state = FollowedShear(
-                stamp, velocity, elapsed, seals, seals, True, direction, rest_since, full, way_left, True
-            )
-            return state, ShearedFriction(True, full, 0.0, True)
+    if not bears:
+        slides_on, further = slide_on(
+            elasticity, state, stamp, velocity, direction, rest_since, coulomb, velocity_friction
+        )
+        if slides_on:
+            return further, ShearedFriction(True, further.fully_sheared, 0.0, True)
     seals, softer = _with_elements(elasticity, seals, softer, full)
     if rest_since == stamp:
         alike = _are_alike(seals, softer, EQUAL * coulomb)
@@ -181,6 +177,56 @@ def follow(
 
 
 @compilable
+def slide_on(
+    elasticity: FollowedElasticity,
+    state: FollowedShear,
+    stamp: int,
+    velocity: float,
+    direction: int,
+    rest_since: int,
+    coulomb: float,
+    velocity_friction: float,
+) -> tuple[bool, FollowedShear]:
+    """Whether seals that all slid still slide in their direction, and then the next state: most samples, for a third.
+
+    Args:
+        elasticity: Of the seals.
+        state: Before this sample.
+        stamp: [ns]
+        velocity: [m/s] as measured.
+        direction: -1 or 1 of the motion; 0: the rod rests.
+        rest_since: [ns] stamp; `NEVER` while the rod moves.
+        coulomb: Coulomb friction [N].
+        velocity_friction: What sliding adds to it [N].
+    """
+    last_stamp, last_velocity, period, seals, _, is_known, _, _, full, way_back, _ = state
+    if not is_known or full * direction <= 0.0:
+        return False, state
+    elapsed = (stamp - last_stamp) * 1e-9
+    if not (0.0 <= elapsed <= SHORT_GAP or SHORT_GAP < elapsed <= _longest_gap(period)):
+        return False, state
+    way = (0.5 * (last_velocity + velocity) * elapsed + way_back) * direction
+    excess, way_left = seals.excess, way
+    if way > 0.0:
+        way_left, memory_length = 0.0, elasticity.seals.memory_length
+        if memory_length > 0.0:
+            stretch = (coulomb + excess - abs(full)) * elasticity.seals.shares.last
+            length = between(0.0, way - stretch / elasticity.seals.stiffnesses.last, way)  # `presliding.gross_sliding`
+            excess = relaxed(excess, velocity_friction, length, memory_length)
+        else:
+            excess = velocity_friction
+    sliding = coulomb + excess if coulomb + excess > 0.0 else 0.0
+    if not (sliding - abs(full)) * elasticity.yield_compliance <= abs(way):
+        return False, state
+    if excess != seals.excess:
+        seals = Shear(NO_ELEMENTS, excess)
+    full, way_left = direction * sliding, direction * way_left
+    return True, FollowedShear(
+        stamp, velocity, elapsed, seals, seals, True, direction, rest_since, full, way_left, True
+    )
+
+
+@compilable
 def _rest(stamp: int, direction: int, since: int, last_direction: int) -> tuple[int, int]:
     """Stamp [ns] since which the rod rests, `NEVER` if it moves, and the direction: the last one for `REST`."""
     if direction != 0:
@@ -188,18 +234,6 @@ def _rest(stamp: int, direction: int, since: int, last_direction: int) -> tuple[
     if since == NEVER:
         since = stamp
     return since, last_direction if 0 <= stamp - since < REST else 0
-
-
-@compilable
-def _sliding_on(
-    elasticity: FollowedElasticity, moment: Moment, excess: float, full: float, way: float
-) -> tuple[float, float]:
-    """Excess [N] of seals that slide with a friction ``full`` [N] and go on by ``way`` [m], and what is left of it."""
-    if way <= 0.0:
-        return excess, way
-    stretch = (moment.coulomb_friction + excess - abs(full)) * elasticity.seals.shares.last
-    length = between(0.0, way - stretch / elasticity.seals.stiffnesses.last, way)  # as `presliding.gross_sliding`
-    return relaxed(excess, moment.velocity_friction, length, elasticity.seals.memory_length), 0.0
 
 
 @compilable
