@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.task import Future
 from rich.console import Console
 from rich.table import Table
@@ -113,16 +113,19 @@ class Asker:
             self._add(ServoReference, 'servo_reference', ServoReference(velocity=0.05))
             self._add(RodVelocity, 'rod_velocity', RodVelocity(velocity=0.05))
             topics = ['friction_estimate']
-        self._each = count if case.together else 1
         kind = MachineFriction if case.together else FrictionEstimate
         for topic in ['/machine_estimator/friction'] if case.together else topics:
-            self.node.create_subscription(kind, topic, self._hear, qos.STREAM, raw=True)
+            hear = self._hear_all if case.together else self._hear
+            self.node.create_subscription(kind, topic, hear, qos.STREAM, raw=True)
 
     def _add(self, kind: Any, topic: str, message: Any) -> None:
         self.messages.append((self.node.create_publisher(kind, topic, qos.STREAM), message))
 
     def _hear(self, _data: bytes) -> None:
-        self.answers += self._each
+        self.answers += 1
+
+    def _hear_all(self, data: bytes) -> None:
+        self.answers += len(deserialize_message(data, MachineFriction).estimated)
 
     def __enter__(self) -> 'Asker':
         self._stopped = Future()

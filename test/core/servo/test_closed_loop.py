@@ -8,8 +8,17 @@ import pytest
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
-from seal_friction_ros.core.servo.closed_loop import Axis, run_closed_loop, without_feedforward
-from seal_friction_ros.core.servo.motions import RoundedWave, Sine, Trapezoid
+from seal_friction_ros.core.servo.closed_loop import (
+    EVALUATED_PERIODS,
+    SETTLING_PERIODS,
+    Axis,
+    AxisRun,
+    EvaluationMotions,
+    StoppedWave,
+    run_closed_loop,
+    without_feedforward,
+)
+from seal_friction_ros.core.servo.motions import RoundedWave, Setpoint, Sine, Trapezoid
 from seal_friction_ros.core.servo.position_servo import ServoParameters
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.tracking import reversals, tracking_rms
@@ -89,3 +98,16 @@ def test_with_adaptation_a_seal_of_40_percent_more_friction_tracks_as_with_its_o
     fixed = adapted_error(stronger, off)
     assert adapted < fixed < without
     assert adapted < 1.3 * right_file
+
+
+def test_a_stopped_wave_stands_still_from_its_stop_on():
+    wave = StoppedWave(Sine(1e-3, 5.0), 0.33)
+    assert wave.at(0.329) == wave.wave.at(0.329)
+    assert wave.at(0.33) == wave.at(10.0) == Setpoint(wave.wave.at(0.33).position)
+
+
+def test_the_evaluated_part_is_whole_periods_of_the_sine():
+    time = PERIOD * np.arange(1, 20_001)
+    part = EvaluationMotions(Sine(1e-3, 2.0), 1.0).evaluated_part(AxisRun(*(time,) * len(AxisRun._fields)))
+    assert len(part.time) == round(EVALUATED_PERIODS / 2.0 / PERIOD)
+    assert part.time[0] == pytest.approx(SETTLING_PERIODS / 2.0 + PERIOD)

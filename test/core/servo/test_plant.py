@@ -13,12 +13,13 @@ from paths import ROOT
 from scipy.integrate import solve_ivp
 
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
-from seal_friction_ros.core.servo.hydraulics import ServoValve, signed_root
-from seal_friction_ros.core.servo.plant import Load, fastest_rate, inner_step, stored_energy
+from seal_friction_ros.core.servo.hydraulics import ServoValve, oil_chamber_rate, signed_root
+from seal_friction_ros.core.servo.plant import Load, fastest_rate, inner_step, steepest_friction, stored_energy
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs
 
 SEAL = parse_seal(yaml.safe_load((ROOT / 'config/seals/ms28775_114.yaml').read_text()))
@@ -314,3 +315,24 @@ def test_largest_inner_step_that_is_accepted_is_stable():
     for _ in range(200):
         state = advance(longest, state, 1.0)
     assert state.charge_a == pytest.approx(longest.valve.supply_pressure, rel=0.01)
+
+
+def test_each_leakage_of_a_chamber_at_its_stop_adds_its_rate():
+    """Both lands of the valve and both sides of the piston let oil out; the other chamber moves the other way."""
+    rate = oil_chamber_rate(TIGHT_VALVE, TIGHT_CYLINDER)
+    per_leakage = TIGHT_CYLINDER.bulk_modulus / TIGHT_CYLINDER.dead_volume
+    for part, name, factor in (
+        ('valve', 'null_leakage', 2.0), ('cylinder', 'internal_leakage', 2.0), ('cylinder', 'external_leakage', 1.0)
+    ):  # fmt: skip
+        parts = {'valve': TIGHT_VALVE, 'cylinder': TIGHT_CYLINDER}
+        parts[part] = dataclasses.replace(parts[part], **{name: 1e-12})
+        added = oil_chamber_rate(parts['valve'], parts['cylinder']) - rate
+        assert added == pytest.approx(factor * 1e-12 * per_leakage, rel=1e-6)
+
+
+def test_one_seal_with_viscous_friction_makes_the_friction_steep():
+    rigid = SEALS[0].seal
+    viscous = dataclasses.replace(rigid, velocity_terms=VelocityTerms(viscous_friction=500.0))
+    assert steepest_friction(SEALS, 20e6) == 0.0
+    mixed = (MountedSeal(rigid, 'a'), MountedSeal(viscous, 'b'))
+    assert steepest_friction(mixed, 20e6) == pytest.approx(500.0, rel=1e-6)

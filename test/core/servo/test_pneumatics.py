@@ -13,7 +13,13 @@ from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.plant import Load, fastest_rate, inner_step, stored_energy
-from seal_friction_ros.core.servo.pneumatics import GAS_CONSTANT, PneumaticValve, air_pressures_at_rest, iso6358_flow
+from seal_friction_ros.core.servo.pneumatics import (
+    GAS_CONSTANT,
+    PneumaticValve,
+    air_pressures_at_rest,
+    chamber_rates,
+    iso6358_flow,
+)
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs, simulate
 from seal_friction_ros.core.servo.tracking import tracking_rms
 from seal_friction_ros.files import default_configuration
@@ -294,3 +300,15 @@ def test_step_that_is_too_long_for_the_air_is_rejected_with_the_part():
 def test_loop_that_is_too_stiff_for_the_air_is_rejected():
     with pytest.raises(ValueError, match='closed loop is unstable'):
         axis(controller=dataclasses.replace(CONTROLLER, force_bandwidth=2000.0))
+
+
+@pytest.mark.parametrize('pressure', [-5e4, 3e5])
+def test_air_brings_the_enthalpy_of_where_it_comes_from(pressure):
+    """A chamber below the ambient pressure draws air as warm as it is outside; one above it loses its own."""
+    valve, hot = axis(valve=TIGHT).constants.valve, 350.0
+    rate, _, power = chamber_rates(valve, 0.0, 0.5, pressure, hot, 1e-4, 0.0)
+    land = 0.5 * valve.sonic_conductance
+    flow_in = iso6358_flow(valve, land, AMBIENT, valve.temperature, pressure + AMBIENT, hot)
+    source = valve.temperature if pressure < 0.0 else hot
+    assert power == pytest.approx(1.4 / 0.4 * GAS_CONSTANT * flow_in * source, rel=1e-9)
+    assert rate * pressure < 0.0

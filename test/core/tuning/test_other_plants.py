@@ -41,5 +41,12 @@ def test_a_rigid_feed_forward_is_worth_less_on_elastic_seals_and_an_elastic_one_
     assert lugre.tuned.error_area < of_lugre.tuned.error_area
 
 
+def test_three_seals_are_more_than_the_elastic_plant_takes():
+    three = problem(SEAL)
+    seals = tuple(MountedSeal(SEAL, chamber) for chamber in 'aba')
+    axis = three.axis._replace(servo=replace(three.axis.servo, seals=seals))
+    assert on_plants(replace(three, axis=axis), FeedForwardSettings()) == ()
+
+
 def test_without_presliding_in_every_seal_file_there_are_no_other_plants():
     assert on_plants(problem(replace(SEAL, presliding=None)), FeedForwardSettings()) == ()

@@ -119,6 +119,11 @@ def test_acceleration_is_exact_for_a_parabola_and_unknown_at_gaps_and_faults():
     assert np.isfinite(slope[[894, 906]]).all()
 
 
+def test_a_steady_velocity_has_no_acceleration_and_a_slow_change_has():
+    assert not acceleration(TIME, np.full(len(TIME), 0.1))[5:-5].any()  # 0, not rounding
+    np.testing.assert_allclose(acceleration(TIME, 0.1 + 1e-5 * TIME)[5:-5], 1e-5, rtol=1e-3)
+
+
 def test_acceleration_of_next_to_nothing_is_unknown():
     assert np.isnan(acceleration(np.zeros(20), np.zeros(20))).all()
     assert np.isnan(acceleration(np.arange(3.0), np.arange(3.0))).all()
