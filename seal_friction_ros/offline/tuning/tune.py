@@ -427,7 +427,7 @@ def parameter_text(tuning: SimulatorTuning | BagTuning, actuator: str = '') -> s
     for name, meaning in meanings(settings).items():
         value = yaml.safe_dump({name: getattr(settings, name)}).strip()
         unit = f'[{meaning.unit}] ' if meaning.unit else ''
-        lines.append(f'      {value:<32}# {unit}{"tuned" if name in task.tuned else "unchanged"}')
+        lines.append(f'      {value:<32}  # {unit}{"tuned" if name in task.tuned else "unchanged"}')
     return '\n'.join(lines) + '\n'
 
 
