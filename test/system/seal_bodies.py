@@ -5,6 +5,7 @@ Tables, all of them by default:
 - ``bodies``: friction, solid share and rise on slowing down of ``inner_seal`` on each body, three meshes of finite
   elements, what the groove holds, and other widths of the section;
 - ``edge``: peak and forces at the control edge on each body, with the time step of ``inner_seal_control_edge``;
+- ``valve``: the whole valve, ``spool``, all its seals with each body;
 - ``strain``: contact force of the section on a smooth wall by small displacements and by finite strain;
 - ``groove``: ``inner_seal_groove`` with friction of the seal in its groove;
 - ``air``: air under 6 bar through the gap that opens at the edge of ``inner_seal_control_edge``.
@@ -29,7 +30,7 @@ from harness.blow_by import blow_by
 from seal_friction_ros.core.lubrication.contact import dry_contact
 from seal_friction_ros.core.lubrication.findings import findings
 from seal_friction_ros.core.lubrication.grease import apparent_viscosity
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationNumerics, SealBody
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationNumerics, SealBody, Spool
 from seal_friction_ros.core.lubrication.seal_section import (
     SealSection,
     face_compliance,
@@ -44,7 +45,7 @@ from seal_friction_ros.core.oring_contact.equilibrium import (
     unstressed_state,
 )
 from seal_friction_ros.core.oring_contact.surroundings import node_areas, surface_pressure
-from seal_friction_ros.offline.contact.lubrication_runs import single_case
+from seal_friction_ros.offline.contact.lubrication_runs import cases_of_spool, load_case, run_spool, single_case
 
 Rows = list[dict[str, float | str]]
 EDGE_BODIES = ('half_plane', 'finite_elements', 'bonded_layer')
@@ -110,6 +111,33 @@ def edge(numerics: LubricationNumerics) -> Rows:
             }
         )
     return rows
+
+
+def valve(numerics: LubricationNumerics) -> Rows:
+    """Peaks of the whole valve over the friction around them, all its seals with each body."""
+    spool = load_case('spool')
+    assert isinstance(spool, Spool)
+    rows: Rows = []
+    for body in EDGE_BODIES:
+        cases = {
+            member: dataclasses.replace(
+                case,
+                seal=dataclasses.replace(case.seal, body=body),
+                numerics=dataclasses.replace(case.numerics, cells=numerics.cells),
+            )
+            for member, case in cases_of_spool(spool, 'spool').items()
+        }
+        numbers = run_spool(spool, cases, 2).numbers()
+        rows.append({'body': body, **{name: numbers[name] for name in VALVE_NUMBERS}})
+    return rows
+
+
+VALVE_NUMBERS = (
+    'positive_level_N',
+    'positive_peak_over_level',
+    'negative_level_N',
+    'negative_peak_over_level',
+)
 
 
 def strain(_: LubricationNumerics) -> Rows:
@@ -213,6 +241,7 @@ def _of_finite_strain(seal: SealBody, section: SealSection, squeeze: float) -> f
 TABLES: dict[str, Callable[[LubricationNumerics], Rows]] = {
     'bodies': bodies,
     'edge': edge,
+    'valve': valve,
     'strain': strain,
     'groove': groove,
     'air': air,

@@ -60,7 +60,7 @@ def run_case(arguments: argparse.Namespace) -> int:
     if isinstance(case, Spool):
         if arguments.bag is not None:
             raise ValueError(f'{arguments.case}: a spool cannot be compared with a bag: take the case of one seal')
-        spool = runs.run_spool(case, arguments.case, cli.workers_of(arguments))
+        spool = runs.run_spool(case, runs.cases_of_spool(case, arguments.case), cli.workers_of(arguments))
         return _finish(
             arguments, spool, lambda page: report.write_spool_page(case.name, spool.result, spool.labels, page)
         )

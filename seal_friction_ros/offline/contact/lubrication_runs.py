@@ -29,6 +29,7 @@ from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
 from seal_friction_ros.core.lubrication.lubrication_case import (
     LubricationCase,
     Spool,
+    SpoolSeal,
     parse_lubrication_case,
     varied_case,
 )
@@ -217,31 +218,38 @@ class SpoolRun(NamedTuple):
         )
 
 
-def run_spool(spool: Spool, case_file: str, workers: Workers) -> SpoolRun:
+def cases_of_spool(spool: Spool, case_file: str) -> dict[SpoolSeal, LubricationCase]:
+    """Case of every distinct seal of a spool, from beside ``case_file``, the path or name of its file, else config/ehl.
+
+    Raises:
+        ValueError: A case cannot be read.
+    """
+    beside, cases = config_path('ehl', case_file).parent, {}
+    for member in spool.members:
+        local = beside / f'{member.case}.yaml'
+        cases[member] = single_case(str(local) if local.is_file() else member.case, 'spool in it')
+    return cases
+
+
+def run_spool(spool: Spool, cases: Mapping[SpoolSeal, LubricationCase], workers: Workers) -> SpoolRun:
     """Run every distinct seal of a spool once and add the forces of all seals, all in the shortest of their time steps.
 
     Args:
         spool: The spool.
-        case_file: Path or name of its file: the cases of its seals are looked for beside it, then in config/ehl.
+        cases: From `cases_of_spool`.
         workers: Seals at a time, or a cluster.
 
     Raises:
-        ValueError: A case cannot be read, or a step did not converge.
+        ValueError: A step did not converge.
     """
-    beside = config_path('ehl', case_file).parent
-    distinct = list(dict.fromkeys(spool.members))
-    cases = []
-    for member in distinct:
-        local = beside / f'{member.case}.yaml'
-        cases.append(single_case(str(local) if local.is_file() else member.case, 'spool in it'))
-    shortest = min(case.numerics.time_step for case in cases)
+    shortest = min(case.numerics.time_step for case in cases.values())
     calls = []
-    for case, member in zip(cases, distinct, strict=True):
+    for member, case in cases.items():
         numerics, motion = replace(case.numerics, time_step=shortest), replace(spool.motion, centre=member.shift)
         moved = replace(case, motion=motion, numerics=numerics)
         calls.append(partial(run_with_progress, moved, SpoolSealMotion(spool.motion, member)))
     found = run_all(spool.name, calls, workers, prepare=partial(compile_for, calls[0].args[0]))
-    results = dict(zip(distinct, found, strict=True))
+    results = dict(zip(cases, found, strict=True))
     return SpoolRun(spool, superposed(spool.members, [results[member] for member in spool.members]))
 
 

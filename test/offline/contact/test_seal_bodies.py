@@ -42,6 +42,15 @@ def test_the_table_of_the_edge_has_its_peak(monkeypatch, capsys):
     assert row['push of the chamfer [N]'] > 0.2
 
 
+@pytest.mark.long  # two seals with steps for the edge
+def test_a_peak_of_one_seal_stands_on_the_friction_of_the_whole_valve(monkeypatch, capsys):
+    monkeypatch.setattr(seal_bodies, 'EDGE_BODIES', ('finite_elements',))
+    (row,) = table('valve', monkeypatch, capsys)
+    for direction in ('positive', 'negative'):
+        assert 1.05 < row[f'{direction}_peak_over_level'] < 1.5
+        assert row[f'{direction}_level_N'] > 3.0
+
+
 def test_small_displacements_are_right_for_a_small_squeeze(monkeypatch, capsys):
     for row in table('strain', monkeypatch, capsys):
         assert abs(row['more [%]']) < 0.5
@@ -67,4 +76,4 @@ def test_an_unknown_table_is_refused(monkeypatch, capsys):
     monkeypatch.setattr('sys.argv', ['seal_bodies.py', 'soles'])
     with pytest.raises(SystemExit):
         seal_bodies.main()
-    assert 'there is no table soles: there are bodies, edge, strain, groove, air' in capsys.readouterr().err
+    assert 'there is no table soles: there are bodies, edge, valve, strain, groove, air' in capsys.readouterr().err
