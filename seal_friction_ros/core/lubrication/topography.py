@@ -8,6 +8,7 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 from seal_friction_ros.core.lubrication.flow_factors import flow_factor_coefficients
 
 _LEAST_SHARE = 0.02  # of the separation length
+_FURTHEST = 700.0  # [-] separation over decay length from which on the asperities bear nothing: 1 / e^700
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,6 @@ def contact_pressure(stiffness: float, length: float, filling: bool, separation:
     least = _LEAST_SHARE if filling else 0.0
     ratio = max(separation / length, least)
     less = 1.0 if filling else 0.0
-    share = 1.0 / (math.exp(ratio) - less)
+    share = 1.0 / (math.exp(ratio) - less) if ratio < _FURTHEST else 0.0
     slope = -stiffness * share * (1.0 + less * share) / length
     return stiffness * share + slope * min(separation - least * length, 0.0), slope

@@ -4,6 +4,7 @@ The records are those that the live node makes of the same messages (`core.machi
 ``identify``, ``tune``, ``health`` and ``replay`` take the bags as if this package had recorded them.
 """
 
+from array import array
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
@@ -132,15 +133,15 @@ class _Track:
     """Wanted and measured position of an actuator."""
 
     def __init__(self) -> None:
-        self._wanted: list[tuple[int, float]] = []  # stamp [ns], position [m]
-        self._measured: list[tuple[int, float]] = []
+        self._wanted = array('d')  # stamp [ns] and position [m] in turn: tuples take seven times the memory
+        self._measured = array('d')
 
     def take(self, record: Input) -> None:
         """Take one record."""
         if isinstance(record, ServoReference):
-            self._wanted.append((record.stamp, record.position))
+            self._wanted.extend((record.stamp, record.position))
         elif isinstance(record, Position):
-            self._measured.append((record.stamp, record.position))
+            self._measured.extend((record.stamp, record.position))
 
     @property
     def rms(self) -> float | None:

@@ -28,7 +28,7 @@ The rig file describes the columns of the log, their units, signs and areas. The
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
@@ -63,6 +63,7 @@ from seal_friction_ros.offline.work.progress import progress
 
 _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one beyond the int32 seconds of a ROS stamp
 _LONGEST_LINE = 1 << 18  # characters
+_BLOCK = 10_000  # rows that are numbers of Python at a time
 _SHOWN = 40  # characters of an invalid cell in an error message
 _PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
 _REFERENCES = {
@@ -491,17 +492,16 @@ def write_samples(out: Path, samples: Samples, frame_id: str, track: Track = NO_
     Raises:
         BagError: ``out`` exists already or cannot be made.
     """
-    frame = frame_id.encode()
-    nothing = [None] * len(samples.stamp)
-    positions = nothing if track.position is None else track.position.tolist()
-    temperatures = nothing if track.temperature is None else (track.temperature - ZEROS['degC']).tolist()
-    references: Any = nothing
+    frame, rows = frame_id.encode(), len(samples.stamp)
+    positions = repeat(None, rows) if track.position is None else _in_blocks(track.position)
+    celsius_of_rows = repeat(None, rows) if track.temperature is None else _in_blocks(track.temperature - ZEROS['degC'])
+    references: Iterator[Any] = repeat(None, rows)
     if track.reference is not None:
-        references = zip(*(column.tolist() for column in track.reference), strict=True)
-    columns = [array.tolist() for array in samples]
-    with BagWriter(out) as writer, progress(f'import {out.name}', len(samples.stamp)) as advance:
+        references = zip(*map(_in_blocks, track.reference), strict=True)
+    with BagWriter(out) as writer, progress(f'import {out.name}', rows) as advance:
         for count, (row, position, reference, celsius) in enumerate(
-            zip(zip(*columns, strict=True), positions, references, temperatures, strict=True), start=1
+            zip(zip(*map(_in_blocks, samples), strict=True), positions, references, celsius_of_rows, strict=True),
+            start=1,
         ):
             stamp, chamber_a, chamber_b, force_sum, velocity = row
             if celsius is not None:
@@ -524,3 +524,9 @@ def write_samples(out: Path, samples: Samples, frame_id: str, track: Track = NO_
                 advance(1000)
     finite = np.logical_and.reduce([np.isfinite(array) for array in samples[1:]])
     return ImportSummary(len(finite), int((~finite).sum()), int(samples.stamp[0]), int(samples.stamp[-1]))
+
+
+def _in_blocks(values: NDArray[Any]) -> Iterator[Any]:
+    """Values as Python numbers, some at a time: a list of them takes four times the memory of the array."""
+    for first in range(0, len(values), _BLOCK):
+        yield from values[first : first + _BLOCK].tolist()
