@@ -80,7 +80,7 @@ class FeedForwardSettings:
     """Settings of the feed-forward, one field per ROS parameter.
 
     Raises:
-        ValueError: A setting is out of bounds.
+        ValueError: A setting is out of bounds, or the force may act against a measured motion, which may oscillate.
     """
 
     scale: float = parameter(
@@ -128,6 +128,11 @@ class FeedForwardSettings:
 
     def __post_init__(self) -> None:
         check(self)
+        if self.presliding_against_motion and self.use_measured_velocity:
+            raise ValueError(
+                'FeedForwardSettings.presliding_against_motion = true with use_measured_velocity = true: the force '
+                'would take the stiffness of the seals out of a closed loop, which may oscillate: switch one off'
+            )
 
 
 class FeedForwardState(NamedTuple):

@@ -253,7 +253,7 @@ changes = st.fixed_dictionaries(
         'force_rate_max': st.floats(1e2, 1e8),
         'acceleration_max': st.floats(1.0, 1e3),
     },
-)
+).filter(lambda changed: not (changed.get('use_measured_velocity') and changed.get('presliding_against_motion')))
 
 
 @hypothesis_settings(max_examples=250)

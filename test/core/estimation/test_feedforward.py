@@ -202,6 +202,8 @@ def test_a_setting_out_of_bounds_is_refused():
         FeedForwardSettings(fade_time=0.0)
     with pytest.raises(ValueError, match=r'estimate_timeout = 60\.0 s is above'):
         FeedForwardSettings(estimate_timeout=60.0)
+    with pytest.raises(ValueError, match='take the stiffness of the seals out of a closed loop'):
+        FeedForwardSettings(presliding_against_motion=True, use_measured_velocity=True)
 
 
 SPRINGS = presliding_numbers([Presliding(stiffness=1e5, yield_exponent=1.0)])
