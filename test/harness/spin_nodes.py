@@ -45,6 +45,13 @@ class SpunNodes:
         self._executor = (EventsExecutor or SingleThreadedExecutor)(context=context)
         for node in nodes:
             self._executor.add_node(node)
+        context.on_shutdown(self._release)
+
+    def _release(self) -> None:
+        """Let go of the nodes: an executor holds their timers, and so their context and its participant."""
+        for node in self._nodes:
+            self._executor.remove_node(node)
+        self._executor.shutdown(timeout_sec=0)
 
     def spin_until(self, condition: Callable[[], object], timeout: float = TIMEOUT) -> bool:
         """Spin until ``condition`` holds; whether it does within ``timeout`` [s]."""
