@@ -44,8 +44,9 @@ from seal_friction_ros.core.estimation.sheared_seals import (
     FollowedElasticity,
     FollowedShear,
     Moment,
-    follow,
+    ShearedFriction,
     followed_elasticity,
+    shear_on,
     slide_on,
 )
 from seal_friction_ros.core.foundation.compiled import compilable
@@ -509,29 +510,28 @@ def _with_sheared_seals(
         return state, estimate
     known, measured, moves = state.adaptation, state.velocity.velocity, sign(seen.velocity)
     last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear = state
+    slides_on = False
     if moves != 0:
         slides_on, shear = slide_on(
             elasticity, shear, stamp, measured, moves, NEVER, coulomb, friction.velocity_friction
         )
-        if slides_on and shear.fully_sheared == force:  # then nothing in the estimate changes
-            return EstimatorState(
-                last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known,
-                shear,
-            ), estimate  # fmt: skip
-    inertia = settings.moving_mass * known.acceleration
-    moment = Moment(
-        stamp,
-        measured,
-        moves,
-        seen.force_sum - offset - inertia,
-        not status & _NO_FORCE_SUM,
-        settings.moving_mass > 0.0 and abs(inertia) <= LARGEST_INERTIA * coulomb and known.stamp != NEVER,
-        coulomb,
-        friction.velocity_friction,
-        breakaway - coulomb,
-    )
-    shear, sheared = follow(elasticity, state.shear, moment)
-    if sheared.is_followed and acting != UNKNOWN:
+    if slides_on:
+        sheared = ShearedFriction(True, shear.fully_sheared, 0.0, True)
+    else:
+        inertia = settings.moving_mass * known.acceleration
+        moment = Moment(
+            stamp,
+            measured,
+            moves,
+            seen.force_sum - offset - inertia,
+            not status & _NO_FORCE_SUM,
+            settings.moving_mass > 0.0 and abs(inertia) <= LARGEST_INERTIA * coulomb and known.stamp != NEVER,
+            coulomb,
+            friction.velocity_friction,
+            breakaway - coulomb,
+        )
+        shear, sheared = shear_on(elasticity, shear, moment)
+    if sheared.is_followed and acting != UNKNOWN and not (slides_on and sheared.force == force):  # else as it is
         if left != 0.0:  # 0.0: adaptation is off, or there is no residual of this sample
             left += force - sheared.force
         force, std = sheared.force, math.sqrt(std * std + sheared.std * sheared.std)

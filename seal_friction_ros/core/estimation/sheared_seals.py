@@ -134,6 +134,19 @@ def follow(
         state: `NOT_FOLLOWED` or the state before.
         moment: The sample.
     """
+    stamp, velocity, direction, _, _, _, coulomb, velocity_friction, _ = moment
+    if direction != 0:
+        slides_on, further = slide_on(elasticity, state, stamp, velocity, direction, NEVER, coulomb, velocity_friction)
+        if slides_on:
+            return further, ShearedFriction(True, further.fully_sheared, 0.0, True)
+    return shear_on(elasticity, state, moment)
+
+
+@compilable
+def shear_on(
+    elasticity: FollowedElasticity, state: FollowedShear, moment: Moment
+) -> tuple[FollowedShear, ShearedFriction]:
+    """`follow` where the rod rests, or `slide_on` found that its seals do not slide on."""
     last_stamp, last_velocity, period, seals, softer, is_known, last_direction, rest_since, full, way_back, alike = (
         state
     )
@@ -148,7 +161,7 @@ def follow(
     elapsed = between(0.0, elapsed, LONGEST_GAP)
     rest_since, direction = _rest(stamp, direction, rest_since, last_direction)
     bears = rest_since != NEVER and knows_inertia and knows_force_sum
-    if not bears:
+    if rest_since != NEVER and not bears:
         slides_on, further = slide_on(
             elasticity, state, stamp, velocity, direction, rest_since, coulomb, velocity_friction
         )
@@ -247,8 +260,8 @@ def _moved(
     """
     seals, force = shear(elasticity.seals, seals, slide)
     softer, softer_force = shear(elasticity.softer, softer, slide)
-    sliding = between(0.0, slide.coulomb_friction + seals.excess, math.inf)
-    of_softer = between(0.0, slide.coulomb_friction + softer.excess, math.inf)
+    sliding, of_softer = slide.coulomb_friction + seals.excess, slide.coulomb_friction + softer.excess
+    sliding, of_softer = sliding if sliding > 0.0 else 0.0, of_softer if of_softer > 0.0 else 0.0
     apart = abs(force - softer_force)
     slides = force * direction >= SETTLED * sliding and softer_force * direction >= SETTLED * of_softer
     slides = slides and apart <= (1.0 - SETTLED) * sliding

@@ -220,7 +220,8 @@ def shear(numbers: PreslidingNumbers, state: Shear, slide: Slide) -> tuple[Shear
         excess = relaxed(excess, sliding_excess, length, numbers.memory_length)
     else:
         excess = relaxed(excess, stiction, elapsed, numbers.dwell_time)
-    friction = between(0.0, coulomb + excess, math.inf)
+    friction = coulomb + excess
+    friction = friction if friction > 0.0 else 0.0
     forces, force = element_forces(numbers, forces, displacement, friction)
     return Shear(forces, excess), force
 

@@ -325,6 +325,20 @@ def test_no_equilibrium_is_an_error_and_not_a_number(monkeypatch: pytest.MonkeyP
         next(oring_results(ring(), (0.0,)))
 
 
+def test_no_equilibrium_with_friction_of_the_walls_is_an_error_that_says_so(monkeypatch: pytest.MonkeyPatch):
+    follow = loading.follow_path
+
+    def not_with_friction(*arguments):
+        if arguments[-1] == loading._FRICTION_STRIDE:
+            raise NotConvergedError('at 10 % of the path')
+        return follow(*arguments)
+
+    monkeypatch.setattr(loading, 'follow_path', not_with_friction)
+    reason = r'no equilibrium at 1e\+06 Pa with wall_friction = 0\.03: at 10 % of the path'
+    with pytest.raises(NotConvergedError, match=reason):
+        next(oring_results(dataclasses.replace(ring(), wall_friction=0.03), (1e6,)))
+
+
 def test_a_step_that_fails_is_tried_again_shorter(monkeypatch: pytest.MonkeyPatch):
     solve, failures = continuation.solve_equilibrium, []
 
