@@ -8,7 +8,8 @@ play counts as motion: the direction changes after a way back of 2 h, and at res
 
 The half-width is learnt: a velocity that goes up and at once down again, at a low speed, is a ripple; h is the
 largest ripple so far that came twice, times the sample period, forgotten with `MEMORY`. Reversals after ways of only
-a few h widen it by half. A clean signal has no ripple: h is 0 and the velocity comes out unchanged, without delay.
+a few h widen it by half, up to a few ripples: beyond that they are a rod that swings. A clean signal has no ripple: h
+is 0 and the velocity comes out unchanged, without delay.
 
 The speed is the way of a push over the time since the last push (the period method of encoders), smoothed over 10 h /
 |v|, at most `LONGEST_SMOOTHING`; a way of more than 2 h counts over its own sample. While nothing pushes, the speed
@@ -29,6 +30,7 @@ LONGEST_WAIT = 0.2  # [s] a signal that has not pushed for this time, or takes i
 MEMORY = 60.0  # [s] time constant with which a learnt half-width is forgotten
 SLOW_RIPPLE = 4.0  # [-] a ripple counts at speeds up to this multiple of it; a sharp peak of a fast motion is none
 SETTLING = 100  # samples, or [ms] if that is sooner, after which the ripple of a signal is known
+WIDEST = 4.0  # [-] half-width over the last ripple from which on reversals widen it no more: they are a motion
 SHORT_WAY = 8.0  # [-] a reversal after a way of less than this multiple of h widens the play
 
 
@@ -93,7 +95,7 @@ def condition_velocity(
     if 10.0 * half_width < abs(last) * LONGEST_SMOOTHING:
         smoothing = 10.0 * half_width / abs(last)
     turns = push * way < 0.0
-    if turns and abs(way) < SHORT_WAY * half_width:
+    if turns and abs(way) < SHORT_WAY * half_width and half_width < WIDEST * max(ripple, resolution * step):
         half_width = 1.5 * half_width
     result = _speed(state, stamp, push, half_width, smoothing, step)
     return ConditionedVelocity(

@@ -22,6 +22,7 @@ MEMORY = 60.0  # [s]
 SLOW_RIPPLE = 4.0  # [-]
 SETTLING = 100  # samples, or [ms]
 SHORT_WAY = 8.0  # [-]
+WIDEST = 4.0  # [-]
 MS = 1_000_000  # [ns]
 COUNT = 1e-6  # [m] of the encoder
 RATE = 1000.0  # [Hz]
@@ -193,6 +194,17 @@ def test_a_speed_that_would_take_too_long_for_one_play_is_rest():
     for speed, moves in ((0.9 * slow, False), (1.2 * slow, True)):
         state = KNOWN._replace(slack=KNOWN.half_width, last_push=KNOWN.stamp, way=100 * COUNT, velocity=speed)
         assert bool(run([speed], state)[-1].velocity) is moves
+
+
+def test_a_rod_that_swings_is_no_ripple_and_a_motion_after_it_is_seen():
+    """A heavy load on the springs of seals and oil swings out to and fro, again and again."""
+    time = [i / RATE for i in range(20_000)]
+    swing = [3e-4 * math.exp(-(t % 1.0) / 0.15) * math.sin(50.0 * t) for t in time]
+    moving = [swing[-1] + 0.02 * i / RATE for i in range(200)]
+    counts = [round(x / COUNT) for x in swing + moving]
+    states = run([ONE * (after - before) for before, after in pairwise(counts)])
+    assert max(s.half_width for s in states) <= 1.5 * WIDEST * 2.0 * COUNT  # a ripple is one count or two
+    assert all(s.velocity == pytest.approx(0.02, rel=0.1) for s in states[-100:])
 
 
 # --- stamps ---
