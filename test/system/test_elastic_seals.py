@@ -1,7 +1,7 @@
 """The feed-forward with fitted elasticity, on a plant of the same kind and on a structurally different one."""
 
 import pytest
-from system.elastic_seals import MOTIONS, PLANTS, estimate_errors, identified, result
+from system.elastic_seals import MOTIONS, PLANTS, estimate_errors, identified, on_random_motions, result
 
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.servo.motions import Sine
@@ -58,3 +58,8 @@ def test_on_every_plant_status_0_is_a_promise(plant):
         rigid, elastic = (estimate_errors(PLANTS[plant], seals, wave, duration) for seals in (None, model))
         assert elastic.rms < 0.6 * rigid.rms
         assert not elastic.in_band < 0.95  # NaN: no sample is good on soft seals and a short stroke
+
+
+@pytest.mark.long
+def test_on_random_motions_of_heavy_and_light_loads_status_0_is_a_promise():
+    assert on_random_motions(12) > 0.95
