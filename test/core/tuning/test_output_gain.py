@@ -80,6 +80,7 @@ def test_standard_error_covers_the_spread_of_the_gain_over_noise():
     ('change', 'reason'),
     [
         (lambda r: r._replace(command=np.full_like(r.command, 0.001)), 'does not change'),
+        (lambda r: r._replace(command=1e3 + 1e-2 * r.command), 'does not change'),  # in whatever unit
         (lambda r: CommandRecord(*(values[:100] for values in r)), '100 usable samples'),
         (lambda r: r._replace(force=-r.force), 'check the sign'),
         (lambda r: r._replace(velocity=np.zeros_like(r.velocity)), 'do not change independently'),
