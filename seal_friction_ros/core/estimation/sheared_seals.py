@@ -1,6 +1,6 @@
 r"""Friction of seals that still shear: the elastic state that the estimate follows from sample to sample.
 
-``state = NOT_FOLLOWED``, then ``state, friction = follow(elasticity, state, moment)`` for every sample.
+``state = NOT_FOLLOWED``, then `slide_on` for every sample of a rod that moves, and `shear_on` for all others.
 
 - **The rod moves**: its seals shear by its way, :math:`\Delta x = \tfrac12 (v_0 + v)\,\Delta t`, as in
   `presliding.shear`, with the velocities as measured: those of an encoder add up to its positions. While the seals
@@ -124,29 +124,16 @@ def followed_elasticity(seals: PreslidingNumbers, relative_std: float, unlike: f
 
 
 @compilable
-def follow(
+def shear_on(
     elasticity: FollowedElasticity, state: FollowedShear, moment: Moment
 ) -> tuple[FollowedShear, ShearedFriction]:
-    """Friction at one sample.
+    """Friction at one sample where the rod rests, or where `slide_on` found that the seals do not just slide on.
 
     Args:
         elasticity: Of the seals.
         state: `NOT_FOLLOWED` or the state before.
         moment: The sample.
     """
-    stamp, velocity, direction, _, _, _, coulomb, velocity_friction, _ = moment
-    if direction != 0:
-        slides_on, further = slide_on(elasticity, state, stamp, velocity, direction, NEVER, coulomb, velocity_friction)
-        if slides_on:
-            return further, ShearedFriction(True, further.fully_sheared, 0.0, True)
-    return shear_on(elasticity, state, moment)
-
-
-@compilable
-def shear_on(
-    elasticity: FollowedElasticity, state: FollowedShear, moment: Moment
-) -> tuple[FollowedShear, ShearedFriction]:
-    """`follow` where the rod rests, or `slide_on` found that its seals do not slide on."""
     last_stamp, last_velocity, period, seals, softer, is_known, last_direction, rest_since, full, way_back, alike = (
         state
     )

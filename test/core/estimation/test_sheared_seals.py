@@ -14,7 +14,7 @@ from paths import ROOT
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import SealSelection, first_snapshot, parse_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure, RodSample, Status
+from seal_friction_ros.core.estimation.records import NEVER, Force, FrictionEstimate, Pressure, RodSample, Status
 from seal_friction_ros.core.estimation.sheared_seals import (
     LEAST_STD,
     NOT_FOLLOWED,
@@ -22,8 +22,9 @@ from seal_friction_ros.core.estimation.sheared_seals import (
     FollowedShear,
     Moment,
     ShearedFriction,
-    follow,
     followed_elasticity,
+    shear_on,
+    slide_on,
 )
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.presliding import (
@@ -46,6 +47,18 @@ START, MS = 10**12, 10**6  # [ns]
 PRESSURE = 2e6  # [Pa]
 SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))
 SOFT = Presliding(stiffness=5e4, relative_std=0.0)  # each of two
+
+
+def follow(elasticity, state, moment):
+    """State and friction of one sample, as the estimator takes them."""
+    if moment.direction != 0:
+        rubbing = moment.coulomb_friction, moment.velocity_friction
+        slides_on, further = slide_on(
+            elasticity, state, moment.stamp, moment.velocity, moment.direction, NEVER, *rubbing
+        )
+        if slides_on:
+            return further, ShearedFriction(True, further.fully_sheared, 0.0, True)
+    return shear_on(elasticity, state, moment)
 
 
 def parameters(
