@@ -113,7 +113,7 @@ def test_a_linear_law_and_the_offset_are_the_joint_least_squares_solution():
     terms = [law.friction(readings.at, law.named(unit)) for unit in np.eye(len(names))]
     columns = np.column_stack([*terms, readings.at.direction]) / readings.scale[:, None]
     measured = readings.at.direction * readings.force / readings.scale
-    *values, offset = np.linalg.lstsq(columns, measured)[0]
+    *values, offset = np.linalg.lstsq(columns, measured, rcond=None)[0]
     found = fit(law, readings)
     assert [found.values[name] for name in names] == pytest.approx(values, rel=1e-9)
     assert found.offsets == pytest.approx([offset], rel=1e-9)
