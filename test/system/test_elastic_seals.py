@@ -1,8 +1,11 @@
 """The feed-forward with fitted elasticity, on a plant of the same kind and on a structurally different one."""
 
-import pytest
-from system.elastic_seals import MOTIONS, PLANTS, estimate_errors, identified, on_random_motions, result
+from dataclasses import replace
 
+import pytest
+from system.elastic_seals import MOTIONS, PLANTS, estimate_errors, identified, on_random_motions, result, tracking
+
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.servo.motions import Sine
 
@@ -19,6 +22,15 @@ def test_the_elastic_feed_forward_reduces_the_tracking_error(plant, less, agains
     assert max(found.softer, found.stiffer) < 0.45 * found.without
     assert max(found.against_softer, found.against_stiffer) < 0.4 * found.without
     assert found.elastic < 0.5 * found.rigid
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('against', [False, True])
+def test_a_stiffness_that_is_a_tenth_of_the_right_one_is_not_worse_than_no_feed_forward(against):
+    off = FeedForwardSettings(scale=0.0, slew_limit=1e9)
+    on = replace(off, scale=1.0, presliding=True, presliding_against_motion=against)
+    plant = PLANTS['elements, 1e6 N/m']
+    assert tracking(plant, Presliding(stiffness=1e5), on) < 0.9 * tracking(plant, None, off)
 
 
 FOUND = Presliding(stiffness=6.22e5, yield_exponent=2.32, memory_length=4e-4, relative_std=0.004)
