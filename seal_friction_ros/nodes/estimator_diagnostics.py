@@ -20,6 +20,7 @@ from seal_friction_ros.core.estimation.seal_health import (
     health_values,
     with_sample,
 )
+from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
@@ -244,7 +245,12 @@ class EstimatorDiagnostics:
         return [name for name in self._inputs if self._received[name] == self._received_before[name]]
 
     def report(
-        self, active: bool, refused: bool, graph: GraphFindings, parameters: EstimatorParameters | None = None
+        self,
+        active: bool,
+        refused: bool,
+        graph: GraphFindings,
+        parameters: EstimatorParameters | None = None,
+        swing: Swing = NO_SWING,
     ) -> DiagnosticStatus:
         """Status of the estimate in this interval.
 
@@ -253,9 +259,10 @@ class EstimatorDiagnostics:
             active: Whether the node estimates.
             refused: Whether the node rejects its inputs because of duplicate publishers.
             graph: State of the graph.
+            swing: Of the newest sample.
         """
         seconds = max(time.monotonic() - self._started, 1e-3)
-        level, message = self._level(seconds, parameters) if active else (DiagnosticStatus.OK, 'inactive')
+        level, message = self._level(seconds, parameters, swing) if active else (DiagnosticStatus.OK, 'inactive')
         if refused:
             level = DiagnosticStatus.ERROR
         elif (graph.duplicates or graph.unheard) and level == DiagnosticStatus.OK:
@@ -263,6 +270,7 @@ class EstimatorDiagnostics:
         values = self._input_values(seconds, graph) | self._output_values(seconds)
         if active and parameters is not None:
             values |= health_values(parameters, self._adaptation, self._health, self._starts)
+        values['swing without force [um]'] = f'{swing.doubted * 1e6:.1f}'
         values |= {f'{name} best effort only, from': node for name, node in graph.best_effort.items()}
         return DiagnosticStatus(
             level=level,
@@ -270,7 +278,7 @@ class EstimatorDiagnostics:
             values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
 
-    def _level(self, seconds: float, parameters: EstimatorParameters | None) -> tuple[bytes, str]:
+    def _level(self, seconds: float, parameters: EstimatorParameters | None, swing: Swing) -> tuple[bytes, str]:
         """Level and message of an active estimator ``seconds`` [s] after the start of the interval."""
         if not self._latencies and (seconds > _SHORTEST_SILENCE or not self._estimated_before):
             return DiagnosticStatus.STALE, 'no rod_velocity received'
@@ -296,6 +304,9 @@ class EstimatorDiagnostics:
             for bit, message in _NEAR_REST_MESSAGES.items()
             if _share(estimates, bit) > _LARGEST_NEAR_REST
         ]
+        if swing.doubted > 0.0 and _share(estimates, Status.MOTION_UNCERTAIN) > _LARGEST_NEAR_REST:
+            way = f'rod_velocity swings by {swing.doubted * 1e6:.0f} um'
+            said.append(f'{way}, the force sum does not show it: hum, or a wrong force sum')
         return (DiagnosticStatus.WARN, '; '.join(said)) if said else (DiagnosticStatus.OK, 'estimating')
 
     def _feedforward_findings(self, seconds: float) -> list[str]:

@@ -36,6 +36,7 @@ from seal_friction_ros.core.estimation.node_options import (
 )
 from seal_friction_ros.core.estimation.pipeline import init, is_tick_due, receive
 from seal_friction_ros.core.estimation.records import WatchdogTick
+from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.nodes import qos
@@ -241,7 +242,8 @@ class FrictionEstimator(EstimatorNode):
         graph = self._watch.findings(self._statistics.silent_inputs, retry=self.active)
         self._refuse_inputs(graph.duplicates)
         adapting = self._known.estimator if self._adapts else None
-        estimate = self._statistics.report(self.active, self.active and self._state.refused, graph, adapting)
+        swing = self._state.estimator.swing if self.active else NO_SWING
+        estimate = self._statistics.report(self.active, self.active and self._state.refused, graph, adapting, swing)
         return {'estimate': estimate, 'recorder': self.report_graph(graph)}
 
     @property

@@ -30,6 +30,7 @@ from seal_friction_ros.core.estimation.node_options import (
     MachineOptions,
 )
 from seal_friction_ros.core.estimation.records import WatchdogTick
+from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
@@ -339,8 +340,10 @@ class MachineEstimator(EstimatorNode):
         for number, actuator in enumerate(self._machine.actuators):
             name, active = actuator.name, self.active
             adapting = actuator.pipeline.estimator if active and actuator.pipeline.estimator.adapts else None
-            refused = active and self._state.actuators[number].pipeline.refused
-            status = self._statistics[name].report(active, refused, graph, adapting)
+            known = self._state.actuators[number].pipeline if active else None
+            swing = known.estimator.swing if known else NO_SWING
+            refused = known is not None and known.refused
+            status = self._statistics[name].report(active, refused, graph, adapting, swing)
             said = self._unanswered(number) if active else []
             if said:
                 status.level = max(status.level, DiagnosticStatus.WARN)

@@ -7,6 +7,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.messages import INPUTS
 from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
+from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, Lateness, MissingSamples
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
@@ -43,6 +44,16 @@ def test_slow_motion_as_each_reversal_has_it_is_no_warning_and_a_quarter_of_a_se
     level, message = level_of(bit, 0.3)
     assert level == DiagnosticStatus.WARN
     assert message.startswith('30% of rod_velocity')
+
+
+def test_a_velocity_that_hums_is_named():
+    diagnostics, watched = EstimatorDiagnostics(), GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {})
+    for i in range(100):
+        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(Status.MOTION_UNCERTAIN) if i < 50 else 0), 1000, 0)
+    report = diagnostics.report(True, False, watched, swing=NO_SWING._replace(doubted=64e-6))
+    assert report.message.endswith('swings by 64 um, the force sum does not show it: hum, or a wrong force sum')
+    assert {value.key: value.value for value in report.values}['swing without force [um]'] == '64.0'
+    assert 'swings' not in diagnostics.report(True, False, watched).message
 
 
 @pytest.mark.parametrize('bit', [Status.FASTER_THAN_IDENTIFIED, Status.DIRECTION_NOT_IDENTIFIED])

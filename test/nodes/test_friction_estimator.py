@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 import yaml
+from diagnostic_msgs.msg import DiagnosticStatus
 from harness.live_graph import graph
 from harness.processes import STOP_TIMEOUT
 from lifecycle_msgs.msg import Transition
@@ -443,3 +444,13 @@ def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it():
         values = {item.key: item.value for item in g.estimator.diagnostics()['estimate'].values}
         assert values['adaptation mode'] == 'observe'
         assert values['adaptation scale std'] == 'not learnt'
+
+
+def test_a_velocity_that_hums_on_a_rod_that_is_held_is_a_warning():
+    with graph() as g:
+        g.connect()
+        for i in range(200):  # 20 mm/s at 10 Hz
+            g.estimate(SECOND + 5 * i * 10**6, 0.02 * math.sin(2.0 * math.pi * i / 20.0 + 0.1), force=10.0)
+        report = g.estimator.diagnostics()['estimate']
+        assert report.level == DiagnosticStatus.WARN
+        assert 'the force sum does not show it: hum' in report.message

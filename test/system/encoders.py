@@ -50,6 +50,7 @@ class Encoder(NamedTuple):
 
 
 ENCODERS = (Encoder(1e-6, 1e-6, 1000.0), Encoder(5e-6, 1.25e-6, 1000.0), Encoder(1e-6, 0.3e-6, 5000.0))
+HUMS = ((20.0, 0.005), (50.0, 0.01), (50.0, 0.1), (100.0, 0.05))  # [Hz], [m/s] of an analogue velocity
 SET_POINTS = (Encoder(1e-6, 0.0, 1000.0), Encoder(1e-6, 0.3e-6, 1000.0))
 
 
@@ -170,6 +171,18 @@ def moving_rod(encoder: Encoder, seconds: float) -> Found:
     )
 
 
+def held_rod_with_hum(rate: float, amplitude: float, seconds: float) -> Found:
+    """A held rod is stuck, though its analogue velocity hums, with noise and steps of 0.1 mm/s."""
+    time = np.arange(0.0, seconds, 1e-3)
+    noise = np.random.default_rng(7).normal(0.0, 1.0, (2, len(time)))
+    velocity = np.round((amplitude * np.sin(2.0 * math.pi * rate * time) + 3e-4 * noise[0]) / 1e-4) * 1e-4
+    held = HOLDING_FORCE + noise[1]
+    answers = answers_of(PARAMETERS, 1000.0, velocity, held)
+    turns = reversals(answers.friction[answers.status == 0])
+    case = f'held rod; hum of {amplitude * 1e3:g} mm/s at {rate:g} Hz'
+    return Found(case, seconds, turns, 0, **quality(answers, held), least_good=-1.0)
+
+
 def measured_velocity_at_rest(encoder: Encoder, seconds: float) -> Found:
     """With ``use_measured_velocity`` a rod at rest gets no reversal."""
     time = np.arange(0.0, seconds, 1.0 / encoder.rate)
@@ -214,6 +227,8 @@ def all_cases(seconds: float) -> Iterator[Callable[[], Found]]:
     for encoder in ENCODERS:
         for case in (held_rod, moving_rod, measured_velocity_at_rest):
             yield lambda case=case, encoder=encoder: case(encoder, seconds)
+    for rate, amplitude in HUMS:
+        yield lambda r=rate, a=amplitude: held_rod_with_hum(r, a, seconds)
     for set_point in SET_POINTS:
         for speed in (0.0, 5e-5, 5e-4, 9e-4, 1.5e-3, 5e-3):
             yield lambda s=set_point, v=speed: held_speed(s, seconds, v)

@@ -17,6 +17,7 @@ from seal_friction_ros.core.estimation.feedforward import FADED_OUT, FeedForward
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
 from seal_friction_ros.core.estimation.records import NO_TEMPERATURE, Force, Pressure
 from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED
+from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.mounting import CHAMBERS_TEXT, check_chambers
 from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of
@@ -271,8 +272,10 @@ def _state(configuration: Configuration, document: Any, version: int) -> Pipelin
         return init(configuration.parameters())._replace(
             pressure=pressure, force=force, refused=bool(document['refused'])
         )
-    # Older bags are without adaptation, temperature, sheared seals, a field of these and elements of the feed-forward.
-    estimator = {'adaptation': _encoded_record(NOT_ADAPTED)} | document['estimator']
+    # Older bags are without adaptation, temperature, sheared seals, a field of these, swings and elements of the
+    # feed-forward.
+    later = {'adaptation': _encoded_record(NOT_ADAPTED), 'swing': _encoded_record(NO_SWING)}
+    estimator = later | document['estimator']
     estimator['shear'] = _encoded_record(NOT_FOLLOWED) | estimator.get('shear', {})
     guided = _encoded_record(FADED_OUT) | document['feedforward']
     document = {'temperature': _encoded_record(NO_TEMPERATURE)} | document

@@ -49,6 +49,7 @@ from seal_friction_ros.core.estimation.sheared_seals import (
     shear_on,
     slide_on,
 )
+from seal_friction_ros.core.estimation.swings import LONGEST_SWING, NO_SWING, Swing, swing_on
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.actuator import (
@@ -309,6 +310,7 @@ class EstimatorState(NamedTuple):
     motion: ConditionedVelocity  # of the usable velocities
     adaptation: AdaptationState = NOT_ADAPTED
     shear: FollowedShear = NOT_FOLLOWED
+    swing: Swing = NO_SWING
 
 
 class Observation(NamedTuple):
@@ -395,6 +397,7 @@ def step(
 
     Source: thesis, chapter 7 (Figures 20 and 21); what is done with unusable inputs is our choice.
     """
+    last_stamp = state.stamp
     state, seen = assess_inputs(parameters, state, sample)
     friction = _NO_FRICTION
     if not seen.status & _PRESSURE_MISSING:
@@ -404,10 +407,11 @@ def step(
         seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
     if not parameters.adapts:
         estimate = estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
-        return _with_sheared_seals(
+        state, estimate = _with_sheared_seals(
             parameters.adaptation, parameters.followed_elasticity, state, seen, friction, estimate
         )
-    return _adapted_step(parameters, state, seen, friction)
+        return _with_swing(state, seen, last_stamp, estimate) if seen.velocity != 0.0 else (state, estimate)
+    return _adapted_step(parameters, state, seen, friction, last_stamp)
 
 
 @compilable
@@ -441,7 +445,11 @@ def _at_seal_temperature(
 
 @compilable
 def _adapted_step(
-    parameters: EstimatorParameters, state: EstimatorState, seen: Observation, friction: ActuatorFriction
+    parameters: EstimatorParameters,
+    state: EstimatorState,
+    seen: Observation,
+    friction: ActuatorFriction,
+    last_stamp: int,
 ) -> tuple[EstimatorState, FrictionEstimate]:
     """Second half of a step with adaptation: estimate by what was learnt before, then learn from this sample."""
     settings, uses_scale, known = parameters.adaptation, parameters.uses_scale, state.adaptation
@@ -461,10 +469,12 @@ def _adapted_step(
             left += (learnt.scale - 1.0) * law * (1.0 if velocity > 0.0 else -1.0)
     estimate = estimate_of(parameters, seen, adapted, learnt.scale, scale_std, learnt.offset, left)
     state, estimate = _with_sheared_seals(settings, parameters.followed_elasticity, state, seen, adapted, estimate)
+    if velocity != 0.0:
+        state, estimate = _with_swing(state, seen, last_stamp, estimate)
     if not is_due(known, stamp):
         return state, estimate
     status = estimate.status & ~_MODEL_DISAGREES
-    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear = state
+    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear, swing = state
     slide = Slide(
         stamp,
         velocity,
@@ -478,7 +488,33 @@ def _adapted_step(
     )
     known = adapt(settings, known, slide)
     return EstimatorState(
-        last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear
+        last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear, swing
+    ), estimate
+
+
+@compilable
+def _with_swing(
+    state: EstimatorState, seen: Observation, last_stamp: int, estimate: FrictionEstimate
+) -> tuple[EstimatorState, FrictionEstimate]:
+    """Estimate of a sliding rod, marked as uncertain if the force sum does not show its swings."""
+    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear, swing = (
+        state
+    )
+    stamp, velocity, force_sum, _, _ = seen
+    way, doubted = swing.way, swing.doubted
+    if doubted == 0.0 and abs(way) > LONGEST_SWING and (velocity > 0.0) == (way > 0.0):  # most samples of a motion
+        return state, estimate
+    if estimate.status & (_NO_STATE | _NO_FORCE_SUM):
+        return state, estimate
+    swing = swing_on(swing, (stamp - last_stamp) * 1e-9, velocity, force_sum, estimate.friction_force)
+    if swing.doubted > 0.0:
+        _, coulomb, std, breakaway, friction, acting, direction, status, age, scale, scale_std, offset, left = estimate
+        status |= _MOTION_UNCERTAIN
+        estimate = FrictionEstimate(
+            stamp, coulomb, std, breakaway, friction, acting, direction, status, age, scale, scale_std, offset, left
+        )
+    return EstimatorState(
+        last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear, swing
     ), estimate
 
 
@@ -509,7 +545,9 @@ def _with_sheared_seals(
     if status & _NO_STATE:
         return state, estimate
     known, measured, moves = state.adaptation, state.velocity.velocity, sign(seen.velocity)
-    last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear = state
+    last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear, _ = (
+        state
+    )
     slides_on = False
     if moves != 0:
         slides_on, shear = slide_on(
@@ -543,7 +581,18 @@ def _with_sheared_seals(
             stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left
         )
     return EstimatorState(
-        last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear
+        last,
+        at_rest,
+        pressure,
+        known_force,
+        speed,
+        leapt_pressure,
+        leapt_force,
+        leapt_velocity,
+        motion,
+        known,
+        shear,
+        state.swing,
     ), estimate
 
 
@@ -570,6 +619,7 @@ def assess_inputs(
         motion,
         known,
         shear,
+        swing,
     ) = state
     settings = parameters.settings
     status = _INPUT_REFUSED if refused else 0
@@ -607,7 +657,18 @@ def assess_inputs(
         if not at_rest or (uncertain and drives):
             sliding_velocity = motion.velocity
     state = EstimatorState(
-        stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear
+        stamp,
+        at_rest,
+        pressure,
+        force,
+        velocity,
+        leapt_pressure,
+        leapt_force,
+        leapt_velocity,
+        motion,
+        known,
+        shear,
+        swing,
     )
     return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
 

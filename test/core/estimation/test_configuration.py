@@ -40,6 +40,7 @@ from seal_friction_ros.core.estimation.records import (
     Velocity,
 )
 from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED, FollowedShear
+from seal_friction_ros.core.estimation.swings import NO_SWING, Swing
 from seal_friction_ros.core.friction.presliding import NO_ELEMENTS, SLOTS, Elements
 from seal_friction_ros.files import load_configuration, read_yaml
 
@@ -110,6 +111,7 @@ states = st.builds(
         conditioned,
         st.just(NOT_ADAPTED) | records(AdaptationState),
         st.just(NOT_FOLLOWED) | records(FollowedShear),
+        st.just(NO_SWING) | records(Swing),
     ),
     st.builds(
         FeedForwardState,
