@@ -1,5 +1,6 @@
 """Base class of the nodes: lifecycle, parameters from dataclasses, diagnostics once a second."""
 
+import inspect
 import time
 from collections.abc import Callable
 from importlib import import_module
@@ -35,6 +36,11 @@ def message_class(type_name: str) -> Any:
         return getattr(import_module(f'{package}.msg'), name)
     except (ImportError, AttributeError):
         raise ValueError(f'{type_name} is not installed: install the package {package}') from None
+
+
+def publish_raw(publisher: Any, data: bytes) -> None:
+    """Publish an encoded message of an active node: as ``publisher.publish(data)``, in a third of the time."""
+    publisher.handle.publish_raw(data)
 
 
 class _SteadyTimer:
@@ -84,6 +90,7 @@ class ManagedNode(LifecycleNode):
         self.configured = False
         self._groups = groups
         self._diagnostics_timer: Any = None
+        self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._steady_timers: list[_SteadyTimer] = []
         self._diagnostics_publisher: Any = None
         try:
@@ -261,7 +268,9 @@ class ManagedNode(LifecycleNode):
             if self.configured and not made.was_just_called(time.monotonic_ns()):
                 made.call()
 
-        return self.create_timer(period, call, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        # rclpy asks for the signature at every call; without a ready one that is most of the time of a short callback.
+        call.__signature__ = inspect.Signature()  # type: ignore[attr-defined]
+        return self.create_timer(period, call, clock=self._steady_clock)
 
     def call_overdue_timers(self) -> None:
         """Call the timers that the executor has not called in time.

@@ -60,27 +60,35 @@ def day_of(kind: str, seed: int) -> Day:
     }[kind]
 
 
-def simulated(kind: str, seconds: float, seed: int) -> dict[str, Any]:
-    """Largest error of the scale once it has settled, and the reversals after which a change was found."""
-    day = day_of(kind, seed)
-    state, health, worst, found, settled = estimator.init(PARAMETERS), SealHealth(), 0.0, [], []
-    for number, sample in enumerate(samples(day, seconds, seed)):
+def scales(day: Day, seconds: float, seed: int) -> tuple[np.ndarray, list[int]]:
+    """Scale after each sample from `BEGIN` on, and the reversals after which a change was found."""
+    state, health, found, learnt = estimator.init(PARAMETERS), SealHealth(), [], []
+    for sample in samples(day, seconds, seed):
         before = state
         state, _ = step(PARAMETERS, state, sample)
-        adaptation = state.adaptation
         known = health.change.changes
         health = followed(health, PARAMETERS, before, state)
         if health.change.changes > known:
             found.append(health.learnt)
-        time = number * day.period
-        if time < BEGIN:
-            continue
-        truth = day.scale(time)
-        if time < BEGIN + 6.0:
-            settled.append(adaptation.learnt.scale / truth)
-        reference = float(np.mean(settled)) if kind != 'drift' else 1.0
-        worst = max(worst, abs(adaptation.learnt.scale / truth / reference - 1.0))
-    return {'worst': worst, 'found': found}
+        learnt.append(state.adaptation.learnt.scale)
+    return np.array(learnt[round(BEGIN / day.period) :]), found
+
+
+def simulated(kind: str, seconds: float, seed: int) -> dict[str, Any]:
+    """Largest error of the scale, and the reversals after which a change was found.
+
+    The error is against the truth of a drift, else against the mean scale of the same machine without the disturbance.
+    """
+    day = day_of(kind, seed)
+    learnt, found = scales(day, seconds, seed)
+    if kind == 'drift':
+        times = BEGIN + day.period * np.arange(len(learnt))
+        reference = np.array([day.scale(time) for time in times])
+    elif kind == 'undisturbed':
+        reference = learnt.mean()
+    else:
+        reference = scales(day_of('undisturbed', seed), seconds, seed)[0].mean()
+    return {'worst': float(np.abs(learnt / reference - 1.0).max()), 'found': found}
 
 
 def campaign(seeds: int, hours: float, workers: int) -> dict[str, Any]:

@@ -9,6 +9,10 @@ def test_what_is_not_friction_moves_the_scale_of_a_random_machine_by_less_than_5
     assert max(simulated(kind, 45.0, seed)['worst'] for seed in range(100, 103)) < 0.05
 
 
+def test_a_noisy_force_sensor_moves_the_scale_of_the_worst_of_1000_machines_by_less_than_5_percent():
+    assert max(simulated('noise', 45.0, seed)['worst'] for seed in (54, *range(100, 103))) < 0.05
+
+
 @pytest.mark.long  # `core/estimation/test_adaptation.py` has one machine
 def test_a_drift_of_20_percent_is_followed_and_found_and_a_steady_friction_is_no_change():
     drifting = simulated('drift', 100.0, 100)

@@ -16,9 +16,14 @@ own:
 
 .. math:: z = d_2 \frac{\bar y_2 - \bar y_1 - c (\bar x_2 - \bar x_1)}{\bar f_1 + \bar f_2}
 
-  s follows the median of the last six z. A load step within a stroke spoils two z, an offset that drifts makes them
+  s follows the median m of the last six z. A load step within a stroke spoils two z, an offset that drifts makes them
   alternate; the median of an even number of values passes on neither. The standard deviation of s is that of the median
-  of independent z, from their mean absolute deviation, and the distance that s still has to go.
+  of independent z, from their mean absolute deviation, and the distance that s still has to go. At each reversal s goes
+  half of the way to a median that is clearly elsewhere, and less within its standard deviation sigma_m, where the
+  distance is mostly noise:
+
+.. math:: s \leftarrow s + \frac{(m - s)^2}{(m - s)^2 + 4 \sigma_m^2}\,\frac{m - s}{2}
+
 - Force sum, friction of the law and velocity go through **the same two lags**, of which the acceleration is taken: so
   inertia and friction are compared at one and the same time, also while the rod accelerates.
 - **Noise**, the standard deviation of the residual: it grows with each residual outside its 95 % band and shrinks with
@@ -65,7 +70,8 @@ LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is be
 FEWEST_REVERSALS = 3  # before which no scale is believed
 FORGETTING_TIME = 3600.0  # [s] without a reversal in which the scale becomes as uncertain as the seal file
 LARGEST_CHANGE = 0.1  # [-] of the scale in one reversal
-GAIN = 0.5  # [-] share of the way to the median that the scale goes in one reversal
+GAIN = 0.5  # [-] share of the way to the median that the scale goes in one reversal, without noise
+NOISE_WEIGHT = 4.0  # [-] of the variance of the median against the square of that way
 STD_OF_MEAN_DEVIATION = 1.2533  # [-] standard deviation over mean absolute deviation of a normal distribution
 
 
@@ -462,11 +468,13 @@ def _learnt_scale(
     for i in range(known):
         deviation += abs(ratios[i] - median)
     deviation *= STD_OF_MEAN_DEVIATION / known
+    variance = 0.5 * math.pi * deviation * deviation / known  # of a median it is pi / 2 times that of a mean
     if settings.scale_min <= median <= settings.scale_max:
-        most = LARGEST_CHANGE * scale
-        scale += between(-most, GAIN * (median - scale), most)
-    # The variance of a median is pi / 2 times that of a mean.
-    std = math.sqrt(0.5 * math.pi * deviation * deviation / known + (median - scale) * (median - scale))
+        most, distance = LARGEST_CHANGE * scale, median - scale
+        evident = distance * distance
+        share = GAIN * evident / (evident + NOISE_WEIGHT * variance) if evident > 0.0 else 0.0
+        scale += between(-most, share * distance, most)
+    std = math.sqrt(variance + (median - scale) * (median - scale))
     return scale, std, median, ratios
 
 

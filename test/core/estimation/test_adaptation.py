@@ -312,6 +312,18 @@ def test_the_deviation_of_the_scale_is_that_of_a_median_of_six_and_of_what_it_la
     assert math.sqrt(fmean(variances)) == pytest.approx(pstdev(medians), rel=0.15)
 
 
+def after_one_more(scale: float, ratios: tuple[float, ...], ratio: float) -> float:
+    return _learnt_scale(AdaptationSettings('on'), scale, 0.0, Ratios(*ratios), 6, ratio)[0]
+
+
+def test_the_scale_goes_half_of_the_way_to_a_median_that_is_clearly_elsewhere_and_less_within_noise():
+    assert after_one_more(1.0, (1.1,) * 6, 1.1) == pytest.approx(1.05)
+    noisy = (1.04, 0.94, 1.06, 0.98, 1.03, 0.99)  # median 1.01 with the next one, of a standard deviation of 0.02
+    assert 1.0 < after_one_more(1.0, noisy, 1.03) < 1.001
+    assert after_one_more(1.0, (1.0,) * 6, 1.0) == 1.0
+    assert after_one_more(1.0, (2.0,) * 6, 2.0) == pytest.approx(1.1)  # at most a tenth
+
+
 def test_the_feed_forward_follows_a_drift_of_20_percent_over_200_reversals_within_5():
     estimates, reversals = run(replace(DAY, scale=lambda time: 1.0 + 0.001 * time), 201.0)
     late = estimates[20_000]
