@@ -19,8 +19,8 @@ own:
   s follows the median m of the last six z. A load step within a stroke spoils two z, an offset that drifts makes them
   alternate; the median of an even number of values passes on neither. The standard deviation of s is that of the median
   of independent z, from their mean absolute deviation, and the distance that s still has to go. At each reversal s goes
-  half of the way to a median that is clearly elsewhere, and less within its standard deviation sigma_m, where the
-  distance is mostly noise:
+  half of the way to a median that is clearly elsewhere, and less where the distance is mostly noise, of which the
+  median has the standard deviation sigma_m by the differences of one z to the next, so that a drift is no noise:
 
 .. math:: s \leftarrow s + \frac{(m - s)^2}{(m - s)^2 + 4 \sigma_m^2}\,\frac{m - s}{2}
 
@@ -72,6 +72,7 @@ FORGETTING_TIME = 3600.0  # [s] without a reversal in which the scale becomes as
 LARGEST_CHANGE = 0.1  # [-] of the scale in one reversal
 GAIN = 0.5  # [-] share of the way to the median that the scale goes in one reversal, without noise
 NOISE_WEIGHT = 4.0  # [-] of the variance of the median against the square of that way
+STD_OF_MEAN_DIFFERENCE = 0.8862  # [-] standard deviation over mean absolute difference of two such values in a row
 STD_OF_MEAN_DEVIATION = 1.2533  # [-] standard deviation over mean absolute deviation of a normal distribution
 
 
@@ -464,17 +465,20 @@ def _learnt_scale(
     median = _median(ratios, known)
     if known < FEWEST_REVERSALS:
         return scale, std, median, ratios
-    deviation = 0.0
+    deviation, difference = 0.0, 0.0
     for i in range(known):
         deviation += abs(ratios[i] - median)
+        if i > 0:
+            difference += abs(ratios[i] - ratios[i - 1])
     deviation *= STD_OF_MEAN_DEVIATION / known
-    variance = 0.5 * math.pi * deviation * deviation / known  # of a median it is pi / 2 times that of a mean
+    difference *= STD_OF_MEAN_DIFFERENCE / (known - 1)
+    of_median = 0.5 * math.pi / known  # the variance of a median is pi / 2 times that of a mean
     if settings.scale_min <= median <= settings.scale_max:
         most, distance = LARGEST_CHANGE * scale, median - scale
         evident = distance * distance
-        share = GAIN * evident / (evident + NOISE_WEIGHT * variance) if evident > 0.0 else 0.0
-        scale += between(-most, share * distance, most)
-    std = math.sqrt(variance + (median - scale) * (median - scale))
+        share = evident / (evident + NOISE_WEIGHT * of_median * difference * difference) if evident > 0.0 else 0.0
+        scale += between(-most, GAIN * share * distance, most)
+    std = math.sqrt(of_median * deviation * deviation + (median - scale) * (median - scale))
     return scale, std, median, ratios
 
 
