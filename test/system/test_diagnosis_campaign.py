@@ -1,7 +1,7 @@
 """The campaign of wrong inputs holds, in a short form."""
 
 import pytest
-from diagnosis_campaign import FAULTS, campaign, of_log
+from diagnosis_campaign import FAULTS, campaign, of_log, of_machine
 from paths import ROOT
 
 from seal_friction_ros.offline.commands.main import main
@@ -14,6 +14,11 @@ def test_on_random_machines_each_wrong_input_is_named_within_30_s_and_none_on_cl
         assert row['named'] == (0 if row['fault'] == 'clean' else row['runs']), row
         assert row['something_else_named'] == 0, row
         assert row['longest_s'] <= 30.0, row
+
+
+def test_a_machine_whose_strokes_have_four_samples_at_even_speed_has_its_wrong_input_named():
+    assert of_machine('halved force sum', 10)['named'] <= 30.0
+    assert of_machine('clean', 10)['others'] == []
 
 
 @pytest.mark.skipif(not LOGS.is_dir(), reason='the shared data are not beside the project')
