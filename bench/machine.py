@@ -4,11 +4,15 @@ One ``sensor_msgs/JointState`` with all velocities, two ``std_msgs/Float64MultiA
 ``JointState`` with all references at ``--rate``; two answers of each actuator and one array of commands out, all
 recorded. Beside it, in the same run and in turn, the estimator of one actuator with its own messages (four in, two
 out, recorded). Processor time is that of the whole process, its middleware and its recorder among it.
+
+The bare node takes and sends as many messages with rclpy; it decodes, computes and records nothing. No node in Python
+takes less.
 """
 
 import argparse
 import json
 import shutil
+import subprocess
 import sys
 import tempfile
 import threading
@@ -30,6 +34,7 @@ from seal_friction_msgs.msg import (
     CylinderPressure,
     ForceSum,
     FrictionEstimate,
+    FrictionFeedForward,
     MachineFriction,
     RodVelocity,
     ServoReference,
@@ -38,8 +43,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
-from harness.processes import free_domain, node_process
+from harness.processes import free_domain, graph_environment, node_process
 
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.messages import encode
+from seal_friction_ros.core.estimation.records import NO_ESTIMATE
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.nodes.executor import spin
@@ -48,6 +56,7 @@ from seal_friction_ros.offline.replay.replay import replay
 OWN = 'one actuator, own messages'
 WARM_UP = 0.5  # [s] of a round, not counted
 _PATIENCE = 30.0  # [s]
+NO_FORCE = FeedForward(0, 0.0, 0.0, 0)
 
 
 class Case(NamedTuple):
@@ -55,11 +64,13 @@ class Case(NamedTuple):
 
     count: int  # of actuators; 0: one, with its own messages
     together: bool = False  # whether the answers are one message
+    bare: bool = False  # whether it is a node that only takes and sends
 
     @property
     def name(self) -> str:
         """For the table."""
-        return f'machine of {self.count}' + ', answers together' * self.together if self.count else OWN
+        kind = 'bare node with the messages of' if self.bare else 'machine of'
+        return f'{kind} {self.count}' + ', answers together' * self.together if self.count else OWN
 
 
 def mapping(case: Case) -> str:
@@ -87,6 +98,29 @@ def mapping(case: Case) -> str:
     topics = {'/joint_states': joints, '/set': joints, '/a': array, '/b': array}
     answers = 'together' if case.together else 'each'
     return json.dumps({'name': 'bench', 'topics': topics, 'answers': answers, 'actuators': actuators})  # which is YAML
+
+
+def echo(count: int) -> None:
+    """Take the messages of a machine, and send as many bytes as its answers have, whatever they say."""
+    rclpy.init()
+    node = Node('bare')
+    answers = [(FrictionEstimate, 'friction_estimate', NO_ESTIMATE), (FrictionFeedForward, 'feedforward', NO_FORCE)]
+    sent = [
+        (node.create_publisher(kind, f'/axis_{i}/{topic}', qos.STREAM), encode(record))
+        for i in range(count)
+        for kind, topic, record in answers
+    ]
+    effort = serialize_message(Float64MultiArray(data=[0.0] * count))
+    sent.append((node.create_publisher(Float64MultiArray, '/effort', qos.STREAM), effort))
+
+    def answer(_data: bytes) -> None:
+        for publisher, data in sent:
+            publisher.publish(data)
+
+    for kind, topic in ((Float64MultiArray, '/a'), (Float64MultiArray, '/b'), (JointState, '/set')):
+        node.create_subscription(kind, topic, lambda _data: None, qos.STREAM, raw=True)
+    node.create_subscription(JointState, '/joint_states', answer, qos.STREAM, raw=True)
+    spin(node, Future())
 
 
 class Asker:
@@ -184,14 +218,19 @@ def node(case: Case, folder: Path) -> Iterator[Asker]:
         values['machine'] = str(path)
     with ExitStack() as stack:
         name, log = 'machine_estimator' if case.count else 'friction_estimator', folder / f'{case.name}.log'
-        process = stack.enter_context(node_process(name, domain, values, log))
+        if case.bare:
+            command = [sys.executable, __file__, '--bare', str(case.count)]
+            process = stack.enter_context(subprocess.Popen(command, env=graph_environment(domain)))
+            stack.callback(process.kill)
+        else:
+            process = stack.enter_context(node_process(name, domain, values, log))
         asker = stack.enter_context(Asker(process, domain, case))
         deadline = time.monotonic() + _PATIENCE
         while not asker.answers:
             asker.ask()
             time.sleep(0.05)
             if time.monotonic() > deadline:
-                raise RuntimeError(f'{name} does not answer: {log.read_text()[-500:]}')
+                raise RuntimeError(f'{case.name} does not answer; see {log}')
         yield asker
 
 
@@ -203,9 +242,14 @@ def main() -> int:
     parser.add_argument('--seconds', type=float, default=4.0, help='of a round')
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--json', action='store_true')
+    parser.add_argument('--bare', type=int, default=0, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     set_up_discovery()
-    cases = [Case(0), *(Case(n, together) for n in arguments.actuators for together in (False, True))]
+    if arguments.bare:
+        echo(arguments.bare)
+        return 0
+    forms = ({}, {'together': True}, {'bare': True})
+    cases = [Case(0), *(Case(n, **form) for n in arguments.actuators for form in forms)]
     found: dict[str, list[tuple[float, float, int]]] = {case.name: [] for case in cases}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -216,7 +260,7 @@ def main() -> int:
                     for one, asker in askers.items():
                         found[one].append(asker.round(arguments.rate, arguments.seconds))
             shutil.rmtree(folder / OWN)
-        identical = {case.name: replay(folder / case.name).identical for case in cases[1:]}
+        identical = {case.name: replay(folder / case.name).identical for case in cases[1:] if not case.bare}
     own = [cost for cost, _, _ in found[OWN]]
     figures = {
         case: {
