@@ -104,7 +104,10 @@ def echo(count: int) -> None:
     """Take the messages of a machine, and send as many bytes as its answers have, whatever they say."""
     rclpy.init()
     node = Node('bare')
-    answers = [(FrictionEstimate, 'friction_estimate', NO_ESTIMATE), (FrictionFeedForward, 'feedforward', NO_FORCE)]
+    answers = [
+        (FrictionEstimate, 'friction_estimate', NO_ESTIMATE._replace(stamp=0)),
+        (FrictionFeedForward, 'feedforward', NO_FORCE),
+    ]
     sent = [
         (node.create_publisher(kind, f'/axis_{i}/{topic}', qos.STREAM), encode(record))
         for i in range(count)
