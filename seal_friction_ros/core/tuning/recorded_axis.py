@@ -36,6 +36,7 @@ from seal_friction_ros.core.tuning.simulated_axis import bounded, force_limit, n
 
 ACCELERATION_WINDOW = 11  # samples of the parabola whose slope is the acceleration
 MOST_UNEVEN = 0.5  # of the median period: a sample with a larger deviation has no acceleration
+SLOW = 0.1  # [-] of the largest speed; above, a doubt about the motion is one about the friction, which the fit finds
 FEWEST_SLIDING = 100  # samples of a fit
 BOTH_DIRECTIONS = 0.1  # smallest share of the sliding samples in each direction, to separate offset and friction
 NEAR_REVERSAL = 0.1  # of the time between two reversals of the reference, before and after each
@@ -155,8 +156,10 @@ def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
     velocity = recording.velocity
     slope = acceleration(recording.time, velocity)
     state = np.array([estimate.state for estimate in recording.estimates])
-    unsuited = UNUSABLE | int(Status.MOTION_UNCERTAIN)
-    usable = np.array([not estimate.status & unsuited for estimate in recording.estimates])
+    status = np.array([estimate.status for estimate in recording.estimates], np.int64)
+    speed = np.abs(velocity)
+    slow = speed < SLOW * np.max(speed[np.isfinite(speed)], initial=0.0)
+    usable = (status & UNUSABLE == 0) & ~(slow & (status & int(Status.MOTION_UNCERTAIN) != 0))
     sliding = (state == FrictionState.SLIDING) & usable & np.isfinite(slope) & np.isfinite(recording.force_sum)
     count = int(np.count_nonzero(sliding))
     if count < FEWEST_SLIDING:
