@@ -18,6 +18,10 @@ from seal_friction_ros.core.estimation.adaptation import (
     NOTHING_LEARNT,
     AdaptationSettings,
     Ratios,
+    Reading,
+    Slide,
+    _averaged,
+    _can_be_compared,
     _learnt_scale,
     _median,
     disagrees,
@@ -310,6 +314,27 @@ def test_the_deviation_of_the_scale_is_that_of_a_median_of_six_and_of_what_it_la
         medians.append(median)
         variances.append(std**2 - (median - scale) ** 2)
     assert math.sqrt(fmean(variances)) == pytest.approx(pstdev(medians), rel=0.15)
+
+
+def test_a_level_has_the_means_of_its_readings_and_how_they_depend_on_the_travel():
+    chance = np.random.default_rng(8)
+    travel, reading, friction = chance.normal(0.1, 0.02, 20), chance.normal(40.0, 3.0, 20), chance.normal(38.0, 1.0, 20)
+    level, slide = NO_LEVEL, Slide(START, 0.01, 0.0, 0.0, 0.0, 2e6, 1e6, True, True)
+    for i in range(20):
+        level = _averaged(level, slide, 0.01, Reading(1, reading[i], friction[i], travel[i], 0.0))
+    means = (level.travel, level.reading, level.friction, level.pressure_a, level.pressure_b)
+    assert means == pytest.approx((travel.mean(), reading.mean(), friction.mean(), 2e6, 1e6))
+    assert level.travel_variance == pytest.approx(travel.var())
+    assert level.covariance == pytest.approx(np.cov(travel, reading, bias=True)[0, 1])
+    assert (level.duration, level.samples) == (pytest.approx(0.2), 20)
+
+
+@pytest.mark.parametrize(('few', 'compared'), [((4, 4), True), ((3, 9), False), ((9, 3), False)])
+def test_both_strokes_that_are_compared_need_four_samples(few, compared):
+    before, after = (
+        NO_LEVEL._replace(direction=d, stamp=START, duration=1.0, samples=n) for d, n in zip((1, -1), few, strict=True)
+    )
+    assert _can_be_compared(before, after) == compared
 
 
 def after_one_more(scale: float, ratios: tuple[float, ...], ratio: float) -> float:

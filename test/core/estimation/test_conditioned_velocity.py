@@ -228,6 +228,14 @@ def test_a_gap_or_a_clock_that_was_set_back_counts_as_the_longest_step(change):
     assert moved == pytest.approx(2.0 * ONE * LONGEST_STEP, rel=1e-3)
 
 
+@given(st.lists(st.integers(-3, 9), min_size=30, max_size=120))
+def test_there_and_back_are_alike_with_a_ripple_too(counts):
+    velocities = [number * ONE for number in counts]
+    there, back = run(velocities, KNOWN), run([-velocity for velocity in velocities], KNOWN)
+    assert [state.velocity for state in there] == [-state.velocity for state in back]
+    assert [state.smoothing for state in there] == [state.smoothing for state in back]
+
+
 # --- settling ---
 
 
