@@ -49,6 +49,7 @@ def test_each_kind_has_its_distribution():
         ({'rubber.hardness': {'tolerance': True}}, 'is not one number'),
         ({'rubber.hardness': {'tolerance': [1.0, 2.0]}}, 'is not one number'),
         ({'rubber.hardness': {'range': [1.0]}}, 'is not a list of two numbers'),
+        ({'rubber.hardness': {'range': [60.0, 'x']}}, 'is not a list of two numbers'),
         ({'rubber.hardness': {'range': [80.0, 60.0]}}, 'does not go from a lower to a higher value'),
         ({'rubber.hardness': {'range': [math.nan, 60.0]}}, 'range is not finite'),
         ({'rubber.hardness': {'tolerance': math.inf}}, 'tolerance is not finite'),

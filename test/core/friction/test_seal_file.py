@@ -16,7 +16,7 @@ from seal_friction_ros.core.friction.laws.friction_coefficient import Coefficien
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
-from seal_friction_ros.core.friction.seal_file import mount_seals, parse_seal
+from seal_friction_ros.core.friction.seal_file import law_document, mount_seals, parse_seal
 from seal_friction_ros.files import read_yaml
 
 CONFIG = ROOT / 'config' / 'seals'
@@ -91,6 +91,14 @@ def test_laws_are_chosen_by_name():
     assert type(power.coulomb_law.friction_coefficient_law) is PowerLaw
     assert type(table.coulomb_law.normal_force_law) is NormalForceTable
     assert type(table.coulomb_law.friction_coefficient_law) is CoefficientTable
+
+
+@pytest.mark.parametrize('document', [POWER, TABLE, CHART], ids=['power', 'table', 'chart'])
+def test_a_law_comes_back_from_the_part_of_a_seal_file_that_it_is_written_as(document):
+    law = parse_seal(document).coulomb_law
+    written = law_document(law)
+    assert parse_seal({**document, **written}).coulomb_law == law
+    assert written.keys() <= document.keys()
 
 
 BARE = {'name': 'x', 'uncertainty': {'relative_std': 0.1}, 'identified_pressure': [0.0, 5e6]}

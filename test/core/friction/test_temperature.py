@@ -14,6 +14,7 @@ from seal_friction_ros.core.friction.temperature import (
     is_identified_at,
     one_temperature_scale,
     scale_at,
+    std_of_unknown,
 )
 from seal_friction_ros.files import read_yaml
 
@@ -83,3 +84,7 @@ def test_seals_of_an_actuator_have_one_scale():
     assert one_temperature_scale([None, None]) is None
     with pytest.raises(ValueError, match='different temperature parts'):
         one_temperature_scale([LAW, None])
+
+
+def test_a_temperature_that_is_not_known_may_be_any_of_the_identified_ones():
+    assert std_of_unknown(LAW) == pytest.approx(0.01 * 40.0 / math.sqrt(12.0))  # of a uniform distribution
