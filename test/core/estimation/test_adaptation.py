@@ -337,6 +337,35 @@ def test_both_strokes_that_are_compared_need_four_samples(few, compared):
     assert _can_be_compared(before, after) == compared
 
 
+@pytest.mark.parametrize(('pause', 'compared'), [(59, True), (61, False)])
+def test_strokes_are_compared_over_a_pause_of_a_minute_however_long_they_are(pause, compared):
+    before = NO_LEVEL._replace(direction=1, stamp=START, duration=20.0, samples=9)
+    after = before._replace(direction=-1, stamp=START + (pause + 20) * SECOND)
+    assert _can_be_compared(before, after) == compared
+
+
+@pytest.mark.parametrize('mode', ['observe', 'on'])
+def test_at_rest_and_without_a_force_sum_there_is_no_residual(mode):
+    parameters = EstimatorParameters(EstimatorSettings(), SEALS, AdaptationSettings(mode))
+    at_rest = RodSample(START, 0.0, Pressure(START, 2e6, 2e6), Force(START, 7.0))
+    without_force = RodSample(START, 0.01, Pressure(START, 2e6, 2e6), Force(START - SECOND, 7.0))
+    for sample in (at_rest, without_force):
+        assert step(parameters, estimator.init(parameters), sample)[1].residual == 0.0
+
+
+@pytest.mark.parametrize('mode', ['observe', 'on'])
+def test_the_residual_is_what_friction_and_offset_leave_of_the_force_sum(mode):
+    parameters = EstimatorParameters(EstimatorSettings(), SEALS, AdaptationSettings(mode))
+    state, seen = estimator.init(parameters), 0
+    for sample in samples(replace(DAY, friction=1.4 * DAY.friction), 8.0, 1):
+        state, estimate = step(parameters, state, sample)
+        if estimate.state == FrictionState.SLIDING and abs(estimate.adaptation_scale - 1.0) > 0.2:
+            left = sample.force.force - estimate.friction_force - estimate.adaptation_offset
+            assert estimate.residual == pytest.approx(left, abs=1e-9)
+            seen += 1
+    assert seen > 100
+
+
 def after_one_more(scale: float, ratios: tuple[float, ...], ratio: float) -> float:
     return _learnt_scale(AdaptationSettings('on'), scale, 0.0, Ratios(*ratios), 6, ratio)[0]
 
