@@ -25,8 +25,10 @@ def test_every_node_answers_round_trips():
 @pytest.mark.long
 def test_a_machine_is_timed_and_its_bags_replay_to_the_byte():
     found = run_json('bench/machine.py', '--actuators', '2', '--rounds', '1', '--seconds', '0.5', '--rate', '100')
-    assert list(found) == ['one actuator, own messages', 'machine of 2', 'machine of 2, answers together']
-    assert [figures['replay identical'] for figures in found.values()] == ['', True, True]
+    bare = 'bare node with the messages of 2'
+    assert list(found) == ['one actuator, own messages', 'machine of 2', 'machine of 2, answers together', bare]
+    assert [figures['replay identical'] for figures in found.values()] == ['', True, True, '']
+    assert [figures['missed'] for figures in found.values()] == [0] * 4
 
 
 @pytest.mark.long
