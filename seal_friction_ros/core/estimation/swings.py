@@ -10,8 +10,8 @@ offset adds to one stroke what it takes from the other. So over two strokes, wit
 
 If the left side is less than half of the right, the rod does not slide as the velocity says, or the friction is far
 less than the estimate: either way the estimate is not to be trusted. The doubt lasts until two strokes agree, or a
-stroke is four times as long as any in doubt. Long strokes are not judged: a machine may lack a load in its force
-sum, and a hum has none.
+stroke is four times as long as any in doubt. Long strokes are not judged: hum has none, and a machine may lack a load
+in its force sum.
 
 Source: energy balance; all numbers are our choice.
 """
