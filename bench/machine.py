@@ -5,8 +5,7 @@ One ``sensor_msgs/JointState`` with all velocities, two ``std_msgs/Float64MultiA
 recorded. Beside it, in the same run and in turn, the estimator of one actuator with its own messages (four in, two
 out, recorded). Processor time is that of the whole process, its middleware and its recorder among it.
 
-The bare node takes and sends as many messages with rclpy; it decodes, computes and records nothing. No node in Python
-takes less.
+The bare node takes and sends as many messages with rclpy; it decodes, computes and records nothing.
 """
 
 import argparse

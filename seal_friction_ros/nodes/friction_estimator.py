@@ -44,7 +44,7 @@ from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
 from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STOP_PERIOD, EstimatorNode
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.graph_watch import GraphWatch
-from seal_friction_ros.nodes.managed_node import message_class, publish_raw
+from seal_friction_ros.nodes.managed_node import message_class
 
 SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
 NEEDED_INPUTS = (
@@ -206,7 +206,7 @@ class FrictionEstimator(EstimatorNode):
     def _send(self, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once; the rest waits until all answers are out."""
         type_name, data = type_of(answer), encode(answer, frame_id)
-        publish_raw(self._outputs[type_name], data)
+        self._outputs[type_name].publish(data)
         self._sent.append((type_name, answer, data))
 
     # --- parameters ---

@@ -55,7 +55,7 @@ from seal_friction_ros.nodes.estimator_node import LAST_FORCES, STOP_PERIOD, Est
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.friction_estimator import SWITCH_INTERVAL
 from seal_friction_ros.nodes.graph_watch import GraphWatch
-from seal_friction_ros.nodes.managed_node import message_class, publish_raw
+from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import message_definition
 
 
@@ -203,7 +203,7 @@ class MachineEstimator(EstimatorNode):
         data = frame_id
         if not self._file.together:
             data = encode(answer, frame_id)
-            publish_raw(self._outputs[name, type_of(answer)], data)
+            self._outputs[name, type_of(answer)].publish(data)
         self._sent.append(NamedAnswer(name, answer, data))
 
     def _send_together(self) -> None:
@@ -211,14 +211,14 @@ class MachineEstimator(EstimatorNode):
         self._together = b''
         if self._file.together and self._sent:
             self._together = encode_together(self._sent)
-            publish_raw(self._outputs['', MACHINE_TYPE], self._together)
+            self._outputs['', MACHINE_TYPE].publish(self._together)
 
     def _command(self, received: int) -> list[Command]:
         """Publish what the controllers take after a message."""
         guided = any(type_of(answer) == FEEDFORWARD_TYPE for _, answer, _ in self._sent)
         made = due_commands(self._machine, self._state, guided, received)
         for command in made:
-            publish_raw(self._outputs['', command.topic], command.data)
+            self._outputs['', command.topic].publish(command.data)
         return made
 
     def _record_answers(self, made: list[Command], latency: int = 0, received: int = 0) -> None:

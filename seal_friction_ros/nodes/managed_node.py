@@ -38,11 +38,6 @@ def message_class(type_name: str) -> Any:
         raise ValueError(f'{type_name} is not installed: install the package {package}') from None
 
 
-def publish_raw(publisher: Any, data: bytes) -> None:
-    """Publish an encoded message of an active node: as ``publisher.publish(data)``, in a third of the time."""
-    publisher.handle.publish_raw(data)
-
-
 class _SteadyTimer:
     """When a timer was called last.
 

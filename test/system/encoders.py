@@ -180,7 +180,7 @@ def held_rod_with_hum(rate: float, amplitude: float, seconds: float) -> Found:
     answers = answers_of(PARAMETERS, 1000.0, velocity, held)
     turns = reversals(answers.friction[answers.status == 0])
     case = f'held rod; hum of {amplitude * 1e3:g} mm/s at {rate:g} Hz'
-    return Found(case, seconds, turns, 0, **quality(answers, held), least_good=-1.0)
+    return Found(case, seconds, turns, 0, **quality(answers, held))
 
 
 def measured_velocity_at_rest(encoder: Encoder, seconds: float) -> Found:

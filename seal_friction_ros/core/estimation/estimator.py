@@ -313,6 +313,28 @@ class EstimatorState(NamedTuple):
     swing: Swing = NO_SWING
 
 
+@compilable
+def _with_learnt(
+    state: EstimatorState, adaptation: AdaptationState, shear: FollowedShear, swing: Swing
+) -> EstimatorState:
+    """State with what is learnt from the motion; compiled code has no ``_replace``."""
+    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, _, _ = state
+    return EstimatorState(
+        last,
+        at_rest,
+        pressure,
+        force,
+        speed,
+        leapt_pressure,
+        leapt_force,
+        leapt_velocity,
+        motion,
+        adaptation,
+        shear,
+        swing,
+    )
+
+
 class Observation(NamedTuple):
     """One sample after the checks, before any friction is computed."""
 
@@ -474,22 +496,18 @@ def _adapted_step(
     if not is_due(known, stamp):
         return state, estimate
     status = estimate.status & ~_MODEL_DISAGREES
-    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear, swing = state
     slide = Slide(
         stamp,
         velocity,
         force_sum,
         law,
         friction.coulomb_friction_std,
-        pressure.chamber_a,
-        pressure.chamber_b,
+        state.pressure.chamber_a,
+        state.pressure.chamber_b,
         not status & ~_EXTRAPOLATED,
         status == 0,
     )
-    known = adapt(settings, known, slide)
-    return EstimatorState(
-        last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear, swing
-    ), estimate
+    return _with_learnt(state, adapt(settings, known, slide), state.shear, state.swing), estimate
 
 
 @compilable
@@ -497,25 +515,20 @@ def _with_swing(
     state: EstimatorState, seen: Observation, last_stamp: int, estimate: FrictionEstimate
 ) -> tuple[EstimatorState, FrictionEstimate]:
     """Estimate of a sliding rod, marked as uncertain if the force sum does not show its swings."""
-    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear, swing = (
-        state
-    )
     stamp, velocity, force_sum, _, _ = seen
-    way, doubted = swing.way, swing.doubted
+    way, _, _, _, _, doubted = state.swing
     if doubted == 0.0 and abs(way) > LONGEST_SWING and (velocity > 0.0) == (way > 0.0):  # most samples of a motion
         return state, estimate
     if estimate.status & (_NO_STATE | _NO_FORCE_SUM):
         return state, estimate
-    swing = swing_on(swing, (stamp - last_stamp) * 1e-9, velocity, force_sum, estimate.friction_force)
+    swing = swing_on(state.swing, (stamp - last_stamp) * 1e-9, velocity, force_sum, estimate.friction_force)
     if swing.doubted > 0.0:
         _, coulomb, std, breakaway, friction, acting, direction, status, age, scale, scale_std, offset, left = estimate
         status |= _MOTION_UNCERTAIN
         estimate = FrictionEstimate(
             stamp, coulomb, std, breakaway, friction, acting, direction, status, age, scale, scale_std, offset, left
         )
-    return EstimatorState(
-        last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, known, shear, swing
-    ), estimate
+    return _with_learnt(state, state.adaptation, state.shear, swing), estimate
 
 
 @compilable
@@ -544,10 +557,7 @@ def _with_sheared_seals(
     stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left = estimate
     if status & _NO_STATE:
         return state, estimate
-    known, measured, moves = state.adaptation, state.velocity.velocity, sign(seen.velocity)
-    last, at_rest, pressure, known_force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, shear, _ = (
-        state
-    )
+    known, shear, measured, moves = state.adaptation, state.shear, state.velocity.velocity, sign(seen.velocity)
     slides_on = False
     if moves != 0:
         slides_on, shear = slide_on(
@@ -580,20 +590,7 @@ def _with_sheared_seals(
         estimate = FrictionEstimate(
             stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left
         )
-    return EstimatorState(
-        last,
-        at_rest,
-        pressure,
-        known_force,
-        speed,
-        leapt_pressure,
-        leapt_force,
-        leapt_velocity,
-        motion,
-        known,
-        shear,
-        state.swing,
-    ), estimate
+    return _with_learnt(state, known, shear, state.swing), estimate
 
 
 @compilable
@@ -607,20 +604,7 @@ def assess_inputs(
     """
     # One unpacking takes a quarter of the time of an attribute each.
     stamp, given, newest_pressure, newest_force, refused, stamp_age, _ = sample
-    (
-        last_stamp,
-        at_rest,
-        pressure,
-        force,
-        velocity,
-        leapt_pressure,
-        leapt_force,
-        leapt_velocity,
-        motion,
-        known,
-        shear,
-        swing,
-    ) = state
+    last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, _, _, _ = state
     settings = parameters.settings
     status = _INPUT_REFUSED if refused else 0
     if last_stamp != NEVER and stamp <= last_stamp:
@@ -666,9 +650,9 @@ def assess_inputs(
         leapt_force,
         leapt_velocity,
         motion,
-        known,
-        shear,
-        swing,
+        state.adaptation,
+        state.shear,
+        state.swing,
     )
     return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
 

@@ -46,11 +46,13 @@ def swing_on(swing: Swing, elapsed: float, velocity: float, force_sum: float, fr
 
     Args:
         swing: `NO_SWING` or the result before.
-        elapsed: Since the sample before [s].
+        elapsed: Since the sample before [s]; negative after a clock was set back.
         velocity: At which the seals slide [m/s], not 0.
         force_sum: Usable [N].
         friction: Of the estimate [N], with the sign of the motion.
     """
+    if elapsed == 0.0:  # a repeated stamp is no new sample
+        return swing
     way, work, heat, last_force, last_friction, doubted = swing
     if way != 0.0 and (velocity > 0.0) != (way > 0.0):
         stroke = abs(way)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
 from seal_friction_ros.core.estimation.records import Force, FrictionEstimate, Pressure, RodSample, Status
-from seal_friction_ros.core.estimation.swings import LONGEST_SWING, MUCH_LONGER, NO_SWING, Swing, swing_on
+from seal_friction_ros.core.estimation.swings import LONGEST_SWING, NO_SWING, Swing, swing_on
 from seal_friction_ros.files import default_configuration
 
 START, RATE = 10**12, 1000.0  # [ns], [Hz]
@@ -147,11 +147,12 @@ def test_long_strokes_are_not_judged():
     assert after_long.doubted == 0.0  # a short stroke after a long one has no partner
 
 
-def test_a_gap_counts_as_20_ms_and_so_does_a_stamp_further_back():
+def test_a_gap_counts_as_20_ms_as_does_a_stamp_further_back_and_a_repeated_one_as_nothing():
     for elapsed in (0.02, 3.0, -1.0):
         assert swing_on(NO_SWING, elapsed, 0.01, 0.0, 0.0).way == pytest.approx(2e-4)
     assert swing_on(NO_SWING, 0.005, 0.01, 0.0, 0.0).way == pytest.approx(5e-5)
-    assert MUCH_LONGER == 4.0
+    begun = swing_on(NO_SWING, 0.005, 0.01, 0.0, 0.0)
+    assert swing_on(begun, 0.0, -0.01, 30.0, -40.0) == begun
 
 
 def test_work_is_along_the_way():
