@@ -22,7 +22,7 @@ from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_c
 from seal_friction_ros.nodes.recording import Recording
 from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 
-_WATCH_PERIOD = 0.05  # [s]
+_WATCH_PERIOD = 45_000_000  # [ns] of the graph and the clocks: every other call of the watchdog, even of an early one
 _WATCHDOG_PERIOD = 0.025  # [s] less than the default timeouts of the feed-forward; a call costs 0.3 ms, mostly waking
 _TICK_PERIOD = 0.01  # [s] while ticks keep a force up; more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
 _TICKING = 1_000_000_000  # [ns] after the last tick: inputs slower than the ticks need them again and again
@@ -60,7 +60,7 @@ class EstimatorNode(ManagedNode):
         self._topics: dict[Any, str] = {}
         self._newest_inputs: dict[str, TopicMessage] = {}
         self.has_viewer = False  # by a live view
-        self._watchdog_called = self._ticked = 0  # [ns] of `time.perf_counter_ns`
+        self._watchdog_called = self._ticked = self._watched = 0  # [ns] of `time.perf_counter_ns`
         self._is_ticking = False
         self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
@@ -149,7 +149,6 @@ class EstimatorNode(ManagedNode):
         self._is_ticking = False
         self._timers = [
             self._tick_timer,
-            self.create_steady_timer(_WATCH_PERIOD, self._on_watch_timer),
             self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog_timer),
             self.create_steady_timer(_HEALTH_PERIOD, self._on_health_timer),
             self.create_steady_timer(_INPUT_PERIOD, self._on_input_timer),
@@ -196,7 +195,10 @@ class EstimatorNode(ManagedNode):
         self._topics[name] = self._inputs[name].topic_name
 
     def _on_watchdog_timer(self) -> None:
-        """Let the watchdog act; every `_TICK_PERIOD` while it has to or somebody looks on, else seldom."""
+        """Let the watchdog act; every `_TICK_PERIOD` while it has to or somebody looks on, else seldom.
+
+        Graph and clocks have no timer of their own: each call of one wakes two threads.
+        """
         now = self._watchdog_called = time.perf_counter_ns()
         if self.on_watchdog():
             self._ticked = now
@@ -205,6 +207,9 @@ class EstimatorNode(ManagedNode):
         if is_ticking != self._is_ticking:
             self._is_ticking = is_ticking
             (self._tick_timer.reset if is_ticking else self._tick_timer.cancel)()
+        if now - self._watched >= _WATCH_PERIOD:
+            self._watched = now
+            self._look_at_graph()
 
     def look_after_timers(self, now: int) -> None:
         """Call what is overdue, if the watchdog was not called for long; after a message, at ``now`` [ns].
@@ -234,7 +239,7 @@ class EstimatorNode(ManagedNode):
 
     # --- clock and graph ---
 
-    def _on_watch_timer(self) -> None:
+    def _look_at_graph(self) -> None:
         """Publish diagnostics when a publisher of an input has appeared or disappeared; follow a clock that was set.
 
         If the next bag is due, let it begin with a snapshot.
