@@ -66,29 +66,35 @@ class MissingSamples:
         self._count_before = 0  # before the period was learnt
         self._stamp = 0
         self._period = 0.0
+        self._shortest = self._longest = 0.0  # between them a step is of the period; both 0.0 until that is learnt
         self._steps: deque[int] = deque(maxlen=15)
 
     def on_stamp(self, stamp: int) -> None:
         """Add the stamp [ns] of the next sample."""
         step = stamp - self._stamp if self._stamp else 0
+        if self._shortest < step < self._longest:  # as nearly all
+            self._stamp = stamp
+            self._steps.append(step)
+            return
         if -_LARGEST_DELAY <= step < 0:
             self.count = max(self.count - 1, 0)
             self._count_before -= 1
             return
         self._stamp = stamp
+        self._shortest = self._longest = 0.0
         if step <= 0:
             self._steps.clear()
             self._count_before = self.count
             return
         is_learnt = len(self._steps) == self._steps.maxlen
         self._steps.append(step)
-        if is_learnt and 0.7 * self._period < step < 1.5 * self._period:
-            return
         self._period = sorted(self._steps)[len(self._steps) // 4]  # seldom: sorting is slow
         if is_learnt:
             self.count += self._missing(step)
         else:
             self.count = max(self._count_before + sum(map(self._missing, self._steps)), 0)
+        if len(self._steps) == self._steps.maxlen:
+            self._shortest, self._longest = 0.7 * self._period, 1.5 * self._period
 
     def _missing(self, step: int) -> int:
         return round(step / self._period) - 1 if step > 1.5 * self._period else 0

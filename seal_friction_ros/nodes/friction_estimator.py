@@ -19,7 +19,7 @@ from seal_friction_ros.core.estimation.configuration import (
     snapshot_text,
 )
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, newest_force
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     DECODERS,
@@ -79,8 +79,8 @@ class FrictionEstimator(EstimatorNode):
         self._statistics = EstimatorDiagnostics()
         answers = {type_name: type_name for type_name in OUTPUTS.values()}
         self._watch = GraphWatch(self, self._inputs, INPUTS, self._outputs, answers, self.subscribe)
-        for topic, type_name in OUTPUTS.items():
-            self._outputs[type_name] = self.create_lifecycle_publisher(
+        for topic, type_name in OUTPUTS.items():  # not of the life cycle, which costs time: only an active node answers
+            self._outputs[type_name] = self.create_publisher(
                 message_class(type_name),
                 topic,
                 qos.STREAM,
@@ -159,7 +159,8 @@ class FrictionEstimator(EstimatorNode):
         if self.has_viewer:
             self.keep_for_view(self._topics[name], type_name, data)
         self._statistics.on_input(name, message.stamp)
-        self._record_answers(done - taken, received)
+        if self._sent:
+            self._record_answers(done - taken, received)
         if name == 'rod_velocity':
             if self._known.estimator.adapts:
                 state = self._state
@@ -192,7 +193,7 @@ class FrictionEstimator(EstimatorNode):
 
     def fade_out(self) -> None:
         """Fade the force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""
-        if self._state.feedforward.fade * self._state.feedforward.force == 0.0:
+        if newest_force(self._state.feedforward) == 0.0:
             return
         self._state = self._state._replace(refused=True)
         self.publish_configuration()  # a replay fades from here on

@@ -12,11 +12,10 @@ from rclpy.event_handler import PublisherEventCallbacks
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
-    FEEDFORWARD_TYPE,
     OUTPUTS,
     TICK_TYPE,
     Output,
@@ -117,7 +116,7 @@ class MachineEstimator(EstimatorNode):
 
     def _publish_on(self, key: tuple[str, str], topic: str, type_name: str) -> None:
         incompatible = PublisherEventCallbacks(incompatible_qos=partial(self._watch.on_incompatible_subscriber, key))
-        self._outputs[key] = self.create_lifecycle_publisher(
+        self._outputs[key] = self.create_publisher(  # not of the life cycle: only an active node answers
             message_class(type_name),
             topic,
             qos.STREAM,
@@ -215,7 +214,7 @@ class MachineEstimator(EstimatorNode):
 
     def _command(self, received: int) -> list[Command]:
         """Publish what the controllers take after a message."""
-        guided = any(type_of(answer) == FEEDFORWARD_TYPE for _, answer, _ in self._sent)
+        guided = FeedForward in [type(answer) for _, answer, _ in self._sent]
         made = due_commands(self._machine, self._state, guided, received)
         for command in made:
             self._outputs['', command.topic].publish(command.data)

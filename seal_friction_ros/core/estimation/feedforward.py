@@ -240,6 +240,11 @@ def step(
     return elastic_step(settings, None, state, stamp, received, friction, velocity, velocity, velocity)
 
 
+def newest_force(state: FeedForwardState) -> float:
+    """Force of the newest feed-forward [N]."""
+    return state.fade * state.force + 0.0
+
+
 @compilable
 def elastic_step(
     settings: FeedForwardSettings,

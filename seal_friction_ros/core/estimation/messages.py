@@ -10,7 +10,6 @@ Source: OMG DDS-RTPS 2.5, section 10 (CDR); message layouts: ``msg_defs/msg``.
 
 import struct
 from collections.abc import Callable
-from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.feedforward import FeedForward
@@ -71,6 +70,11 @@ class Layout(NamedTuple):
     older_numbers: int | None = None  # how many numbers the message had before it grew; None: it never grew
 
     @property
+    def keeps_frame(self) -> bool:
+        """Whether the record has the frame name."""
+        return 'frame_id' in self.record.__annotations__
+
+    @property
     def fields(self) -> tuple[str, ...]:
         """Name of each number."""
         return tuple(self.record.__annotations__)[1 : 1 + len(self.codes)]
@@ -119,7 +123,9 @@ GROWN = {
 LONGEST_FRAME = 1024  # [bytes] our choice; a longer frame name is not valid
 SECOND = 1_000_000_000  # [ns]
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little endian, no options
-_FIRST_HEADER_PART = struct.Struct('<4siII')
+_LITTLE_ENDIAN = b'\x00\x01'  # begin of the encapsulation
+_SHORTEST = 16  # [bytes] encapsulation, stamp and length of the frame name
+_MOST_KNOWN = 256  # sizes of messages whose layout is kept
 
 
 def head_size(frame_length: int) -> int:
@@ -127,46 +133,85 @@ def head_size(frame_length: int) -> int:
     return (12 + frame_length + 7) // 8 * 8
 
 
-@lru_cache(maxsize=256)
 def _struct(frame_length: int, body: str) -> struct.Struct:
+    """Of a whole message; its first field are the two bytes that tell the encoding."""
     padding = head_size(frame_length) - 12 - frame_length
-    return struct.Struct(f'<4siII{frame_length}s{padding}x{body}')
+    return struct.Struct(f'<2s2xiI4s{frame_length}s{padding}x{body}')
 
 
-def _encode(body: str, stamp: int, frame_id: bytes, numbers: tuple[Any, ...]) -> bytes:
-    seconds, nanoseconds = divmod(stamp, SECOND)
-    length = len(frame_id) + 1
-    return _struct(length, body).pack(_ENCAPSULATION, seconds, nanoseconds, length, frame_id, *numbers)
+def _length(frame_length: int) -> bytes:
+    return frame_length.to_bytes(4, 'little')
 
 
-def _decode(record: type, body: str, older: str, keeps_frame: bool, check: Check | None, data: bytes) -> Any:
-    if len(data) < _FIRST_HEADER_PART.size:
+def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
+    """Makes the bytes of a message from its stamp, frame name and numbers."""
+    body = layout.body()
+    known: dict[int, tuple[Callable[..., bytes], bytes]] = {}  # by the length of the frame name
+
+    def encode_numbers(stamp: int, frame_id: bytes, numbers: tuple[Any, ...]) -> bytes:
+        found = known.get(len(frame_id))
+        if found is None:
+            length = len(frame_id) + 1
+            if len(known) >= _MOST_KNOWN:
+                known.clear()
+            found = known[len(frame_id)] = _struct(length, body).pack, _length(length)
+        pack, length_bytes = found
+        seconds, nanoseconds = divmod(stamp, SECOND)
+        return pack(_LITTLE_ENDIAN, seconds, nanoseconds, length_bytes, frame_id, *numbers)
+
+    return encode_numbers
+
+
+def _decoder(layout: Layout) -> Callable[[bytes], Any]:
+    """Makes the record of a message from its bytes."""
+    record, check, keeps_frame = layout.record, layout.check, layout.keeps_frame
+    known: dict[int, tuple[Callable[[bytes], tuple[Any, ...]], bytes]] = {}  # by the size of the message
+
+    def decode_bytes(data: bytes) -> Any:
+        found = known.get(len(data))
+        if found is None or found[1] != data[12:16]:
+            if len(known) >= _MOST_KNOWN:
+                known.clear()
+            found = known[len(data)] = _layout_of(layout, data)
+        fields = found[0](data)
+        nanoseconds = fields[2]
+        if fields[0] != _LITTLE_ENDIAN:
+            raise ValueError(f'encapsulation {data[:4].hex()} is not little-endian CDR')
+        if nanoseconds >= SECOND:
+            raise ValueError(f'header with {nanoseconds} ns is not valid')
+        stamp = fields[1] * SECOND + nanoseconds
+        if keeps_frame:
+            return record(stamp, *fields[5:], fields[4][:-1])
+        decoded = record(stamp, *fields[5:])
+        if check is not None:
+            check(decoded)
+        return decoded
+
+    return decode_bytes
+
+
+def _layout_of(layout: Layout, data: bytes) -> tuple[Callable[[bytes], tuple[Any, ...]], bytes]:
+    """How to unpack messages with the size of this one and the length of its frame name, and that length as bytes.
+
+    Raises:
+        ValueError: No message has this size and this length.
+    """
+    if len(data) < _SHORTEST:
         raise ValueError(f'{len(data)} bytes are too few for a stamped message')
-    encapsulation, seconds, nanoseconds, length = _FIRST_HEADER_PART.unpack_from(data)
-    if encapsulation[:2] != b'\x00\x01':
-        raise ValueError(f'encapsulation {encapsulation.hex()} is not little-endian CDR')
-    if not 0 <= length <= LONGEST_FRAME or not 0 <= nanoseconds < SECOND:
-        raise ValueError(f'header with {nanoseconds} ns and a frame name of {length} bytes is not valid')
-    known = _struct(length, body)
-    if len(data) < known.size and older != body:
-        known = _struct(length, older)
+    length = int.from_bytes(data[12:16], 'little')
+    if data[:2] != _LITTLE_ENDIAN:
+        raise ValueError(f'encapsulation {data[:4].hex()} is not little-endian CDR')
+    if length > LONGEST_FRAME:
+        raise ValueError(f'header with a frame name of {length} bytes is not valid')
+    known = _struct(length, layout.body())
+    if len(data) < known.size and layout.older_numbers is not None:
+        known = _struct(length, layout.body(layout.older_numbers))
     if not known.size <= len(data) <= known.size + 3:  # some writers pad the whole to a multiple of 4
         raise ValueError(f'{len(data)} bytes where the message has {known.size}')
-    fields = known.unpack_from(data)
-    stamp = seconds * SECOND + nanoseconds
-    if keeps_frame:
-        return record(stamp, *fields[5:], fields[4][:-1])
-    decoded = record(stamp, *fields[5:])
-    if check is not None:
-        check(decoded)
-    return decoded
+    return known.unpack_from, data[12:16]
 
 
-def _keeps_frame(layout: Layout) -> bool:
-    return 'frame_id' in layout.record.__annotations__
-
-
-_BODIES = {layout.record: (layout.body(), _keeps_frame(layout)) for layout in LAYOUTS}
+_ENCODERS = {layout.record: (_encoder(layout), layout.keeps_frame) for layout in LAYOUTS}
 _TYPES = {layout.record: layout.message_type for layout in LAYOUTS}
 
 
@@ -177,10 +222,10 @@ def type_of(record: Any) -> str:
 
 def encode(record: Any, frame_id: bytes = b'') -> bytes:
     """Message of a record as bytes; ``frame_id`` is for records without a frame name of their own."""
-    body, keeps_frame = _BODIES[type(record)]
+    encode_numbers, keeps_frame = _ENCODERS[type(record)]
     if keeps_frame:
-        return _encode(body, record[0], record[-1], record[1:-1])
-    return _encode(body, record[0], frame_id, record[1:])
+        return encode_numbers(record[0], record[-1], record[1:-1])
+    return encode_numbers(record[0], frame_id, record[1:])
 
 
 def encode_text(text: str) -> bytes:
@@ -204,12 +249,7 @@ def decode_text(data: bytes) -> str:
 
 
 DECODERS: dict[str, Callable[[bytes], Any]] = {
-    **{
-        layout.message_type: partial(
-            _decode, layout.record, layout.body(), layout.body(layout.older_numbers), _keeps_frame(layout), layout.check
-        )
-        for layout in LAYOUTS
-    },
+    **{layout.message_type: _decoder(layout) for layout in LAYOUTS},
     CONFIGURATION_TYPE: decode_text,
 }
 """Message type -> its decoder: bytes to record. Raises ValueError for bytes that are not such a message."""

@@ -42,6 +42,7 @@ from seal_friction_ros.core.estimation.feedforward import (
     FeedForwardState,
     elastic_step,
     led_velocity,
+    newest_force,
     usable,
     wanted_velocity,
 )
@@ -267,7 +268,7 @@ def is_tick_due(state: PipelineState, now: int) -> bool:
         now: [ns] on the clock of receipt.
     """
     made = state.feedforward
-    return made.received != NEVER and made.fade * made.force != 0.0 and now - made.received >= TICK_INTERVAL
+    return made.received != NEVER and newest_force(made) != 0.0 and now - made.received >= TICK_INTERVAL
 
 
 @compilable

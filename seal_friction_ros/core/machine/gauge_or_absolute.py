@@ -25,6 +25,8 @@ class Lowest(NamedTuple):
         if pressure.stamp == NEVER:
             return self
         (low_a, low_b), (_, a, b) = self, pressure
+        if a >= low_a and b >= low_b:
+            return self
         return Lowest(a if a < low_a else low_a, b if b < low_b else low_b)
 
 

@@ -18,11 +18,12 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration
-from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.feedforward import newest_force
 from seal_friction_ros.core.estimation.messages import Input, Output
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
 from seal_friction_ros.core.estimation.records import (
@@ -375,19 +376,11 @@ def _passed(
     """State after some records have taken the path of their actuator."""
     if not records:
         return ActuatorState(state.pipeline, memory, state.force)
-    name, force = actuator.mapping.name, state.force
-
-    def pass_on(record: Output, frame_id: bytes) -> None:
-        """Emit with the name of the actuator, and keep the force [N] of a feed-forward."""
-        nonlocal force
-        if type(record) is FeedForward:
-            force = record.force
-        emit(name, record, frame_id)
-
-    known = state.pipeline
+    known, pass_on = state.pipeline, partial(emit, actuator.mapping.name)
     for record in records:
         known = pipeline.receive(actuator.pipeline, known, record, received, pass_on)
-    return ActuatorState(known, memory, force)
+    has_feedforward = known.feedforward is not state.pipeline.feedforward
+    return ActuatorState(known, memory, newest_force(known.feedforward) if has_feedforward else state.force)
 
 
 def records_of(
@@ -437,8 +430,11 @@ def _add_forces(
 ) -> tuple[int, int]:
     """Append pressure and force sum, each if the oldest of its parts has a new stamp; returns these stamps."""
     wiring, terms = actuator.wiring, actuator.mapping.force_sum
-    oldest = min([stamps[quantity] for quantity in wiring.pressure])
-    oldest_of_force = min([stamps[quantity] for quantity in wiring.force]) if terms is not None else force_stamp
+    oldest = min(map(stamps.__getitem__, wiring.pressure))
+    oldest_of_force = force_stamp
+    if terms is not None:
+        alike = wiring.force == wiring.pressure
+        oldest_of_force = oldest if alike else min(map(stamps.__getitem__, wiring.force))
     if oldest == pressure_stamp and oldest_of_force == force_stamp:
         return pressure_stamp, force_stamp
     pressure = _pressures(actuator, values, stamps)

@@ -31,7 +31,7 @@ _END_SIZE = 1 << 18  # [bytes] reserved for the last chunk, the end of the file 
 _INDEX_SHARE = 200  # a file is at least as many times larger than its index
 _IDLE_PERIOD = 0.05  # [s] between checks of the queue without `flush_if_idle`; more wake-ups slow the estimator
 _BACKLOG_PERIOD = 0.002  # [s] the same while there is a backlog
-_WAKE_LENGTH = 50  # [messages] shortest queue for which `flush_if_idle` wakes the thread; each wake-up costs more than a message
+_WAKE_LENGTH = 50  # [messages] shortest queue for which `flush_if_idle` wakes the thread: a wake-up costs more
 _BATCH = 50  # messages written before the thread yields the processor, so that a backlog does not delay the estimator
 
 
