@@ -54,7 +54,8 @@ QUIET = 0.3  # [s] 0 N for good
 LONGEST_WAIT = 5.0  # [s] for it
 SLOW_SLEW = 500.0  # [N/s] where stamps alternate
 JITTER = 0.01  # [s] of the receipt
-SHORT_LEASE = '2'  # [s] until a killed publisher is gone from the graph, here
+SHORT_LEASE = '<sec>2</sec>'  # until a killed publisher is gone from the graph, here
+ANNOUNCED = '<sec>0</sec><nanosec>500000000</nanosec>'  # between two announcements, which have to be within the lease
 
 
 # --- a publisher in a process of its own ---
@@ -216,7 +217,7 @@ def axis(parameters: dict[str, Any] | None = None) -> Iterator[Axis]:
     domain = free_domain()
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder, profile = Path(name), share_directory('seal_friction_ros', __file__) / 'config' / 'fastdds.xml'
-        text = profile.read_text().replace('<sec>20</sec>', f'<sec>{SHORT_LEASE}</sec>')
+        text = profile.read_text().replace('<sec>2</sec>', ANNOUNCED).replace('<sec>20</sec>', SHORT_LEASE)
         (folder / 'fastdds.xml').write_text(text)
         os.environ[PROFILES[0]] = str(folder / 'fastdds.xml')
         stack.callback(os.environ.pop, PROFILES[0])
