@@ -30,3 +30,5 @@ def test_seals_without_a_correction_and_seals_with_the_same_one_agree():
     one = ForceSumCorrection(1e-5)
     assert one_correction([None, None]) is None
     assert one_correction([None, one, ForceSumCorrection(1e-5), None]) == one
+    with pytest.raises(ValueError, match='two seals have different force_sum_correction'):
+        one_correction([one, ForceSumCorrection(2e-5)])

@@ -14,6 +14,7 @@ from seal_friction_ros.core.friction.geometry import (
     squeeze,
     stretch,
 )
+from seal_friction_ros.core.friction.laws.normal_force import squeeze_force
 
 
 def hoop_force(seal: SealGeometry) -> float:
@@ -95,6 +96,22 @@ def test_geometry_scales(factor):
     assert contact_length(scaled) == pytest.approx(factor * contact_length(RING))
     assert projected_area(scaled) == pytest.approx(factor**2 * projected_area(RING))
     assert stretch_radial_force(scaled) == pytest.approx(factor**2 * stretch_radial_force(RING))
+
+
+def test_a_squeeze_of_nothing_and_of_one_half_are_both_refused():
+    """In binary fractions of a metre, so that the squeeze is exact."""
+    sizes = {'section_diameter': 0.0625, 'ring_inner_diameter': 0.9, 'rod_diameter': 1.0}
+    for gland, share in ((1.125, '0.000'), (1.0625, '0.500')):
+        with pytest.raises(ValueError, match=f'squeeze of {share}; bounds 0 to 0.5'):
+            SealGeometry(**sizes, gland_diameter=gland)
+    assert squeeze(SealGeometry(**sizes, gland_diameter=1.09375)) == 0.25
+
+
+def test_rubber_has_5_5_megapascal_unless_told():
+    """The O-ring of the thesis: 70 Shore A."""
+    sizes = {'section_diameter': 2e-3, 'ring_inner_diameter': 8e-3, 'rod_diameter': 10e-3, 'gland_diameter': 13.6e-3}
+    ring = SealGeometry(**sizes)
+    assert squeeze_force(ring) == pytest.approx(squeeze_force(RING) * 5.5 / 4.0)
 
 
 @pytest.mark.parametrize(

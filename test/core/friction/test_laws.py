@@ -1,6 +1,7 @@
 """Friction maps, velocity terms, and the laws that need no geometry, against their formulas."""
 
 import math
+from contextlib import nullcontext
 
 import pytest
 from hypothesis import given
@@ -213,6 +214,37 @@ def test_first_guesses_of_a_fit_reach_the_friction_of_the_readings():
     assert terms['stribeck_friction'] == pytest.approx(0.2 * 40.0)
     assert terms['stribeck_velocity'] == pytest.approx(0.01)
     assert terms['asymmetry'] == 0.0
+
+
+def test_a_pressure_guess_rises_as_an_elastic_contact_does():
+    """A sphere on a plane has four times the area of contact at eight times the force: Hertz, Schallamach."""
+    typical = TypicalReading(friction=40.0, pressure=80e5, speed=0.1, normal_force=100.0)
+    law = PressurePowerLaw(**{name: meaning.start(typical) for name, meaning in meanings(PressurePowerLaw).items()})
+    high, low = (law.coulomb_friction(pressure) - law.coulomb_friction(0.0) for pressure in (80e5, 10e5))
+    assert high == pytest.approx(4.0 * low)
+
+
+def test_first_guesses_are_finite_without_speed_and_pressure_and_inside_the_bounds_of_the_fit_on_a_fast_machine():
+    slow, fast = (TypicalReading(40.0, pressure, speed, 100.0) for pressure, speed in ((0.0, 0.0), (1e9, 15.0)))
+    for law in (ConstantCoulomb, PressurePowerLaw, PowerLaw, VelocityTerms):
+        for meaning in meanings(law).values():
+            if meaning.start is not None:
+                low, high = meaning.fit_bounds or (meaning.lower, meaning.upper)
+                assert 0.0 <= meaning.start(slow) < math.inf
+                assert low <= meaning.start(fast) <= high
+
+
+def test_half_a_newton_of_stribeck_friction_counts():
+    terms = VelocityTerms(stribeck_friction=0.5, stribeck_velocity=0.02)
+    seals = (MountedSeal(seal_of(ConstantCoulomb(7.0), velocity_terms=terms), 'a'),)
+    assert actuator_friction(seals, 1e6, 0.0, 0.02).velocity_friction == pytest.approx(0.5 / math.e)
+
+
+@pytest.mark.parametrize(('middle', 'taken'), [(1.00152e-2, True), (1.00155e-2, False)])
+def test_speeds_of_a_map_are_in_equal_ratios_to_a_thousandth_of_a_column(middle, taken):
+    """Of three speeds over two decades: ln(100) / 3 / 1000 = 0.001535."""
+    with nullcontext() if taken else pytest.raises(ValueError, match='not in equal ratios'):
+        friction_map(speeds=(1e-3, middle, 1e-1))
 
 
 def test_a_seal_without_friction_is_a_seal():

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.foundation.compiled import compiled
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.presliding import (
     NO_ELEMENTS,
     NOT_SHEARED,
@@ -25,6 +26,7 @@ from seal_friction_ros.core.friction.presliding import (
     initial_loading,
     lugre,
     presliding_numbers,
+    presliding_of_map,
     shear,
     stored_energy,
 )
@@ -150,6 +152,135 @@ class TestClosedForm:
             peaks.append(peak - FRICTION)
         one_step = numbers.stiffnesses.last * 1e-6  # [N] the rod breaks away within a step
         assert peaks == pytest.approx([5.0 * (1.0 - math.exp(-t / 2.0)) for t in (0.0, 1.0, 2.0, 60.0)], abs=one_step)
+
+
+class TestElements:
+    @pytest.mark.parametrize(('exponent', 'parts'), [(0.0, (1, 1, 1)), (1.0, (1, 3, 5)), (2.0, (1, 9, 25))])
+    def test_equal_stiffnesses_and_yields_by_the_power_law_the_last_ranks_first(self, exponent, parts):
+        numbers = presliding_numbers([Presliding(stiffness=3e5, elements=3, yield_exponent=exponent)])
+        assert numbers.stiffnesses == pytest.approx((0.0, 0.0, 0.0, 1e5, 1e5, 1e5))
+        assert numbers.shares == pytest.approx([0.0] * 3 + [part / sum(parts) for part in parts])
+
+    def test_lengths_times_and_shares_of_unlike_seals_are_weighted_with_their_stiffness(self):
+        soft = Presliding(stiffness=1e5, elements=1, memory_length=1e-3, dwell_time=2.0)
+        stiff = Presliding(stiffness=3e5, elements=2, yield_exponent=1.0, memory_length=2e-3, dwell_time=4.0)
+        numbers = presliding_numbers([soft, stiff])
+        assert numbers.stiffness == 4e5
+        assert (numbers.memory_length, numbers.dwell_time) == pytest.approx((1.75e-3, 3.5))
+        assert numbers.shares == pytest.approx((0.0, 0.0, 0.0, 0.0, 0.75 * 0.25, 0.25 + 0.75 * 0.75))
+
+    def test_springs_store_half_force_times_stretch_and_rigid_seals_store_nothing(self):
+        three = presliding_numbers([Presliding(stiffness=3e5, elements=3, yield_exponent=0.0)])
+        forces = Elements(0.0, 0.0, 0.0, 3.0, -2.0, 1.0)
+        assert stored_energy(three, Shear(forces, 4.0)) == pytest.approx((9.0 + 4.0 + 1.0) / 2.0 / 1e5)
+        assert stored_energy(RIGID, Shear(NO_ELEMENTS._replace(last=FRICTION), 0.0)) == 0.0
+
+    def test_a_map_with_a_presliding_length_is_one_spring_that_yields_over_it(self):
+        table = {'speeds': (1e-3, 1e-1), 'pressures': (0.0, 5e6), 'frictions': (8.0, 6.0, 30.0, 20.0)}
+        law = FrictionMap(**table, reference_speed=0.01, memory_length=2e-3, presliding_length=4e-5)
+        seal = presliding_of_map(law)
+        numbers = presliding_numbers([seal])
+        assert [initial_loading(numbers, x, 8.0) for x in (1e-5, 3.9e-5, 4.1e-5)] == pytest.approx([2.0, 7.8, 8.0])
+        assert numbers.memory_length == pytest.approx(2e-3)
+        assert 0.1 * seal.stiffness == seal.relative_std * seal.stiffness  # a tenth: nothing is measured
+        assert presliding_of_map(replace(law, presliding_length=0.0)) is None
+
+
+class TestSymmetry:
+    """Laws of nature know no unit and no side: exact, since powers of two do not round."""
+
+    slides = st.lists(
+        st.builds(
+            lambda micrometres, elapsed, *forces: Slide(1e-6 * micrometres, float(elapsed), *map(float, forces)),
+            st.sampled_from([0, 1, -1]) | st.integers(-1000, 1000),
+            st.integers(0, 3),
+            st.integers(0, 20),
+            st.integers(-25, 5),
+            st.integers(0, 5),
+        ),
+        min_size=1,
+        max_size=8,
+    )
+    numbers = st.just(RIGID) | st.builds(
+        lambda seal, memory, dwell: presliding_numbers([replace(seal, memory_length=memory, dwell_time=dwell)]),
+        preslidings,
+        st.sampled_from([0.0, 1e-4]),
+        st.sampled_from([0.0, 2.0]),
+    )
+
+    @staticmethod
+    def run(numbers, slides, force=1.0, length=1.0, side=1.0):
+        """Friction, excess, state and direction after each slide, in other units or on the other side."""
+        stiffness = force / length
+        numbers = numbers._replace(
+            stiffness=numbers.stiffness * stiffness,
+            stiffnesses=Elements(*(k * stiffness for k in numbers.stiffnesses)),
+            memory_length=numbers.memory_length * length,
+        )
+        state, seen = NOT_SHEARED, []
+        for displacement, elapsed, *forces in slides:
+            slide = Slide(side * length * displacement, elapsed, *(force * f for f in forces))
+            state, friction = shear(numbers, state, slide)
+            velocity, at_rest = side * displacement, displacement == 0.0
+            acting = acting_friction(numbers, state, friction, slide, at_rest, velocity, side * force * 7.0)
+            energy = stored_energy(numbers, state)
+            seen.append((friction, state.excess, acting.friction_force, energy, acting.state, acting.direction))
+        return seen
+
+    @given(numbers, slides)
+    def test_a_thousandth_of_all_forces_gives_a_thousandth_of_the_friction(self, numbers, slides):
+        unit = 2.0**-10
+        expected = self.run(numbers, slides)
+        for (force, excess, acting, energy, *states), found in zip(
+            expected, self.run(numbers, slides, force=unit), strict=True
+        ):
+            assert found == (unit * force, unit * excess, unit * acting, unit * energy, *states)
+
+    @given(numbers, slides)
+    def test_a_thousandth_of_all_lengths_gives_the_same_friction(self, numbers, slides):
+        unit = 2.0**-10
+        for (*forces, energy, state, direction), found in zip(
+            self.run(numbers, slides), self.run(numbers, slides, length=unit), strict=True
+        ):
+            assert found == (*forces, unit * energy, state, direction)
+
+    @given(numbers, slides)
+    def test_the_other_way_round_friction_is_the_opposite(self, numbers, slides):
+        for (force, excess, acting, energy, state, direction), found in zip(
+            self.run(numbers, slides), self.run(numbers, slides, side=-1.0), strict=True
+        ):
+            assert found == (-force, excess, -acting, energy, state, -direction)
+
+
+class TestExcess:
+    def test_an_excess_that_takes_all_friction_away_leaves_none(self):
+        numbers = presliding_numbers([replace(SEAL, memory_length=1e-3)])
+        state, force = shear(numbers, Shear(NO_ELEMENTS, -30.0), Slide(1e-4, 0.1, FRICTION, -24.0, 5.0))
+        assert state.excess == pytest.approx(-24.0 - 6.0 * math.exp(-0.1))  # the whole contact slides from the start
+        assert force == 0.0
+        assert state.forces == NO_ELEMENTS
+
+    def test_a_rigid_seal_that_comes_to_rest_holds_no_more_than_its_breakaway_force(self):
+        state, force = shear(RIGID, NOT_SHEARED, Slide(1e-3, 1e-3, FRICTION, 6.0, 2.0))
+        assert force == FRICTION + 6.0
+        _, held = shear(RIGID, state, Slide(0.0, 1e-3, FRICTION, 0.0, 2.0))
+        assert held == FRICTION + 2.0
+
+    @pytest.mark.parametrize('side', [1, -1])
+    def test_an_elastic_seal_slides_only_at_its_friction_with_the_excess(self, side):
+        spring = presliding_numbers([Presliding(stiffness=1e5, yield_exponent=0.0)])
+        slide = Slide(side * 1e-2, 1e-3, FRICTION, 4.0, 4.0)
+        state, force = shear(spring, NOT_SHEARED, slide)
+        assert acting_friction(spring, state, force, slide, False, side, 0.0) == (
+            FrictionState.SLIDING,
+            side,
+            side * 24.0,
+        )
+        back = Slide(-side * 5e-5, 1e-3, FRICTION, 4.0, 4.0)  # 24 N - 1e5 N/m * 50 um = 19 N, below 24 N
+        state, force = shear(spring, state, back)
+        acting = acting_friction(spring, state, force, back, True, 0.0, 0.0)
+        assert (acting.state, acting.direction) == (FrictionState.STUCK, side)
+        assert side * acting.friction_force == pytest.approx(19.0)
 
 
 class TestHysteresis:
@@ -296,6 +427,21 @@ def test_lugre_at_even_speed_is_its_sliding_friction_and_its_first_slope_is_the_
     assert force == pytest.approx(FRICTION, rel=1e-12)
     assert lugre(LuGreNumbers(1e5, 0.0), 0.0, 1e-9, 0.0, FRICTION)[1] == pytest.approx(1e5 * 1e-9, rel=1e-4)
     assert deflection == pytest.approx(FRICTION / 1e5)
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize('friction', [0.5, FRICTION])
+def test_lugre_relaxes_over_the_yield_of_its_bristles_and_its_damping_acts_on_their_rate(side, friction):
+    bristles, far, before = LuGreNumbers(1e5, 300.0), friction / 1e5, -0.4 * friction / 1e5
+    deflection, force = lugre(bristles, side * before, side * 2.0 * far, side * 0.05, friction)
+    assert side * deflection == pytest.approx(far * (1.0 - 1.4 * math.exp(-2.0)))
+    rate = 0.05 * (1.0 - side * deflection / far)
+    assert side * force == pytest.approx(1e5 * side * deflection + 300.0 * rate)
+    assert lugre(bristles, before, 0.0, 0.0, friction) == (before, 1e5 * before)  # at rest nothing relaxes
+
+
+def test_lugre_without_friction_is_none():
+    assert lugre(LuGreNumbers(1e5, 300.0), 1e-4, 1e-3, 0.05, 0.0) == (0.0, 0.0)
 
 
 @compiled

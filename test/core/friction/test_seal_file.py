@@ -16,7 +16,8 @@ from seal_friction_ros.core.friction.laws.friction_coefficient import Coefficien
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, NormalForceTable
 from seal_friction_ros.core.friction.laws.physics_based import PhysicsBased
 from seal_friction_ros.core.friction.laws.prior_art_chart import PriorArtChart
-from seal_friction_ros.core.friction.seal_file import law_document, mount_seals, parse_seal
+from seal_friction_ros.core.friction.mounting import Mounting
+from seal_friction_ros.core.friction.seal_file import law_document, mount_seals, mounting_of, parse_seal
 from seal_friction_ros.files import read_yaml
 
 CONFIG = ROOT / 'config' / 'seals'
@@ -148,6 +149,11 @@ def test_breakaway_may_follow_the_load():
         ({**CONSTANT, 'identification': 'mine'}, 'identification is not a mapping'),
         ({**CONSTANT, 'identification': {'rms': math.nan}}, 'identification is not a mapping'),
         ({**CONSTANT, 'identification': {'day': date(2022, 1, 28)}}, 'identification is not a mapping'),
+        ({**CONSTANT, 'identification': {'n': 3, 'rms': math.nan}}, 'identification is not a mapping'),
+        ({**CONSTANT, 'identification': {'rms': [1.0, math.nan]}}, 'identification is not a mapping'),
+        ({**CONSTANT, 'identification': {1: 2.0}}, 'identification is not a mapping'),
+        ({**CONSTANT, 'mounting': {'chambers': []}}, 'Mounting.chambers is empty'),
+        ({**CONSTANT, 'mounting': {'chambers': ['a', 'c']}}, "'c' is not a, b, difference or ambient"),
     ],
 )
 def test_a_spoiled_part_of_an_identified_seal_is_named(document, words):
@@ -157,6 +163,18 @@ def test_a_spoiled_part_of_an_identified_seal_is_named(document, words):
 def test_what_identification_says_of_itself_is_passed_over():
     plain, told = CONSTANT, {**CONSTANT, 'identification': {'law': 'x', 'measured_N': [1.0, None], 'data': [{'n': 1}]}}
     assert parse_seal(plain) == parse_seal(told)
+
+
+def test_a_seal_file_tells_how_its_seals_are_mounted_or_not():
+    assert mounting_of({**CONSTANT, 'mounting': {'chambers': ['a', 'ambient']}}) == Mounting(('a', 'ambient'))
+    assert mounting_of(CONSTANT) is None
+    assert mounting_of('no document') is None
+
+
+def test_the_scale_that_adapt_writes_acts_on_all_friction():
+    adapted = parse_seal({**CONSTANT, 'friction_scale': 1.25, 'stiction': 2.0})
+    found = actuator_friction((MountedSeal(adapted, 'a'),), 1e6, 0.0)
+    assert (found.coulomb_friction, found.stiction) == pytest.approx((15.0, 2.5))
 
 
 def test_laws_of_different_kinds_go_together():

@@ -1,5 +1,7 @@
 """Sliding, breakaway, stuck: the thesis's equation, its Figures 22 and 23, and the hysteresis of rest."""
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -71,6 +73,17 @@ def test_at_the_threshold_itself_the_rod_breaks_away(force_sum, was):
 def test_the_six_states_and_their_directions_with_stiction(velocity, force_sum, state, direction, friction):
     result = state_friction(velocity, force_sum, velocity == 0.0, 20.0, 23.0)
     assert result == (state, direction, friction)
+
+
+def test_a_rod_without_velocity_that_does_not_rest_has_no_friction_and_neither_has_one_without_a_seal():
+    assert state_friction(0.0, 7.0, False, 20.0, 23.0) == (FrictionState.SLIDING, 0, 0.0)
+    assert state_friction(0.0, 0.0, True, 0.0, 0.0) == (FrictionState.BREAKAWAY, 0, 0.0)
+
+
+def test_states_have_the_numbers_of_the_message():
+    text = (ROOT / 'msg_defs' / 'msg' / 'FrictionEstimate.msg').read_text()
+    for state in FrictionState:
+        assert re.search(rf'^uint8 {state.name} = {int(state)}\b', text, re.MULTILINE)
 
 
 # --- figures ---

@@ -1,13 +1,20 @@
 """Friction over temperature: one scale on every force, bounded, and as unsure as its coefficient."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
 
-from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, actuator_friction, at_temperature
+from seal_friction_ros.core.friction.actuator import (
+    ActuatorFriction,
+    MountedSeal,
+    actuator_friction,
+    at_temperature,
+    at_unknown_temperature,
+)
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.temperature import (
     TemperatureScale,
@@ -50,7 +57,7 @@ def test_the_relative_deviation_grows_with_the_distance_from_the_reference(tempe
     assert found.coulomb_friction_std / found.coulomb_friction >= 0.1 * (1.0 - 1e-9)
 
 
-@pytest.mark.parametrize(('temperature', 'is_known'), [(288.9, False), (289.1, True), (330.9, True), (331.1, False)])
+@pytest.mark.parametrize(('temperature', 'is_known'), [(288.9, False), (289.0, True), (331.0, True), (331.1, False)])
 def test_one_kelvin_outside_counts_as_identified_still(temperature, is_known):
     assert is_identified_at(LAW, temperature) == is_known
 
@@ -62,7 +69,14 @@ def test_a_seal_file_holds_it_and_without_it_the_numbers_are_the_same_to_the_bit
     mounted = actuator_friction((MountedSeal(seal, 'a'),), 3e6, 0.0)
     expected = actuator_friction((MountedSeal(plain, 'a'),), 3e6, 0.0)
     assert mounted.coulomb_friction == expected.coulomb_friction
-    assert mounted.coulomb_friction_std > expected.coulomb_friction_std  # the estimator has no temperature
+    unsure = expected.coulomb_friction * 0.01 * 40.0 / math.sqrt(12.0)  # the estimator has no temperature
+    assert mounted.coulomb_friction_std == pytest.approx(math.hypot(expected.coulomb_friction_std, unsure))
+
+
+def test_the_spread_of_an_unknown_temperature_is_a_share_of_all_sliding_friction():
+    warm = at_unknown_temperature(FRICTION, LAW)
+    assert warm == FRICTION._replace(coulomb_friction_std=warm.coulomb_friction_std)
+    assert warm.coulomb_friction_std == pytest.approx(math.hypot(4.0, 45.0 * 0.01 * 40.0 / math.sqrt(12.0)))
 
 
 @pytest.mark.parametrize(
@@ -88,3 +102,4 @@ def test_seals_of_an_actuator_have_one_scale():
 
 def test_a_temperature_that_is_not_known_may_be_any_of_the_identified_ones():
     assert std_of_unknown(LAW) == pytest.approx(0.01 * 40.0 / math.sqrt(12.0))  # of a uniform distribution
+    assert std_of_unknown(replace(LAW, coefficient=-0.01)) == std_of_unknown(LAW)
