@@ -14,7 +14,9 @@ from seal_friction_ros.core.servo.closed_loop import (
     Axis,
     AxisRun,
     EvaluationMotions,
+    Performance,
     StoppedWave,
+    performance_of,
     run_closed_loop,
     without_feedforward,
 )
@@ -104,6 +106,63 @@ def test_a_stopped_wave_stands_still_from_its_stop_on():
     wave = StoppedWave(Sine(1e-3, 5.0), 0.33)
     assert wave.at(0.329) == wave.wave.at(0.329)
     assert wave.at(0.33) == wave.at(10.0) == Setpoint(wave.wave.at(0.33).position)
+
+
+MOTIONS = EvaluationMotions(Sine(0.01, 2.0, 0.05), 0.5)
+
+
+def test_the_sine_stops_at_a_trough_and_the_move_begins_there_and_reaches_its_speed_and_acceleration():
+    sine, move = MOTIONS.sine, MOTIONS.move
+    assert MOTIONS.stop_time == pytest.approx(6.75 / 2.0)
+    assert sine.at(MOTIONS.stop_time)[:2] == pytest.approx((0.04, 0.0), abs=1e-12)
+    assert move.at(0.0) == Setpoint(0.04, 0.0, move.acceleration)
+    steps = [move.at(i * 1e-3) for i in range(round(move.duration * 1000))]
+    one = [sine.at(i * 1e-3) for i in range(500)]
+    for field in Setpoint._fields:
+        assert max(getattr(s, field) for s in steps) == pytest.approx(max(getattr(s, field) for s in one), rel=1e-3)
+    assert move.duration == pytest.approx(1.0)  # half the frequency, once
+
+
+BEST = Performance(1.0, 5.0, 1.0, 0.0, 3, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ('change', 'better'),
+    [
+        ({'tracking_rms': 0.9}, True),
+        ({}, False),
+        ({'tracking_rms': 0.9, 'dwell': 1.1}, False),
+        ({'tracking_rms': 0.9, 'dwell': 0.9}, True),
+        ({'tracking_rms': 0.9, 'limit_cycle_reversals': 4}, False),
+        ({'tracking_rms': 0.9, 'limit_cycle_reversals': 2, 'tracking_peak': 9.0}, True),
+        ({'tracking_rms': 1.1, 'dwell': 0.0, 'limit_cycle_reversals': 0}, False),
+    ],
+)
+def test_better_is_a_smaller_error_without_more_rest_or_more_reversals_at_rest(change, better):
+    assert BEST._replace(**change).better_than(BEST) is better
+
+
+def made_run(seconds, position, velocity=0.0, feedforward=0.0):
+    time = PERIOD * np.arange(1, round(seconds / PERIOD) + 1)
+    parts = [np.broadcast_to(values, time.shape) for values in (position(time), velocity, 0.0, feedforward)]
+    return AxisRun(time, np.full_like(time, 0.05), *parts)
+
+
+def test_performance_is_error_rest_overshoot_limit_cycle_and_force():
+    flicker = np.where(np.arange(1000) % 2, 1e-3, -1e-3)
+    sine = made_run(4.0, lambda t: 0.05 + 2e-3 * np.where(t > 1.0, 1.0, 7.0))  # the settling does not count
+    sine = sine._replace(velocity=np.where(sine.time <= 1.2, 0.0, 1.0), feedforward=np.full(4000, -7.0))
+    move = made_run(1.0, lambda t: 0.05 - 0.013 * t)._replace(velocity=flicker)
+    force = np.concatenate([np.zeros(500), np.full(500, 5.0)])
+    step = made_run(1.0, lambda t: 0.05 + 0.0 * t)._replace(feedforward=force)
+    found = performance_of(PERIOD, MOTIONS, (sine, move, step))
+    assert (found.tracking_rms, found.tracking_peak) == pytest.approx((2e-3, 2e-3))
+    assert found.dwell == pytest.approx(0.2 / 8)  # of two seconds evaluated, with eight reversals
+    assert found.overshoot == pytest.approx(0.003)
+    assert found.limit_cycle_reversals == 499  # in the half second of the hold
+    assert (found.largest_force, found.largest_force_rate) == pytest.approx((7.0, 7.0 / PERIOD))
+    small = move._replace(position=np.full(1000, 0.055))
+    assert performance_of(PERIOD, MOTIONS, (sine, small, step)).overshoot == 0.0
 
 
 def test_the_evaluated_part_is_whole_periods_of_the_sine():

@@ -7,12 +7,19 @@ import pytest
 from paths import ROOT
 
 from seal_friction_ros.core.friction.actuator import MountedSeal
-from seal_friction_ros.core.friction.presliding import Presliding
+from seal_friction_ros.core.friction.presliding import Presliding, Slide
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.servo.elastic_plant import ElasticSeals, elastic_seals, energy_of_seals, seals_of_plant
+from seal_friction_ros.core.servo.elastic_plant import (
+    NO_SHEAR,
+    ElasticSeals,
+    elastic_seals,
+    energy_of_seals,
+    seals_of_plant,
+    sheared,
+)
 from seal_friction_ros.core.servo.motions import Setpoint, Sine
 from seal_friction_ros.core.servo.plant import stored_energy
-from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, simulate
+from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, simulate, step
 from seal_friction_ros.files import read_yaml
 
 DOCUMENT = read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml')
@@ -78,6 +85,58 @@ def test_the_plants_of_the_simulator_are_as_stiff_as_the_seal_files():
     assert lugre.bristle_damping == pytest.approx(np.sqrt(3e5 * 5.0))
     with pytest.raises(ValueError, match='no seal file has presliding: identify it'):
         seals_of_plant('elements', SEALS, 5.0)
+
+
+def test_one_seal_has_all_of_the_friction_and_three_are_too_many():
+    one = MountedSeal(replace(SEAL, presliding=SOFT), 'a')
+    assert elastic_seals((one,)) == ElasticSeals(SOFT, None, 1.0)
+    assert ElasticSeals(SOFT, None, 0.3).numbers.first_share == 1.0  # no second group to have the rest
+    assert ElasticSeals(SOFT, replace(SOFT, stiffness=3e5), 0.3).stiffness == 4e5
+    with pytest.raises(ValueError, match='3 of 3 seal files have presliding: the simulated servo takes one or two'):
+        elastic_seals((one, one, one))
+
+
+def test_lugre_may_have_no_damping_and_elements_have_no_bristles():
+    assert ElasticSeals(SOFT, bristle_damping=0.0).numbers.is_lugre
+    assert not ElasticSeals(SOFT).numbers.is_lugre
+    assert ElasticSeals(SOFT).numbers.lugre.bristle_damping == 0.0
+
+
+def test_two_groups_share_friction_excess_and_stiction():
+    numbers = ElasticSeals(SOFT, replace(SOFT, stiffness=3e5, yield_exponent=0.0), 0.3).numbers
+    for slide, friction in (
+        (Slide(1.0, 0.1, 20.0, 4.0, 6.0), 24.0),  # both slide
+        (Slide(0.0, 0.1, 20.0, 4.0, 6.0), 0.0),
+        (Slide(1e-9, 0.1, 20.0, 4.0, 6.0), 4e5 * 1e-9),  # both stick: their springs add up
+    ):
+        assert sheared(numbers, NO_SHEAR, slide, 0.1).friction == pytest.approx(friction)
+    slid = sheared(numbers, NO_SHEAR, Slide(1.0, 0.1, 20.0, 4.0, 6.0), 0.1)
+    held = sheared(numbers, slid, Slide(0.0, 0.1, 20.0, 4.0, 6.0), 0.0)
+    assert (slid.first.excess, slid.second.excess) == pytest.approx((0.3 * 4.0, 0.7 * 4.0))
+    assert (held.first.excess, held.second.excess) == pytest.approx((0.3 * 6.0, 0.7 * 6.0))
+    lugre = ElasticSeals(SOFT, bristle_damping=0.0).numbers
+    bent = sheared(lugre, NO_SHEAR, Slide(1.0, 0.1, 20.0, 4.0, 6.0), 0.1)
+    assert (bent.friction, bent.deflection) == pytest.approx((24.0, 24.0 / 1e5))
+    assert energy_of_seals(lugre, bent) == pytest.approx(0.5 * 24.0**2 / 1e5)
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_a_rod_on_elastic_seals_ends_at_the_stop_with_the_loss_of_its_energy(side):
+    servo = ServoParameters(seals=SEALS, elastic=ElasticSeals(SOFT))
+    limit = servo.cylinder.limit
+    start = init(servo, side * (limit - 1e-5))
+    state, seen = start, []
+    for _ in range(60):
+        state, _ = step(servo, state, Setpoint(0.0), side * 2000.0, side * 500.0)
+        assert abs(state.plant.position) <= limit * (1.0 + 1e-6)
+        assert abs(state.plant.spool) <= 1.0
+        seen.append(side * state.plant.position >= limit)
+    assert any(seen)
+    stored = stored_energy(servo.constants, state.plant) - stored_energy(servo.constants, start.plant)
+    stored += energy_of_seals(servo.elastic.numbers, state.seals)
+    turnover = abs(state.plant.energy_in)
+    assert turnover > 0.1
+    assert abs(state.plant.energy_in - state.plant.energy_dissipated - stored) < 2e-2 * turnover
 
 
 def test_refusals_name_the_remedy():

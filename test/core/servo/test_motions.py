@@ -8,7 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.foundation.units import PSI
-from seal_friction_ros.core.servo.motions import Chirp, PullTest, RoundedWave, Setpoint, Sine, Step, Trapezoid
+from seal_friction_ros.core.servo.motions import (
+    Chirp,
+    PullCommand,
+    PullTest,
+    RoundedWave,
+    Setpoint,
+    Sine,
+    Step,
+    Trapezoid,
+)
 
 WAVES = [Sine(0.002, 3.0, 0.01), Trapezoid(), Chirp(duration=2.0), Chirp(start_frequency=9.0, end_frequency=2.0)]
 
@@ -39,6 +48,36 @@ def test_a_rounded_wave_is_a_digital_set_point_and_its_differences(wave, sample,
     assert abs(now.position - wave.at(sample / rate).position) <= 0.5 * resolution * (1.0 + 1e-6)
     assert now.velocity == pytest.approx((now.position - before.position) * rate, abs=1e-9)
     assert now.acceleration == pytest.approx((now.velocity - before.velocity) * rate, abs=1e-6)
+
+
+def test_a_sine_is_at_its_ends_and_in_its_middle_when_it_should_be():
+    wave = Sine(0.002, 5.0, 0.01)
+    rate = 10.0 * math.pi
+    for quarter, (position, velocity, acceleration) in enumerate(((0, 1, 0), (1, 0, -1), (0, -1, 0), (-1, 0, 1))):
+        expected = (0.01 + 0.002 * position, 0.002 * rate * velocity, 0.002 * rate**2 * acceleration)
+        assert wave.at(0.05 * quarter) == pytest.approx(expected, abs=1e-12)
+
+
+def test_strokes_that_fill_the_period_and_just_reach_their_speed():
+    """0.5 m at 1 m/s and 2 m/s2: half a second of ramp up, half a second of ramp down, no rest."""
+    wave = Trapezoid(distance=0.5, speed=1.0, acceleration=2.0, frequency=0.5, offset=-0.1, cycles=2)
+    assert (wave.move_time, wave.duration) == (1.0, 4.0)
+    assert wave.at(0.25) == pytest.approx((-0.1 + 0.0625, 0.5, 2.0))
+    assert wave.at(0.75) == pytest.approx((0.4 - 0.0625, 0.5, -2.0))
+    assert wave.at(1.25) == pytest.approx((0.4 - 0.0625, -0.5, -2.0))
+    assert wave.at(3.75) == pytest.approx((-0.1 + 0.0625, -0.5, 2.0))
+    assert wave.at(4.0) == Setpoint(-0.1)
+    for wrong in ({'speed': 1.001}, {'frequency': 0.501}):
+        with pytest.raises(ValueError, match=r'^Trapezoid\.'):
+            Trapezoid(**{'distance': 0.5, 'speed': 1.0, 'acceleration': 2.0, 'frequency': 0.5} | wrong)
+    assert Trapezoid(cycles=0).duration == math.inf
+
+
+def test_a_chirp_in_the_middle_of_its_sweep():
+    wave = Chirp(amplitude=0.5, start_frequency=1.0, end_frequency=3.0, duration=4.0, offset=0.2)
+    assert wave.at(2.0).position == pytest.approx(0.2 + 0.5 * math.sin(2.0 * math.pi * 1.5 * 2.0), abs=1e-12)
+    assert wave.at(2.0).velocity == pytest.approx(0.5 * 2.0 * math.pi * 2.0 * math.cos(2.0 * math.pi * 3.0))
+    assert wave.at(6.0).position == pytest.approx(0.2 + 0.5 * math.sin(2.0 * math.pi * (8.0 + 6.0)), abs=1e-9)
 
 
 def test_step_steps_once():
@@ -83,7 +122,12 @@ def test_pull_test_is_that_of_appendix_a():
     assert (extend.direction, retract.direction) == (1, -1)
     assert extend.carriage == pytest.approx(0.01)
     assert retract.carriage == pytest.approx(0.01)
-    assert plan.at(1e9).test == 32
+    assert plan.at(1e9) == PullCommand(1000.0 * PSI, 0.0, 32, 0)  # all done: at rest, the carriage back
+    assert plan.at(-5.0) == PullCommand(0.0, 0.0, 0, 0)
+    assert plan.at(30.0) == PullCommand(0.0, 0.0, 0, 0)
+    assert plan.at(35.0) == PullCommand(0.0, 0.02, 0, -1)  # the turn: 5 s at 4 mm/s
+    assert plan.at(40.0) == pytest.approx((100.0 * PSI, 0.0, 1, 0))
+    assert PullTest(intervals=4, pressure_max=8e5).at(40.0).pressure == 2e5
     assert plan.force(extend, 0.006) == pytest.approx(40.0)
 
 

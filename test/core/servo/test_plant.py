@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from contextlib import nullcontext
 from itertools import pairwise
 
 import numpy as np
@@ -12,13 +13,14 @@ from hypothesis import strategies as st
 from paths import ROOT
 from scipy.integrate import solve_ivp
 
+from seal_friction_ros.core.foundation.units import PSI
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
-from seal_friction_ros.core.servo.hydraulics import ServoValve, oil_chamber_rate, signed_root
+from seal_friction_ros.core.servo.hydraulics import ServoValve, oil_chamber_rate, oil_rates, port_flow, signed_root
 from seal_friction_ros.core.servo.plant import Load, fastest_rate, inner_step, steepest_friction, stored_energy
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs
 
@@ -77,6 +79,59 @@ def test_pressure_of_a_locked_piston_leaks_away_as_the_closed_form():
     rate = 2.0 * locked.cylinder.bulk_modulus / locked.cylinder.mid_volume_a * (5e-14 + 6e-14)
     expected = 2e6 * math.exp(-rate * 100 * locked.control_period)
     assert state.charge_a - state.charge_b == pytest.approx(expected, rel=1e-7)
+
+
+def test_oil_leaks_to_ambient_from_each_chamber_as_the_closed_form():
+    # dp/dt = -(beta/V) C_e p, of either chamber for itself
+    leaking = ServoParameters(
+        seals=LOCK, valve=TIGHT_VALVE, cylinder=Cylinder(internal_leakage=0.0, external_leakage=5e-14)
+    )
+    start = state = plant(leaking, charge_a=2e6, charge_b=5e6)
+    for _ in range(100):
+        state = advance(leaking, state, 0.0)
+    cylinder = leaking.cylinder
+    share = math.exp(-cylinder.bulk_modulus / cylinder.mid_volume_a * 5e-14 * 100 * leaking.control_period)
+    assert (state.charge_a, state.charge_b) == pytest.approx((2e6 * share, 5e6 * share), rel=1e-7)
+    lost = stored_energy(leaking.constants, start) - stored_energy(leaking.constants, state)
+    assert state.energy_dissipated == pytest.approx(lost, rel=1e-6)
+    assert state.energy_in == 0.0
+
+
+@pytest.mark.parametrize('chamber', ['a', 'b'])
+def test_oil_that_flows_into_a_cavity_fills_it_by_its_volume(chamber):
+    # The oil is V exp((charge - vapour) / beta) at vapour pressure; its rate is the flow.
+    c, charge = SERVO.constants, -5e6
+    y = list(plant(SERVO, **{f'charge_{chamber}': charge}))[:10]
+    rates = oil_rates(c.valve, c, tuple(y))
+    beta, volume = SERVO.cylinder.bulk_modulus, SERVO.cylinder.mid_volume_a
+    vapour = SERVO.cylinder.vapour
+    oil = volume * math.exp((charge - vapour) / beta)
+    other = y[3] if chamber == 'a' else y[2]
+    flow = 6e-14 * (1000.0 * PSI + 1e5 - 2.0 * vapour) + 1e-14 * (other - vapour)
+    assert getattr(rates, f'pressure_{chamber}') * oil / beta == pytest.approx(flow, rel=1e-9)
+
+
+def test_the_rated_flow_passes_two_lands_that_share_the_rated_drop():
+    valve = SERVO.constants.valve
+    drop = 1000.0 * PSI / 2.0
+    assert port_flow(valve, 1.0, 3e6, 3e6 - drop) == pytest.approx(2.5e-5 + 6e-14 * drop)
+    assert port_flow(valve, 0.5, 3e6 - drop, 3e6) == pytest.approx(-0.5 * 2.5e-5 - 6e-14 * drop)
+
+
+def test_fastest_rate_is_that_of_the_spool_or_of_oil_with_the_mass_on_it():
+    slow = Cylinder(type='single_rod', bore_diameter=0.04, rod_diameter=0.022, stroke=0.3, dead_volume=5e-5)
+    valve, load = ServoValve(natural_frequency=2e4, damping_ratio=0.3), Load(mass=80.0, spring_stiffness=5e7)
+    assert fastest_rate(valve, slow, load)[0] == 2e4
+    assert fastest_rate(dataclasses.replace(valve, damping_ratio=0.8), slow, load)[0] == pytest.approx(1.6 * 2e4)
+    load = Load(mass=80.0, spring_stiffness=5e7, viscous_damping=800.0)
+    valve = ServoValve(natural_frequency=100.0)
+    rate, part = fastest_rate(valve, slow, load)
+    a, b, v = slow.area_a, slow.area_b, slow.dead_volume
+    stiffness = slow.bulk_modulus * (a**2 / v + b**2 / (b * 0.3 + v)) + 5e7  # at the stop of the larger chamber
+    assert rate == pytest.approx(oil_chamber_rate(valve, slow) + math.sqrt(stiffness / 80.0) + 10.0)
+    assert part.startswith('chamber and orifice')
+    orifice = 1.25 * ServoValve().orifice_gain / math.sqrt(3e5)
+    assert oil_chamber_rate(TIGHT_VALVE, TIGHT_CYLINDER) == pytest.approx(7e8 / 2e-6 * orifice)
 
 
 def test_spool_follows_its_second_order_step_response():
@@ -282,6 +337,7 @@ def test_whatever_is_done_to_it_stays_physical(inputs, seals):
         ({'inner_step': 5e-4}, r'inner_step = 0.0005 s is too long: at most .* chamber and orifice'),
         ({'valve': ServoValve(natural_frequency=6e4)}, 'spool of the valve'),
         ({'inner_step': 1.5e-4}, 'not a multiple'),
+        ({'inner_step': 2e-3}, 'not a multiple'),
         ({'controller': ServoController(position_gain=3e6)}, 'closed loop is unstable'),
         ({'control_period': 1e-2}, 'closed loop is unstable'),
     ],
@@ -311,6 +367,9 @@ def test_largest_inner_step_that_is_accepted_is_stable():
     rate, _ = fastest_rate(SERVO.valve, SERVO.cylinder, SERVO.load)
     longest = ServoParameters(seals=LOCK, inner_step=2e-4, control_period=4e-4)
     assert rate * 2e-4 > 2.0
+    for product, taken in ((2.49, True), (2.51, False)):  # 2.78 is the limit of Runge-Kutta on the real axis
+        with nullcontext() if taken else pytest.raises(ValueError, match='too long'):
+            ServoParameters(seals=(), inner_step=product / rate, control_period=2.0 * product / rate)
     state = plant(longest, position=-longest.cylinder.stroke / 2.0, spool=1.0)
     for _ in range(200):
         state = advance(longest, state, 1.0)

@@ -4,6 +4,7 @@ import itertools
 import math
 from statistics import fmean, stdev
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -50,9 +51,30 @@ def test_noise_is_white():
     assert abs(sum(a * b for a, b in pairs) / sum(a * a for a, _ in pairs)) < 0.05
 
 
+def test_errors_and_losses_of_one_sensor_tell_nothing_of_another():
+    rows = [flat(read(NOISY, i, TRUTH)) for i in range(10_000)]
+    complete = np.array([row for row in rows if None not in row])
+    together = np.corrcoef(complete.T)
+    assert np.abs(together[~np.eye(5, dtype=bool)]).max() < 0.05
+    lost = np.array([[value is None for value in row[1:]] for row in rows])
+    assert np.array_equal(lost[:, 0], [row[0] is None for row in rows])  # both pressures are of one sensor
+    for i, j in itertools.combinations(range(4), 2):
+        assert np.mean(lost[:, i] & lost[:, j]) == pytest.approx(0.1 * 0.1, abs=0.005)
+
+
+def test_all_samples_are_lost_none_are_and_what_is_not_there_cannot_be_read():
+    nothing = Readings(None, None, None, None)
+    for i in range(200):
+        assert read(SensorSettings(drop_out=1.0), i, TRUTH) == nothing
+        assert read(SensorSettings(), i, TRUTH) == TRUTH
+    for name in Readings._fields:
+        assert read(SensorSettings(), 5, TRUTH._replace(**{name: None})) == TRUTH._replace(**{name: None})
+
+
 def test_resolution_rounds_to_the_nearest_step():
     coarse = SensorSettings(pressure_resolution=7e5, velocity_resolution=0.03, force_resolution=25.0)
     readings = read(coarse, 3, TRUTH)
+    assert read(SensorSettings(position_resolution=0.004), 3, TRUTH).position == 0.004
     assert readings.pressure == pytest.approx((2.8e6, 7e5))
     assert (readings.velocity, readings.force_sum, readings.position) == (0.03, -50.0, 0.005)
 

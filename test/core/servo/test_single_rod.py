@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core.servo.controller import ServoController
-from seal_friction_ros.core.servo.cylinder import Cylinder
+from seal_friction_ros.core.servo.cylinder import Cylinder, pressure_force
 from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.plant import Load, inner_step, stored_energy
@@ -36,6 +36,20 @@ def test_areas_are_those_of_bore_and_rod():
     balanced = dataclasses.replace(CYLINDER, type='balanced')
     assert balanced.area_a == balanced.area_b == CYLINDER.area_b
     assert balanced.rod_area == 0.0
+
+
+def test_pressures_push_with_their_areas_and_vapour_is_nearly_a_bar_below_ambient():
+    assert pressure_force(CYLINDER, 3e6, 5e6) == pytest.approx(3e6 * CYLINDER.area_a - 5e6 * CYLINDER.area_b)
+    assert CYLINDER.vapour == 1e3 - 101325.0
+    assert CYLINDER.mid_volume_a == pytest.approx(CYLINDER.area_a * 0.15 + 5e-5)
+    assert CYLINDER.mid_volume_b == pytest.approx(CYLINDER.area_b * 0.15 + 5e-5)
+
+
+def test_a_chamber_has_at_least_one_percent_of_the_swept_volume_at_its_stop():
+    swept = CYLINDER.area_a * CYLINDER.stroke
+    assert dataclasses.replace(CYLINDER, dead_volume=0.01001 * swept).dead_volume == 0.01001 * swept
+    with pytest.raises(ValueError, match='1 % of the swept volume'):
+        dataclasses.replace(CYLINDER, dead_volume=0.00999 * swept)
 
 
 def test_unknown_type_is_rejected_with_the_known_ones():

@@ -29,6 +29,13 @@ def test_standstill_speed_counts_as_rest():
     assert reversals(velocity, 0.1) == 1
 
 
+def test_a_rod_exactly_at_the_standstill_speed_rests():
+    velocity = np.array([1.0, 0.1, -1.0, -0.1, 0.1, -1.0])
+    assert dwell_per_reversal(velocity, 1.0, 0.1) == 1.0
+    assert reversals(velocity, 0.1) == 1
+    assert reversals(velocity) == 3
+
+
 def test_rms_and_peak():
     reference, position = np.array([0.0, 0.0, 3.0, 0.0]), np.array([0.0, 4.0, 3.0, 0.0])
     assert tracking_rms(reference, position) == 2.0
