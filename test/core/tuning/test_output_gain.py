@@ -76,6 +76,73 @@ def test_standard_error_covers_the_spread_of_the_gain_over_noise():
     assert 0.5 < np.std(gains) / np.sqrt(np.mean(np.square(errors))) < 2.0
 
 
+def made(noise=0.0, samples=2000, gain=2e-5, seed=3):
+    """A command that is exactly linear in force, velocity and position, with noise over its standard deviation."""
+    time = np.arange(samples) * PERIOD
+    force, velocity = 300.0 * np.sin(7.0 * time), 0.02 * np.cos(11.0 * time)
+    position = 0.01 * np.sin(3.0 * time + 1.0)
+    command = gain * force + 0.3 * velocity + 1.5 * position + 0.4
+    command = command + noise * command.std() * np.random.default_rng(seed).normal(size=samples)
+    return CommandRecord(time, command, force, position, velocity)
+
+
+def test_an_exact_relation_comes_back_with_every_share():
+    found = output_gain(made())
+    assert found == pytest.approx((2e-5, 0.0, 1.5, 0.3, 2000 - 19), abs=1e-12)  # averaged over 20 samples of 1 ms
+    record = made()
+    nothing = record._replace(position=np.full(2000, np.nan), command=record.command - 1.5 * record.position)
+    assert output_gain(nothing)[::2] == pytest.approx((2e-5, 0.0, 2000 - 19), abs=1e-12)
+
+
+@pytest.mark.parametrize('samples', [499, 500])
+def test_a_gain_takes_500_samples(samples):
+    record = CommandRecord(*(values[:samples] for values in made()))
+    if samples == 500:
+        assert output_gain(record).gain == pytest.approx(2e-5)
+    else:
+        with pytest.raises(ValueError, match='499 usable samples'):
+            output_gain(record)
+
+
+def test_samples_that_are_not_finite_do_not_count():
+    record = made()
+    record.force[7] = record.velocity[1900] = np.nan
+    assert output_gain(record).samples == 1998 - 19
+    slow = made()._replace(time=np.arange(2000) * 1e-5)  # 0.02 s are all of its samples
+    with pytest.raises(ValueError, match='2000 usable samples'):
+        output_gain(slow)
+
+
+@pytest.mark.parametrize(('variation', 'taken'), [(0.8e-6, False), (1.5e-6, True)])
+def test_a_command_that_changes_by_a_millionth_of_its_size_changes(variation, taken):
+    record = made()
+    shape = record.command - record.command.mean()
+    record = record._replace(command=1.0 + variation * shape / np.ptp(shape))
+    if taken:
+        assert output_gain(record).gain > 0.0
+    else:
+        with pytest.raises(ValueError, match='does not change'):
+            output_gain(record)
+
+
+@pytest.mark.parametrize(('noise', 'taken'), [(0.5, True), (2.0, False)])
+def test_a_gain_is_known_to_a_tenth_or_not_at_all(noise, taken):
+    """Its relative standard deviation over noise, from 40 draws, decides as the standard error of each does."""
+    errors = []
+    for seed in range(40):
+        record = made(noise, seed=seed)
+        inputs = np.column_stack([record.force, record.velocity, record.position, np.ones(2000)])
+        errors.append(np.linalg.lstsq(inputs, record.command, rcond=None)[0][0] / 2e-5 - 1.0)
+    assert (np.std(errors) < 0.05) is taken
+    assert (np.std(errors) > 0.12) is not taken
+    if taken:
+        found = output_gain(made(noise))
+        assert 0.5 < found.standard_error / found.gain / np.std(errors) < 2.0
+    else:
+        with pytest.raises(ValueError, match='more than 10%'):
+            output_gain(made(noise))
+
+
 @pytest.mark.parametrize(
     ('change', 'reason'),
     [

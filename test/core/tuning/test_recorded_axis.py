@@ -10,13 +10,16 @@ from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.tuning.recorded_axis import (
+    RecordedLaw,
     RecordedMotion,
     Recording,
     acceleration,
     delayed,
     feedforward_force,
     fit_law,
+    largest_friction,
     near_reversals,
+    residual,
     tune_recorded_axis,
 )
 from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RecordedAxisSettings
@@ -127,6 +130,94 @@ def test_a_steady_velocity_has_no_acceleration_and_a_slow_change_has():
 def test_acceleration_of_next_to_nothing_is_unknown():
     assert np.isnan(acceleration(np.zeros(20), np.zeros(20))).all()
     assert np.isnan(acceleration(np.arange(3.0), np.arange(3.0))).all()
+
+
+@pytest.mark.parametrize(('stretch', 'known'), [(1.4, True), (1.6, False), (0.6, True), (0.4, False)])
+def test_a_sample_that_is_half_a_period_early_or_late_has_no_acceleration(stretch, known):
+    time = TIME + np.where(np.arange(len(TIME)) > 700, (stretch - 1.0) / RATE, 0.0)
+    slope = acceleration(time, 3.0 * TIME)
+    assert np.isfinite(slope[696:706]).all() == known
+    assert np.isfinite(slope[[695, 706]]).all()
+
+
+def only(made, keep):
+    """The recording with the estimates outside ``keep`` unusable."""
+    bad = int(Status.PRESSURE_STALE)
+    estimates = [e if k else e._replace(status=bad) for e, k in zip(made.estimates, keep, strict=True)]
+    return made._replace(estimates=estimates)
+
+
+def test_a_doubtful_motion_counts_from_a_tenth_of_the_largest_speed_on():
+    made = recording(status=int(Status.MOTION_UNCERTAIN))
+    speed = np.abs(made.velocity[5:-5])
+    np.testing.assert_array_equal(fit_law(made).sliding[5:-5], speed >= 0.1 * 0.03)
+    sure = fit_law(recording()).sliding[5:-5]
+    np.testing.assert_array_equal(sure, speed > 1e-3)
+
+
+def test_a_law_takes_a_hundred_samples():
+    made = recording()
+    places = np.flatnonzero(fit_law(made).sliding)
+    for count in (99, 100):
+        keep = np.isin(np.arange(len(TIME)), places[:: len(places) // count][:count])
+        if count == 100:
+            assert fit_law(only(made, keep)).scale == pytest.approx(0.8, rel=0.01)
+        else:
+            with pytest.raises(ValueError, match='slides in 99 usable samples, the friction needs 100'):
+                fit_law(only(made, keep))
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize(('percent', 'offset'), [(11, 3.0), (9, 0.0)])
+def test_an_offset_takes_a_tenth_of_the_samples_in_each_direction(percent, offset, side):
+    made = recording()
+    places = np.flatnonzero(fit_law(made).sliding)
+    few, many = (places[side * s * made.velocity[places] > 0.0] for s in (1.0, -1.0))
+    chosen = [*few[:: len(few) // percent][:percent], *many[:: len(many) // 100][: 100 - percent]]
+    law = fit_law(only(made, np.isin(np.arange(len(TIME)), chosen)))
+    assert np.count_nonzero(law.sliding) == 100
+    assert law.offset == pytest.approx(offset, abs=1e-2 if offset else 0.0)
+
+
+@pytest.mark.parametrize(('noise', 'low', 'high', 'known'), [(110.0, 0.05, 0.1, False), (50.0, 0.025, 0.05, True)])
+def test_a_scale_is_known_to_5_percent_or_not_at_all(noise, low, high, known):
+    made = recording(noise=noise)
+    law = fit_law(made)
+    assert low < law.scale_std / law.scale < high
+    found = tune_recorded_axis(made, SETTINGS, KNOWN)
+    assert found.identified['scale'] is known
+    assert found.feedforward.scale == (round(law.scale, 2) if known else SETTINGS.scale)
+
+
+@pytest.mark.parametrize(('share', 'counts'), [(0.015, True), (0.005, False)])
+def test_the_largest_hundredth_of_the_frictions_is_noise(share, counts):
+    made = recording(coulomb=40.0, scale=1.0)
+    law = fit_law(made)
+    places = np.flatnonzero(law.sliding)
+    peaks = places[np.linspace(0, len(places) - 1, round(share * len(places))).astype(int)]
+    law.friction[peaks] = -300.0
+    expected = 300.0 if counts else 44.0  # of the law: the friction rises by a tenth
+    assert largest_friction(made, law) == pytest.approx(expected, rel=0.01)
+    assert largest_friction(made, law._replace(friction=0.0 * law.friction)) == pytest.approx(44.0, rel=0.01)
+
+
+def test_what_remains_counts_where_the_rod_slides_and_near_a_reversal():
+    law = RecordedLaw(
+        1.0, 0.0, 0.0, False, 0.0, np.array([3.0, 5.0, 9.0, np.nan]), np.array([True, True, False, False])
+    )
+    left = residual(law, np.array([False, True, True, True]), np.array([0.0, 1.0, 0.0, 0.0]))
+    assert left == pytest.approx((math.sqrt((9.0 + 16.0) / 2.0), 4.0))
+    assert residual(law, np.zeros(4, bool), np.zeros(4)).reversal == 0.0
+    assert left.better_than(left._replace(sliding=4.0))
+    assert not left.better_than(left)
+
+
+def test_an_estimate_that_is_unusable_has_no_force_and_a_wrong_model_has_its_share_more():
+    made = recording()
+    assert not feedforward_force(SETTINGS, only(made, np.zeros(len(TIME), bool))).any()
+    plain, more = (feedforward_force(SETTINGS, made, error) for error in (0.0, 0.2))
+    steady = np.abs(plain) > 0.99 * np.abs(plain).max()
+    np.testing.assert_allclose(more[steady], 1.2 * plain[steady], rtol=0.01)
 
 
 def test_reversals_of_the_reference_are_found_also_across_rest():

@@ -1,6 +1,7 @@
 """Closed loop, performance, and search for the feed-forward of a simulated axis."""
 
 import dataclasses
+import itertools
 import math
 from functools import cache
 
@@ -30,6 +31,7 @@ from seal_friction_ros.core.tuning.settings import RobustnessCase, TuningSetting
 from seal_friction_ros.core.tuning.simulated_axis import (
     MOST_CANDIDATES,
     NEARLY_AS_GOOD,
+    SearchPoint,
     TuningProblem,
     bounded,
     force_limit,
@@ -225,10 +227,115 @@ def test_a_search_in_which_every_point_is_rejected_ends(monkeypatch):
     assert tune(QUICK).merit == math.inf
 
 
+def test_the_search_starts_from_none_and_from_a_third_to_more_than_all_of_the_friction_up_to_twice_the_delay_ahead():
+    points = simulated_axis._grid(DEFAULT)
+    settings = [DEFAULT.feedforward(point) for point in points]
+    assert [s.lead_time for s in settings if s.scale == 0.0] == [0.0]
+    for scale in (0.3, 0.6, 0.9, 1.2):
+        leads = [s.lead_time for s in settings if s.scale == scale]
+        assert leads == pytest.approx([0.0, DEFAULT.whole_delay, 2.0 * DEFAULT.whole_delay], abs=DEFAULT.lead_step)
+    assert len(points) == 13
+    assert abs(math.log10(20.0 * DEFAULT.lead_step / DEFAULT.whole_delay)) <= 0.05  # twenty steps to the delay
+    change = (10.0 * math.pi) ** 2 * 1e-3 * PERIOD  # of the speed of the sine in one sample
+    assert {abs(math.log10(s.smoothing_velocity / (0.5 * change))) <= 0.05 for s in settings} == {True}
+    jump = 2.0 * PIPELINE.feedforward.force_limit / PERIOD
+    assert {abs(math.log10(s.slew_limit / jump)) <= 0.05 for s in settings} == {True}
+
+
+def test_a_point_of_the_search_counts_hundredths_of_the_scale_steps_of_lead_and_preferred_numbers():
+    settings = DEFAULT.feedforward(SearchPoint(93, 2, -30, 50))
+    assert settings.scale == 0.93
+    assert settings.lead_time == pytest.approx(2.0 * DEFAULT.lead_step)
+    assert (settings.smoothing_velocity, settings.slew_limit) == (1e-3, 1e5)
+    assert settings.force_limit == PIPELINE.feedforward.force_limit
+
+
+@pytest.mark.parametrize('start', [SearchPoint(0, 0, 3, 4), SearchPoint(120, 40, 3, 4), SearchPoint(37, 12, 3, 4)])
+@pytest.mark.parametrize('best', [(93, 27), (1, 2), (-7, 31)])
+def test_the_compass_ends_at_the_best_scale_and_lead_that_are_not_negative(start, best):
+    asked = []
+
+    def merit_at(point):
+        asked.append(point)
+        return (point.scale - best[0]) ** 2 + 2.0 * (point.lead - best[1]) ** 2
+
+    found = simulated_axis._compass(start, merit_at, simulated_axis.STRIDES)
+    assert found == (max(best[0], 0), max(best[1], 0), 3, 4)
+    assert min(point.scale for point in asked) >= 0
+    assert min(point.lead for point in asked) >= 0
+
+
+def test_the_gentlest_settings_are_the_widest_and_slowest_that_lose_a_twentieth():
+    def merit_at(point):
+        return 2.0 * (1.0 + 0.0098 * max(point.smoothing - 10, 0) + 0.02 * max(30 - point.slew, 0))
+
+    wide = simulated_axis._gentlest(SearchPoint(90, 20, 10, 30), merit_at)
+    assert wide == (90, 20, 15, 30)  # 4.9 %; the slew limit would cost more than is left
+    slow = simulated_axis._gentlest(SearchPoint(90, 20, 10, 30), lambda p: merit_at(p) + 9.0 * (p.smoothing != 10))
+    assert slow == (90, 20, 10, 28)
+    assert simulated_axis._gentlest(SearchPoint(1, 2, 3, 4), lambda _: math.inf) == (1, 2, 3, 4)
+
+
+@pytest.mark.parametrize('error', [0.2, -0.1, -1.0])
+def test_an_error_of_the_delay_is_one_of_the_whole_delay_and_comes_in_before_the_controller(error, monkeypatch):
+    asked = {}
+
+    def runs(motions, axis, delay, noise):
+        asked.update(hold=motions.hold_time, axis=axis, delay=delay, noise=noise)
+
+    monkeypatch.setattr(simulated_axis.EvaluationMotions, 'runs', runs)
+    DEFAULT.runs(PIPELINE.feedforward, 0.3, error, 0.7)
+    assert asked['delay'] == pytest.approx(max(0.001 + error * DEFAULT.whole_delay, 0.0))
+    assert (asked['hold'], asked['noise']) == (0.7, None)
+    assert {mounted.friction_scale for mounted in asked['axis'].pipeline.estimator.seals} == {1.3}
+    assert asked['axis'].servo is SERVO
+
+
+def test_a_task_at_the_limit_of_the_servo_is_one_that_it_follows():
+    reach = SERVO.gains.reach
+    TuningProblem(AXIS, TuningSettings(amplitude=reach, frequency=0.1))
+    with pytest.raises(ValueError, match='way'):
+        TuningProblem(AXIS, TuningSettings(amplitude=1.001 * reach, frequency=0.1))
+    rate = 2.0 * math.pi * 45.0
+    for amplitude, frequency, name in (
+        (0.01, 0.2 / (2.0 * math.pi * 0.01), 'speed'),
+        (50.0 / rate**2, 45.0, 'acceler'),
+    ):
+        TuningProblem(AXIS, TuningSettings(amplitude=0.999 * amplitude, frequency=frequency))
+        with pytest.raises(ValueError, match=name):
+            TuningProblem(AXIS, TuningSettings(amplitude=1.001 * amplitude, frequency=frequency))
+
+
+def test_an_axis_may_overshoot_as_far_as_it_does_without_feed_forward():
+    was = Performance(4e-4, 5e-4, 0.04, 3e-4, 2, 0.0, 0.0)
+    assert merit(DEFAULT, was, [RobustnessCase(0.0, 0.0, was)]) == 1.0
+    for worse in (was._replace(overshoot=3.01e-4), was._replace(limit_cycle_reversals=3)):
+        assert merit(DEFAULT, was, [RobustnessCase(0.0, 0.0, worse)]) == math.inf
+    straight = was._replace(overshoot=0.0)
+    limit = 2.0 * DEFAULT.settings.amplitude * DEFAULT.settings.overshoot_limit
+    assert merit(DEFAULT, straight, [RobustnessCase(0.0, 0.0, straight._replace(overshoot=limit))]) == 1.0
+
+
+def test_a_case_is_nominal_without_any_error_and_a_result_is_better_in_every_case_or_not():
+    assert [RobustnessCase(f, d, None).is_nominal for f in (0.0, 0.3) for d in (0.0, 0.2)] == [
+        True,
+        False,
+        False,
+        False,
+    ]
+    was = Performance(4e-4, 5e-4, 0.04, 0.0, 0, 0.0, 0.0)
+    good = RobustnessCase(0.0, 0.0, was._replace(tracking_rms=1e-4))
+    for others, better in (((), True), ((RobustnessCase(0.3, 0.0, was),), False)):
+        result = simulated_axis.Tuning(PIPELINE.feedforward, was, (*others, good), 40.0, 0.5, 1)
+        assert result.better_in_every_case is better
+        assert result.nominal is good.outcome
+
+
 def test_cases_are_all_combinations_in_order():
     errors = [case[:2] for case in found().cases]
     assert errors == [(-0.3, 0.0), (0.0, 0.0), (0.3, 0.0)]
-    assert len(set(DEFAULT.errors())) == 9
+    assert set(DEFAULT.errors()) == set(itertools.product((-0.3, 0.0, 0.3), (-0.2, 0.0, 0.2)))
+    assert len(DEFAULT.errors()) == 9
     assert DEFAULT.errors()[0] == (0.0, 0.0)
 
 
