@@ -1,9 +1,11 @@
 """Breakaway that grows with the time at rest: told where the dwell was varied, and only there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from seal_friction_ros.core.identification.breakaway import LAWS, fit_breakaway
+from seal_friction_ros.core.identification.breakaway import LAWS, dwell_growth, dwell_varies, fit_breakaway
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding, breakaways
@@ -71,6 +73,43 @@ def test_where_the_dwell_was_not_varied_there_is_no_rung_with_it(dwell):
     _, found = starts(lambda friction, _: 0.2 * friction, dwell)
     assert {*found.cross_validation_rms} == {'constant', 'load_dependent', 'both'}
     assert found.dwell is None
+
+
+@pytest.mark.parametrize(('longer', 'varied'), [(2.9, False), (3.1, True)])
+def test_a_dwell_varies_where_the_upper_fifth_is_three_times_the_lower(longer, varied):
+    readings, _ = starts(lambda friction, _: 0.2 * friction, lambda _, t: np.where(t > 50.0, 10.0 * longer, 10.0))
+    assert dwell_varies(readings) is varied
+    held = np.where(readings.level < 2, 10.0, readings.dwell)
+    assert not dwell_varies(replace(readings, dwell=held))  # at half of the pressures is not at most of them
+    assert dwell_varies(replace(readings, dwell=np.where(readings.level < 1, 10.0, readings.dwell))) is varied
+    assert not dwell_varies(replace(readings, dwell=np.where(readings.dwell == 10.0, 0.0, readings.dwell)))
+
+
+def test_growth_is_counted_in_decades_from_one_second_on():
+    assert dwell_growth(np.array([0.0, 9.0, 99.0])) == pytest.approx([0.0, 1.0, 2.0])
+
+
+def test_exact_laws_come_back_with_the_stiction_of_one_seal_at_the_mean_dwell():
+    _, both = starts(lambda friction, t: 3.0 + 0.2 * friction + 0.05 * friction * np.log10(1.0 + t), scatter=0.0)
+    decades = np.log10(1.0 + RESTS).mean()
+    assert both.law == 'both_dwell'
+    assert (both.stiction, both.ratio) == pytest.approx((1.5, 0.2 + 0.05 * decades))
+    assert (both.ratio_per_decade, both.stiction_per_decade) == pytest.approx((0.05, 0.0))
+    assert both.dwell == pytest.approx(10.0**decades - 1.0)
+    assert both.standard_errors == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert both.cross_validation_rms['both_dwell'] == pytest.approx(0.0, abs=1e-9)
+    assert both.cross_validation_rms['constant'] > 1.0
+
+
+def test_standard_errors_of_stiction_are_those_of_the_jackknife_over_the_pressures():
+    draws = (starts(lambda *_: 6.0, lambda bar, _: np.full(len(bar), 30.0), seed=seed) for seed in range(20))
+    readings, found = next(draw for draw in draws if draw[1].law == 'constant')
+    excess = readings.magnitudes(np.zeros(1)) - coulomb(readings.at.pressure.mean(axis=1) / 1e5)
+    weight = readings.scale**-2.0
+    without = np.array([np.average(excess[~out], weights=weight[~out]) for out in readings.groups])
+    error = np.sqrt(3.0 / 4.0 * np.sum((without - without.mean()) ** 2)) / 2.0  # of one of two seals
+    assert found.standard_errors == pytest.approx((error, 0.0))
+    assert found.stiction == pytest.approx(np.average(excess, weights=weight) / 2.0)
 
 
 def test_the_dwell_of_a_log_is_the_time_at_rest_before_the_start():

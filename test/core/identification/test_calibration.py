@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from seal_friction_ros.core.identification.calibration import (
     NOMINAL,
@@ -68,6 +69,32 @@ def test_shares_of_normal_deviations_are_the_nominal_shares():
     assert shares == pytest.approx(NOMINAL, abs=0.015)
     assert np.isnan(shares_inside(np.empty(0))).all()
     assert (NOMINAL[0], NOMINAL[-1], len(NOMINAL)) == (0.10, 0.99, 90)
+
+
+def test_a_deviation_at_the_edge_of_a_band_is_inside():
+    edges = norm.ppf(0.5 * (1.0 + NOMINAL))
+    shares = shares_inside(np.array([edges[40], 9.0]))
+    assert shares.tolist() == [0.0] * 40 + [0.5] * 50
+
+
+def test_a_run_repeats_another_at_the_pressures_that_they_share():
+    made = strokes(runs=3, pressures=4)
+    fewer = made.taken((made.source != 2) | (made.level == 1))
+    found = repeated_runs(fewer)
+    assert [np.unique(fewer.source[others]).tolist() for others, _ in found] == [[1, 2], [0, 2], [0, 1]]
+    assert [np.unique(fewer.level[out]).tolist() for _, out in found] == [[0, 1, 2, 3], [0, 1, 2, 3], [1]]
+    alone = made.taken((made.source == 0) & (made.level < 2) | (made.source == 1) & (made.level > 1))
+    assert repeated_runs(alone) == []
+    swept = replace(alone, are_samples=True)
+    assert [np.count_nonzero(out) for _, out in repeated_runs(swept)] == [16, 16]
+
+
+@pytest.mark.parametrize(('count', 'parts'), [(8, 8), (6, 0)])
+def test_a_run_at_few_pressures_is_judged_in_four_parts_of_eight_readings_at_least(count, parts):
+    run = strokes(runs=1, pressures=2, count=count)
+    ratios, groups = within_run(LAW, run, TRUTH)
+    assert groups == parts
+    assert len(ratios) == (2 * count if parts else 0)
 
 
 def test_with_normal_scatter_alone_both_curves_are_near_the_diagonal():

@@ -319,6 +319,43 @@ def test_runs_that_were_never_repeated_differ_by_the_prior_and_many_by_what_they
     assert found.of_band < alone.of_band
 
 
+def test_the_deviation_between_runs_is_the_posterior_of_prior_and_runs():
+    """Two runs at two pressures: friction 10 % above and below their mean at one, 20 % at the other."""
+    frictions = [9.0, 18.0 / 0.9 * 0.8, 11.0, 18.0 / 0.9 * 1.2]  # run 0 at both pressures, then run 1
+    direction = np.tile([1.0, -1.0], 4)
+    at = OperatingConditions(np.tile(np.repeat([1e6, 2e6], 2), 2)[:, np.newaxis], None, direction, direction)
+    source, level = np.repeat([0, 1], 4), np.tile([0, 0, 1, 1], 2)
+    made = FrictionReadings(at, direction * np.repeat(frictions, 2), source, source, level, ('a', 'b'), 'file', False)
+    found = between_runs(made, np.ones(8), np.zeros(2))
+    squares = 2 * 0.1**2 + 2 * 0.2**2
+    assert found.freedom == 2
+    assert found.measured == pytest.approx(np.sqrt(squares / 2.0))
+    assert found.std == pytest.approx(np.sqrt((8.0 * 0.15**2 + squares) / 10.0))
+    assert found.of_band == pytest.approx(found.std * stats.t.ppf(0.975, 10) / BAND_95)
+    swept_ = between_runs(replace(made, are_samples=True), np.repeat([10.0, 20.0, 10.0, 20.0], 2), np.zeros(2))
+    shares = np.array([(9.0 * 10.0 + 16.0 * 20.0) / 500.0, (11.0 * 10.0 + 24.0 * 20.0) / 500.0])
+    assert swept_.freedom == 1
+    assert swept_.measured == pytest.approx(np.sqrt(np.sum((shares / shares.mean() - 1.0) ** 2)))
+
+
+def test_jackknife_of_means_is_the_standard_error_of_the_mean():
+    values = np.array([3.0, 5.0, 9.0, 1.0])
+    without = np.array([[np.delete(values, i).mean()] for i in range(4)])
+    assert jackknife_errors(without) == pytest.approx([values.std(ddof=1) / 2.0])
+
+
+def test_plain_mean_needs_another_group_at_every_pressure_and_held_pressures():
+    readings = noted(scatter=0.05)
+    assert plain_mean(readings.taken((readings.group == 0) | (readings.level > 0))) is None
+    assert plain_mean(replace(readings, are_samples=True)) is None
+    assert plain_mean(replace(readings, left_out_by='pressure')) is None
+    found = plain_mean(readings)
+    assert found.predicted + found.deviation == pytest.approx(np.abs(readings.force), rel=0.05)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(found.deviation**2)))
+    assert found.mean_deviation == pytest.approx(np.abs(found.deviation).mean())
+    assert found.error == pytest.approx(np.abs(found.deviation).sum() / np.abs(readings.force).sum(), rel=0.01)
+
+
 # --- whether friction rises ---
 
 

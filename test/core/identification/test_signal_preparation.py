@@ -88,6 +88,154 @@ def test_a_pause_in_the_log_ends_a_stroke():
     assert len(strokes(paused, SLIDING)) == 2
 
 
+def even_stroke(n=400, **columns) -> Signals:
+    """One stroke at an even speed, with other columns."""
+    plain = {
+        'time': np.arange(n) / RATE, 'velocity': np.full(n, 0.02), 'pressure_a': np.full(n, 1e6),
+        'pressure_b': np.zeros(n), 'force_sum': np.full(n, FRICTION),
+    }  # fmt: skip
+    return Signals(**plain | columns)
+
+
+@pytest.mark.parametrize(
+    ('column', 'span', 'held'),
+    [
+        ('pressure_a', 1.05e5, True),  # of 1 MPa; nine tenths of the samples count
+        ('pressure_a', 1.3e5, False),
+        ('pressure_b', 2.1e4, True),  # noise at any pressure
+        ('pressure_b', 2.4e4, False),
+    ],
+)
+def test_a_pressure_is_held_within_a_tenth_and_a_fifth_of_a_bar(column, span, held):
+    base = {'pressure_a': 1e6, 'pressure_b': 0.0}[column]
+    found = strokes(even_stroke(**{column: base + span * np.linspace(-0.5, 0.5, 400)}), SLIDING)
+    assert bool(found) is held
+
+
+@pytest.mark.parametrize(('off', 'held'), [(0.24, True), (0.26, False)])
+@pytest.mark.parametrize(('share', 'few'), [(0.49, True), (0.6, False)])
+def test_a_speed_is_held_where_half_of_the_samples_are_within_a_quarter_of_it(off, held, share, few):
+    velocity = np.full(400, 0.02)
+    velocity[: round(0.5 * share * 400)] *= 1.0 - off
+    velocity[400 - round(0.5 * share * 400) :] *= 1.0 + off
+    found = strokes(even_stroke(velocity=velocity), Sliding(largest_acceleration=5.0))
+    assert bool(found) is (held or few)
+
+
+@pytest.mark.parametrize(('samples', 'counts'), [(9, False), (10, True)])
+def test_a_stroke_has_ten_even_samples(samples, counts):
+    signals = even_stroke(samples)
+    assert bool(strokes(signals, SLIDING)) is counts
+
+
+@pytest.mark.parametrize(('rest', 'counts'), [(0.12, True), (0.07, False)])
+def test_a_rest_before_a_start_takes_a_tenth_of_a_second(rest, counts):
+    found = breakaways(trapezoid([0.02, -0.02], rest=rest, peak=5.0), Sliding(slowest=1e-9))
+    assert bool(found) is counts
+
+
+@pytest.mark.parametrize(('pause', 'strokes_'), [(0.49, 1), (0.52, 2)])
+def test_half_a_second_without_a_sample_is_a_pause(pause, strokes_):
+    signals = trapezoid([0.02])
+    time = signals.time + np.where(signals.time > 1.5, pause - 1.0 / RATE, 0.0)
+    assert len(strokes(signals._replace(time=time), SLIDING)) == strokes_
+
+
+def test_a_sample_at_the_limit_of_rest_rests_and_one_at_the_limit_of_acceleration_is_not_even():
+    limit = Sliding(slowest=0.02, largest_acceleration=0.5)
+    assert not even_sliding(even_stroke(), limit).any()
+    assert even_sliding(even_stroke(velocity=np.full(400, 0.0201)), limit).all()
+    for slope_, even in ((0.49, True), (0.51, False)):
+        rising = even_stroke(velocity=0.03 + slope_ * np.arange(400) / RATE)
+        assert even_sliding(rising, limit).any() == even
+    lost = even_stroke(velocity=np.full(400, 0.03))
+    lost.force_sum[7] = np.nan
+    assert np.flatnonzero(~even_sliding(lost, limit)).tolist() == [7]
+
+
+@pytest.mark.parametrize(
+    ('pressures', 'levels'),
+    [
+        ([1e6, 1.052e6], [0, 0]),
+        ([1e6, 1.054e6], [0, 1]),  # a step of a twentieth of the higher one
+        ([1e4, 1.9e4], [0, 0]),
+        ([1e4, 2.1e4], [0, 1]),  # a step of a tenth of a bar near zero
+        ([3e6, 1e6, 2e6, 1e6], [2, 0, 1, 0]),
+    ],
+)
+def test_a_twentieth_of_the_pressure_and_a_tenth_of_a_bar_part_two_levels(pressures, levels):
+    assert pressure_levels(np.array(pressures)).tolist() == levels
+
+
+def test_a_ramp_is_cut_into_parts_of_a_tenth_of_the_highest_pressure():
+    ramp = np.linspace(1e6, 2e6, 1001)
+    labels = pressure_levels(ramp)
+    assert labels.max() == 4  # 1 MPa of 2 MPa: five parts of 0.2 MPa
+    widths = [np.ptp(ramp[labels == level]) for level in range(5)]
+    assert max(widths) <= 2e5
+    assert max(widths) - min(widths) <= 2e3
+
+
+@pytest.mark.parametrize(('other', 'one_level'), [(1.21e6, True), (1.23e6, False)])
+def test_two_directions_are_one_level_within_a_fifth_of_their_mean(other, one_level):
+    direction = np.tile([1.0, -1.0], 10)
+    found = held_pressures(np.where(direction > 0.0, 1e6, other), direction)
+    assert (len(set(found.tolist())) == 1) is one_level
+    low = held_pressures(np.where(direction > 0.0, 0.0, 1.9e4), direction)
+    assert set(low.tolist()) == {9.5e3}  # near zero: within a fifth of a bar
+    assert len(set(held_pressures(np.where(direction > 0.0, 0.0, 2.1e4), direction).tolist())) == 2
+    assert held_pressures(np.full(5, 1e6), np.ones(5)).tolist() == [1e6] * 5
+
+
+@pytest.mark.parametrize(
+    ('pressure', 'ambient'),
+    [(1.19e4, True), (-1.19e4, True), (1.21e4, False), (1e5 - 1.19e4, True), (1e5 + 1.21e4, False), (5e4, False)],
+)
+def test_the_air_has_zero_or_one_bar_within_0_12_bar(pressure, ambient):
+    assert is_ambient(pressure) is ambient
+
+
+def test_a_sensor_is_clipped_where_it_stays_five_samples_at_its_end_in_a_hundredth_of_them():
+    wave = np.sin(np.arange(1000) * 0.9)
+    for run, clipped in ((4, False), (5, True), (12, True)):
+        values = wave.copy()
+        for start in (100, 400, 700):
+            values[start : start + run] = 2.0
+        assert (clipped_share(values) > 0.0) is clipped
+        if clipped:
+            assert clipped_share(values) == pytest.approx(3 * run / 1000)
+            assert clipped_share(-values) == pytest.approx(3 * run / 1000)
+            assert clipped_share(-values, low_is_real=True) == 0.0
+    once = wave.copy()
+    once[100:109] = 2.0
+    assert clipped_share(once) == 0.0  # nine in a thousand
+    once[100:110] = 2.0
+    assert clipped_share(once) == pytest.approx(0.01)
+    assert clipped_share(once[50:149]) == 0.0  # fewer than a hundred samples tell nothing
+    assert clipped_share(once[50:150]) > 0.0
+
+
+def test_slopes_reach_across_no_pause_and_need_a_window_of_samples():
+    time = np.arange(100) / RATE
+    law = SavitzkyGolay(window=0.1, order=2, largest_gap=0.05)
+    broken = time + np.where(np.arange(100) >= 50, 0.06, 0.0)
+    steps = np.where(np.arange(100) >= 50, 7.0, 0.0) + 2.0 * broken
+    assert slope(broken, steps, law) == pytest.approx(np.full(100, 2.0), abs=1e-9)
+    assert np.abs(slope(time, steps, law)).max() > 10.0  # without the pause it is a jump
+    lost = 2.0 * time
+    lost[30] = np.nan
+    found = slope(time, lost, law)
+    assert np.flatnonzero(np.isnan(found)).tolist() == [30]
+    assert np.delete(found, 30) == pytest.approx(np.full(99, 2.0))
+    with pytest.raises(ValueError, match=r'holds 1 samples, 0.01 s apart: order 2 needs 3'):
+        slope(time, time, SavitzkyGolay(window=0.009, order=2, largest_gap=0.05))
+    with pytest.raises(ValueError, match=r'is long enough for a Savitzky-Golay window of 2.0 s'):
+        slope(time, time, SavitzkyGolay(window=2.0, order=2, largest_gap=0.05))
+    assert slope(time[:11], time[:11], law) == pytest.approx(np.ones(11))
+    with pytest.raises(ValueError, match='long enough'):
+        slope(time[:10], time[:10], law)
+
+
 def test_reversals_without_rest_part_the_motion():
     time = np.arange(800) / RATE
     signals = Signals(time, 0.02 * np.sign(np.sin(np.pi * time)), *(np.ones((3, 800))))

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from seal_friction_ros.core.friction.temperature import scale_at
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
@@ -92,6 +93,40 @@ def test_readings_at_the_reference_have_no_temperature_left_in_them():
     same = fit_temperature(warm).reference
     expected = readings([same] * len(RUNS)).force
     np.testing.assert_allclose(cold.force, expected, rtol=0.02)
+
+
+@pytest.mark.parametrize(('span', 'enough'), [(7.9, False), (8.1, True)])
+def test_a_temperature_has_to_vary_by_eight_kelvin(span, enough):
+    found = fit_temperature(readings([300.0 + span * share for share in (0.0, 1.0, 0.1, 0.9, 0.05, 0.95)], noise=1e-3))
+    assert (found.why_not == '') is enough
+    assert enough or '8 K are needed' in found.why_not
+
+
+@pytest.mark.parametrize(('spread', 'enough'), [(1.9, False), (2.1, True)])
+def test_what_is_left_of_the_temperature_has_a_standard_deviation_of_two_kelvin(spread, enough):
+    half = math.sqrt(6.0) * spread  # two of twelve runs are off by as much
+    found = fit_temperature(readings([300.0 - half, 300.0 + half, *[300.0] * 10], noise=1e-3))
+    assert (found.why_not == '') is enough
+    assert enough or 'went with' in found.why_not
+
+
+def test_slope_and_error_are_those_of_a_line_through_the_runs_with_the_band_of_student():
+    made = readings(RUNS, run_to_run=0.03, seed=2)
+    found = fit_temperature(made)
+    x = np.array(RUNS)
+    friction = [np.log(made.magnitudes(np.full(6, 5.0))[made.source == run]).mean() for run in range(6)]
+    line = stats.linregress(x, friction)
+    assert found.coefficient == pytest.approx(-line.slope, rel=0.02)
+    assert found.error == pytest.approx(line.stderr * stats.t.ppf(0.975, 4) / 1.96, rel=0.05)
+    assert found.scale.reference == np.median(made.temperature)
+    assert (found.scale.coefficient, found.scale.coefficient_std) == (found.coefficient, found.error)
+
+
+@pytest.mark.parametrize(('readings_', 'enough'), [(12, True), (11, False)])
+def test_a_scale_takes_twelve_readings(readings_, enough):
+    made = readings((280.0, 330.0, 290.0, 320.0), noise=1e-3, strokes=2, offset=0.0)
+    found = fit_temperature(made.taken(np.flatnonzero(made.level < 2)[:readings_]))
+    assert ('too few readings' in found.why_not) is not enough
 
 
 @pytest.mark.parametrize('law', [0.0, 0.012])
