@@ -1,0 +1,251 @@
+"""Which law is taken: what was varied, whether friction rises, which laws are beaten, and which compete at all."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from seal_friction_ros.core.identification.candidate_laws import (
+    OperatingConditions,
+    Variation,
+    candidate_laws,
+    with_velocity_terms,
+)
+from seal_friction_ros.core.identification.fitting import LawFit
+from seal_friction_ros.core.identification.readings import FrictionReadings
+from seal_friction_ros.core.identification.selection import (
+    LawScore,
+    Rise,
+    choose_without,
+    is_beaten,
+    recommended,
+    regroupings,
+    rise_over_pressures,
+    variation_of,
+)
+
+BAR = 1e5  # [Pa]
+BASES = candidate_laws(Variation())
+LAWS = {law.name: law for law in (*BASES, *with_velocity_terms(BASES[-1], Variation()))}
+
+
+def readings(bars, speeds=(0.02,), force=None, sources=1, samples=False, count=1):
+    """Each speed in both directions at each pressure, of each source."""
+    rows = [
+        (s, i, side * v)
+        for s in range(sources)
+        for i in range(len(bars))
+        for v in speeds
+        for side in (1.0, -1.0)
+        for _ in range(count)
+    ]
+    source, level, velocity = np.array(rows).T
+    source, level, direction = source.astype(int), level.astype(int), np.sign(velocity)
+    at = OperatingConditions(np.asarray(bars, float)[level][:, np.newaxis] * BAR, None, velocity, direction)
+    magnitude = np.full(len(rows), 10.0) if force is None else np.asarray(force, float)
+    names = tuple(map(str, range(sources)))
+    return FrictionReadings(at, direction * magnitude, source, level, level, names, 'pressure', samples)
+
+
+# --- what was varied ---
+
+
+@pytest.mark.parametrize(('fast', 'varied'), [(0.0299, False), (0.0301, True)])
+def test_a_speed_is_varied_where_it_is_half_as_fast_again_at_one_pressure(fast, varied):
+    made = readings([0, 10, 20, 30], (0.02, fast))
+    assert variation_of(made).speeds is varied
+    half = np.where(made.level < 2, 0.02, np.abs(made.at.velocity)) * made.at.direction
+    assert not variation_of(replace(made, at=made.at._replace(velocity=half))).speeds  # at most of the pressures
+    most = np.where(made.level < 1, 0.02, np.abs(made.at.velocity)) * made.at.direction
+    assert variation_of(replace(made, at=made.at._replace(velocity=most))).speeds is varied
+    unknown = np.where(made.level < 1, np.nan, made.at.velocity)
+    assert not variation_of(replace(made, at=made.at._replace(velocity=unknown))).speeds
+
+
+def test_a_speed_that_follows_pressure_or_direction_is_not_varied():
+    made = readings([0, 10, 20, 30])
+    for speed in (0.01 * (1.0 + made.level), np.where(made.at.direction > 0.0, 0.02, 0.09)):
+        followed = replace(made, at=made.at._replace(velocity=made.at.direction * speed))
+        assert not variation_of(followed).speeds
+
+
+@pytest.mark.parametrize(
+    ('bars', 'pressures', 'exponent'),
+    [
+        ([20], 1, False),
+        ([20, 30], 2, False),
+        ([20, 20.4], 1, False),
+        ([0, 20, 40], 3, False),
+        ([0, 10, 20, 30, 40], 3, False),
+        ([0, 10, 20, 30, 40, 50], 3, True),
+    ],
+)
+def test_as_many_pressures_as_there_are_up_to_three_and_an_exponent_from_six_on(bars, pressures, exponent):
+    found = variation_of(readings(bars))
+    assert (found.pressures, found.exponent) == (pressures, exponent)
+    assert variation_of(readings(bars, samples=True)).exponent
+
+
+def test_asymmetry_takes_both_directions_and_several_pressures_of_one_source():
+    made = readings([0, 20, 40])
+    assert variation_of(made).asymmetry
+    assert not variation_of(made.taken(made.at.direction > 0.0)).asymmetry
+    each = replace(made, source=made.level, names=('a', 'b', 'c'))  # one pressure a source: its offset
+    assert not variation_of(each).asymmetry
+    assert variation_of(replace(made, source=np.minimum(made.level, 1), names=('a', 'b'))).asymmetry
+
+
+# --- whether friction rises ---
+
+
+def test_friction_rises_from_two_standard_errors_on():
+    assert [Rise(rise, 1.5).is_significant for rise in (3.01, 3.0, 2.99, -9.0)] == [True, False, False, False]
+
+
+def test_rise_and_its_error_are_those_of_a_weighted_line():
+    """Friction exactly on a line; strokes alternate by 4 %, so that they repeat within a known scatter."""
+    bars = np.array([10.0, 20.0, 40.0])
+    friction = 5.0 + 0.5 * bars
+    alternating = np.tile([1.04, 0.96, 0.96, 1.04], 6)  # of each direction at each pressure
+    made = readings(bars, count=4, force=np.repeat(friction, 8) * alternating)
+    found = rise_over_pressures(made)
+    share = 0.04 * np.sqrt(8.0 * 3 / (3.0 * 6))  # squares of 24 strokes over the freedom of six runs
+    errors = friction * share / np.sqrt(8.0)
+    (slope, _), covariance = np.polyfit(bars * BAR, friction, 1, w=1.0 / errors, cov='unscaled')
+    assert found.rise == pytest.approx(slope * 30e5)
+    assert found.standard_error == pytest.approx(np.sqrt(covariance[0, 0]) * 30e5)
+    together = replace(made, force=made.at.direction * np.repeat(friction, 8) * np.tile([1.04, 1.04, 0.96, 0.96], 6))
+    # Neighbours go together, lag-one correlation 1/4: as if there were 0.75 / 1.25 of the strokes.
+    longer = rise_over_pressures(together)
+    assert longer.standard_error == pytest.approx(found.standard_error * np.sqrt(1.25 / 0.75))
+
+
+def test_a_rise_takes_three_held_pressures_with_repeated_strokes_and_friction_at_each():
+    made = readings([10, 20, 40], count=2)
+    assert rise_over_pressures(made) is not None
+    assert rise_over_pressures(replace(made, are_samples=True)) is None
+    assert rise_over_pressures(made.taken(made.level < 2)) is None
+    assert rise_over_pressures(readings([10, 20, 40])) is None
+    assert rise_over_pressures(replace(made, force=np.where(made.level == 1, -made.force, made.force))) is None
+    once = made.taken((made.level < 2) | (np.arange(made.count) % 2 == 0))
+    assert rise_over_pressures(once) is None  # nothing was repeated at one of them
+
+
+# --- which laws are beaten, and which compete ---
+
+
+def test_a_law_that_is_off_twice_as_much_is_beaten_without_a_test():
+    best = np.array([1.0, 2.0, 0.5])
+    for times, beaten in ((2.05, True), (1.95, False)):
+        scattered = times * best.mean() + np.array([3.0, -2.9, -0.1])  # no test tells it from the noise
+        assert not is_beaten(scattered, best)
+        assert is_beaten(scattered, best, many_times=True) is beaten
+    assert not is_beaten(np.array([1.0, -1.0, 3.0]), np.zeros(3), many_times=True)
+
+
+def score(name, losses, *, sound=True):
+    fit = SimpleNamespace(why_unsound='' if sound else 'at its bound')
+    return LawScore(LAWS[name], fit, None, np.asarray(losses, float))
+
+
+EVEN = np.ones(4)
+CONSTANT, ONE, FREE = 'constant_coulomb', 'pressure_power_law_1', 'pressure_power_law'
+RISES, DOES_NOT = Rise(5.0, 1.0), Rise(1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ('scores', 'rise', 'name'),
+    [
+        ([score(CONSTANT, 1.05 * EVEN), score(FREE, EVEN)], None, CONSTANT),  # 5 % are not worth two parameters
+        ([score(CONSTANT, 1.2 * EVEN), score(FREE, EVEN)], None, FREE),
+        ([score(CONSTANT, 1.05 * EVEN), score(FREE, EVEN)], RISES, FREE),
+        ([score(CONSTANT, 1.05 * EVEN), score(FREE, EVEN)], DOES_NOT, CONSTANT),
+        ([score(CONSTANT, 1.05 * EVEN), score('coulomb_viscous', EVEN)], RISES, 'coulomb_viscous'),
+        ([score(CONSTANT, EVEN)], RISES, CONSTANT),  # there is no other
+        ([score(ONE, 1.9 * EVEN), score(FREE, EVEN, sound=False)], None, ONE),
+        ([score(ONE, 2.1 * EVEN), score(FREE, EVEN, sound=False)], None, FREE),
+        ([score('pressure_power_law_2', 1.04 * EVEN), score(ONE, 1.02 * EVEN), score(FREE, EVEN)], None, ONE),
+        ([LawScore(LAWS[CONSTANT], why_not='too few'), score(FREE, EVEN)], None, FREE),
+        ([score(ONE, [9.0, 0.1, 0.1, 0.1]), score(FREE, EVEN)], None, FREE),  # twice as far off
+        ([score(ONE, [9.0, 0.1, 0.1, 0.1]), score(FREE, EVEN)], DOES_NOT, ONE),  # the rise decides, not four numbers
+    ],
+)
+def test_the_simplest_law_that_is_not_beaten_is_recommended(scores, rise, name):
+    assert recommended(scores, rise).law.name == name
+
+
+def test_without_any_fit_there_is_no_recommendation_but_the_reasons():
+    with pytest.raises(ValueError, match='no law could be fitted: constant_coulomb: too few; pressure_power_law: bad'):
+        recommended([LawScore(LAWS[CONSTANT], why_not='too few'), LawScore(LAWS[FREE], why_not='bad')])
+
+
+def test_a_group_for_which_no_law_can_be_chosen_has_no_prediction():
+    def none(_):
+        raise ValueError('no law')
+
+    made = readings([10, 20, 40])
+    found = choose_without(made, made.level == 1, none)
+    assert found.law == ''
+    assert np.isnan(found.predicted).tolist() == [True, True]
+
+
+def test_a_swept_log_is_left_out_by_thirds_of_speed_and_pressure_and_by_files():
+    made = readings(np.linspace(0.0, 90.0, 30), np.linspace(0.01, 0.1, 30), sources=2, samples=True)
+    cells, files = regroupings(made)
+    assert files.group.tolist() == made.source.tolist()
+    thirds = [
+        np.searchsorted(np.quantile(values, [1 / 3, 2 / 3]), values)
+        for values in (np.abs(made.at.velocity), made.seal_pressure)
+    ]
+    assert len(cells.groups) == 9
+    for one in cells.groups:
+        assert {*zip(*(third[one] for third in thirds), strict=True)} == {(thirds[0][one][0], thirds[1][one][0])}
+    assert len(regroupings(made.taken(made.source == 0))) == 2  # the names tell that there were two files
+    assert regroupings(replace(made, are_samples=False)) == []
+    same = readings([20.0], (0.02,), samples=True)
+    assert regroupings(same) == []
+
+
+# --- soundness ---
+
+
+def fitted(condition=2.0, **values):
+    """A fit of the pressure power law whose scaled Jacobian has this condition number in its first two columns."""
+    angle = 2.0 * np.arctan(1.0 / condition)  # between two unit columns: condition = cot(angle / 2)
+    jacobian = np.zeros((4, 3))
+    jacobian[0, :2], jacobian[1, 1], jacobian[2, 2] = (5.0, 7.0 * np.cos(angle)), 7.0 * np.sin(angle), 0.1
+    plain = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 0.7}
+    return LawFit(LAWS[FREE], plain | values, np.zeros(1), jacobian)
+
+
+@pytest.mark.parametrize(
+    ('values', 'reason'),
+    [
+        ({}, ''),
+        ({'friction_at_no_pressure': 0.0}, ''),  # a term that the data do not show
+        ({'pressure_exponent': 2.0}, 'pressure_exponent is at its bound of 2'),
+        ({'pressure_exponent': 0.05}, 'pressure_exponent is at its bound of 0.05'),
+        ({'pressure_exponent': 1.99}, ''),
+        ({'pressure_exponent': 0.0501}, ''),
+    ],
+)
+def test_parameters_at_a_bound_are_not_believed_but_one_that_is_nothing(values, reason):
+    assert fitted(**values).why_unsound == reason
+
+
+@pytest.mark.parametrize(('condition', 'sound'), [(29.0, True), (31.0, False)])
+def test_a_fit_is_ill_conditioned_from_30_on(condition, sound):
+    found = fitted(condition)
+    assert found.condition_number == pytest.approx(condition)
+    assert (found.why_unsound == '') is sound
+    angle = 2.0 * np.arctan(1.0 / condition)
+    assert found.correlation[0, 1] == pytest.approx(-np.cos(angle))
+    assert np.diag(found.correlation) == pytest.approx(np.ones(3))
+
+
+def test_a_parameter_without_effect_is_not_identifiable():
+    found = replace(fitted(), jacobian=fitted().jacobian * [1.0, 1.0, 0.0])
+    assert found.condition_number == np.inf
+    assert 'ill-conditioned' in found.why_unsound
+    assert np.isnan(found.correlation).all()
