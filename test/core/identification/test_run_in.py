@@ -97,6 +97,52 @@ def test_the_settled_friction_is_within_two_of_its_standard_deviations(course):
     assert np.mean(inside) >= 0.9
 
 
+WAY = STROKE * np.arange(30)
+LENGTHS = WAY.max() * np.geomspace(0.05, 1.0, 15)  # that are tried
+
+
+@pytest.mark.parametrize('offset', [0.0, -7.0])
+@pytest.mark.parametrize(('length', 'share'), [(LENGTHS[3], -0.25), (LENGTHS[10], 0.4), (LENGTHS[14], -0.3)])
+def test_an_exact_approach_is_found_with_half_of_what_is_unseen_and_its_form_in_doubt(length, share, offset):
+    readings = run(approach(share, length), count=30, scatter=0.0, offset=offset)
+    (drift,) = drifts(readings, np.array([offset]))
+    mean = SETTLED * approach(share, length)(WAY).mean()
+    assert drift.is_evident
+    assert drift.settled_share == pytest.approx(SETTLED / mean, rel=1e-6)
+    height = SETTLED * share
+    unseen = height * np.exp(-WAY.max() / length)
+    assert drift.settled_std == pytest.approx(np.hypot(0.5 * unseen, 0.15 * height) / mean, rel=1e-5)
+    settled = settled_readings(readings, np.array([offset]))
+    course = approach(share, length)(WAY)
+    assert settled.share == pytest.approx(np.full(30, SETTLED / mean))
+    expected = offset + readings.at.direction * SETTLED / mean * SETTLED * course
+    assert settled.readings.force == pytest.approx(expected)
+    assert settled.relative_std == pytest.approx(drift.settled_std / drift.settled_share)
+
+
+@pytest.mark.parametrize(('off', 'evident'), [(0.018, False), (0.022, True)])
+def test_a_run_within_2_percent_of_the_settled_seal_needs_no_correction(off, evident):
+    seen = approach(1.0, LENGTHS[3])(WAY).mean() - 1.0
+    for share in (off / (1.0 - off) / seen, -off / (1.0 + off) / seen):
+        (drift,) = drifts(run(approach(share, LENGTHS[3]), count=30, scatter=0.0), np.zeros(1))
+        assert drift.is_evident is evident
+        assert drift.settled_share == pytest.approx(1.0 - np.sign(share) * off, rel=1e-3) or not evident
+
+
+@pytest.mark.parametrize(('count', 'found'), [(5, 0), (6, 1)])
+def test_a_drift_takes_six_strokes(count, found):
+    made = run(approach(-0.3, 0.1), count=6)
+    assert len(drifts(made.taken(np.arange(count)), np.zeros(1))) == found
+
+
+def test_a_rod_that_did_not_travel_and_a_friction_that_is_none_show_no_drift():
+    made = run(approach(-0.3, 0.1), count=20)
+    for still in (replace(made, travel=np.full(20, 3.0)), replace(made, force=-made.force)):
+        (drift,) = drifts(still, np.zeros(1))
+        assert (drift.is_evident, drift.settled_share, drift.settled_std) == (False, 1.0, 0.0)
+        assert np.isnan([drift.asymptote, drift.length]).all()
+
+
 def test_the_extrapolation_is_bounded_by_the_change_that_was_seen():
     for i in range(20):
         straight = run(lambda s: 1.0 + 0.2 * s / s.max(), seed=i)

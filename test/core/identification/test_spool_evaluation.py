@@ -96,6 +96,47 @@ def test_another_measurement_may_give_the_reference():
     assert doubled.normalised == pytest.approx(own.normalised / 2.0)
 
 
+def test_cycles_begin_a_quarter_before_the_rod_passes_the_middle_upwards():
+    time = np.arange(3500) / 1000.0
+    displacement = 2.0 + 1.5 * np.sin(2.0 * np.pi * (time - 0.3))  # upwards through the middle at 0.3, 1.3, 2.3, 3.3 s
+    starts = cycle_starts(displacement)
+    assert starts == pytest.approx([50, 1050, 2050, 3050, 3500], abs=1)
+    cut = cycle_starts(displacement[200:])
+    assert cut == pytest.approx([0, 850, 1850, 2850, 3300], abs=1)
+    one = cycle_starts(displacement[:2000])
+    assert one == pytest.approx([50, 1050, 2000], abs=1)
+    assert cycle_starts(displacement[:2100])[-1] == pytest.approx(2050, abs=1)  # a whole period long
+
+
+def test_the_reference_force_is_the_mean_magnitude_up_to_half_a_millimetre_from_the_middle():
+    displacement = np.array([-0.6, -0.5, 0.0, 0.5, 0.6]) * 1e-3
+    force = np.array([99.0, -3.0, 5.0, -7.0, 99.0])
+    assert reference_force(displacement, force, 0.5e-3) == pytest.approx(5.0)
+    assert reference_force(displacement[1:4], force[1:4], 0.5e-3) == pytest.approx(5.0)  # it just reaches
+    with pytest.raises(ValueError, match=r'the stroke of \+/- 0.5 mm does not reach \+/- 0.501 mm'):
+        reference_force(displacement[1:4], force[1:4], 0.501e-3)
+    with pytest.raises(ValueError, match='does not reach'):
+        reference_force(displacement[[0, 4]], force[[0, 4]], 0.5e-3)  # no sample there
+    with pytest.raises(ValueError, match='force in the middle of the stroke is zero'):
+        reference_force(displacement, 0.0 * force, 0.5e-3)
+
+
+def test_a_moving_average_holds_its_ends_and_has_no_delay():
+    step = np.where(np.arange(20) >= 10, 1.0, 0.0)
+    smooth = moving_average(step, 5)
+    assert smooth[[0, 7, 8, 9, 10, 11, 12, 19]] == pytest.approx([0.0, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0])
+
+
+def test_a_force_without_resonance_is_not_filtered_and_the_last_cycle_can_be_evaluated():
+    time, displacement, force = rig(amplitude=0.0)
+    last = SpoolEvaluation(evaluated_cycle=CYCLES, moving_average=1)
+    found = evaluate_cycles(time, displacement, force, last)
+    assert found.resonance is None
+    assert np.array_equal(found.filtered, found.force)
+    assert found.normalised == pytest.approx(found.force / found.reference_force)
+    assert np.abs(found.velocity).max() == pytest.approx(SPEED, rel=0.03)
+
+
 def test_too_few_cycles_and_too_short_strokes_are_refused():
     time, displacement, force = rig()
     third = len(time) // 3
