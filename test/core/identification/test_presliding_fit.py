@@ -20,6 +20,7 @@ from seal_friction_ros.core.identification.presliding_fit import (
     position_noise,
     reversal_curves,
     score_presliding,
+    turning_points,
 )
 
 FRICTION, OFFSET = 20.0, -1.5  # [N]
@@ -114,6 +115,63 @@ def test_friction_after_a_reversal_is_that_of_the_elements():
     expected = [element_forces(numbers, forces, s, FRICTION)[1] for s in way.tolist()]
     shared = np.array([np.log(1e5), 2.0, 0.0, 0.0, -np.inf])
     np.testing.assert_allclose(friction_after_reversal(shared, way, FRICTION, 0.0), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize('rest', [0.0, 0.3, 5.0])
+@pytest.mark.parametrize('exponent', [0.0, 1.5])
+def test_after_a_rest_stiction_has_grown_and_falls_over_the_memory_length(rest, exponent):
+    """The same as a seal that slid, rested and is drawn back without loss of time."""
+    length, dwell, stiction = 3e-4, 0.5, 6.0
+    seal = Presliding(stiffness=1e5, yield_exponent=exponent, memory_length=length, dwell_time=dwell)
+    numbers = presliding_numbers([seal])
+    state, _ = shear(numbers, NOT_SHEARED, Slide(-1.0, 1.0, FRICTION, 0.0, stiction))
+    state, _ = shear(numbers, state, Slide(0.0, rest, FRICTION, 0.0, stiction))
+    way, expected = np.arange(1, 2001) * 1e-6, []
+    for _ in way:
+        state, force = shear(numbers, state, Slide(1e-6, 0.0, FRICTION, 0.0, stiction))
+        expected.append(force)
+    shared = np.array([np.log(1e5), exponent, stiction / FRICTION, np.log(length), np.log(dwell)])
+    found = friction_after_reversal(shared, way, FRICTION, rest)
+    np.testing.assert_allclose(found, expected, atol=0.05)  # [N] of 26: the step of the walk
+    at_once = friction_after_reversal(np.array([*shared[:4], -np.inf]), way, FRICTION, rest)
+    grown = friction_after_reversal(shared, way, FRICTION, 1e3)
+    np.testing.assert_allclose(at_once, grown, atol=1e-6)
+
+
+def test_friction_that_rises_with_the_speed_is_lower_where_the_rod_turns():
+    """Excess below zero: at the reversal 14 N, after some memory lengths 20 N again."""
+    shared = np.array([np.log(1e5), 0.0, -0.3, np.log(3e-4), -np.inf])
+    way = np.array([0.0, 1e-4, 2.8e-4, 2.8e-4 + 3e-4, 1e-2])
+    found = friction_after_reversal(shared, way, FRICTION, 0.0)
+    slid = 2.8e-4 + 3e-4 - 2.0 * 14.0 / 1e5
+    expected = [-14.0, -4.0, 14.0, 20.0 - 6.0 * np.exp(-slid / 3e-4), 20.0]
+    assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_position_turns_where_it_comes_back_by_more_than_the_threshold():
+    position = np.array([0.0, 1.0, 3.0, 2.0, 4.0, 2.9, 1.0, -2.0, -1.0, -2.5, 0.0])
+    assert turning_points(position, 1.2) == [0, 4, 9, 10]
+    assert turning_points(position, 0.9) == [0, 2, 3, 4, 7, 8, 9, 10]
+    assert turning_points(position, 1.0) == [0, 4, 9, 10]  # by more, not by as much
+    assert turning_points(-position, 1.2) == [0, 4, 9, 10]
+    assert turning_points(np.zeros(5), 0.1) == [0, 4]
+
+
+def test_a_curve_begins_where_the_rod_turns_and_knows_how_long_it_rested():
+    time, position = strokes(periods=3, rests=(0.05, 2.0))
+    force = 1e3 * position
+    curves = reversal_curves([ReversalLog('log', time, position, force)], 1e-3)
+    assert [curve.direction for curve in curves] == [-1, 1, -1, 1, -1]
+    assert [curve.rest for curve in curves] == pytest.approx(
+        [0.057, 2.007, 0.057, 2.007, 0.057], abs=2e-3
+    )  # with four steps about it
+    ends = [8.0 if curve.direction < 0 else -8.0 for curve in curves]
+    for curve, end in zip(curves, ends, strict=True):
+        assert curve.log == 0
+        assert curve.displacement[0] <= 3.2e-5 < curve.displacement[1]  # of the rest one sample
+        assert curve.displacement[-1] == pytest.approx(1e-3, abs=5e-5)
+        assert curve.friction[0] == pytest.approx(end, abs=0.05)
+        assert len(curve.up_to(5e-4).displacement) == pytest.approx(0.5 * len(curve.displacement), abs=2)
 
 
 def test_the_noise_of_a_position_is_its_step_or_its_standard_deviation():
