@@ -1,5 +1,6 @@
 """Friction and load of a simulated boom from pressures, position and velocity alone, and what is refused."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,9 +9,11 @@ from harness import boom
 from harness.boom import Boom
 
 from seal_friction_ros.core.identification.load_over_position import (
+    FrictionTerms,
     LoadOverPosition,
     averaging_window,
     fit_load,
+    follows_position,
     inertia_at,
     known_acceleration,
     load_at,
@@ -116,6 +119,74 @@ def test_one_sine_gives_the_friction_and_warns_that_inertia_counts_as_load():
     load = fitted(log)
     assert any('inertia cannot be told apart' in warning and 'two speeds' in warning for warning in load.warnings)
     assert abs(errors(run, Boom(), log)[0]) < 0.05
+
+
+# --- whether there is a load ---
+
+
+def held_load(times, friction=20.0, sides=(1.0, -1.0)):
+    """Even strokes over 0.4 m whose load changes by so many times the friction beyond the middle."""
+    place, velocity = [], []
+    for side in sides:
+        way = np.linspace(0.0, 0.4, 401)
+        place.append(way if side > 0.0 else way[::-1])
+        velocity.append(np.full(401, 0.1 * side))
+    x, v = np.concatenate(place), np.concatenate(velocity)
+    pressure = np.full(len(x), 1e6)
+    force = np.sign(v) * friction + times * friction * (x > 0.2) + 7.0
+    return Signals(np.arange(len(x)) * 0.01, v, pressure, pressure, force), x
+
+
+@pytest.mark.parametrize(('times', 'follows'), [(1.9, False), (2.1, True), (-1.9, False), (-2.1, True), (0.0, False)])
+def test_a_load_shows_where_the_middle_changes_by_twice_the_friction(times, follows):
+    signals, x = held_load(times)
+    loose = Sliding(largest_acceleration=100.0)
+    assert follows_position(signals, x, loose) is follows
+    lost = np.where(np.arange(len(x)) % 7 == 0, np.nan, x)  # a position that is missing now and then
+    assert follows_position(signals, lost, loose) is follows
+    assert not follows_position(signals, np.full(len(x), np.nan), loose)
+    assert not follows_position(signals, np.full(len(x), 0.3), loose)
+    one_way, there = held_load(times, sides=(1.0,))
+    assert not follows_position(one_way, there, loose)
+    assert not follows_position(signals, x, Sliding(slowest=0.2, largest_acceleration=100.0))
+
+
+def told(noise=30.0, friction=40.0, mass_std=2.0):
+    terms = FrictionTerms(('constant',), np.array([friction]), friction, 1.0)
+    return LoadOverPosition(
+        np.linspace(0.0, 1.0, 4), np.zeros(4), np.zeros(4), 10.0, (0.0, 0.0), mass_std, terms, noise, 1.0, 4
+    )
+
+
+@pytest.mark.parametrize(
+    ('noise', 'window'), [(1.0, 0.2), (2.0, 0.2), (3.0, 0.45), (4.0, 0.8), (4.5, 1.0), (400.0, 1.0)]
+)
+def test_a_mean_is_as_long_as_its_noise_is_a_twentieth_of_the_friction_within_0_2_to_1_s(noise, window):
+    assert averaging_window(told(noise)) == pytest.approx(window)
+
+
+def test_inertia_is_known_to_a_fiftieth_of_the_friction_up_to_some_acceleration():
+    assert known_acceleration(told()) == pytest.approx(0.02 * 40.0 / 2.0)
+    assert known_acceleration(told(mass_std=0.0)) == 0.0
+
+
+def test_where_there_is_no_load_the_means_of_a_motion_are_left_and_a_rest_as_it_was():
+    """Means over 0.2 s, one sample kept in 50 ms; a mean of a straight line is the line."""
+    time = np.arange(400) * 0.01
+    velocity = np.where(time < 1.0, 0.0, 0.1)
+    ramp = 5.0 * time
+    signals = Signals(time, velocity, 1e5 * ramp, 2e5 * ramp, np.where(time < 1.0, 3.0, ramp))
+    noise = np.where(np.arange(400) % 2 == 0, 1.0, -1.0) * (time >= 1.5)
+    position = np.full(400, 0.5)
+    load = replace(told(0.1), mass=0.0)
+    left = without_load(signals._replace(force_sum=signals.force_sum + noise), position, load, SLIDING)
+    resting, moving = left.time < 0.995, left.time >= 0.995
+    assert np.count_nonzero(resting) == 100
+    assert (left.force_sum[resting] == 3.0).all()
+    assert np.diff(left.time[moving]) == pytest.approx(np.full(np.count_nonzero(moving) - 1, 0.05))
+    assert left.pressure_a[moving] == pytest.approx(1e5 * 5.0 * left.time[moving])
+    inside = (left.time > 1.7) & (left.time < 3.8)
+    assert np.abs(left.force_sum - 5.0 * left.time)[inside].max() <= 1.0 / 21.0 + 1e-9  # of 21 samples
 
 
 # --- records ---
