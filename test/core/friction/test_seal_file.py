@@ -345,6 +345,12 @@ def test_a_wrong_correction_or_identified_motion_is_refused(key, value, expected
     assert expected in complaint({**POWER, key: value})
 
 
+def test_each_seal_is_mounted_on_its_chamber():
+    mounted = mount_seals((POWER, CHART), ('b', 'difference'))
+    assert mounted == (MountedSeal(parse_seal(POWER), 'b'), MountedSeal(parse_seal(CHART), 'difference'))
+    assert mount_seals((), ()) == ()
+
+
 def test_as_many_chambers_as_seals():
     with pytest.raises(ValueError, match='seals has 2 entries but seal_chambers has 1'):
         mount_seals((POWER, POWER), ('a',))
