@@ -165,6 +165,11 @@ RISES, DOES_NOT = Rise(5.0, 1.0), Rise(1.0, 1.0)
         ([score(CONSTANT, EVEN)], RISES, CONSTANT),  # there is no other
         ([score(ONE, 1.9 * EVEN), score(FREE, EVEN, sound=False)], None, ONE),
         ([score(ONE, 2.1 * EVEN), score(FREE, EVEN, sound=False)], None, FREE),
+        (
+            [score('pressure_power_law_2', 5.0 * EVEN), score(ONE, 1.9 * EVEN), score(FREE, EVEN, sound=False)],
+            None,
+            ONE,
+        ),
         ([score('pressure_power_law_2', 1.04 * EVEN), score(ONE, 1.02 * EVEN), score(FREE, EVEN)], None, ONE),
         ([LawScore(LAWS[CONSTANT], why_not='too few'), score(FREE, EVEN)], None, FREE),
         ([score(ONE, [9.0, 0.1, 0.1, 0.1]), score(FREE, EVEN)], None, FREE),  # twice as far off
