@@ -44,6 +44,15 @@ def test_grease_without_yield_and_thickener_is_newtonian():
     assert {apparent_viscosity(oil.numbers, rate) for rate in (0.0, 1.0, 1e6)} == {0.3}
 
 
+def test_grease_at_rest_is_as_stiff_as_at_the_floor_of_its_shear_rate():
+    assert apparent_viscosity(Grease().numbers, 0.0) == pytest.approx(
+        (530.96 + 6.7823 * 100.0**0.6327) / 100.0 + 94.779e-3, rel=1e-12
+    )
+    assert apparent_viscosity(Grease(shear_rate_floor=30.0).numbers, -40.0) == pytest.approx(
+        (530.96 + 6.7823 * 50.0**0.6327) / 50.0 + 94.779e-3, rel=1e-12
+    )
+
+
 @pytest.mark.parametrize('number', PEKLENIK_NUMBERS)
 def test_flow_factors_tend_to_those_of_a_smooth_gap_and_have_their_slope(number):
     coefficients = flow_factor_coefficients(number)
@@ -94,6 +103,34 @@ def test_roughness_that_has_no_flow_factors_is_refused():
 def test_roughness_cannot_be_flatter_than_its_longest_wave():
     with pytest.raises(ValueError, match=r'rms_slope = 0.1 is below 0.5027'):
         Topography(rms_slope=0.1)
+    assert Topography(rms_slope=2.0 * math.pi * 2e-6 / 25e-6).rms_slope == pytest.approx(0.50265, rel=1e-5)
+
+
+def test_roughness_of_persson_has_the_lengths_and_pressures_of_its_spectrum():
+    """h_rms = 1 um, q_0 = 2 pi / 20 um, h' = 0.5, E* = 10 MPa."""
+    surface = Topography(rms_height=1e-6, rms_slope=0.5, roll_off_length=20e-6)
+    assert surface.separation_length == pytest.approx(0.486e-6, rel=1e-12)
+    assert surface.contact_stiffness(1e7) == pytest.approx(1.1780972e6, rel=1e-7)  # 0.375 q_0 h_rms E*
+    assert surface.real_area_pressure(1e7) == pytest.approx(3.5355339e6, rel=1e-7)  # E* h' / sqrt 2
+
+
+def test_asperities_push_by_the_exponential_and_below_it_by_its_tangent():
+    stiffness, length = 3e6, 2e-6
+    for filling, less, least in ((False, 0.0, 0.0), (True, 1.0, 0.02)):
+        for ratio in (1.0, 3.0):
+            pressure, slope = contact_pressure(stiffness, length, filling, ratio * length)
+            assert pressure == pytest.approx(stiffness / (math.exp(ratio) - less), rel=1e-12)
+            assert slope == pytest.approx(-stiffness / length * math.exp(ratio) / (math.exp(ratio) - less) ** 2)
+        at_least, steepest = contact_pressure(stiffness, length, filling, least * length)
+        below, slope = contact_pressure(stiffness, length, filling, (least - 0.5) * length)
+        assert slope == pytest.approx(steepest, rel=1e-12)
+        assert below == pytest.approx(at_least - 0.5 * length * steepest, rel=1e-12)
+
+
+@pytest.mark.parametrize('filling', [False, True])
+def test_surfaces_far_apart_do_not_touch(filling):
+    assert contact_pressure(1e6, 1e-6, filling, 0.8e-3) == (0.0, 0.0)
+    assert 0.0 < contact_pressure(1e6, 1e-6, filling, 0.69e-3)[0] < 1e-290
 
 
 @given(st.floats(-2e-6, 6e-6), st.booleans())
@@ -274,6 +311,16 @@ def test_control_edge_falls_by_its_depth_with_its_slope():
     assert (beyond - fall) / 1e-9 == pytest.approx(slope, abs=1e-6)
 
 
+def test_corners_of_the_control_edge_are_hyperbolas():
+    """Half of the fall in the middle of the chamfer; half of its slope where it begins and where it ends."""
+    edge = ControlEdge(position=0.3e-3, slope=0.5, depth=50e-6, rounding=20e-6)
+    fall, slope = edge.fall(np.array([0.3e-3, 0.35e-3, 0.4e-3]))
+    corner = 0.25 * (100e-6 + 20e-6 - math.hypot(100e-6, 20e-6))
+    assert fall == pytest.approx([corner, 25e-6, 50e-6 - corner], rel=1e-9)
+    steep = 0.25 * 100e-6 / math.hypot(100e-6, 20e-6)
+    assert slope == pytest.approx([steep, 0.5 * 50e-6 / math.hypot(50e-6, 20e-6), steep], rel=1e-9)
+
+
 def test_air_in_an_even_gap_flows_as_the_square_of_pressure_says():
     """Step by step along the gap: m R T = -p h^3 / (12 eta) dp/dx."""
     cells, width, height, pressure = 2000, 1e-7, 1e-6, 6e5
@@ -309,6 +356,35 @@ def test_film_on_the_wall_is_moved_and_never_made():
     assert after.volume.min() >= 0.0
 
 
+FILM = WallFilm(-2e-6, 1e-6, np.array([1.0, 2.0, 3.0, 4.0]) * 1e-12)
+"""Cells from -2 to 2 um."""
+
+
+def test_lubricant_of_a_cell_lies_in_the_part_that_the_seal_leaves_free():
+    """A seal from -1.5 to 0.5 um: half of the first and of the third cell, all of the second, none of the last."""
+    seal = (-1.5e-6, 0.5e-6)
+    assert FILM.ahead(0.5e-6, 1.25e-6, *seal) == pytest.approx([0.0, 0.0, 3e-12, 1e-12])
+    assert FILM.ahead(0.5e-6, 0.75e-6, *seal) == pytest.approx([0.0, 0.0, 1.5e-12, 0.0])
+    assert FILM.ahead(-1.75e-6, -1.5e-6, *seal) == pytest.approx([0.5e-12, 0.0, 0.0, 0.0])
+    assert FILM.ahead(-9e-6, 9e-6, *seal) == pytest.approx([1e-12, 0.0, 3e-12, 4e-12])  # never more than all
+
+
+def test_what_a_stroke_leaves_is_laid_evenly_and_what_does_not_fit_is_pushed_ahead():
+    none = np.zeros(4)
+    laid = FILM.moved(none, 0.0, 0.0, -1.5e-6, 0.0, 6e-12).volume - FILM.volume
+    assert laid == pytest.approx([2e-12, 4e-12, 0.0, 0.0], abs=1e-25)
+    pushed = FILM.moved(np.array([0.0, 0.5, 1.0, 0.0]) * 1e-12, 1.5e-12, 1.5e-6, 0.0, 0.0, 0.0)
+    assert pushed.volume == pytest.approx([1e-12, 1.5e-12, 2e-12, 5.5e-12])
+    assert (pushed.start, pushed.width) == (-2e-6, 1e-6)
+    assert FILM.volume == pytest.approx([1e-12, 2e-12, 3e-12, 4e-12])  # as before
+
+
+@pytest.mark.parametrize(('place', 'cell'), [(-9e-6, 0), (-1.5e-6, 0), (-0.5e-6, 1), (0.5e-6, 2), (9e-6, 3)])
+def test_what_leaves_a_seal_at_rest_stays_where_it_stands_or_at_the_end_of_the_wall(place, cell):
+    left = FILM.moved(np.zeros(4), 0.0, place, place, place, 2e-12).volume - FILM.volume
+    assert left == pytest.approx(2e-12 * np.eye(4)[cell], abs=1e-25)
+
+
 def test_constant_acceleration_is_the_motion_of_table_1():
     motion = ConstantAcceleration(cycles=2)
     assert motion.stroke_time == pytest.approx(1.8e-3 / 34e-3 + 34e-3 / 0.68)
@@ -326,16 +402,33 @@ def test_motion_that_never_reaches_its_speed_is_refused():
         ConstantAcceleration(speed=0.1)
 
 
+def test_way_of_the_spool_is_that_of_the_laws_of_motion_about_its_centre():
+    """0.1 m/s after 0.2 s and 0.01 m; then 0.06 m in 0.6 s: 1 s from end to end."""
+    motion = ConstantAcceleration(distance=0.08, speed=0.1, acceleration=0.5, cycles=2, centre=0.5)
+    assert (motion.stroke_time, motion.duration) == pytest.approx((1.0, 4.0))
+    course = {0.1: 0.4625, 0.2: 0.47, 0.5: 0.5, 0.8: 0.53, 0.9: 0.5375, 1.0: 0.54, 1.1: 0.5375, 1.5: 0.5, 2.0: 0.46}
+    course |= {2.3: 0.48, 3.3: 0.52, 4.0: 0.46, -1.0: 0.46, 9.0: 0.46}  # it stands before its start and after its end
+    assert {time: motion.position(time) for time in course} == pytest.approx(course, abs=1e-12)
+
+
+def test_motion_may_reach_its_speed_in_the_middle_alone():
+    motion = ConstantAcceleration(distance=1.0, speed=0.5, acceleration=0.25)
+    assert motion.stroke_time == 4.0
+    assert (motion.position(2.0), motion.position(4.0)) == (0.0, 0.5)
+
+
 def test_measured_motion_passes_through_its_samples():
     motion = MeasuredMotion([5.0, 6.0, 8.0], [0.0, 1.0, 0.0])
     assert motion.duration == 3.0
     assert [motion.position(t) for t in (0.0, 0.5, 1.0, 2.0, 9.0)] == [0.0, 0.5, 1.0, 0.5, 0.0]
+    assert MeasuredMotion([0.0, 2.0], [1.0, 3.0]).position(0.5) == 1.5
 
 
 @pytest.mark.parametrize(
     ('times', 'positions', 'words'),
     [
-        ([0.0], [0.0], 'give two or more'),
+        ([0.0], [0.0], '1 times and 1 positions: give two or more'),
+        ([0.0, 1.0, 2.0], [0.0, 1.0], '3 times and 2 positions: give two or more of each'),
         ([0.0, 0.0], [1.0, 2.0], 'do not increase'),
         ([0.0, 1.0], [0.0, math.nan], 'finite'),
     ],
