@@ -10,12 +10,16 @@ from hypothesis import strategies as st
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.foundation.parameters import (
+    CheckedParameters,
     Meaning,
     ParameterGroup,
     check,
     from_mapping,
     meanings,
+    meant,
+    name_and_source,
     parameter,
+    printable,
     similar_names,
 )
 from seal_friction_ros.core.foundation.units import unit_size
@@ -72,6 +76,24 @@ def test_a_number_is_accepted_exactly_inside_its_bounds(value):
 def test_the_error_names_field_value_unit_and_bound(value, complaint):
     with pytest.raises(ValueError, match='^' + complaint.replace('.', r'\.') + '$'):
         Spring(value)
+
+
+def test_a_record_of_checked_parameters_is_checked_at_construction_and_bounds_are_of_numbers_alone():
+    @dataclass(frozen=True)
+    class Valve(CheckedParameters):
+        lift: float = parameter(unit='mm', lower=1.0, upper=2.0, description='Lift.')
+        is_open: bool = parameter(True, unit='', lower=2.0, description='Whether it is open.')
+        maker: str = parameter('', unit='', lower=2.0, description='Who made it.')
+
+    assert Valve(1.0) == Valve(1.0, True, '')
+    with pytest.raises(ValueError, match=r'^Valve\.lift = 2\.5 mm is above its upper bound 2\.0 mm$'):
+        Valve(2.5)
+
+
+def test_every_number_of_a_tuple_is_checked_and_named():
+    for place, lengths in enumerate([(math.nan, 1.0), (1.0, math.inf)]):
+        with pytest.raises(ValueError, match=rf'^Spring\.lengths\[{place}\] = (nan|inf) m is not finite$'):
+            Spring(10.0, lengths=lengths)
 
 
 def test_fields_with_a_default_are_optional():
@@ -139,6 +161,74 @@ def test_a_similar_name_has_few_other_letters_or_another_prefix(name, expected):
     assert similar_names([name], known).get(name) == expected
 
 
+def test_the_first_ten_unknown_names_are_compared_with_the_known_ones():
+    strange = [f'q{number}' for number in range(9)]
+    assert similar_names([*strange, 'coil'], ['coils']) == {'coil': 'coils'}
+    assert similar_names([*strange, 'q9', 'coil'], ['coils']) == {}
+
+
+def test_of_several_similar_names_the_most_similar_one_counts():
+    assert similar_names(['coil'], ['boil', 'coils', 'cool']) == {'coil': 'coils'}
+
+
+@pytest.mark.parametrize(
+    ('word', 'known', 'said'),
+    [
+        ('bom', ['boom', 'arm'], 'did you mean boom? there are arm, boom'),
+        ('coil', ['boil', 'coils'], 'did you mean coils? there are boil, coils'),
+        ('x', ['boom'], 'there is boom'),
+        ('x', [], 'there are none'),
+    ],
+)
+def test_what_a_word_was_meant_to_be_is_said_with_all_known_ones(word, known, said):
+    assert meant(word, known) == said
+
+
+@pytest.mark.parametrize(
+    ('document', 'complaint'),
+    [
+        (None, 'a case file is a mapping of names to values, not NoneType'),
+        (['name'], 'a case file is a mapping of names to values, not list'),
+        ({}, 'case file: name = None is not one line of text'),
+        ({'name': ''}, "case file: name = '' is not one line of text"),
+        ({'name': 5}, 'case file: name = 5 is not one line of text'),
+        ({'name': 'a\nb'}, r"case file: name = 'a\\nb' is not one line of text"),
+        ({'name': 'x', 'source': None}, 'case x: source = None is not a text'),
+    ],
+)
+def test_a_document_without_name_or_with_a_source_that_is_no_text_is_refused(document, complaint):
+    with pytest.raises(ValueError, match=f'^{complaint}$'):
+        name_and_source(document, 'case')
+
+
+def test_name_and_source_of_a_document_are_told():
+    assert name_and_source({'name': 'x', 'source': 'Table 3\nand 4'}, 'case') == ('x', 'Table 3\nand 4')
+    assert name_and_source({'name': 'x'}, 'case') == ('x', '')
+
+
+def test_a_name_is_one_line_in_a_message():
+    assert (printable('bore'), printable(5), printable('a\nb')) == ('bore', '5', r"'a\nb'")
+
+
+@pytest.mark.parametrize('text', ['15e-3', '1.0e5', '-1E+5', '+.5e3'])
+def test_a_number_that_yaml_reads_as_text_is_told_how_to_write_it(text):
+    with pytest.raises(ValueError, match=r'is not a number: write it with a point and a signed exponent'):
+        make(stiffness=text)
+    with pytest.raises(ValueError, match=r'is not a whole number$'):
+        make(coils=text)
+
+
+@pytest.mark.parametrize('text', ['10', '1e', 'e5', '1e5 N', ''])
+def test_another_text_gets_no_such_hint(text):
+    with pytest.raises(ValueError, match=r'is not a number$'):
+        make(stiffness=text)
+
+
+def test_an_integer_that_no_float_holds_is_refused_as_one():
+    with pytest.raises(ValueError, match=r'^spring\.stiffness is too large for a floating-point number$'):
+        make(stiffness=10**400)
+
+
 def test_a_group_prefixes_its_names_and_knows_the_fixed_ones():
     @dataclass(frozen=True)
     class Clock:
@@ -203,7 +293,7 @@ def test_meanings_come_in_order_of_declaration_of_class_and_instance_alike():
 
 @pytest.mark.parametrize(
     ('lower', 'upper', 'text'),
-    [(None, None, ''), (0.0, 1.0, '0.0 to 1.0')],
+    [(None, None, ''), (0.0, 1.0, '0.0 to 1.0'), (0.5, None, '0.5 to None'), (None, 0.5, 'None to 0.5')],
 )
 def test_bounds_have_a_text(lower, upper, text):
     assert Meaning('', '', lower, upper).bounds_text() == text

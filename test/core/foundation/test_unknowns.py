@@ -17,6 +17,10 @@ KNOWN = {'seal.solid_shear_stress': 1.5e6, 'wall_friction': 0.0, 'rubber.hardnes
 RING = yaml.safe_load((ROOT / 'config' / 'oring' / 'ms28775_114_blind.yaml').read_text())
 
 
+def parsed(given, vary=lambda _: None):
+    return parse_unknowns(given, KNOWN, vary, 'unknown')
+
+
 def at(share: float, kind: str, *amounts: float) -> float:
     return float(Unknown('x', 10.0, kind, amounts).at(np.array(share)))
 
@@ -31,6 +35,32 @@ def test_each_kind_has_its_distribution():
     assert drawn.std() / drawn.mean() == pytest.approx(0.3, rel=1e-2)
     assert np.median(drawn) == pytest.approx(10.0)
     assert drawn.min() > 0.0
+
+
+def test_the_largest_spreads_are_taken():
+    given = {
+        'seal.solid_shear_stress': {'factor': 1000.0},
+        'rubber.hardness': {'relative_std': 10},
+        'wall_friction': {'range': [-1e15, 1e15]},
+    }
+    assert [(unknown.name, unknown.value, unknown.kind, unknown.amounts) for unknown in parsed(given)] == [
+        ('seal.solid_shear_stress', 1.5e6, 'factor', (1000.0,)),
+        ('rubber.hardness', 70.0, 'relative_std', (10.0,)),
+        ('wall_friction', 0.0, 'range', (-1e15, 1e15)),
+    ]
+
+
+def test_the_case_is_made_at_both_ends_beyond_which_half_a_percent_lies():
+    made = []
+    parsed({'rubber.hardness': {'tolerance': 5.0}, 'wall_friction': {'range': [0.0, 0.1]}}, made.append)
+    wanted = [
+        ('rubber.hardness', 65.05),
+        ('rubber.hardness', 74.95),
+        ('wall_friction', 0.0005),
+        ('wall_friction', 0.0995),
+    ]
+    assert [next(iter(values.items())) for values in made] == [(name, pytest.approx(end)) for name, end in wanted]
+    assert Unknown('x', 10.0, 'tolerance', (2.0,)).ends == (pytest.approx(8.02), pytest.approx(11.98))
 
 
 @pytest.mark.parametrize(
@@ -57,6 +87,13 @@ def test_each_kind_has_its_distribution():
         ({'rubber.hardness': {'tolerance': -1.0}}, 'tolerance = -1 is not above 0'),
         ({'rubber.hardness': {'factor': 1.0}}, 'factor = 1 is not above 1'),
         ({'rubber.hardness': {'relative_std': 20.0}}, 'relative_std = 20 is above 10'),
+        ({'rubber.hardness': {'factor': 1001.0}}, 'factor = 1001 is above 1000'),
+        ({'rubber.hardness': {'relative_std': 0.0}}, 'relative_std = 0 is not above 0'),
+        ({'rubber.hardness': {'tolerance': 0}}, 'tolerance = 0 is not above 0'),
+        ({'rubber.hardness': {'tolerance': 1.1e15}}, 'tolerance is not finite, or above 1e+15'),
+        ({'rubber.hardness': {'range': [-1.1e15, 0.0]}}, 'range is not finite, or above 1e+15'),
+        ({'rubber.hardness': {'range': [60.0, 60.0]}}, 'does not go from a lower to a higher value'),
+        ({'wall_friction': {'relative_std': 0.5}}, 'wall_friction is 0 in the case: give it a range'),
         ({'wall_friction': {'factor': 2.0}}, 'wall_friction is 0 in the case: give it a range'),
     ],
 )
