@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from statistics import fmean, pstdev
 
 import numpy as np
@@ -17,15 +18,23 @@ from seal_friction_ros.core.estimation.adaptation import (
     NOT_ADAPTED,
     NOTHING_LEARNT,
     AdaptationSettings,
+    Lagging,
     Ratios,
     Reading,
     Slide,
     _averaged,
     _can_be_compared,
+    _is_even,
+    _is_spike,
+    _learn,
     _learnt_scale,
     _median,
+    _ratio,
+    _share,
+    adapt,
     disagrees,
     is_due,
+    residual,
     with_scale,
 )
 from seal_friction_ros.core.estimation.disagreement import Reversal, last_reversal, likely_reason
@@ -453,3 +462,363 @@ def test_below_the_identified_pressures_a_unit_is_named_that_does_not_contradict
     seal = replace(SEAL, coulomb_law=law, pressure_min=1e6, pressure_max=7e6)
     reversals = [Reversal(i, 1.0, 40.0, 0.0, 30.0 + i, 0.0) for i in range(8)]  # 30 bar as Pa
     assert 'bar' in likely_reason((MountedSeal(seal, 'a').numbers,), reversals)
+
+
+# --- one sample at a time, by hand ---
+
+OBSERVE = AdaptationSettings()
+EVEN = Slide(START, 0.02, 45.0, 40.0, 4.0, 3e6, 2e6, True, True)
+"""Even sliding at 45 N where the law says 40 N."""
+BOUNDED = AdaptationSettings(scale_min=0.3, scale_max=3.0)
+
+
+@pytest.mark.parametrize(
+    ('velocity', 'left'), [(0.02, 60.0 - 8.0 - 3.0 - 1.25 * 40.0), (-0.02, 60.0 - 8.0 - 3.0 + 1.25 * 40.0), (0.0, 0.0)]
+)
+def test_a_residual_is_the_force_sum_less_inertia_offset_and_friction(velocity, left):
+    state = NOT_ADAPTED._replace(acceleration=0.4, learnt=NOTHING_LEARNT._replace(scale=1.25, offset=3.0))
+    assert residual(AdaptationSettings(moving_mass=20.0), state, velocity, 60.0, 40.0) == pytest.approx(left)
+
+
+@pytest.mark.parametrize(
+    ('mass', 'acceleration', 'newest', 'is_even'),
+    [
+        (0.0, 0.05, 0.0, True),
+        (0.0, 0.051, 0.0, False),
+        (0.0, -0.051, 0.0, False),
+        (0.0, 0.0, 0.051, False),
+        (0.0, 0.01, -0.051, False),
+        (0.0, -0.04, 0.05, True),
+        (10.0, 2.0, 0.0, True),  # 20 N of inertia are half of 40 N
+        (10.0, 2.01, 0.0, False),
+        (10.0, 0.0, -2.01, False),
+        (10.0, 0.0, 0.0, True),
+        (100.0, 0.04, 0.0, True),
+        (1000.0, 0.04, 0.0, False),
+    ],
+)
+def test_speed_is_even_at_a_small_acceleration_or_with_a_known_mass_at_an_inertia_of_half_the_friction(
+    mass, acceleration, newest, is_even
+):
+    settings = AdaptationSettings(moving_mass=mass, acceleration_max=0.05)
+    assert _is_even(settings, acceleration, newest, 40.0) is is_even
+
+
+@pytest.mark.parametrize(
+    ('changes', 'direction', 'missed', 'is_spike'),
+    [
+        ({}, 1, 4.01, True),
+        ({}, 1, -4.01, True),
+        ({}, 1, 4.0, False),
+        ({}, 1, -3.9, False),
+        ({}, -1, 9.0, False),  # the first sample of another direction
+        ({'outliers': 1}, 1, 9.0, False),  # two in a row are a load step
+        ({'noise': -1.0}, 1, 9.0, False),  # the noise is not known yet
+        ({'noise': 0.0}, 1, 1e-9, True),
+    ],
+)
+def test_a_spike_is_one_residual_of_more_than_four_deviations(changes, direction, missed, is_spike):
+    learnt = NOTHING_LEARNT._replace(**{'direction': 1, 'noise': 1.0} | changes)
+    assert _is_spike(learnt, direction, missed) is is_spike
+
+
+@given(st.floats(1e-4, 0.1), st.sampled_from([0.5, 10.0]), st.integers(1, 10**5))
+def test_a_mean_is_a_plain_one_until_it_forgets(elapsed, memory, samples):
+    assert _share(elapsed, memory, samples) == max(elapsed / (elapsed + memory), 1.0 / samples)
+
+
+def test_the_ratio_is_the_half_difference_over_the_friction_less_what_depends_on_the_place():
+    before = NO_LEVEL._replace(direction=1, reading=60.0, friction=38.0, travel=0.10)
+    after = NO_LEVEL._replace(direction=-1, reading=-36.0, friction=42.0, travel=0.12)
+    assert _ratio(before, after) == pytest.approx(96.0 / 80.0)
+    assert _ratio(after, before) == pytest.approx(96.0 / 80.0)
+    # A load of 200 N/m, seen in either stroke: 4 N of the difference are its.
+    before = before._replace(travel_variance=1e-4, covariance=1e-2)
+    after = after._replace(travel_variance=3e-4, covariance=7e-2)
+    assert _ratio(before, after) == pytest.approx((96.0 + 4.0) / 80.0)
+    assert _ratio(after, before) == pytest.approx((96.0 + 4.0) / 80.0)
+
+
+@pytest.mark.parametrize(
+    ('durations', 'compared'),
+    [((1.0, 5.0), True), ((1.0, 5.1), False), ((5.0, 1.0), True), ((5.1, 1.0), False), ((2.0, 2.0), True)],
+)
+def test_a_stroke_is_compared_with_one_of_up_to_five_times_its_duration(durations, compared):
+    strokes = [
+        NO_LEVEL._replace(direction=side, stamp=START, samples=9, duration=duration)
+        for side, duration in zip((1, -1), durations, strict=True)
+    ]
+    assert _can_be_compared(*strokes) is compared
+
+
+@pytest.mark.parametrize('directions', [(1, 1), (-1, -1), (0, 1), (1, 0)])
+def test_strokes_of_one_direction_are_not_compared(directions):
+    strokes = [NO_LEVEL._replace(direction=side, stamp=START, samples=9, duration=1.0) for side in directions]
+    assert not _can_be_compared(*strokes)
+
+
+def learnt_after(learnt, missed=0.0, force=45.0, elapsed=0.1, direction=1, slide=EVEN, settings=OBSERVE):
+    """What is learnt after one more reading; its friction by the law is 40 N."""
+    return _learn(settings, learnt, slide, elapsed, Reading(direction, force, 40.0, 0.1, missed))
+
+
+SLIDING_ON = NOTHING_LEARNT._replace(direction=1, samples=3, noise=2.0)
+
+
+@pytest.mark.parametrize(('missed', 'outside'), [(3.9, 0.0), (-3.9, 0.0), (3.93, 1.0), (-3.93, 1.0)])
+def test_the_noise_grows_with_a_residual_outside_its_95_percent_band_and_shrinks_with_one_inside(missed, outside):
+    """In a second outside by 95 %, in a second inside by 5 %: so 5 % stay outside in the long run."""
+    assert learnt_after(SLIDING_ON, missed).noise == pytest.approx(2.0 * (1.0 + 0.1 * (outside - 0.05)))
+
+
+def test_the_noise_begins_with_the_deviation_of_the_seal_file():
+    assert learnt_after(NOTHING_LEARNT).noise == pytest.approx(4.0 * (1.0 - 0.1 * 0.05))
+    assert learnt_after(NOTHING_LEARNT._replace(noise=0.0)).noise == 0.0
+
+
+def test_the_offset_is_the_mean_of_what_the_friction_leaves_and_begins_anew_at_a_reversal():
+    known = SLIDING_ON._replace(scale=1.1, offset=7.0)
+    for count, share in ((3, 0.25), (50, 0.1 / 0.6)):  # a plain mean, then one over half a second
+        after = learnt_after(known._replace(samples=count), force=45.0)
+        assert after.offset == pytest.approx(7.0 + share * (45.0 - 1.1 * 40.0 - 7.0))
+        assert after.samples == count + 1
+    turned = learnt_after(known, force=-45.0, direction=-1)
+    assert turned.offset == pytest.approx(-45.0 + 1.1 * 40.0)
+    assert (turned.direction, turned.samples, turned.scale) == (-1, 1, 1.1)
+
+
+def test_two_residuals_of_more_than_four_deviations_are_a_load_step_after_which_the_offset_begins_anew():
+    once = learnt_after(SLIDING_ON._replace(offset=1.0), missed=8.1)
+    assert (once.outliers, once.samples) == (1, 4)
+    assert learnt_after(once, missed=7.0).outliers == 0
+    twice = learnt_after(once._replace(noise=2.0), missed=-8.1, force=95.0)
+    assert (twice.outliers, twice.samples, twice.offset) == (0, 1, pytest.approx(55.0))
+    assert learnt_after(SLIDING_ON, missed=8.0).outliers == 0
+    assert learnt_after(once, direction=-1).outliers == 0
+
+
+def test_a_stroke_holds_readings_within_the_identified_range_alone():
+    assert learnt_after(SLIDING_ON).level.samples == 1
+    assert learnt_after(SLIDING_ON, slide=EVEN._replace(is_identified=False)).level == NO_LEVEL
+
+
+def test_at_a_reversal_the_last_two_strokes_make_a_ratio_and_the_offset_keeps_what_the_scale_takes():
+    out = NO_LEVEL._replace(direction=1, stamp=START, reading=60.0, friction=40.0, duration=1.0, samples=9)
+    back = out._replace(direction=-1, stamp=START + SECOND, reading=-50.0)
+    known = NOTHING_LEARNT._replace(
+        direction=-1,
+        samples=9,
+        noise=2.0,
+        level=back,
+        before=out,
+        ratios=Ratios(*[1.375] * 6),
+        reversals=6,
+        median=1.375,
+    )
+    after = learnt_after(known, force=55.0)
+    assert after.ratios == Ratios(*[1.375] * 6)
+    assert (after.median, after.reversals, after.before) == (1.375, 7, back)
+    assert after.scale == pytest.approx(1.1)  # a tenth at most
+    assert after.offset == pytest.approx(55.0 - 1.1 * 40.0)
+    assert after.level.samples == 1
+    alike = learnt_after(known._replace(before=out._replace(direction=-1)), force=55.0)
+    assert (alike.reversals, alike.scale, alike.before) == (6, 1.0, back)
+
+
+def by_the_docstring(scale, ratios, bounds=(0.3, 3.0)):
+    """Scale and standard deviation after the ratios, the newest first, by the equations at the top of the module."""
+    m, k = float(np.median(ratios)), len(ratios)
+    of_median = math.sqrt(math.pi / 2.0 / k)
+    sigma_m = of_median * 0.8862 * fmean([abs(a - b) for a, b in pairwise(ratios)])
+    if bounds[0] <= m <= bounds[1] and m != scale:
+        way = (m - scale) ** 2 / ((m - scale) ** 2 + 4.0 * sigma_m**2) * (m - scale) / 2.0
+        scale += min(max(way, -0.1 * scale), 0.1 * scale)
+    return scale, math.hypot(of_median * 1.2533 * fmean([abs(z - m) for z in ratios]), m - scale)
+
+
+@given(st.lists(st.floats(0.2, 3.3), min_size=6, max_size=6), st.integers(3, 9), st.floats(0.5, 2.0))
+def test_scale_and_deviation_follow_the_equations(ratios, number, scale):
+    found, std, median, kept = _learnt_scale(BOUNDED, scale, -1.0, Ratios(*ratios[1:], 9.0), number - 1, ratios[0])
+    known = ratios[: min(number, 6)]
+    assert kept == Ratios(*ratios)
+    assert median == np.median(known)
+    assert (found, std) == pytest.approx(by_the_docstring(scale, known), rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(('median', 'moves'), [(0.3, True), (0.299, False), (3.0, True), (3.001, False)])
+def test_the_scale_stands_still_while_the_median_is_out_of_its_bounds(median, moves):
+    scale, std, *_ = _learnt_scale(BOUNDED, 1.0, -1.0, Ratios(*[median] * 6), 6, median)
+    assert (scale != 1.0) is moves
+    assert std == pytest.approx(abs(median - scale))
+
+
+@pytest.mark.parametrize(('reversals', 'believed'), [(0, False), (1, False), (2, True)])
+def test_no_scale_is_believed_before_the_third_reversal(reversals, believed):
+    scale, std, median, _ = _learnt_scale(BOUNDED, 1.0, -1.0, Ratios(1.4, 1.4, *[1.0] * 4), reversals, 1.4)
+    assert (scale != 1.0, std >= 0.0) == (believed, believed)
+    assert median == 1.4
+
+
+@pytest.mark.parametrize(
+    ('changes', 'uses_scale', 'is_at_rest', 'said'),
+    [
+        ({'scale_std': -1.0, 'median': 9.0}, False, False, False),  # nothing is learnt
+        ({'scale_std': 0.0, 'median': 9.0}, True, False, True),
+        ({'median': 0.3, 'scale': 0.3}, True, False, False),
+        ({'median': 0.299, 'scale': 0.3}, True, False, True),
+        ({'median': 3.0, 'scale': 3.0}, True, False, False),
+        ({'median': 3.001, 'scale': 3.0}, True, False, True),
+        ({'median': 1.199}, False, False, False),  # twice 4 N of 40 N
+        ({'median': 1.201}, False, False, True),
+        ({'median': 0.801}, False, False, False),
+        ({'median': 0.799}, False, False, True),
+        ({'median': 1.5, 'scale': 1.31}, True, False, False),
+        ({'median': 1.5, 'scale': 1.29}, True, False, True),
+        ({'median': 1.0, 'scale': 1.5}, False, False, False),
+        ({'offset': 24.9}, False, True, False),  # half of 40 N and 10 N of stiction
+        ({'offset': 25.1}, False, True, True),
+        ({'offset': -25.1}, False, True, True),
+        ({'offset': 25.1}, False, False, False),
+        ({'offset': 25.1, 'scale': 1.1, 'median': 1.1}, True, True, False),
+        ({'offset': 27.6, 'scale': 1.1, 'median': 1.1}, True, True, True),
+    ],
+)
+def test_what_is_learnt_contradicts_the_law_beyond_twice_its_deviation_out_of_bounds_or_by_the_offset_at_rest(
+    changes, uses_scale, is_at_rest, said
+):
+    learnt = NOTHING_LEARNT._replace(**{'scale_std': 0.01} | changes)
+    assert disagrees(BOUNDED, learnt, ActuatorFriction(40.0, 4.0, 10.0, True, 0.0), uses_scale, is_at_rest) is said
+
+
+@pytest.mark.parametrize(
+    ('noise', 'scale_std', 'stamp', 'std'),
+    [
+        (3.0, 0.01, 0, 3.0),  # the noise
+        (0.3, 0.05, 0, 2.0),  # the scale
+        (0.3, 0.005, 0, 0.4),  # nobody knows a friction to less than 1 %
+        (0.0, 0.0, 1800 * SECOND, math.hypot(0.4, 4.0 * math.sqrt(0.5))),
+        (0.0, 0.0, -1800 * SECOND, 0.4),  # a clock that was set back
+    ],
+)
+def test_the_deviation_is_the_largest_of_noise_scale_and_1_percent_with_what_an_hour_forgets(
+    noise, scale_std, stamp, std
+):
+    learnt = NOTHING_LEARNT._replace(noise=noise, scale_std=scale_std, before=NO_LEVEL._replace(stamp=0))
+    assert with_scale(ActuatorFriction(40.0, 4.0, 10.0, True, 0.0), learnt, stamp, True) == pytest.approx(
+        (40.0, std, 10.0, True, 0.0)
+    )
+
+
+def test_without_a_reversal_the_deviation_of_the_seal_file_stays():
+    learnt = NOTHING_LEARNT._replace(noise=3.0, scale_std=0.0)
+    assert with_scale(ActuatorFriction(40.0, 4.0, 10.0, True, 0.0), learnt, START, True).coulomb_friction_std == 5.0
+
+
+def test_the_scale_is_on_every_force():
+    learnt = NOTHING_LEARNT._replace(scale=1.5, scale_std=0.0, noise=1.0, before=NO_LEVEL._replace(stamp=0))
+    friction = ActuatorFriction(40.0, 4.0, 10.0, False, -6.0)
+    assert with_scale(friction, learnt, 0, True) == (60.0, 1.0, 15.0, False, -9.0)
+    assert with_scale(friction, learnt, 0, False)[::2] == friction[::2]
+
+
+# --- the two lags ---
+
+
+def adapted(slides, settings=OBSERVE, state=NOT_ADAPTED):
+    for slide in slides:
+        state = adapt(settings, state, slide)
+    return state
+
+
+def moving(count, velocity, force, friction=40.0, start=START, step=0.01):
+    """Samples every ``step`` [s]; velocity [m/s] and force sum [N] by time [s]."""
+    for i in range(count):
+        time = i * step
+        stamp = start + round(time * SECOND)
+        yield Slide(stamp, velocity(time), force(time), friction, 4.0, 3e6, 2e6, True, True)
+
+
+def test_both_lags_have_a_time_constant_of_5_ms():
+    first, second = EVEN._replace(force_sum=0.0, velocity=0.02), EVEN._replace(stamp=START + SECOND // 50)
+    state = adapted([first, second._replace(velocity=0.03, force_sum=50.0, friction=60.0)])
+    share = 0.02 / 0.025
+    once = Lagging(0.02 + share * 0.01, share * 50.0, 40.0 + share * 20.0, share * 0.03 * 0.02)
+    assert state.once == pytest.approx(once)
+    twice = [before + share * (now - before) for before, now in zip((0.02, 0.0, 40.0, 0.0), once, strict=True)]
+    assert state.twice == pytest.approx(twice)
+    assert state.acceleration == pytest.approx(share * 0.01 / 0.025)
+    assert state.travel == pytest.approx(0.03 * 0.02)
+
+
+def test_a_steady_acceleration_is_found_and_its_inertia_is_no_friction():
+    settings = AdaptationSettings(moving_mass=10.0)
+    state = adapted(moving(200, lambda t: 0.02 + 0.5 * t, lambda _: 43.0 + 10.0 * 0.5), settings)
+    assert state.acceleration == pytest.approx(0.5)
+    assert state.learnt.offset == pytest.approx(3.0, abs=0.1)
+    assert state.learnt.level.reading == pytest.approx(43.0, abs=0.1)
+    unknown = adapted(moving(200, lambda t: 0.02 + 0.5 * t, lambda _: 48.0))
+    assert unknown.learnt == NOTHING_LEARNT  # it may be inertia
+
+
+@pytest.mark.parametrize(('gap', 'is_known'), [(0.1, True), (0.101, False), (-0.01, False), (0.0, False)])
+def test_after_a_gap_of_more_than_100_ms_or_a_step_back_acceleration_and_strokes_begin_anew(gap, is_known):
+    state = adapted(moving(100, lambda _: 0.02, lambda _: 45.0))._replace(acceleration=0.01)
+    after = adapt(OBSERVE, state, EVEN._replace(stamp=state.stamp + round(gap * SECOND)))
+    assert bool(after.learnt.level.samples) is is_known
+    if not is_known:
+        assert after.once == after.twice == Lagging(0.02, 45.0, 40.0, state.travel)
+        assert (after.acceleration, after.travel, after.stamp) == (0.0, state.travel, state.stamp + round(gap * SECOND))
+        assert after.learnt == state.learnt._replace(level=NO_LEVEL, before=NO_LEVEL)
+        assert after.learnt_stamp == state.learnt_stamp
+
+
+def test_nothing_is_learnt_until_the_lagging_friction_is_95_percent_of_that_of_the_new_direction():
+    """At 4 ms a sample two lags of 5 ms have done so after 7 samples: 1 - 2 (1 + 7 / 1.8) (5 / 9)^7 is 0.84."""
+    out = adapted(moving(100, lambda _: 0.02, lambda _: 45.0, step=0.004))
+    known, lags, number = out, [1.0, 1.0], 0
+    while known.learnt.direction == 1:
+        number += 1
+        known = adapt(
+            AdaptationSettings(acceleration_max=1e3), known,
+            EVEN._replace(stamp=out.stamp + number * 4_000_000, velocity=-0.02, force_sum=-35.0),
+        )  # fmt: skip
+        lags[0] += 4.0 / 9.0 * (-1.0 - lags[0])
+        lags[1] += 4.0 / 9.0 * (lags[0] - lags[1])
+        assert (known.learnt.direction == -1) == (lags[1] <= -0.95)
+    assert 5 < number < 15
+    assert known.learnt_stamp == known.stamp
+
+
+def test_a_law_without_friction_teaches_nothing():
+    assert adapted(moving(50, lambda _: 0.02, lambda _: 45.0, friction=0.0)).learnt == NOTHING_LEARNT
+
+
+def test_a_pause_counts_as_100_ms_at_most_where_something_is_learnt_again():
+    out = adapted(moving(100, lambda _: 0.02, lambda _: 45.0))
+    assert out.learnt.level.duration == pytest.approx(0.1 + 0.99 - 0.02, abs=0.011)  # the first one counts as 100 ms
+    bad = [EVEN._replace(stamp=out.stamp + i * SECOND // 100, is_usable=False) for i in range(1, 51)]
+    paused = adapted(bad, state=out)
+    assert paused.learnt == out.learnt
+    again = adapt(OBSERVE, paused, EVEN._replace(stamp=paused.stamp + SECOND // 100))
+    assert again.learnt.level.duration - out.learnt.level.duration == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_a_spike_reaches_the_lags_as_four_deviations(side):
+    out = adapted(moving(100, lambda _: 0.02, lambda _: 45.0))
+    clean, spoiled = (
+        adapt(OBSERVE, out, EVEN._replace(stamp=out.stamp + SECOND // 100, force_sum=force))
+        for force in (45.0, 45.0 + side * 900.0)
+    )
+    share = 0.01 / 0.015
+    assert spoiled.once.force_sum - clean.once.force_sum == pytest.approx(side * share * 4.0 * out.learnt.noise)
+    assert spoiled.learnt.outliers == 1
+
+
+def test_the_scale_is_on_the_friction_of_a_spike_and_of_inertia():
+    """44 N are 4 N more than the friction: no spike of a noise of 2 N; but 20 N less than with a scale of 1.6."""
+    out = adapted(moving(100, lambda _: 0.02, lambda _: 40.0))
+    known = out._replace(learnt=out.learnt._replace(noise=2.0, offset=0.0))
+    slide = EVEN._replace(stamp=out.stamp + SECOND // 100, force_sum=44.0)
+    assert adapt(OBSERVE, known, slide).learnt.outliers == 0
+    assert adapt(OBSERVE, known._replace(learnt=known.learnt._replace(scale=1.6)), slide).learnt.outliers == 1
