@@ -1,5 +1,6 @@
 """The likely reason of a friction that is not that of the law: each clause up to its bound and not beyond."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -78,7 +79,7 @@ def test_the_last_reversal_learnt_from_has_the_offset_that_the_ratio_leaves_of_t
     [
         (0.049, 'does not follow the motion'),
         (-0.049, 'does not follow the motion'),
-        (0.051, ''),
+        (0.05, ''),
         (0.5, ''),
         (-0.051, 'the friction drives'),
         (-1.0, 'the friction drives'),
@@ -91,7 +92,7 @@ def test_friction_below_5_percent_is_none_and_a_negative_one_a_wrong_sign(ratio,
 
 
 def test_an_input_fault_needs_three_reversals():
-    assert not input_fault(constant(), shown(-1.0, -1.0))
+    assert input_fault(constant(), shown(-1.0, -1.0)) == ''
     assert 'the friction drives' in input_fault(constant(), shown(-1.0, -1.0, -1.0))
     assert likely_reason(constant(), []) == ''
 
@@ -101,7 +102,7 @@ def test_the_last_twelve_reversals_count_and_no_older_one():
     for older in ([1.5] * 9, [-9.0] * 9):
         assert 'shows 2.00 times the friction' in likely_reason(constant(), shown(*older, *half))
     assert 'the friction drives' in input_fault(constant(), shown(*[1.0] * 20, *[-1.0] * 7, *[1.0] * 5))
-    assert not input_fault(constant(), shown(*[-1.0] * 20, *[1.0] * 12))
+    assert input_fault(constant(), shown(*[-1.0] * 20, *[1.0] * 12)) == ''
 
 
 # --- a halved or doubled area, or another seal ---
@@ -190,11 +191,18 @@ def test_a_line_needs_six_reversals():
 
 
 @pytest.mark.parametrize('ratio', [1.0, 2.5])
-@pytest.mark.parametrize(('share', 'is_named'), [(0.99, False), (1.01, True)])
+@pytest.mark.parametrize(('share', 'is_named'), [(0.99, False), (1.0, True)])
 def test_an_offset_that_changes_by_less_than_the_friction_tells_no_area(share, is_named, ratio):
     offsets = share * ratio * 40.0 * np.linspace(0.0, 1.0, 6)
     said = likely_reason(constant(), with_offsets(RAMP, HELD, offsets, ratio))
     assert ('an area in it is off' in said) is is_named
+
+
+def test_reversals_of_the_wrong_sign_have_friction_too():
+    """Those of long ago; the last twelve have the right one."""
+    ramp = np.tile(RAMP, 6)
+    old = with_offsets(ramp, 0.0 * ramp, 6e-6 * ramp, -1.0)  # 30 N, less than the friction
+    assert 'an area in it is off' not in likely_reason(constant(), old + with_offsets(RAMP, HELD, 6e-6 * RAMP) * 2)
 
 
 @pytest.mark.parametrize(('scatter', 'is_named'), [(0.39, True), (0.42, False)])
@@ -208,15 +216,15 @@ def test_a_line_has_a_correlation_of_95_percent(scatter, is_named):
 # --- the unit of a pressure ---
 
 
-def units_of(numbers, pressures, factor, ratio=1.0):
+def units_of(numbers, pressures, factor, ratio=1.0, scatter=0.0):
     """Reversals of a machine with the friction of the law whose pressures [Pa] are given in a unit of ``factor`` Pa."""
-    each = [friction_of_seals(numbers, p, 0.0, 0.0).coulomb_friction for p in pressures]
-    given = [friction_of_seals(numbers, p / factor, 0.0, 0.0).coulomb_friction for p in pressures]
+    each = [friction_of_seals(numbers, p, p, 0.0).coulomb_friction for p in pressures]
+    given = [friction_of_seals(numbers, p / factor, p / factor, 0.0).coulomb_friction for p in pressures]
     found = []
     for i in range(1, len(pressures)):
         law = 0.5 * (given[i] + given[i - 1])
-        true = ratio * 0.5 * (each[i] + each[i - 1])
-        found.append(Reversal(i, true / law, law, 0.0, pressures[i] / factor, 0.0))
+        true = ratio * math.exp((-1) ** i * scatter) * 0.5 * (each[i] + each[i - 1])
+        found.append(Reversal(i, true / law, law, 0.0, pressures[i] / factor, pressures[i] / factor))
     return found
 
 
@@ -233,25 +241,25 @@ def test_the_unit_is_the_one_whose_friction_scatters_least_on_any_day(unit, fact
 
 
 def test_pressures_in_pascals_are_never_taken_for_another_unit():
-    assert not input_fault(NUMBERS, units_of(NUMBERS, PRESSURES, 1.0))
-    assert not input_fault(NUMBERS, units_of(NUMBERS, [0.0] * 8, 1.0))
+    assert input_fault(NUMBERS, units_of(NUMBERS, PRESSURES, 1.0)) == ''
+    assert input_fault(NUMBERS, units_of(NUMBERS, [0.0] * 8, 1.0)) == ''
 
 
 def test_the_largest_magnitude_that_a_seal_sees_tells_the_unit():
     """One of 3 MPa is in Pa, whatever its sign, and whatever else is small."""
     seals = constant(pressure_min=1e6) + constant(pressure_min=1e6, chamber='b')
     for a, b in ((30.0, -3e6), (-3e6, 30.0), (30.0, 3e6)):
-        assert not input_fault(seals, shown(1.0, 1.0, 1.0, 1.0, pressure_a=a, pressure_b=b))
+        assert input_fault(seals, shown(1.0, 1.0, 1.0, 1.0, pressure_a=a, pressure_b=b)) == ''
     assert 'bar' in input_fault(seals, shown(1.0, 1.0, 1.0, 1.0, pressure_a=-30.0, pressure_b=2.0))
 
 
 @pytest.mark.parametrize(
     ('pressure', 'unit'),
     [
-        (29.0, ''),  # 2.9 MPa are below the lowest identified pressure, 3 MPa less 1 % of the range
-        (29.7, 'bar'),
-        (105.0, 'bar'),  # 10.5 MPa: up to 1.5 times the highest one, 7.04 MPa
-        (106.0, ''),
+        (29.5, ''),  # 2.95 MPa are below the lowest identified pressure, 3 MPa less 1 % of the range
+        (29.6, 'bar'),
+        (105.6, 'bar'),  # 10.56 MPa are 1.5 times the highest one, 7 MPa and 1 %
+        (105.7, ''),
         (428.0, ''),
         (432.0, 'psi'),
         (2900.0, ''),
@@ -275,15 +283,16 @@ def test_of_several_seals_the_range_that_all_of_them_were_identified_in_counts()
     wide, narrow = constant(pressure_min=1e6, pressure_max=7e6), constant(pressure_min=2e6, pressure_max=3e6)
     for seals in (wide + narrow, narrow + wide):
         assert 'bar' in input_fault(seals, shown(1.0, 1.0, 1.0, 1.0, pressure_a=25.0))
-        assert not input_fault(seals, shown(1.0, 1.0, 1.0, 1.0, pressure_a=15.0))  # below 2 MPa
-        assert not input_fault(seals, shown(1.0, 1.0, 1.0, 1.0, pressure_a=50.0))  # above 1.5 times 3 MPa
+        assert input_fault(seals, shown(1.0, 1.0, 1.0, 1.0, pressure_a=15.0)) == ''  # below 2 MPa
+        assert input_fault(seals, shown(1.0, 1.0, 1.0, 1.0, pressure_a=50.0)) == ''  # above 1.5 times 3 MPa
 
 
 def test_seals_without_identified_pressures_tell_no_unit():
-    assert not input_fault((numbers_of_law(ConstantCoulomb(40.0)),), shown(1.0, 1.0, 1.0, pressure_a=30.0))
+    assert input_fault((numbers_of_law(ConstantCoulomb(40.0)),), shown(1.0, 1.0, 1.0, pressure_a=30.0)) == ''
 
 
-def test_a_reversal_with_the_wrong_sign_contradicts_every_unit():
+def test_a_reversal_with_the_wrong_sign_or_without_friction_contradicts_every_unit():
     numbers = constant(pressure_min=1e6)
-    assert not input_fault(numbers, shown(1.0, 1.0, -0.5, 1.0, pressure_a=30.0))
+    assert input_fault(numbers, shown(1.0, 1.0, 0.0, 1.0, pressure_a=30.0)) == ''
+    assert input_fault(numbers, shown(1.0, 1.0, -0.5, 1.0, pressure_a=30.0)) == ''
     assert input_fault(numbers, shown(1.0, 1.0, 0.9, 1.0, pressure_a=30.0))

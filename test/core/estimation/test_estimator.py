@@ -22,6 +22,7 @@ from seal_friction_ros.core.estimation.records import (
     RodSample,
     Status,
 )
+from seal_friction_ros.core.estimation.swings import LONGEST_SWING
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, IdentifiedMotion
@@ -663,3 +664,183 @@ def test_parameters_are_compared_and_shown_by_what_was_given():
         repr(again)
         == f'EstimatorParameters(settings={PARAMETERS.settings!r}, seals={BOTH!r}, adaptation={AdaptationSettings()!r})'
     )
+
+
+# --- exactly at a limit ---
+
+AT_LIMIT = {  # setting: (name, value, bit)
+    'pressure_max': ('pressure', (4.5e7, 3e6), Status.PRESSURE_OUT_OF_RANGE),
+    'pressure_max b': ('pressure', (3e6, 4.5e7), Status.PRESSURE_OUT_OF_RANGE),
+    'pressure_min': ('pressure', (-1.2e5, 3e6), Status.PRESSURE_OUT_OF_RANGE),
+    'pressure_min b': ('pressure', (3e6, -1.2e5), Status.PRESSURE_OUT_OF_RANGE),
+    'force_max': ('force', 1e6, Status.FORCE_OUT_OF_RANGE),
+    'force_max -': ('force', -1e6, Status.FORCE_OUT_OF_RANGE),
+    'velocity_max': ('velocity', 10.0, Status.VELOCITY_OUT_OF_RANGE),
+    'velocity_max -': ('velocity', -10.0, Status.VELOCITY_OUT_OF_RANGE),
+}
+
+
+@pytest.mark.parametrize('case', AT_LIMIT)
+def test_a_value_at_its_limit_is_usable_and_the_next_one_beyond_is_not(case):
+    name, value, bit = AT_LIMIT[case]
+    pair = value if isinstance(value, tuple) else (value,)
+    beyond = tuple(math.nextafter(v, math.copysign(math.inf, v)) if v != 3e6 else v for v in pair)
+    assert not only(sample(**{name: value})).status & bit
+    assert only(sample(**{name: beyond if len(pair) > 1 else beyond[0]})).status & bit
+
+
+CHANGES = {  # name: (a value [SI], the largest change over a millisecond)
+    'pressure a': (2e7, 1e6),
+    'pressure b': (2e7, 1e6),
+    'force': (0.0, 1e5),
+    'velocity': (3.0, 1.0),
+}
+
+
+SLOW = replace(PARAMETERS, settings=EstimatorSettings(pressure_rate_max=1e9))
+
+
+def changed(name: str, value: float, stamp: int) -> RodSample:
+    kind, _, chamber = name.partition(' ')
+    return sample(stamp, **{kind: {'a': (value, 3e6), 'b': (3e6, value), '': value}[chamber]})
+
+
+@pytest.mark.parametrize('name', CHANGES)
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize(
+    ('milliseconds', 'share', 'leaps'),
+    [
+        (1.0, 1.0, False),  # exactly as much as the rate allows
+        (1.0, 1.01, True),
+        (0.1, 0.99, False),  # over less than a millisecond as much as over one
+        (0.1, 1.01, True),
+        (1.5, 1.49, False),
+        (1.5, 1.51, True),
+        (-1.5, 1.49, False),  # a clock that was set back
+        (-1.5, 1.51, True),
+    ],
+)
+def test_a_change_leaps_beyond_the_largest_rate_over_its_time_up_and_down(name, side, milliseconds, share, leaps):
+    value, most = CHANGES[name]
+    first, second = (
+        changed(name, value, START),
+        changed(name, value + side * share * most, START + int(milliseconds * MS)),
+    )
+    bits = Status.PRESSURE_LEAP | Status.FORCE_LEAP | Status.VELOCITY_LEAP
+    assert bool(last(first, second, parameters=SLOW).status & bits) is leaps
+
+
+@pytest.mark.parametrize('name', CHANGES)
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize(('share', 'confirms'), [(0.99, True), (-0.99, True), (1.01, False), (-1.01, False)])
+def test_a_leap_is_confirmed_by_a_value_as_near_to_it_as_the_rate_allows(name, side, share, confirms):
+    value, most = CHANGES[name]
+    far = value + side * 3.5 * most  # so no third value agrees with the first one
+    third = far + share * most
+    samples_ = [changed(name, v, START + i * MS) for i, v in enumerate((value, far, third))]
+    bits = Status.PRESSURE_LEAP | Status.FORCE_LEAP | Status.VELOCITY_LEAP
+    assert [bool(e.status & bits) for e in run(samples_, SLOW)] == [False, True, not confirms]
+
+
+# --- at rest, or not ---
+
+
+def test_before_the_first_sample_the_rod_counts_as_moving():
+    band = sample(velocity=1.5e-3)  # a rod at rest would be at rest, one that slid slides on
+    assert only(band).state == FrictionState.SLIDING
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize(('speed', 'force', 'state', 'uncertain'), [
+    (0.9e-4, -30.0, FrictionState.STUCK, False),  # as slow as that is at rest, whatever the force sum
+    (1.1e-4, -30.0, FrictionState.SLIDING, True),  # friction never drives
+    (9e-4, -30.0, FrictionState.SLIDING, True),
+    (9e-4, 30.0, FrictionState.STUCK, True),
+    (9e-4, 0.0, FrictionState.STUCK, True),
+])  # fmt: skip
+def test_a_rod_in_the_band_of_rest_slides_if_it_moves_against_its_force_sum(speed, force, state, uncertain, side):
+    creeping = [sample(START + i * MS, side * v, force=side * force) for i, v in enumerate([0.0, speed, speed])]
+    found = run(creeping)[-1]
+    assert (found.state, bool(found.status & Status.MOTION_UNCERTAIN)) == (state, uncertain)
+
+
+@pytest.mark.parametrize(('age', 'largest', 'said'), [
+    (1.0, 1.0, False), (1.01, 1.0, True), (-1.0, 1.0, False), (-1.01, 1.0, True), (1e6, 0.0, False), (0.6, 0.5, True),
+])  # fmt: skip
+def test_a_stamp_is_too_old_beyond_its_largest_age_either_way_or_never_with_0(age, largest, said):
+    settings_ = replace(PARAMETERS, settings=EstimatorSettings(stamp_age_max=largest))
+    assert bool(only(sample()._replace(stamp_age=age), settings_).status & Status.STAMP_AGE) is said
+
+
+# --- what adaptation takes of a sample ---
+
+
+def adapted_step(one: RodSample, mode='observe', before=None, **learnt):
+    """State and estimate after a sample of an adapting estimator that has learnt something."""
+    known = replace(PARAMETERS, adaptation=AdaptationSettings(mode))
+    state = before or init(known)
+    known_learnt = state.adaptation.learnt._replace(**learnt)
+    return step(known, state._replace(adaptation=state.adaptation._replace(learnt=known_learnt)), one)
+
+
+def slid(count=20, pressure=3e6, **learnt):
+    """State after even sliding at 100 Hz."""
+    state = None
+    for i in range(count):
+        state, _ = adapted_step(sample(START + 10 * i * MS, pressure=pressure), before=state, **learnt)
+    return state
+
+
+def test_until_a_scale_is_learnt_its_deviation_is_that_of_the_seal_file():
+    estimate = adapted_step(sample())[1]
+    assert estimate.adaptation_scale_std == estimate.coulomb_friction_std / estimate.coulomb_friction
+    assert adapted_step(sample(), scale_std=0.0)[1].adaptation_scale_std == 0.0
+    assert adapted_step(sample(), scale_std=0.25)[1].adaptation_scale_std == 0.25
+    assert adapted_step(sample(pressure=None))[1].adaptation_scale_std == 0.0  # no friction to compare with
+
+
+def test_a_sample_is_learnt_from_every_4_ms_and_no_more_often():
+    before = slid()
+    for milliseconds, learns in ((1, False), (3, False), (4, True)):
+        after, _ = adapted_step(sample(before.stamp + milliseconds * MS), before=before)
+        assert (after.adaptation != before.adaptation) is learns
+
+
+def test_a_law_that_disagrees_is_learnt_from_on():
+    before = slid()
+    after, estimate = adapted_step(sample(before.stamp + 10 * MS), before=before, scale_std=0.0, median=9.0)
+    assert estimate.status == Status.MODEL_DISAGREES
+    assert after.adaptation.learnt.samples == before.adaptation.learnt.samples + 1
+    assert after.adaptation.learnt.level.samples == before.adaptation.learnt.level.samples + 1
+
+
+def test_outside_the_identified_range_the_offset_is_learnt_and_with_a_bad_input_nothing():
+    outside = slid(pressure=8e6).adaptation.learnt
+    assert outside.samples > 10
+    assert outside.level.samples == 0
+    before = slid()
+    stale, _ = adapted_step(sample(before.stamp + 10 * MS, force_age=101), before=before)
+    assert stale.adaptation.learnt == before.adaptation.learnt
+
+
+# --- swings ---
+
+
+@pytest.mark.parametrize('mode', ['off', 'observe'])
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_the_way_of_a_stroke_is_counted_up_to_the_longest_swing(mode, side):
+    known, state, ways = replace(PARAMETERS, adaptation=AdaptationSettings(mode)), init(), []
+    for i in range(400):
+        state, _ = step(known, state, sample(START + i * MS, side * 0.01, force=side * 30.0))
+        ways.append(side * state.swing.way)
+    assert ways[1] - ways[0] == pytest.approx(1e-5)
+    assert ways[100] - ways[0] == pytest.approx(1e-3)
+    assert max(ways) == ways[-1] == pytest.approx(LONGEST_SWING, rel=0.01)
+    state, _ = step(known, state, sample(START + 400 * MS, -side * 0.01, force=side * 30.0))
+    assert side * state.swing.way == pytest.approx(-1e-5)
+
+
+def test_without_a_usable_force_sum_no_swing_is_judged():
+    state, _ = step(PARAMETERS, init(), sample())
+    assert step(PARAMETERS, state, sample(START + MS, force_age=200))[0].swing == state.swing
+    assert step(PARAMETERS, state, sample(START + MS))[0].swing != state.swing

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from seal_friction_msgs.msg import FrictionFeedForward
 
 from seal_friction_ros.core.estimation.feedforward import (
     FADED_IN,
@@ -15,13 +16,21 @@ from seal_friction_ros.core.estimation.feedforward import (
     FeedForwardSettings,
     Limited,
     compensation,
+    elastic_compensation,
     elastic_step,
+    led_velocity,
     step,
     usable,
     wanted_velocity,
 )
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
-from seal_friction_ros.core.friction.presliding import Presliding, initial_loading, presliding_numbers
+from seal_friction_ros.core.friction.presliding import (
+    NO_ELEMENTS,
+    Elements,
+    Presliding,
+    initial_loading,
+    presliding_numbers,
+)
 from seal_friction_ros.core.friction.states import FrictionState
 
 MS = 1_000_000  # [ns]
@@ -273,3 +282,89 @@ def test_rigid_seals_and_presliding_off_are_one_force_to_the_bit(velocities):
 def step_of(settings, velocity):
     """Feed-forward of the first step."""
     return step(settings, FADED_IN, 0, 0, 42.0, velocity)[1]
+
+
+# --- what is not known yet, or not any more ---
+
+
+def test_before_the_first_friction_or_velocity_there_is_no_force_though_nothing_is_faded_out():
+    for friction, velocity in ((NONE, 0.1), (42.0, math.nan)):
+        _, rows = run(SHARP, 3, friction, velocity)
+        assert [row.force for row in rows] == [0.0] * 3
+
+
+def test_a_friction_of_zero_is_usable_and_takes_the_force_away_at_once():
+    state, _ = run(SHARP, 10)
+    state, rows = run(SHARP, 3, 0.0, state=state, start=10)
+    assert [(row.force, row.limited, row.scale) for row in rows] == [(0.0, 0, 0.9)] * 3
+    assert state.friction == 0.0
+
+
+def test_an_input_that_is_lost_is_said_at_once():
+    state, _ = run(SHARP, 10)
+    _, out = step(SHARP, state, 9 * MS, 9 * MS, NONE, 0.1)  # at the time of the last step
+    assert (out.limited, out.scale, out.force) == (Limited.FADE, 0.9, pytest.approx(37.8))
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_clamp_and_slew_hold_in_both_directions(side):
+    _, rows = run(dataclasses.replace(SHARP, force_limit=20.0), 3, velocity=side * 0.1)
+    assert (rows[-1].force, rows[-1].limited) == (side * 20.0, Limited.CLAMP)
+    _, rows = run(dataclasses.replace(SHARP, slew_limit=1000.0), 3, velocity=side * 0.1)
+    assert [row.force for row in rows] == pytest.approx([0.0, side, 2.0 * side])
+    assert [row.limited for row in rows] == [Limited.SLEW] * 3
+    _, rows = run(dataclasses.replace(SHARP, slew_limit=1000.0, force_limit=20.0), 3, velocity=side * 0.1)
+    assert rows[-1].limited == Limited.SLEW | Limited.CLAMP
+
+
+def test_an_acceleration_that_is_not_finite_leads_nowhere_and_no_rod_is_faster_than_100_metres_per_second():
+    settings = FeedForwardSettings(lead_time=0.5)
+    for acceleration in (math.nan, math.inf, -math.inf):
+        assert led_velocity(settings, 0.005, acceleration) == 0.005
+    assert led_velocity(settings, 0.1, 2.0) == pytest.approx(1.1)
+    assert led_velocity(settings, 0.1, -2.0) == pytest.approx(-0.9)  # beyond a reversal, too
+    assert (led_velocity(settings, 0.0, 1e3), led_velocity(settings, 0.0, -1e3)) == (100.0, -100.0)
+    assert math.isnan(led_velocity(settings, math.inf, 0.0))
+
+
+def test_sheared_seals_that_push_the_rod_along_are_held_only_where_that_is_allowed():
+    allowed = dataclasses.replace(ELASTIC, presliding_against_motion=True)
+    for friction_force, velocity in ((30.0, 0.1), (-30.0, -0.1)):
+        assert elastic_compensation(ELASTIC, friction_force, velocity) == pytest.approx(friction_force)
+        assert elastic_compensation(ELASTIC, friction_force, -velocity) == 0.0
+        assert elastic_compensation(allowed, friction_force, -velocity) == pytest.approx(friction_force)
+
+
+def first_elements(*moments, state=FADED_IN):
+    """Sum of the forces of the elements [N] after (friction, velocity) each millisecond."""
+    for i, (friction, velocity) in enumerate(moments):
+        state, _ = elastic_step(ELASTIC, SPRINGS, state, i * MS, i * MS, friction, velocity, velocity, velocity)
+    return state.elements
+
+
+def test_the_seals_are_sheared_by_the_mean_of_two_velocities_and_by_no_step_before_the_first():
+    assert first_elements((42.0, 0.01)) == NO_ELEMENTS
+    assert sum(first_elements((42.0, 0.01), (42.0, 0.03))) == pytest.approx(1e5 * 0.02e-3)
+    assert sum(first_elements((42.0, math.nan), (42.0, 0.01))) == pytest.approx(1e5 * 0.005e-3)
+    assert sum(first_elements((42.0, 0.01), (42.0, math.nan))) == pytest.approx(1e5 * 0.01e-3)  # it goes on
+
+
+def test_a_step_of_more_than_20_ms_shears_the_seals_as_one_of_20_ms():
+    state, _ = elastic_step(ELASTIC, SPRINGS, FADED_IN, 0, 0, 42.0, 0.001, 0.001, 0.001)
+    for elapsed, way in ((10, 1e-5), (20, 2e-5), (500, 2e-5)):
+        after, _ = elastic_step(ELASTIC, SPRINGS, state, 0, elapsed * MS, 42.0, 0.001, 0.001, 0.001)
+        assert sum(after.elements) == pytest.approx(1e5 * way)
+
+
+def test_seals_without_friction_bear_nothing_and_those_of_an_unknown_friction_stay_as_they_are():
+    held = FADED_IN._replace(elements=Elements(1.0, 1.0, 1.0, 1.0, 1.0, 1.0))
+    assert first_elements((0.0, 0.01), state=held) == NO_ELEMENTS
+    assert first_elements((NONE, 0.01), state=held) == held.elements
+
+
+def test_the_bits_in_the_message_definition_are_those_of_the_code():
+    assert {bit.name: bit.value for bit in Limited} == {
+        'SLEW': FrictionFeedForward.SLEW,
+        'CLAMP': FrictionFeedForward.CLAMP,
+        'FADE': FrictionFeedForward.FADE,
+    }

@@ -4,8 +4,11 @@ import pytest
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.node_options import (
+    ADAPTATION_PREFIX,
     FEEDFORWARD_PREFIX,
     FRICTION_ESTIMATOR_PARAMETERS,
+    MACHINE_ESTIMATOR_PARAMETERS,
+    REMOVED_PARAMETERS,
     RecordingOptions,
     StartOptions,
 )
@@ -30,9 +33,22 @@ def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
     assert fixed == {'autostart', 'realtime_priority', 'seals', 'seal_chambers', 'record'}
 
 
+def test_the_mapping_file_of_a_machine_is_fixed_and_what_can_be_recorded_is_not():
+    fixed = {name for group in MACHINE_ESTIMATOR_PARAMETERS for name in group.fixed()}
+    assert fixed == {'autostart', 'realtime_priority', 'machine', 'record'}
+
+
+def test_what_replaces_a_removed_parameter_is_one():
+    names = {name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.names()}
+    assert f'{ADAPTATION_PREFIX}mode' in names
+    assert not names & REMOVED_PARAMETERS.keys()
+    assert set(REMOVED_PARAMETERS.values()) - names == {'velocity_terms of the seal file'}
+
+
 @pytest.mark.parametrize(
     ('name', 'least', 'below'),
     [
+        ('record_state_period', 0.5, 0.49),
         ('record_split_size', 1_000_000, 999_999),
         ('record_split_duration', 10.0, 9.9),
         ('record_keep_size', 10_000_000, 9_999_999),
@@ -41,7 +57,7 @@ def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
 def test_a_split_into_thousands_of_files_is_rejected(name: str, least: float, below: float):
     for good in (0, least):
         assert getattr(RecordingOptions(**{name: type(least)(good)}), name) == good
-    for bad in (below, type(least)(1)):
+    for bad in {below, min(below, type(least)(1))}:
         with pytest.raises(ValueError, match=f'{name} = {bad} is too small: 0 or at least {least}'):
             RecordingOptions(**{name: bad})
 

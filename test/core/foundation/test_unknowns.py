@@ -34,6 +34,7 @@ def test_each_kind_has_its_distribution():
     drawn = Unknown('x', 10.0, 'relative_std', (0.3,)).at(shares)
     assert drawn.std() / drawn.mean() == pytest.approx(0.3, rel=1e-2)
     assert np.median(drawn) == pytest.approx(10.0)
+    assert at(0.9, 'relative_std', 0.3) == pytest.approx(10.0 * math.exp(1.2816 * math.sqrt(math.log(1.09))), rel=1e-4)
     assert drawn.min() > 0.0
 
 
