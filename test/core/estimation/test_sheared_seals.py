@@ -16,12 +16,22 @@ from seal_friction_ros.core.estimation.configuration import SealSelection, first
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
 from seal_friction_ros.core.estimation.records import NEVER, Force, FrictionEstimate, Pressure, RodSample, Status
 from seal_friction_ros.core.estimation.sheared_seals import (
+    AT_REST,
     LEAST_STD,
     NOT_FOLLOWED,
     FollowedElasticity,
     FollowedShear,
     Moment,
     ShearedFriction,
+    _are_alike,
+    _bearing,
+    _held,
+    _longest_gap,
+    _moved,
+    _rest,
+    _sheared_against,
+    _stiffness,
+    _with_elements,
     followed_elasticity,
     shear_on,
     slide_on,
@@ -403,3 +413,306 @@ def test_the_softer_seals_are_two_deviations_softer_but_never_limp():
     assert followed_elasticity(numbers, 0.0, 1.4).softer.stiffness == pytest.approx(0.5 * SOFT.stiffness)
     assert isinstance(followed_elasticity(numbers, 0.3), FollowedElasticity)
     assert isinstance(NOT_FOLLOWED, FollowedShear)
+
+
+# --- one step, by hand ---
+
+ALIKE = presliding_numbers([Presliding(stiffness=6e4, yield_exponent=0.0)])  # six elements of 10 N/mm, a sixth each
+HALF = followed_elasticity(ALIKE, 0.25)  # softer seals of half the stiffness
+LASTING = {'memory_length': 1e9, 'dwell_time': 1e9}
+SLOW_MEMORY = HALF._replace(seals=ALIKE._replace(**LASTING), softer=HALF.softer._replace(**LASTING))
+
+
+def even(force, excess=0.0) -> Shear:
+    """Elements that bear a sixth of a force [N] each."""
+    return Shear(Elements(*[force / 6.0] * 6), excess)
+
+
+def moment_of(force_sum=0.0, coulomb=60.0, stiction=0.0, **changes) -> Moment:
+    return Moment(START, 0.0, 0, force_sum, True, True, coulomb, 0.0, stiction)._replace(**changes)
+
+
+def test_the_element_that_yields_last_takes_up_a_newton_over_the_longest_way():
+    assert HALF.softer.stiffnesses == pytest.approx(Elements(*[5e3] * 6))
+    assert HALF.yield_compliance == pytest.approx(1.0 / 6.0 / 5e3)
+    one = presliding_numbers([Presliding(stiffness=6e4, elements=1, yield_exponent=0.0)])
+    assert followed_elasticity(one, 0.25).yield_compliance == pytest.approx(1.0 / 3e4)
+    unlike = presliding_numbers([Presliding(stiffness=6e4, elements=2, yield_exponent=1.0)])  # a quarter and the rest
+    assert followed_elasticity(unlike, 0.25).yield_compliance == pytest.approx(0.75 / 1.5e4)
+
+
+def test_before_the_first_sample_nothing_is_known_of_the_shear():
+    assert NOT_FOLLOWED == (NEVER, 0.0, 0.0, NOT_SHEARED, NOT_SHEARED, False, 0, NEVER, 0.0, 0.0, False)
+    assert AT_REST == (False, 0.0, 0.0, False)
+
+
+@pytest.mark.parametrize(
+    ('period', 'longest'),
+    [(0.0, 0.01), (1e-3, 0.01), (3e-3, 0.01), (4e-3, 0.012), (0.02, 0.06), (0.033, 0.099), (0.034, 0.1), (5.0, 0.1)],
+)
+def test_the_longest_gap_is_10_ms_or_three_periods_but_not_above_100_ms(period, longest):
+    assert _longest_gap(period) == pytest.approx(longest)
+
+
+@pytest.mark.parametrize(
+    ('milliseconds', 'direction', 'since', 'found'),
+    [
+        (0, 1, 0, (NEVER, 1)),
+        (0, -1, NEVER, (NEVER, -1)),
+        (7, 0, NEVER, (7 * MS, 9)),
+        (0, 0, 0, (0, 9)),
+        (100 - 1e-6, 0, 0, (0, 9)),
+        (100, 0, 0, (0, 0)),
+        (-1, 0, 0, (0, 0)),
+    ],
+)
+def test_a_rest_keeps_the_direction_of_the_motion_before_for_100_ms(milliseconds, direction, since, found):
+    assert _rest(round(milliseconds * MS), direction, since, 9) == found
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_the_stiffness_is_that_of_the_elements_that_do_not_yield_in_the_direction(side):
+    forces = Elements(10.0, -10.0, 9.9, 0.0, -3.0, 10.0)
+    turned = Elements(*(side * force for force in forces))
+    assert _stiffness(ALIKE, turned, side, 60.0) == pytest.approx(4e4)
+    assert _stiffness(ALIKE, turned, -side, 60.0) == pytest.approx(5e4)
+    assert _stiffness(ALIKE, even(side * 60.0).forces, side, 60.0) == 0.0
+    assert _stiffness(ALIKE, even(side * 0.3).forces, side * 0.1, 0.6) == pytest.approx(6e4)
+
+
+HELD = {  # forces of the elements before, force sum, forces after
+    'unsheared': (NO_ELEMENTS, 30.0, even(30.0).forces),
+    'unevenly sheared': (
+        Elements(4.0, -2.0, 0.0, 1.0, 3.0, 0.0), 12.0, Elements(5.0, -1.0, 1.0, 2.0, 4.0, 1.0),
+    ),
+    'one that yields': (
+        Elements(12.0, 0.0, 0.0, 0.0, 0.0, 0.0), 32.0, Elements(12.0, 4.0, 4.0, 4.0, 4.0, 4.0),
+    ),
+    'more than breakaway': (NO_ELEMENTS, 500.0, even(72.0).forces),
+    'within 1 % of breakaway': (even(30.0).forces, 30.7, even(30.0).forces),
+    'beyond 1 % of breakaway': (even(30.0).forces, 30.9, even(30.9).forces),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize('scale', [1.0, 1e-2])
+@pytest.mark.parametrize('case', HELD)
+def test_a_rod_at_rest_shears_its_seals_until_they_bear_the_force_sum(case, scale, side):
+    """At a Coulomb friction of 60 N and 12 N of stiction, or a hundredth of that."""
+    before, force_sum, after = HELD[case]
+    factor = side * scale
+    held = moment_of(factor * force_sum, 60.0 * scale, 12.0 * scale)
+    found = _held(ALIKE, Shear(Elements(*(factor * f for f in before)), 0.0), held, 1e-3)
+    assert found.forces == pytest.approx(Elements(*(factor * f for f in after)), rel=1e-9, abs=1e-12)
+    assert found.excess == 12.0 * scale
+
+
+def test_without_a_force_sum_seals_at_rest_stay_as_they_are():
+    assert _held(ALIKE, even(30.0), moment_of(-30.0, knows_force_sum=False), 1e-3) == even(30.0)
+
+
+def test_stiction_comes_back_with_the_dwell_time_and_in_no_time_not_at_all():
+    slow = ALIKE._replace(dwell_time=0.1)
+    held = moment_of(30.0, 60.0, 12.0)
+    assert _held(slow, even(30.0), held, 0.1).excess == pytest.approx(12.0 * (1.0 - math.exp(-1.0)))
+    assert _held(slow, even(30.0, 2.0), held, 0.0).excess == 2.0
+    assert _held(ALIKE, even(30.0, 2.0), held, 0.0).excess == 2.0
+    # Until it is there the elements bear no more than they slide with.
+    assert sum(_held(ALIKE, even(30.0, 2.0), moment_of(70.0, 60.0, 12.0), 0.0).forces) == pytest.approx(62.0)
+
+
+def test_where_seals_and_softer_seals_bear_unlike_forces_half_of_the_difference_is_the_deviation():
+    assert _bearing(even(30.0), even(-6.0)) == ShearedFriction(True, pytest.approx(30.0), pytest.approx(18.0), False)
+    assert _bearing(even(-6.0), even(30.0)) == ShearedFriction(True, pytest.approx(-6.0), pytest.approx(18.0), False)
+
+
+@pytest.mark.parametrize('place', range(6))
+def test_seals_are_alike_if_every_element_bears_the_same(place):
+    other = Elements(*(5.0 + (0.25 if i == place else 0.0) for i in range(6)))
+    for one, two in ((even(30.0), Shear(other, 0.0)), (Shear(other, 0.0), even(30.0))):
+        assert _are_alike(one, two, 0.25)
+        assert not _are_alike(one, two, 0.24)
+    assert _are_alike(even(30.0), even(30.0), 0.0)
+
+
+@pytest.mark.parametrize('direction', [1, -1])
+@pytest.mark.parametrize('coulomb', [60.0, 0.3])
+def test_seals_of_an_unknown_shear_begin_against_the_motion_with_all_of_their_stiction(direction, coulomb):
+    numbers = presliding_numbers([Presliding(stiffness=6e4, yield_exponent=1.0)])
+    found = _sheared_against(numbers, moment_of(coulomb=coulomb, stiction=0.2 * coulomb), direction)
+    expected = [-direction * 1.2 * coulomb * (2 * i + 1) / 36.0 for i in range(6)]
+    assert found.forces == pytest.approx(Elements(*expected))
+    assert found.excess == 0.2 * coulomb
+
+
+def test_elements_that_all_bear_the_friction_are_kept_as_one_number():
+    assert _with_elements(HALF, even(30.0, 2.0), even(20.0, 3.0), 0.0) == (even(30.0, 2.0), even(20.0, 3.0))
+    for full in (0.5, -60.0):
+        seals, softer = _with_elements(HALF, Shear(NO_ELEMENTS, 2.0), Shear(NO_ELEMENTS, 2.0), full)
+        assert seals == softer == Shear(pytest.approx(even(full).forces), 2.0)
+
+
+def moved(way, direction=1, seals=NOT_SHEARED, softer=NOT_SHEARED, elasticity=HALF, **slide):
+    """Friction after a way [m] at a Coulomb friction of 60 N."""
+    given_ = Slide(way, 1e-3, 60.0, 0.0, 0.0)._replace(**slide)
+    return _moved(elasticity, seals, softer, given_, direction)[2]
+
+
+@pytest.mark.parametrize('side', [1, -1])
+def test_the_rod_slides_once_softer_seals_bear_95_percent_too_and_half_of_the_difference_is_the_deviation(side):
+    """Softer seals shear by 30 N/mm, so they bear 57 N after 1.9 mm."""
+    for way, slides in ((0.5e-3, False), (1.89e-3, False), (1.91e-3, True), (5e-3, True)):
+        force, softer = min(6e4 * way, 60.0), min(3e4 * way, 60.0)
+        found = moved(side * way, side)
+        assert found == ShearedFriction(
+            True, pytest.approx(side * force), pytest.approx(0.5 * (force - softer)), slides
+        )
+        assert not moved(side * way, -side).slides
+
+
+def test_seals_of_which_the_softer_alone_have_come_near_do_not_slide():
+    assert not moved(1e-6, seals=even(56.0), softer=even(60.0), elasticity=SLOW_MEMORY).slides
+    assert not moved(1e-6, seals=even(60.0), softer=even(56.0), elasticity=SLOW_MEMORY).slides
+    assert moved(1e-6, seals=even(58.0), softer=even(58.0), elasticity=SLOW_MEMORY).slides
+
+
+@pytest.mark.parametrize(('excess', 'slides'), [(-2.9, True), (-3.1, False), (2.9, True), (3.1, False)])
+def test_seals_that_slide_at_unlike_frictions_agree_to_5_percent(excess, slides):
+    softer = even(60.0 + excess, excess)
+    assert moved(1e-5, seals=even(60.0), softer=softer, elasticity=SLOW_MEMORY).slides is slides
+
+
+@pytest.mark.parametrize(
+    ('excess', 'sliding_excess', 'slides'),
+    [(12.0, 0.0, False), (3.0, 0.0, True), (3.4, 0.0, False), (12.0, 10.0, True), (12.0, 8.0, False)],
+)
+def test_while_more_than_5_percent_of_stiction_may_still_break_the_rod_does_not_slide(excess, sliding_excess, slides):
+    near = even(0.97 * (60.0 + excess), excess)
+    slide = {'sliding_excess': sliding_excess, 'stiction': excess}
+    assert moved(1e-9, seals=near, softer=near, elasticity=SLOW_MEMORY, **slide).slides is slides
+
+
+def test_seals_whose_friction_has_fallen_to_nothing_slide():
+    assert moved(5e-3, sliding_excess=-70.0) == ShearedFriction(True, 0.0, 0.0, True)
+
+
+# --- seals that slide on ---
+
+
+def slid(direction=1, **changes) -> FollowedShear:
+    """State of seals that slide at 60 N and 10 mm/s, sampled at 1 kHz."""
+    sheared = Shear(NO_ELEMENTS, 0.0)
+    state = FollowedShear(
+        START, direction * 0.01, 1e-3, sheared, sheared, True, direction, NEVER, direction * 60.0, 0.0, True
+    )
+    return state._replace(**changes)
+
+
+def slid_on(state, velocity=0.01, coulomb=60.0, velocity_friction=0.0, elapsed=1e-3, direction=None, elasticity=HALF):
+    stamp = START + round(elapsed * 1e9)
+    towards = state.direction if direction is None else direction
+    return slide_on(elasticity, state, stamp, velocity, towards, NEVER, coulomb, velocity_friction)
+
+
+@pytest.mark.parametrize('side', [1, -1])
+@pytest.mark.parametrize(
+    ('speed', 'coulomb', 'slides'),
+    [
+        (0.01, 60.0, True),
+        (0.01, 20.0, True),
+        (0.05, 61.0, False),  # it takes the softer seals 33 um to take up a newton
+        (0.057, 61.0, True),
+    ],
+)
+def test_seals_slide_on_as_long_as_they_take_up_the_friction_that_grows(side, speed, coulomb, slides):
+    found, state = slid_on(slid(side), side * speed, coulomb)
+    assert found is slides
+    following = slid(side, stamp=START + MS, velocity=side * speed, fully_sheared=side * coulomb)
+    assert state == (following if slides else slid(side))
+
+
+@pytest.mark.parametrize(
+    ('changes', 'direction'), [({'is_known': False}, 1), ({'fully_sheared': 0.0}, 1), ({}, -1), ({}, 0)]
+)
+def test_seals_that_did_not_slide_that_way_do_not_slide_on(changes, direction):
+    assert slid_on(slid(**changes), direction=direction) == (False, slid(**changes))
+
+
+def test_seals_of_less_than_a_newton_slide_on_too():
+    assert slid_on(slid(fully_sheared=0.3), coulomb=0.3)[0]
+    assert slid_on(slid(-1, fully_sheared=-0.3), -0.01, coulomb=0.3)[0]
+
+
+@pytest.mark.parametrize(
+    ('period', 'elapsed', 'slides'),
+    [
+        (1e-3, 0.0, True),
+        (1e-3, 0.01, True),
+        (1e-3, 0.011, False),
+        (1e-3, -1e-3, False),
+        (5e-3, 0.0149, True),
+        (5e-3, 0.0151, False),
+        (0.05, 0.0999, True),
+        (0.05, 0.101, False),
+    ],
+)
+def test_seals_slide_on_over_a_gap_of_10_ms_or_three_periods(period, elapsed, slides):
+    assert slid_on(slid(elapsed=period), elapsed=elapsed)[0] is slides
+
+
+@pytest.mark.parametrize('side', [1, -1])
+def test_a_way_back_is_kept_until_it_is_made_up_for(side):
+    _, back = slid_on(slid(side, velocity=-side * 0.01), -side * 0.03)
+    assert back.way_back == pytest.approx(-side * 2e-5)
+    _, less = slid_on(back._replace(stamp=START, velocity=side * 0.01), side * 0.01)
+    assert less.way_back == pytest.approx(-side * 1e-5)
+    _, none = slid_on(less._replace(stamp=START, velocity=side * 0.02), side * 0.02)
+    assert none.way_back == 0.0
+    assert slid_on(slid(side, velocity=-side * 0.01), -side * 0.01, velocity_friction=5.0)[1].seals.excess == 0.0
+
+
+def test_the_friction_of_seals_that_slide_on_has_the_part_that_depends_on_velocity():
+    found, state = slid_on(slid(velocity=0.5), 0.5, 60.0, 5.0)
+    assert (found, state.fully_sheared, state.seals, state.softer) == (True, 65.0, *[Shear(NO_ELEMENTS, 5.0)] * 2)
+    found, state = slid_on(slid(-1), -0.01, 60.0, -70.0)
+    assert (found, state.fully_sheared) == (True, 0.0)
+
+
+# --- the first sample, a gap, a rest ---
+
+
+@pytest.mark.parametrize('direction', [1, -1])
+@pytest.mark.parametrize(('velocity_friction', 'force'), [(5.0, 65.0), (-59.7, 0.3), (-70.0, 0.0)])
+def test_the_first_force_is_the_sliding_friction_and_a_guess(direction, velocity_friction, force):
+    first = moment_of(stiction=10.0, velocity=0.01 * direction, direction=direction)
+    first = first._replace(velocity_friction=velocity_friction)
+    state, sheared = shear_on(HALF, NOT_FOLLOWED, first)
+    assert sheared.force == pytest.approx(direction * force)
+    assert (state.stamp, state.velocity, state.elapsed, state.direction) == (START, 0.01 * direction, 0.0, direction)
+    assert not sheared.slides or force == 0.0
+
+
+def test_a_rest_that_begins_while_the_seals_slide_has_alike_seals_and_one_that_begins_while_they_shear_has_not():
+    sliding = slid()
+    stopped, at_rest = shear_on(HALF, sliding, moment_of(60.0, stamp=START + MS, velocity=0.0))
+    assert stopped.rests_alike
+    assert (stopped.rest_since, stopped.direction) == (START + MS, 1)
+    assert at_rest.is_followed
+    sheared = sliding._replace(fully_sheared=0.0, seals=even(30.0), softer=even(20.0))
+    assert not shear_on(HALF, sheared, moment_of(30.0, stamp=START + MS))[0].rests_alike
+    nearly = sliding._replace(fully_sheared=0.0, seals=even(30.0), softer=even(30.3), velocity=0.0)
+    assert shear_on(HALF, nearly, moment_of(30.0, stamp=START + MS))[0].rests_alike  # to 0.1 % of 60 N each
+    unlike = nearly._replace(softer=even(30.5))
+    assert not shear_on(HALF, unlike, moment_of(30.0, stamp=START + MS))[0].rests_alike
+
+
+def test_after_100_ms_of_rest_the_seals_bear_the_force_sum_and_no_way_is_left():
+    resting = slid(rest_since=START - 100 * MS, velocity=0.0, way_back=-1e-5)
+    state, found = shear_on(HALF, resting, moment_of(24.0, stamp=START + MS))
+    assert found == AT_REST
+    assert state.seals.forces == state.softer.forces == pytest.approx(even(24.0).forces)
+    assert (state.direction, state.way_back, state.fully_sheared, state.is_known) == (0, 0.0, 0.0, True)
+    for unknown in ({'knows_force_sum': False}, {'knows_inertia': False}):
+        assert not shear_on(HALF, resting, moment_of(24.0, stamp=START + MS, **unknown))[0].is_known
+    for before in ({'is_known': False}, {'rests_alike': False}):
+        assert not shear_on(HALF, resting._replace(**before), moment_of(24.0, stamp=START + MS))[0].is_known
