@@ -69,3 +69,17 @@ def test_bytes_that_are_cut_or_changed_are_a_value_error_or_other_answers(answer
         decode_together(changed)
     except ValueError as error:
         assert '\n' not in str(error)  # noqa: PT017
+
+
+@given(ANSWERS)
+def test_the_message_has_the_stamp_of_its_first_answer_and_no_frame_name(answers):
+    data = encode_together(answers)
+    of_one_kind = sorted(answers, key=lambda answer: type(answer.record) is FeedForward)
+    assert stamp_of(deserialize_message(data, MachineFriction)) == of_one_kind[0].record.stamp
+    assert data[12:17] == b'\x01\x00\x00\x00\x00'  # the length of an empty text is that of its end
+
+
+@pytest.mark.parametrize('head', [b'\x00\x00\x00\x00', b'\x00\x01\x00\x01', b'\x00\x03\x00\x00', b''])
+def test_another_encapsulation_is_refused(head):
+    with pytest.raises(ValueError, match=f'encapsulation {head.hex()} is not little-endian CDR'):
+        decode_together(head + bytes(40) if head else b'')

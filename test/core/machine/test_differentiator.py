@@ -8,6 +8,7 @@ import pytest
 from seal_friction_ros.core.machine.differentiator import (
     LONGEST_DELAY,
     NO_WINDOW,
+    Differentiator,
     chosen_differentiator,
     differentiate,
 )
@@ -71,3 +72,55 @@ def test_a_position_that_is_not_finite_begins_a_new_window():
     differentiator = chosen_differentiator(0.0, 1000.0, 1e-3)
     found = velocities(differentiator, grid(4, 1000.0), [0.0, math.inf, 0.0, 0.001])
     np.testing.assert_allclose(found, [math.nan, math.nan, math.nan, 1.0])
+
+
+@pytest.mark.parametrize(
+    ('samples', 'delay', 'gain', 'largest'),
+    [
+        (2, 0.5, math.sqrt(2.0), 1.0),  # the backward difference
+        (3, 1.0, 1.0 / math.sqrt(2.0), 0.5),
+        (4, 1.5, 1.0 / math.sqrt(5.0), 0.4),
+    ],
+)
+def test_delay_noise_and_largest_error_of_a_few_samples_are_those_by_hand(samples, delay, gain, largest):
+    """In units of the period T, of 1 / T, and of the step over T."""
+    period, step = 0.004, 3e-6
+    differentiator = Differentiator(samples, period, step)
+    assert differentiator.delay == pytest.approx(delay * period)
+    assert differentiator.noise_gain == pytest.approx(gain / period)
+    assert differentiator.noise == pytest.approx(gain * step / math.sqrt(12.0) / period)
+    assert differentiator.largest_error == pytest.approx(largest * step / period)
+
+
+@pytest.mark.parametrize(('rate', 'most'), [(1000.0, 41), (500.0, 21), (1e4, 64), (20.0, 2)])
+def test_the_window_is_the_shortest_with_the_noise_and_has_20_ms_delay_64_samples_or_two_at_most(rate, most):
+    for samples in range(2, most + 1):
+        noise = Differentiator(samples, 1.0 / rate, 1e-3).noise
+        assert chosen_differentiator(1e-3, rate, 1.0001 * noise).samples == samples
+    with pytest.raises(ValueError, match=f'^steps of 0.001 m at {rate:g} Hz: .* is possible'):
+        chosen_differentiator(1e-3, rate, 0.9999 * noise)
+
+
+@pytest.mark.parametrize(('rate', 'most'), [(1000.0, 41), (500.0, 21), (20.0, 2)])
+def test_the_least_noise_that_is_possible_is_told(rate, most):
+    with pytest.raises(ValueError, match=f'{Differentiator(most, 1.0 / rate, 1e-3).noise:.2g} m/s is possible'):
+        chosen_differentiator(1e-3, rate, 1e-9)
+
+
+@pytest.mark.parametrize(('gap', 'velocity'), [(4_000_000, 0.25), (4_100_000, None), (0, None), (-1_000_000, None)])
+def test_over_four_periods_there_is_a_velocity_and_over_more_a_new_window(gap, velocity):
+    differentiator = Differentiator(2, 1e-3, 0.0)
+    window, _ = differentiate(differentiator, NO_WINDOW, 7_000_000, 0.5)
+    following, found = differentiate(differentiator, window, 7_000_000 + gap, 0.501)
+    assert found == (None if velocity is None else pytest.approx(velocity))
+    if gap == 0:
+        assert following is window  # a repeated stamp is no sample
+    elif velocity is None:
+        assert following == ((7_000_000 + gap,), (0.501,))
+
+
+def test_a_long_window_keeps_as_many_samples_as_it_fits_a_line_to():
+    differentiator, window = Differentiator(3, 1e-3, 0.0), NO_WINDOW
+    for i in range(9):
+        window, _ = differentiate(differentiator, window, i * 1_000_000, 0.001 * i)
+    assert window == ((6_000_000, 7_000_000, 8_000_000), pytest.approx((0.006, 0.007, 0.008)))

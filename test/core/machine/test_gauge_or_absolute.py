@@ -51,3 +51,52 @@ def test_gauge_pressures_with_ambient_pressure_taken_off_are_named():
 def test_without_a_pressure_and_with_nan_nothing_is_said():
     assert not remarks([], False)
     assert not remarks([(math.nan, math.nan)], False)
+
+
+OTHER = 'std_msgs/msg/Float64MultiArray'
+
+
+@pytest.mark.parametrize(
+    ('lowest', 'absolute', 'kind', 'said'),
+    [
+        (-5.0e4, True, OTHER, ''),  # a chamber that cavitates
+        (-5.01e4, True, OTHER, 'write absolute: false'),
+        (9.0e4, False, OTHER, ''),
+        (9.01e4, False, OTHER, 'write absolute: true'),
+        (1.15e5, False, OTHER, 'write absolute: true'),  # ambient pressure
+        (1.151e5, False, OTHER, ''),
+        (9.01e4, False, 'sensor_msgs/msg/FluidPressure', 'write absolute: true'),
+        (9.0e4, False, 'sensor_msgs/msg/FluidPressure', ''),
+        (LOADED, True, OTHER, ''),
+    ],
+)
+def test_a_pressure_is_doubted_up_to_the_bounds_of_cavitation_and_weather(lowest, absolute, kind, said):
+    found = remarks([(LOADED, LOADED), (lowest, lowest), (LOADED, LOADED)], absolute, kind)
+    assert len(found) == (2 if said else 0)
+    for name, line in zip(('pressure_a', 'pressure_b'), found, strict=False):
+        assert line.startswith(name)
+        assert f'{lowest:.3g} Pa' in line
+        assert said in line
+
+
+@pytest.mark.parametrize('order', [1, -1])
+def test_one_chamber_below_ambient_pressure_clears_the_other(order):
+    assert not remarks([(2e3, AMBIENT)[::order]], False)
+    assert len(remarks([(9.1e4, AMBIENT)[::order]], False)) == 2
+
+
+def test_the_lowest_pressure_of_each_chamber_is_kept():
+    lowest = Lowest()
+    assert lowest == (math.inf, math.inf)
+    for number, pair in enumerate([(3.0, 5.0), (4.0, 2.0), (math.nan, 9.0), (1.0, math.nan)]):
+        lowest = lowest.after(Pressure(number, *pair))
+    assert lowest == (1.0, 2.0)
+    assert lowest.after(NO_PRESSURE) == lowest
+
+
+def test_a_constant_pressure_is_not_doubted():
+    inputs = {'velocity': '/joint_states velocity[axis]', 'pressure_a': '/p_a', 'pressure_b': 1e5}
+    file = parsed(BENCH, inputs=inputs, force_sum={'load': 'none', 'pressures': True})
+    assert pressure_remarks(file, file.actuators[0], Lowest(2e5, -1e9)) == []
+    (line,) = pressure_remarks(file, file.actuators[0], Lowest(-1e5, -1e9))
+    assert line.startswith('pressure_a')

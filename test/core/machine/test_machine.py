@@ -4,13 +4,25 @@ import json
 import math
 
 import pytest
-from harness.machines import BENCH, EXCAVATOR, made, message
+import yaml
+from harness.machines import BENCH, EXCAVATOR, made, message, message_class, parsed
 
 from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.estimation.records import (
+    NEVER,
+    Force,
+    FrictionEstimate,
+    Position,
+    Pressure,
+    ServoReference,
+    Status,
+    Velocity,
+)
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.machine import machine as m
+from seal_friction_ros.core.machine.machine_file import Spring, Weight
 from seal_friction_ros.core.machine.outputs import commands
+from seal_friction_ros.files import machine_configurations
 
 MS = 1_000_000
 AMBIENT = 101_325.0
@@ -289,3 +301,255 @@ def test_a_constant_temperature_is_refused():
     with pytest.raises(ValueError, match=r'inputs\.temperature is constant: name a topic'):
         made(BENCH, inputs={'velocity': '/joint_states velocity[axis]', 'position': '/joint_states position[axis]',
                             'pressure_a': '/p_a', 'pressure_b': '/p_b', 'temperature': 320.0})  # fmt: skip
+
+
+# --- the records that messages make, by hand ---
+
+
+class Taker:
+    """The first actuator of a machine and what it remembers."""
+
+    def __init__(self, machine):
+        self.machine, self.actuator = machine, machine.actuators[0]
+        self.memory = m.first_memory(self.actuator)
+
+    def take(self, topic, stamp, **fields):
+        """Records of one message."""
+        plan = self.machine.plans[topic]
+        kind = self.machine.file.topics[topic]
+        has_header = 'header' in message_class(kind).get_fields_and_field_types()
+        reading = plan.reader.read(message(kind, stamp if has_header else None, **fields))
+        taken = dict(plan.taken)[0]
+        self.memory, records = m.records_of(self.actuator, self.memory, taken, reading.numbers, stamp, reading.frame_id)
+        return records
+
+    def pressures(self, stamp, a, b):
+        return [*self.take('/p_a', stamp, fluid_pressure=a), *self.take('/p_b', stamp, fluid_pressure=b)]
+
+    def joints(self, stamp, **values):
+        return self.take('/joint_states', stamp, name=['axis'], **{key: [value] for key, value in values.items()})
+
+
+def bench(topics=None, ambient=None, **changes):
+    """The bench with further topics and another ambient pressure; ``changes`` of its actuator, None removes a key."""
+    document = yaml.safe_load(BENCH)
+    document['topics'] |= topics or {}
+    if ambient is not None:
+        document['ambient_pressure'] = ambient
+    return Taker(made(yaml.safe_dump(document), **changes))
+
+
+INPUTS = yaml.safe_load(BENCH)['actuators']['axis']['inputs']
+WEATHER = {'topics': {'/weather': 'sensor_msgs/msg/FluidPressure'}, 'ambient': '/weather'}
+
+
+def test_nothing_is_made_of_a_part_until_the_others_have_come():
+    taker = bench()
+    assert taker.take('/p_a', 5, fluid_pressure=2e6) == []
+    (pressure,) = taker.take('/p_b', 7, fluid_pressure=1e6)
+    assert pressure == Pressure(5, pytest.approx(2e6 - AMBIENT), pytest.approx(1e6 - AMBIENT))
+    (force,) = taker.take('/load', 9, wrench__force__z=100.0)  # the areas take the pressures of 5 ns
+    assert force == Force(5, pytest.approx((2e6 - AMBIENT) * AREA_A - (1e6 - AMBIENT) * AREA_B - 100.0))
+
+
+def test_a_pair_has_the_stamp_of_its_older_part_and_is_made_once_for_each():
+    taker = bench()
+    taker.pressures(5, 2e6, 1e6)
+    taker.take('/load', 5, wrench__force__z=0.0)
+    assert taker.take('/p_a', 8, fluid_pressure=3e6) == []  # the other one is still of 5 ns
+    assert [record.stamp for record in taker.take('/p_b', 9, fluid_pressure=3e6)] == [8]  # the load is of 5 ns
+    assert [type(record) for record in taker.take('/load', 9, wrench__force__z=0.0)] == [Force]
+    assert taker.memory.force_stamp == taker.memory.pressure_stamp == 8
+
+
+def test_a_load_cell_alone_needs_no_pressure():
+    taker = bench(force_sum={'load_force': '/load wrench.force.z'})
+    assert taker.take('/load', 5, wrench__force__z=-40.0) == [Force(5, -40.0)]
+    assert [type(record) for record in taker.pressures(6, 2e6, 1e6)] == [Pressure]
+
+
+def test_the_terms_of_the_force_sum_add_up_with_their_signs():
+    values = [math.nan] * len(m.QUANTITIES)
+    for name, value in {'position': 0.3, 'load_force': 25.0, 'angle': math.radians(30.0)}.items():
+        values[m.QUANTITIES.index(name)] = value
+    mapping = bench().actuator.mapping
+    for terms, force in (
+        (m.ForceSum(pressures=True), 2e6 * AREA_A - 3e6 * AREA_B),
+        (m.ForceSum(load_force=1.0), 25.0),
+        (m.ForceSum(weight=Weight(80.0, 0.0)), -80.0 * 9.80665 * 0.5),
+        (m.ForceSum(spring=Spring(200.0, 0.1)), -200.0 * 0.2),
+        (m.ForceSum(load_over_position=m.LoadTable((0.0, 0.4), (10.0, 50.0))), -40.0),
+        (m.ForceSum(), 0.0),
+        (
+            m.ForceSum(pressures=True, load_force=1.0, spring=Spring(200.0, 0.1)),
+            2e6 * AREA_A - 3e6 * AREA_B + 25.0 - 40.0,
+        ),
+    ):
+        assert m.force_sum(terms, mapping, values, (2e6, 3e6)) == pytest.approx(force)
+    values[m.QUANTITIES.index('angle')] = math.inf
+    assert math.isnan(m.force_sum(m.ForceSum(weight=Weight(80.0, 0.0)), mapping, values, (0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ('position', 'load'),
+    [(0.1, 100.0), (0.15, 200.0), (0.2, 300.0), (0.3, 250.0), (0.4, 200.0), (0.0999, math.nan), (0.4001, math.nan)],
+)
+def test_the_load_is_straight_between_its_points_ends_included_and_not_known_beyond(position, load):
+    table = m.LoadTable((0.1, 0.2, 0.4), (100.0, 300.0, 200.0))
+    assert m.load_at(table, position) == pytest.approx(load, nan_ok=True)
+
+
+def test_constant_parts_are_as_new_as_the_others():
+    weight = {'mass': 10.0, 'angle': '90 deg'}
+    terms = {'pressures': True, 'weight': weight, 'load_force': '5 N'}
+    taker = bench(inputs=INPUTS | {'pressure_b': '2 bar'}, force_sum=terms)
+    pressure, force = taker.take('/p_a', 5, fluid_pressure=2e6)
+    assert pressure == Pressure(5, pytest.approx(2e6 - AMBIENT), 2e5)  # a constant is gauge
+    assert force == Force(5, pytest.approx((2e6 - AMBIENT) * AREA_A - 2e5 * AREA_B - 98.0665 + 5.0))
+
+
+def test_an_angle_that_comes_in_a_message_turns_the_weight():
+    weight = {'mass': 10.0, 'angle': {'topic': '/angle', 'field': 'data', 'unit': 'deg'}}
+    taker = bench({'/angle': 'std_msgs/msg/Float64'}, force_sum={'weight': weight})
+    assert taker.take('/angle', 5, data=30.0) == [Force(5, pytest.approx(-49.03325))]
+
+
+@pytest.mark.parametrize('load', [{'spring': {'stiffness': 200.0, 'rest_position': 0.1}}, {'load_over_position': {
+    'positions': [0.0, 1.0], 'forces': [-20.0, 180.0]}}])  # fmt: skip
+def test_a_load_over_position_is_as_new_as_the_position(load):
+    taker = bench(force_sum=load | {'pressures': True, 'load': 'none'})
+    assert [type(record) for record in taker.pressures(5, 2e6, 1e6)] == [Pressure]
+    force, position = taker.joints(6, position=0.3)
+    balance = (2e6 - AMBIENT) * AREA_A - (1e6 - AMBIENT) * AREA_B
+    assert (force, position) == (Force(5, pytest.approx(balance - 40.0)), Position(6, 0.3))
+
+
+def test_gauge_and_absolute_pressures_may_be_mixed():
+    inputs = INPUTS | {'pressure_b': {'topic': '/p_b', 'absolute': False}}
+    (pressure,) = bench(inputs=inputs, force_sum=None).pressures(5, 2e6, 1e6)
+    assert pressure == Pressure(5, pytest.approx(2e6 - AMBIENT), 1e6)
+    inputs = INPUTS | {'pressure_a': {'topic': '/p_a', 'absolute': False}}
+    (pressure,) = bench(inputs=inputs, force_sum=None).pressures(5, 2e6, 1e6)
+    assert pressure == Pressure(5, 2e6, pytest.approx(1e6 - AMBIENT))
+
+
+SECOND = 1_000_000_000  # [ns]
+
+
+@pytest.mark.parametrize(
+    ('age', 'is_used'),
+    [(0, True), (59 * SECOND, True), (61 * SECOND, False), (-59 * SECOND, True), (-61 * SECOND, False)],
+)
+def test_the_ambient_pressure_of_a_message_is_used_for_a_minute(age, is_used):
+    taker, now = bench(**WEATHER), 1000 * SECOND
+    assert taker.pressures(now - 5, 2e6, 1e6) == []  # it is not known yet
+    assert taker.take('/weather', now - age, fluid_pressure=9e4) == []
+    taker.take('/p_b', now - 1, fluid_pressure=1e6)
+    found = taker.take('/p_a', now, fluid_pressure=2e6)
+    assert found == ([Pressure(now - 1, pytest.approx(1.91e6), pytest.approx(9.1e5))] if is_used else [])
+    taker.take('/load', now, wrench__force__z=0.0)
+    assert taker.memory.force_stamp == (now - 1 if is_used else NEVER)
+
+
+def test_an_ambient_pressure_that_is_no_number_is_not_known_and_gauge_pressures_need_none():
+    taker = bench(**WEATHER)
+    taker.take('/weather', 5, fluid_pressure=math.nan)
+    assert taker.pressures(6, 2e6, 1e6) == []
+    gauge = {f'pressure_{c}': {'topic': f'/p_{c}', 'absolute': False} for c in 'ab'}
+    taker = bench(**WEATHER, inputs=INPUTS | gauge, force_sum=None)
+    assert '/weather' not in taker.machine.plans
+    assert taker.pressures(6, 2e6, 1e6) == [Pressure(6, 2e6, 1e6)]
+
+
+@pytest.mark.parametrize(
+    ('difference', 'pair'), [(3e5, (3e5, 0.0)), (-3e5, (0.0, 3e5)), (0.4, (0.4, 0.0)), (0.0, (0.0, 0.0))]
+)
+def test_a_pressure_difference_is_one_chamber_under_pressure(difference, pair):
+    inputs = {'velocity': '/joint_states velocity[axis]', 'pressure_difference': {'topic': '/p_a', 'absolute': False}}
+    taker = bench(seals=['ms28775_114@difference'], inputs=inputs, force_sum=None)
+    assert taker.take('/p_a', 5, fluid_pressure=difference) == [Pressure(5, *pair)]
+
+
+# --- position, reference and velocity ---
+
+REFERENCED = {
+    name: f'/set {name.removeprefix("reference_")}[axis]' for name in ('reference_position', 'reference_velocity')
+}
+SET = {'topics': {'/set': 'sensor_msgs/msg/JointState'}}
+
+
+def test_position_and_velocity_are_passed_on_when_they_come():
+    taker = bench()
+    assert taker.joints(5, position=0.3) == [Position(5, 0.3)]
+    assert taker.joints(6, velocity=0.2) == [Velocity(6, 0.2)]
+    assert taker.joints(7, position=0.4, velocity=-0.3) == [Position(7, 0.4), Velocity(7, -0.3)]
+
+
+def test_a_velocity_from_position_comes_with_the_position_once_there_are_enough():
+    inputs = {key: value for key, value in INPUTS.items() if key != 'velocity'}
+    taker = bench(inputs=inputs, velocity_from_position={'step': 0.0, 'rate': 1000.0})
+    assert taker.joints(5 * MS, position=0.3) == [Position(5 * MS, 0.3)]
+    assert taker.joints(6 * MS, position=0.3002) == [Position(6 * MS, 0.3002), Velocity(6 * MS, pytest.approx(0.2))]
+
+
+def set_point(taker, stamp, **values):
+    return taker.take('/set', stamp, name=['axis'], **{key: [value] for key, value in values.items()})
+
+
+def test_a_reference_has_the_velocity_that_is_given_and_the_newest_position_and_acceleration():
+    acceleration = {'reference_acceleration': {'topic': '/set', 'field': 'effort[axis]'}}
+    taker = bench(**SET, inputs=INPUTS | REFERENCED | acceleration)
+    (first,) = set_point(taker, 5, velocity=0.2)
+    assert (first.velocity, first.acceleration, math.isnan(first.position)) == (0.2, 0.0, True)
+    assert set_point(taker, 6, position=0.5, effort=3.0) == []  # a velocity makes a reference
+    assert set_point(taker, 7, velocity=0.3) == [ServoReference(7, 0.5, 0.3, 3.0)]
+    assert taker.joints(8, velocity=0.1) == [Velocity(8, 0.1)]  # the rod makes none
+
+
+def test_a_reference_of_positions_has_the_velocity_between_the_last_two_up_to_200_ms_apart():
+    inputs = INPUTS | {'reference_position': REFERENCED['reference_position']}
+    for gap, velocity in ((50 * MS, 0.4), (200 * MS, 0.1), (201 * MS, None)):
+        taker = bench(**SET, inputs=inputs)
+        assert set_point(taker, MS, position=0.5) == []
+        found = set_point(taker, MS + gap, position=0.52)
+        expected = [] if velocity is None else [ServoReference(MS + gap, 0.52, pytest.approx(velocity), 0.0)]
+        assert found == expected
+
+
+def test_a_message_without_a_stamp_has_that_of_its_receipt_on_the_clock_of_the_stamps():
+    run = Run(made(EXCAVATOR))
+    states = [one._replace(pipeline=one.pipeline._replace(clock_offset=500)) for one in run.state.actuators]
+    run.state = m.MachineState(tuple(states))
+    for topic in ('/a', '/b'):
+        run.take(topic, message('std_msgs/Float64MultiArray', data=[20.0, 30.0, 40.0]), 7)
+    assert run.state.actuators[0].pipeline.pressure == Pressure(507, 2e6, 2e6)
+
+
+def test_an_actuator_has_taken_nothing_before_its_first_message():
+    (known,) = m.init(made(BENCH)).actuators
+    assert (known.force, known.fault, known.memory.pressure_stamp, known.memory.force_stamp) == (0.0, '', NEVER, NEVER)
+    assert known.memory.stamps == (NEVER,) * len(m.QUANTITIES)
+    named = zip(m.QUANTITIES, known.memory.values, strict=True)
+    assert [name for name, value in named if not math.isnan(value)] == ['ambient']
+
+
+def test_a_type_that_is_not_defined_is_named_with_its_topic():
+    file = parsed(BENCH)
+    with pytest.raises(ValueError, match=r'/joint_states: the type sensor_msgs/JointState is neither installed'):
+        m.make_machine(file, machine_configurations(file, 'robot.yaml'), {})
+
+
+@pytest.mark.parametrize('damage', [
+    {'values': ['0x0p+0'] * 5}, {'stamps': [0] * 5}, {'windows': [[[1], []], [[], []]]},
+    {'values': ['0x0p+0'] * 10, 'stamps': [0] * 10}, {'force_stamp': None}, {'windows': [[[1], []], [[1], []]]},
+])  # fmt: skip
+def test_a_damaged_memory_is_refused(damage):
+    document = m.memory_document(m.first_memory(made(BENCH).actuators[0])) | damage
+    with pytest.raises(ValueError, match='memory of an actuator'):
+        m.parse_memory(document)
+
+
+def test_a_memory_comes_back_with_every_part():
+    windows = m.Window((1, 2), (0.1, 0.2)), m.Window((3,), (0.3,))
+    memory = m.Memory(tuple(0.5 * i for i in range(12)), tuple(range(12)), 7, 8, *windows)
+    assert m.parse_memory(json.loads(json.dumps(m.memory_document(memory)))) == memory

@@ -13,10 +13,14 @@ from rclpy.serialization import serialize_message
 
 from seal_friction_ros.core.machine.message_fields import (
     LARGEST_MESSAGE,
+    Field,
     Reader,
     definition_of_class,
+    full_name,
+    names_in,
     number_paths,
     parse_definition,
+    short_name,
 )
 from seal_friction_ros.offline.bags.bag import message_definition
 
@@ -291,3 +295,192 @@ def test_the_paths_of_all_numbers_are_listed():
         of_class('geometry_msgs/msg/WrenchStamped'), 'geometry_msgs/msg/WrenchStamped'
     )
     assert 'velocity[]' in number_paths(of_class(JOINT_STATE), JOINT_STATE)
+
+
+# -- definitions and paths, by hand -----------------------------------------------------------------------------------
+
+TEXT = """
+# a comment
+uint8 OPEN=1            # a constant is no field
+string GREETING = "hi"
+std_msgs/Header header
+float64[3] fixed
+float32[<=4] bounded
+string<=9[] names       # bounded texts
+Part[] parts
+float64 speed 1.5       # a default value
+byte flag
+================================================================================
+MSG: a/Part
+string name
+int16 size
+================================================================================
+MSG: std_msgs/Header
+time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+
+
+def test_a_definition_has_fields_of_every_form_and_no_constants():
+    definition = parse_definition('a/msg/A', TEXT)
+    assert definition['a/A'] == (
+        Field('header', 'std_msgs/Header'),
+        Field('fixed', 'float64', 'array', 3),
+        Field('bounded', 'float32', 'sequence'),
+        Field('names', 'string', 'sequence'),
+        Field('parts', 'a/Part', 'sequence'),
+        Field('speed', 'float64'),
+        Field('flag', 'uint8'),
+    )
+    assert definition['a/Part'] == (Field('name', 'string'), Field('size', 'int16'))
+    assert definition['std_msgs/Header'] == (Field('stamp', 'builtin_interfaces/Time'), Field('frame_id', 'string'))
+
+
+def test_the_number_paths_of_a_definition_have_brackets_after_lists():
+    assert number_paths(parse_definition('a/msg/A', TEXT), 'a/msg/A') == [
+        'header.stamp.sec', 'header.stamp.nanosec', 'fixed[]', 'bounded[]', 'parts[].size', 'speed', 'flag',
+    ]  # fmt: skip
+
+
+def test_a_message_without_fields_is_one_byte():
+    assert parse_definition('a/msg/Empty', '\n# nothing\n') == {
+        'a/Empty': (Field('structure_needs_at_least_one_member', 'uint8'),)
+    }
+
+
+def test_a_type_has_a_short_and_a_full_name():
+    assert short_name('a/msg/B') == short_name('a/B') == 'a/B'
+    assert full_name('a/msg/B') == full_name('a/B') == 'a/msg/B'
+
+
+@pytest.mark.parametrize('kind', ['float64[x]', 'set<double>', ''])
+def test_a_field_of_a_class_with_an_unknown_form_is_named(kind):
+    with pytest.raises(ValueError, match='field speed has the unknown type'):
+        definition_of_class('a/A', lambda _: {'speed': kind})
+
+
+def test_a_field_of_a_class_with_an_unknown_kind_is_named():
+    with pytest.raises(ValueError, match='a/A: speed of a/A has the unknown type quaternion'):
+        definition_of_class('a/A', lambda _: {'speed': 'quaternion'})
+
+
+LISTS = 'string[] others\nstring[] joint_names\nstring[] name\nfloat64[] values\nfloat64[2] pair\n'
+
+
+def test_of_several_lists_of_names_the_usual_one_counts_and_of_one_that_one():
+    with_both = parse_definition('a/A', LISTS)
+    assert Reader(with_both, 'a/A', ['values[x]'])._paths[0].steps[0].names == 'name'
+    without = parse_definition('a/A', LISTS.replace('string[] name\n', ''))
+    assert Reader(without, 'a/A', ['values[x]'])._paths[0].steps[0].names == 'joint_names'
+    one = parse_definition('a/A', 'string[] others\nfloat64[] values\n')
+    assert Reader(one, 'a/A', ['values[x]'])._paths[0].steps[0].names == 'others'
+    two = parse_definition('a/A', 'string[] others\nstring[] more\nfloat64[] values\n')
+    with pytest.raises(ValueError, match=r"no list of names tells which element 'x' is: choose it by number, as \[0\]"):
+        Reader(two, 'a/A', ['values[x]'])
+
+
+@pytest.mark.parametrize('number', [0, 1])
+def test_an_array_has_its_elements_and_no_more(number):
+    definition = parse_definition('a/A', LISTS)
+    assert Reader(definition, 'a/A', [f'pair[{number}]'])
+    with pytest.raises(ValueError, match='pair has 2 elements, numbered from 0'):
+        Reader(definition, 'a/A', [f'pair[{number + 2}]'])
+
+
+@pytest.mark.parametrize('path', ['values[0].', '.values[0]', 'values[0]x', 'values[]', 'values[0][1]', 'values[0] '])
+def test_a_path_is_names_with_dots_between_them(path):
+    with pytest.raises(ValueError, match='is not a path of fields'):
+        Reader(parse_definition('a/A', LISTS), 'a/A', [path])
+
+
+# -- limits -----------------------------------------------------------------------------------------------------------
+
+
+def wrench(frame: str, nanoseconds: int = 5) -> bytes:
+    message = message_class('geometry_msgs/msg/WrenchStamped')()
+    message.header.frame_id, message.header.stamp.nanosec = frame, nanoseconds
+    return serialize_message(message)
+
+
+def test_a_frame_name_has_1023_letters_and_its_end_at_most():
+    reader = reader_of('geometry_msgs/msg/WrenchStamped', 'wrench.force.z')
+    assert reader.read(wrench('x' * 1023)).frame_id == b'x' * 1023
+    with pytest.raises(ValueError, match='geometry_msgs/WrenchStamped: a frame name of 1025 bytes is not valid'):
+        reader.read(wrench('x' * 1024))
+
+
+def test_a_stamp_has_less_than_a_second_of_nanoseconds():
+    reader = reader_of('geometry_msgs/msg/WrenchStamped', 'wrench.force.z')
+    assert reader.read(wrench('', 999_999_999)).stamp == 999_999_999
+    with pytest.raises(ValueError, match='a stamp with 1000000000 ns is not valid'):
+        reader.read(wrench('', 10**9))
+
+
+def test_a_message_has_256_kibibytes_at_most():
+    reader = reader_of('std_msgs/msg/UInt8MultiArray', 'data[0]')
+    make = message_class('std_msgs/msg/UInt8MultiArray')
+    head = len(serialize_message(make()))
+    whole = serialize_message(make(data=bytes(range(1, 9)) * ((LARGEST_MESSAGE - head) // 8)))
+    assert 2**18 - 16 < len(whole) <= 2**18 == LARGEST_MESSAGE
+    assert reader.read(whole).numbers == (1,)
+    with pytest.raises(ValueError, match=f'{len(whole) + 17} bytes, more than 262144'):
+        reader.read(whole + bytes(17))
+
+
+def test_lengths_that_change_all_the_time_take_no_more_memory():
+    reader, make = reader_of(JOINT_STATE, 'position[b]'), message_class(JOINT_STATE)
+    for count in range(1, 60):
+        names = ['b', *(f'a{i}' for i in range(count))]
+        assert reader.read(serialize_message(make(name=names, position=[float(count)] * len(names)))).numbers == (
+            count,
+        )
+        assert len(reader._layouts) <= 16
+
+
+def test_twenty_names_are_shown_of_a_message_that_has_not_the_one_that_is_wanted():
+    make = message_class(JOINT_STATE)
+    for count, shown in (
+        (0, 'none'),
+        (20, ', '.join(f'j{i}' for i in range(20))),
+        (21, ', '.join(f'j{i}' for i in range(20))),
+    ):
+        names = [f'j{i}' for i in range(count)]
+        read = reader_of(JOINT_STATE, 'position[zzzz]').read(
+            serialize_message(make(name=names, position=[0.0] * count))
+        )
+        assert read.missing == (f"no 'zzzz' in name: it has {shown}",)
+
+
+def test_numbers_that_are_missing_leave_the_others_in_their_places():
+    reader = reader_of(JOINT_STATE, 'velocity[b]', 'position[x]', 'position[a]', 'effort[a]')
+    data = serialize_message(message_class(JOINT_STATE)(name=['a', 'b'], position=[1.0, 2.0], velocity=[3.0, 4.0]))
+    assert reader.read(data).numbers == (4.0, None, 1.0, None)
+    assert len(reader.read(data).missing) == 2
+
+
+def test_the_names_of_the_elements_of_a_message_are_found():
+    joints = serialize_message(message_class(JOINT_STATE)(name=['a', 'boom'], position=[1.0, 2.0]))
+    assert names_in(of_class(JOINT_STATE), JOINT_STATE, joints) == ['a', 'boom']
+    kind = 'std_msgs/msg/Float64MultiArray'
+    assert names_in(of_class(kind), kind, serialize_message(message_class(kind)(data=[1.0]))) == []
+
+
+@pytest.mark.parametrize(('surplus', 'is_read'), [(0, True), (3, True), (4, False)])
+def test_padding_to_a_multiple_of_four_may_follow(surplus, is_read):
+    reader = reader_of('std_msgs/msg/Float64', 'data')
+    data = struct.pack('<4sd', b'\x00\x01\x00\x00', 2.5) + bytes(surplus)
+    if is_read:
+        assert reader.read(data) == (None, b'', (2.5,), ())
+    else:
+        with pytest.raises(ValueError, match='std_msgs/Float64: 16 bytes where the message has 12'):
+            reader.read(data)
+
+
+@pytest.mark.parametrize('head', [b'\x00\x00\x00\x00', b'\x00\x03\x00\x00', b'\x01\x01\x00\x00'])
+def test_another_encapsulation_is_refused(head):
+    with pytest.raises(ValueError, match=f'encapsulation {head.hex()} is not little-endian CDR'):
+        reader_of('std_msgs/msg/Float64', 'data').read(head + bytes(8))
