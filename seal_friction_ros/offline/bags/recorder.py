@@ -29,10 +29,10 @@ RESUME_PERIOD = 5.0  # [s] between two looks for room on the disk
 _RESUME_ROOM = 1 << 20  # [bytes] that have to be free in addition, and a tenth of ``free_space`` (our choice)
 _END_SIZE = 1 << 18  # [bytes] reserved for the last chunk, the end of the file and metadata.yaml
 _INDEX_SHARE = 200  # a file is at least as many times larger than its index
-_IDLE_PERIOD = 0.1  # [s] between checks of the queue without `flush_if_idle`; more wake-ups slow the estimator
+_IDLE_PERIOD = 0.05  # [s] between checks of the queue without `flush_if_idle`; more wake-ups slow the estimator
 _BACKLOG_PERIOD = 0.002  # [s] the same while there is a backlog
-_WAKE_LENGTH = 100  # [messages] shortest queue for which `flush_if_idle` wakes the thread: a wake-up costs more
-_BATCH = 100  # messages written before the thread yields the processor, so that a backlog does not delay the estimator
+_WAKE_LENGTH = 20  # [messages] shortest queue for which `flush_if_idle` wakes the thread; more delay more estimates
+_BATCH = 50  # messages written before the thread yields the processor, so that a backlog does not delay the estimator
 
 
 class _NextBag(NamedTuple):
