@@ -40,7 +40,7 @@ from seal_friction_ros.core.estimation.adaptation import (
 from seal_friction_ros.core.estimation.disagreement import Reversal, last_reversal, likely_reason
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, step
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
-from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Status
+from seal_friction_ros.core.estimation.records import NEVER, Force, Pressure, RodSample, Status
 from seal_friction_ros.core.friction.actuator import ActuatorFriction, MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.seal_file import parse_seal
@@ -470,6 +470,13 @@ OBSERVE = AdaptationSettings()
 EVEN = Slide(START, 0.02, 45.0, 40.0, 4.0, 3e6, 2e6, True, True)
 """Even sliding at 45 N where the law says 40 N."""
 BOUNDED = AdaptationSettings(scale_min=0.3, scale_max=3.0)
+
+
+def test_before_the_first_sample_nothing_is_learnt():
+    assert NO_LEVEL == (0, NEVER, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+    assert NOTHING_LEARNT == (0, 0.0, 0, 0, -1.0, NO_LEVEL, NO_LEVEL, 1.0, -1.0, 1.0, (1.0,) * 6, 0)
+    at_rest = (0.0, 0.0, 0.0, 0.0)
+    assert (NEVER, at_rest, at_rest, 0.0, 0.0, NOTHING_LEARNT, NEVER) == NOT_ADAPTED
 
 
 @pytest.mark.parametrize(

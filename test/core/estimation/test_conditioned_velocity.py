@@ -13,6 +13,7 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     condition_velocity,
     confirmed_velocity,
 )
+from seal_friction_ros.core.estimation.records import NEVER
 
 # Numbers of the module docstring and of docs, repeated here so that a change is noticed.
 LONGEST_STEP = 0.02  # [s]
@@ -51,6 +52,13 @@ KNOWN = run(RIPPLE)[-1]._replace(velocity=0.0, last_velocity=0.0, last_change=0.
 
 
 # --- clean signals ---
+
+
+def test_before_the_first_sample_nothing_is_known_and_a_clean_one_leaves_itself_and_its_change():
+    assert NOT_CONDITIONED == (NEVER, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0.0, 0.0, NEVER, 0.0, 0)
+    first, second = run([0.125, 0.25])
+    assert first == (0, 0.125, 0.0, 0.0, 0.0, False, 0.125, 0.0, 0.0, 0.0, 0, 0.0, 1)
+    assert second == (MS, 0.25, 0.0, 0.0, 0.0, False, 0.25, 0.125, 0.0, 0.0, MS, 0.0, 2)
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=20).map(sorted))

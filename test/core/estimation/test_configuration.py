@@ -23,6 +23,7 @@ from seal_friction_ros.core.estimation.configuration import (
     mounted,
     parse_snapshot,
     snapshot_text,
+    snapshot_version,
 )
 from seal_friction_ros.core.estimation.estimator import NO_SPEED, EstimatorSettings, EstimatorState, Speed
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
@@ -361,3 +362,74 @@ def test_a_file_that_is_named_once_stands_for_every_seal_of_its_mounting():
     assert found.seals == ('rod.yaml', 'rod.yaml', 'piston.yaml')
     assert found.seal_chambers == ('a', 'a', 'difference')
     assert documents == (rods, rods, piston)
+
+
+ROD = {'name': 'rod', 'mounting': {'chambers': ['a', 'a']}}
+BARE = {'name': 'bare'}
+
+
+def test_chambers_that_are_named_are_taken_as_they_are_and_two_files_that_tell_none_are_on_a_and_b():
+    named = SealSelection(('x', 'y'), ('b', 'ambient'))
+    assert mounted(named, (BARE, ROD)) == (named, (BARE, ROD))
+    found, documents = mounted(SealSelection(('x', 'y')), (BARE, BARE))
+    assert (found.seals, found.seal_chambers, documents) == (('x', 'y'), ('a', 'b'), (BARE, BARE))
+    twice, documents = mounted(SealSelection(('rod', 'rod')), (ROD, ROD))
+    assert (twice.seals, twice.seal_chambers, documents) == (('rod', 'rod'), ('a', 'a'), (ROD, ROD))
+
+
+@pytest.mark.parametrize(
+    ('seals', 'documents', 'complaint'),
+    [
+        (('x',), (BARE,), 'x has no mounting: give every entry its chamber'),
+        (('x', 'y', 'z'), (BARE, BARE, BARE), 'x has no mounting'),
+        (('rod', 'x'), (ROD, BARE), 'x has no mounting'),
+        (('rod', 'rod', 'rod'), (ROD, ROD, ROD), 'seals has rod 3 times but its mounting has 2 chambers: name it once'),
+    ],
+)
+def test_seals_whose_chambers_are_not_known_are_refused(seals, documents, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        mounted(SealSelection(seals), documents)
+
+
+def test_a_configuration_needs_the_chamber_of_each_seal_and_knows_the_placeholder():
+    with pytest.raises(ValueError, match='does not have the chamber of each seal'):
+        dataclasses.replace(CONFIGURATION, selection=SealSelection())
+    assert CONFIGURATION.has_placeholder
+    mixed = dataclasses.replace(CONFIGURATION, selection=SealSelection(('x', 'placeholder'), ('a', 'b')))
+    assert mixed.has_placeholder
+    assert not dataclasses.replace(CONFIGURATION, selection=SealSelection(('x', 'y'), ('a', 'b'))).has_placeholder
+
+
+def of_version_1(**parts) -> str:
+    """Text of a snapshot before there was a version; ``parts`` are merged."""
+    document = json.loads(snapshot_text(SNAPSHOT))
+    del document['version']
+    for name, values in parts.items():
+        document[name] |= values
+    return json.dumps(document)
+
+
+def test_the_default_seals_of_version_1_count_as_placeholder_and_no_others_do():
+    chambers = {'seal_chambers': ['a', 'b']}
+    default = {'selection': {'seals': ['ms28775_114', 'ms28775_114'], **chambers}}
+    assert parse_snapshot(of_version_1(**default)).configuration.has_placeholder
+    other = {'selection': {'seals': ['ms28775_114', 'x'], **chambers}}
+    assert parse_snapshot(of_version_1(**other)).configuration.selection.seals == ('ms28775_114', 'x')
+    now = json.loads(of_version_1(**default)) | {'version': 2}
+    assert not parse_snapshot(json.dumps(now)).configuration.has_placeholder
+
+
+def test_settings_of_version_1_are_taken_within_the_present_bounds():
+    text = of_version_1(
+        settings={'pressure_timeout': 5.0, 'force_timeout': 1e-9, 'velocity_max': 2.0, 'no_longer': 3.0},
+        feedforward={'use_measured_velocity': True},
+    )
+    back = parse_snapshot(text).configuration
+    settings = back.settings
+    assert (settings.pressure_timeout, settings.force_timeout, settings.velocity_max) == (1.0, 1e-3, 2.0)
+    assert back.feedforward.use_measured_velocity
+    without = json.loads(text)
+    del without['settings']['stamp_age_max']
+    assert parse_snapshot(json.dumps(without)).configuration.settings.stamp_age_max == 0.0  # it had no such check
+    assert snapshot_version(text) == 1
+    assert snapshot_version(snapshot_text(SNAPSHOT)) == SNAPSHOT.version == 2

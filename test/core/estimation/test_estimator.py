@@ -26,6 +26,7 @@ from seal_friction_ros.core.estimation.swings import LONGEST_SWING
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, IdentifiedMotion
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import CHAMBERS
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
@@ -844,3 +845,12 @@ def test_without_a_usable_force_sum_no_swing_is_judged():
     state, _ = step(PARAMETERS, init(), sample())
     assert step(PARAMETERS, state, sample(START + MS, force_age=200))[0].swing == state.swing
     assert step(PARAMETERS, state, sample(START + MS))[0].swing != state.swing
+
+
+def test_what_one_seal_depends_on_the_actuator_does():
+    plain = with_seals({}, {})
+    assert (plain.depends_on_velocity, plain.limits_motion, plain.corrects_force_sum) == (False, False, False)
+    assert with_seals({'velocity_terms': VelocityTerms(100.0)}, {}).depends_on_velocity
+    motion = with_seals({}, {'identified_motion': IdentifiedMotion(0.1, 0.2)})
+    assert motion.limits_motion
+    assert Status(only(sample(velocity=0.05), motion).status) == Status.SLOWER_THAN_IDENTIFIED

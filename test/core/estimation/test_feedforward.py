@@ -23,7 +23,7 @@ from seal_friction_ros.core.estimation.feedforward import (
     usable,
     wanted_velocity,
 )
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.estimation.records import NEVER, FrictionEstimate, Status
 from seal_friction_ros.core.friction.presliding import (
     NO_ELEMENTS,
     Elements,
@@ -285,6 +285,11 @@ def step_of(settings, velocity):
 
 
 # --- what is not known yet, or not any more ---
+
+
+def test_before_the_first_estimate_no_friction_is_known():
+    assert FADED_OUT == (NEVER, 0.0, 0.0, -1.0, 0.0, NO_ELEMENTS, 0.0)
+    assert FADED_OUT._replace(fade=1.0) == FADED_IN
 
 
 def test_before_the_first_friction_or_velocity_there_is_no_force_though_nothing_is_faded_out():

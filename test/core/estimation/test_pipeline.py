@@ -9,15 +9,17 @@ from harness.answers import NOTHING, receive_one
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from seal_friction_ros.core.estimation.adaptation import NOTHING_LEARNT, AdaptationSettings
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Limited
-from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, type_of
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, encode, type_of
 from seal_friction_ros.core.estimation.pipeline import (
     NO_REFERENCE,
     TICK_INTERVAL,
     PipelineParameters,
     ReceiptTimes,
     Reference,
+    answered,
     condition_reference,
     init,
     init_running,
@@ -26,6 +28,9 @@ from seal_friction_ros.core.estimation.pipeline import (
 )
 from seal_friction_ros.core.estimation.records import (
     NEVER,
+    NO_FORCE,
+    NO_PRESSURE,
+    NO_TEMPERATURE,
     Force,
     Position,
     Pressure,
@@ -380,3 +385,116 @@ def test_velocity_terms_of_the_seals_are_compensated_at_the_velocity_of_the_refe
         expected = 0.9 * (both.coulomb_friction + both.velocity_friction)
         assert last.feedforward.force == pytest.approx(math.copysign(expected, speed), rel=1e-6)
         assert both.velocity_friction > 5.0
+
+
+# --- what is kept of each message ---
+
+
+def test_before_the_first_message_nothing_is_known():
+    state = init(PARAMETERS)
+    assert (state.friction, state.refused, state.clock_offset) == (-1.0, False, 0)
+    assert (state.pressure, state.force, state.temperature) == (NO_PRESSURE, NO_FORCE, NO_TEMPERATURE)
+    assert state.reference == (NOT_CONDITIONED, 0.0, 0.0)
+    assert state.receipt == (NEVER, NEVER, NEVER, NEVER)
+
+
+def receipts(message, state=None, received=7):
+    """Times of receipt after a message, of velocity, pressure, force and reference."""
+    return receive_one(PARAMETERS, state or init(PARAMETERS), message, received)[0].receipt
+
+
+@pytest.mark.parametrize(
+    ('message', 'counts'),
+    [
+        (Velocity(5, 0.1), True),
+        (Velocity(5, math.nan), False),
+        (Velocity(5, 11.0), False),
+        (Pressure(5, 1e6, 1e6), True),
+        (Pressure(5, math.nan, 1e6), True),  # the estimate tells whether it is usable
+        (Force(5, 1e6), True),
+        (Force(5, -1e6), True),
+        (Force(5, 1.1e6), False),
+        (Force(5, -1.1e6), False),
+        (Force(5, math.nan), False),
+        (ServoReference(5, 0.0, 0.1, 0.0), True),
+        (ServoReference(5, 0.0, math.nan, 0.0), False),
+        (ServoReference(5, 0.0, math.inf, 0.0), False),
+        (Position(5, 0.1), False),
+    ],
+)
+def test_an_input_is_renewed_by_a_sample_that_is_new_and_usable(message, counts):
+    kinds = (Velocity, Pressure, Force, ServoReference)
+    expected = tuple(7 if counts and isinstance(message, kind) else NEVER for kind in kinds)
+    assert receipts(message) == expected
+    state, _ = receive_one(PARAMETERS, init(PARAMETERS), message, 7)
+    assert receipts(message, state, 9) == expected  # the same stamp again
+
+
+@pytest.mark.parametrize(
+    ('late', 'is_flagged'), [(0.0, False), (0.99, False), (1.01, True), (-0.99, False), (-1.01, True)]
+)
+def test_the_age_of_a_stamp_is_taken_on_the_clock_of_the_stamps(late, is_flagged):
+    state = init(PARAMETERS)._replace(clock_offset=500 * 10**9)
+    stamp = 507 * 10**9 - round(late * 1e9)
+    _, answer = receive_one(PARAMETERS, state, Velocity(stamp, 0.1), 7 * 10**9)
+    assert bool(answer.estimate.status & Status.STAMP_AGE) is is_flagged
+
+
+def test_answers_are_told_by_type_and_bytes():
+    state = run_state(ticks(0, 10))
+    velocity = Velocity(10 * MS, 0.05, b'rod')
+    _, expected = receive_one(PARAMETERS, state, velocity)
+    after, found = answered(PARAMETERS, state, velocity, 10 * MS)
+    assert found == [
+        (ESTIMATE_TYPE, encode(expected.estimate, b'rod')),
+        (FEEDFORWARD_TYPE, encode(expected.feedforward, b'rod')),
+    ]
+    assert after.estimator.stamp == 10 * MS
+
+
+def test_the_watchdog_acts_after_9_ms():
+    state = run_state(ticks(0, 400))
+    assert not is_tick_due(state, 408 * MS - 1)
+    assert is_tick_due(state, 408 * MS)
+    weak = state._replace(feedforward=state.feedforward._replace(fade=1.0, force=0.5))
+    assert is_tick_due(weak, 408 * MS)
+
+
+def test_without_any_force_sum_the_force_helps_the_motion_and_without_any_pressure_there_is_none():
+    without_force = [m for m in ticks(0, 400) if not isinstance(m, Force)]
+    assert run(without_force)[-1].feedforward.force > 10.0
+    without_pressure = [m for m in ticks(0, 400) if not isinstance(m, Pressure)]
+    assert {a.feedforward.force for a in run(without_pressure)} == {0.0}
+
+
+@pytest.mark.parametrize(('mode', 'scale'), [('on', 1.5), ('observe', 1.0), ('off', 1.0)])
+def test_the_feed_forward_has_the_scale_that_is_learnt_on_all_of_its_friction(mode, scale):
+    viscous = mounted(velocity_terms=VelocityTerms(viscous_friction=200.0))
+    known = PARAMETERS._replace(estimator=replace(viscous, adaptation=AdaptationSettings(mode)))
+    state = init_running(known)
+    learnt = NOTHING_LEARNT._replace(scale=1.5, scale_std=0.0, median=1.5)
+    adaptation = state.estimator.adaptation._replace(learnt=learnt)
+    state = state._replace(estimator=state.estimator._replace(adaptation=adaptation))
+    for message in ticks(0, 5):
+        state, answer = receive_one(known, state, message)
+    both = actuator_friction(viscous.seals, 3e6, 3e6, 0.05)
+    assert both.velocity_friction > 10.0
+    assert answer.feedforward.force == pytest.approx(0.9 * scale * (both.coulomb_friction + both.velocity_friction))
+
+
+def test_a_law_without_friction_leaves_no_force():
+    none = mounted(coulomb_law=ConstantCoulomb(0.0), velocity_terms=VelocityTerms())
+    assert {answer.feedforward.force for answer in run(ticks(0, 400), PARAMETERS._replace(estimator=none))} == {0.0}
+
+
+def test_velocity_terms_are_not_added_to_a_friction_that_is_not_usable():
+    bad = ticks(400, 410, pressure=math.nan)
+    faded = run(ticks(0, 400) + bad, PARAMETERS._replace(estimator=TERMS))
+    scales = [answer.feedforward.scale for answer in faded[400:]]
+    assert scales == pytest.approx([0.9 * (1.0 - i / 200.0) for i in range(1, 11)])
+
+
+def test_the_first_reference_with_a_ripple_has_no_acceleration_to_smooth():
+    known = NOT_CONDITIONED._replace(half_width=1e-6, samples=SETTLING)
+    first = condition_reference(Reference(known, 7.0, 3.0), ServoReference(5 * MS, 0.0, 0.1, 2.0))
+    assert (first.acceleration, first.last_acceleration) == (2.0, 2.0)

@@ -37,7 +37,8 @@ from seal_friction_ros.core.estimation.sheared_seals import (
     slide_on,
 )
 from seal_friction_ros.core.estimation.swings import NO_SWING
-from seal_friction_ros.core.friction.actuator import MountedSeal
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.presliding import (
     NO_ELEMENTS,
     NOT_SHEARED,
@@ -716,3 +717,175 @@ def test_after_100_ms_of_rest_the_seals_bear_the_force_sum_and_no_way_is_left():
         assert not shear_on(HALF, resting, moment_of(24.0, stamp=START + MS, **unknown))[0].is_known
     for before in ({'is_known': False}, {'rests_alike': False}):
         assert not shear_on(HALF, resting._replace(**before), moment_of(24.0, stamp=START + MS))[0].is_known
+
+
+def test_a_way_back_counts_once_the_direction_turns():
+    back = slid(velocity=-0.01, way_back=-2e-5)
+    state, sheared = shear_on(HALF, back, moment_of(stamp=START + MS, velocity=-0.01, direction=-1))
+    assert sheared.force == pytest.approx(60.0 - 6e4 * 3e-5)
+    assert sheared.std == pytest.approx(0.5 * 3e4 * 3e-5)
+    assert (state.way_back, state.direction, state.is_known) == (0.0, -1, True)
+
+
+def test_a_repeated_stamp_shears_nothing():
+    sheared = slid(fully_sheared=0.0, seals=even(30.0), softer=even(20.0))
+    state, found = shear_on(HALF, sheared, moment_of(velocity=0.01, direction=1))
+    assert (state.is_known, found.force) == (True, pytest.approx(30.0))
+    found, state = slid_on(slid(), velocity_friction=5.0, elapsed=0.0)
+    assert (found, state.fully_sheared, state.seals.excess) == (True, 60.0, 0.0)
+
+
+@pytest.mark.parametrize('side', [1, -1])
+def test_a_rod_that_stops_holds_the_friction_it_slid_with_while_its_inertia_is_not_known(side):
+    stopped = moment_of(0.0, stamp=START + MS, knows_inertia=False)
+    state, found = shear_on(HALF, slid(side), stopped)
+    assert found == ShearedFriction(True, side * 60.0, 0.0, True)
+    assert (state.rest_since, state.direction, state.is_known) == (START + MS, side, True)
+    assert state.fully_sheared == side * 60.0
+
+
+def test_in_a_reversal_stiction_comes_back_with_time_alone():
+    slow = HALF._replace(seals=ALIKE._replace(dwell_time=0.1), softer=HALF.softer._replace(dwell_time=0.1))
+    state, found = shear_on(slow, slid(velocity=0.0), moment_of(24.0, stiction=12.0, stamp=START + MS))
+    assert found.force == pytest.approx(24.0)
+    assert state.seals.excess == pytest.approx(12.0 * (1.0 - math.exp(-0.01)))
+
+
+@pytest.mark.parametrize('side', [1, -1])
+@pytest.mark.parametrize(('apart', 'is_one'), [(0.0, True), (0.119, True), (0.121, False)])
+def test_seals_that_all_slide_alike_are_kept_as_one_number(apart, is_one, side):
+    """Their deviation is half of what they are apart: a thousandth of 60 N."""
+    seals, softer = even(side * 60.0), even(side * (60.0 - apart), -apart)
+    sheared = slid(side, fully_sheared=0.0, seals=seals, softer=softer)
+    moving = moment_of(stamp=START + MS, velocity=side * 0.01, direction=side)
+    state, found = shear_on(SLOW_MEMORY, sheared, moving)
+    assert found.slides
+    assert state.fully_sheared == (side * 60.0 if is_one else 0.0)
+    assert state.seals.forces == (NO_ELEMENTS if is_one else pytest.approx(seals.forces))
+
+
+@pytest.mark.parametrize('side', [1, -1])
+def test_the_one_number_has_what_depends_on_velocity(side):
+    moving = moment_of(stamp=START + MS, velocity=side * 5.0, direction=side, velocity_friction=5.0)
+    state, found = shear_on(
+        HALF, slid(side, fully_sheared=0.0, seals=even(side * 60.0), softer=even(side * 60.0)), moving
+    )
+    assert found == ShearedFriction(True, side * 65.0, 0.0, True)
+    assert (state.fully_sheared, state.seals, state.softer) == (side * 65.0, *[Shear(NO_ELEMENTS, 5.0)] * 2)
+
+
+def test_the_softest_seals_are_followed_too():
+    limp = presliding_numbers([Presliding(stiffness=1.0, yield_exponent=0.0)])
+    assert followed_elasticity(limp, 0.25).yield_compliance == pytest.approx(2.0)
+
+
+# --- seals under unlike pressures ---
+
+
+def softness(*seals, pressure_max=4.5e7) -> float:
+    """Stiffness of the softer seals over that of the seals; a seal is its chamber, and what is changed of it."""
+    mounted = tuple(MountedSeal(dataclasses.replace(SEAL, **{'presliding': SOFT} | change), c) for c, change in seals)
+    followed = EstimatorParameters(EstimatorSettings(pressure_max=pressure_max), mounted).followed_elasticity
+    return followed.softer.stiffness / followed.seals.stiffness
+
+
+def coulomb_at(pressure: float) -> float:
+    return actuator_friction((MountedSeal(SEAL, 'a'),), pressure, 0.0).coulomb_friction
+
+
+@pytest.mark.parametrize('chambers', ['a', 'bb', 'aaa'])
+def test_seals_of_one_chamber_are_under_one_pressure(chambers):
+    assert softness(*((chamber, {}) for chamber in chambers)) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(('pressure_max', 'highest'), [(4.5e7, SEAL.pressure_max), (2e6, 2e6)])
+def test_a_seal_under_the_highest_pressure_slides_later_than_all_with_the_others_at_none(pressure_max, highest):
+    """It yields at f / k, and all of them together at the sum of f over the sum of k."""
+    most, least = coulomb_at(highest), coulomb_at(0.0)
+    two = softness(('a', {}), ('b', {}), pressure_max=pressure_max)
+    assert two == pytest.approx(0.7 / (most / ((most + least) / 2.0)))
+    three = softness(('a', {}), ('b', {}), ('a', {}), pressure_max=pressure_max)
+    assert three == pytest.approx(0.7 / (most / ((most + 2.0 * least) / 3.0)))
+
+
+def test_a_stiff_seal_yields_early_and_the_others_late():
+    stiff = {'presliding': dataclasses.replace(SOFT, stiffness=4.0 * SOFT.stiffness)}
+    most, least = coulomb_at(SEAL.pressure_max), coulomb_at(0.0)
+    assert softness(('a', stiff), ('b', {})) == pytest.approx(0.7 / (most / ((most + least) / 5.0)))
+
+
+def test_seals_without_friction_never_yield_late():
+    none = {'coulomb_law': ConstantCoulomb(0.0)}
+    assert softness(('a', none), ('b', none)) == pytest.approx(0.7)
+
+
+def test_the_stiffness_of_all_seals_is_as_uncertain_as_that_of_each_by_its_share():
+    seals = (('a', {'presliding': dataclasses.replace(SOFT, stiffness=3e5, relative_std=0.2)}),
+             ('a', {'presliding': dataclasses.replace(SOFT, stiffness=1e5, relative_std=0.4)}))  # fmt: skip
+    assert softness(*seals) == pytest.approx(1.0 - 2.0 * 0.25)
+
+
+def test_one_rigid_seal_makes_the_actuator_rigid():
+    mounted = tuple(MountedSeal(dataclasses.replace(SEAL, presliding=p), 'a') for p in (SOFT, None))
+    found = EstimatorParameters(EstimatorSettings(), mounted)
+    assert (found.elasticity, found.followed_elasticity) == (None, None)
+    unused = parameters(use_presliding=False)
+    assert unused.followed_elasticity is None
+    assert unused.elasticity == presliding_numbers([SOFT, SOFT])  # for the feed-forward
+
+
+# --- what the estimate says of sheared seals ---
+
+
+@pytest.mark.parametrize('mass', [0.0, 20.0])
+def test_while_seals_shear_the_residual_is_what_friction_offset_and_inertia_leave(mass):
+    known = dataclasses.replace(parameters(), adaptation=AdaptationSettings('observe', moving_mass=mass))
+    state, seen = init(known), 0
+    for i in range(900):
+        stamp = START + i * MS
+        velocity = 0.01 if i % 300 < 150 else -0.01
+        force = 50.0 if velocity > 0.0 else -30.0
+        acceleration = state.adaptation.acceleration
+        sample = RodSample(stamp, velocity, Pressure(stamp, PRESSURE, PRESSURE), Force(stamp, force))
+        state, estimate = step(known, state, sample)
+        if estimate.status & Status.PRESLIDING and estimate.residual != 0.0:
+            left = force - mass * acceleration - estimate.adaptation_offset - estimate.friction_force
+            assert estimate.residual == pytest.approx(left, abs=1e-9)
+            seen += abs(estimate.friction_force) < 0.9 * estimate.coulomb_friction
+    assert seen > 50
+
+
+def test_the_deviation_of_an_estimate_has_that_of_the_elasticity():
+    velocities = there_and_back(0.01)
+    after = len(velocities) // 2 + 40
+    without_stiction = {'mode': 'off', 'stiction': 0.0, 'stiction_ratio': 0.0}
+    elastic, rigid = (
+        estimates(parameters(elasticity, **without_stiction), velocities, 0.0 * velocities)[after]
+        for elasticity in (SOFT, None)
+    )
+    followed = parameters().followed_elasticity
+    sliding, way = rigid.coulomb_friction, 40 * 1e-5  # [m] since the turn, where the mean velocity is 0
+    forces = [sliding - 2.0 * initial_loading(n, 0.5 * way, sliding) for n in (followed.seals, followed.softer)]
+    assert elastic.coulomb_friction_std > rigid.coulomb_friction_std
+    added = math.sqrt(elastic.coulomb_friction_std**2 - rigid.coulomb_friction_std**2)
+    assert added == pytest.approx(0.5 * abs(forces[0] - forces[1]), rel=1e-6)
+
+
+@pytest.mark.parametrize(('inertia', 'bears'), [(0.49, True), (-0.49, True), (0.51, False), (-0.51, False)])
+def test_the_force_sum_of_a_rod_that_stopped_counts_if_its_inertia_is_at_most_half_of_the_friction(inertia, bears):
+    mass = 20.0
+    known = dataclasses.replace(parameters(), adaptation=AdaptationSettings('observe', moving_mass=mass))
+    state = init(known)
+    for i in range(401):
+        stamp = START + i * MS
+        sample = RodSample(stamp, 0.01, Pressure(stamp, PRESSURE, PRESSURE), Force(stamp, 30.0))
+        state, estimate = step(known, state, sample)
+    acceleration = inertia * estimate.coulomb_friction / mass
+    learnt = state.adaptation.learnt._replace(offset=3.0)
+    state = state._replace(adaptation=state.adaptation._replace(acceleration=acceleration, learnt=learnt))
+    at = stamp + MS
+    _, stopped = step(known, state, RodSample(at, 0.0, Pressure(at, PRESSURE, PRESSURE), Force(at, -5.0)))
+    expected = -5.0 - 3.0 - mass * acceleration
+    assert (stopped.friction_force == pytest.approx(expected, abs=1e-6)) is bears
+    assert stopped.direction == (1 if stopped.friction_force > 0.0 else -1)
+    assert stopped.status == Status.PRESLIDING

@@ -155,6 +155,10 @@ def test_a_gap_counts_as_20_ms_as_does_a_stamp_further_back_and_a_repeated_one_a
     assert swing_on(begun, 0.0, -0.01, 30.0, -40.0) == begun
 
 
+def test_before_the_first_sample_there_is_no_way_and_no_doubt():
+    assert NO_SWING == (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 def test_work_is_along_the_way():
     swing = swing_on(swing_on(NO_SWING, 1e-3, -0.01, -30.0, -40.0), 1e-3, -0.03, -10.0, -40.0)
     assert swing == pytest.approx(Swing(-4e-5, 6e-4, 1.6e-3, 0.0, 0.0, 0.0))
