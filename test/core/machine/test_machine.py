@@ -451,6 +451,14 @@ def test_the_ambient_pressure_of_a_message_is_used_for_a_minute(age, is_used):
     assert taker.memory.force_stamp == (now - 1 if is_used else NEVER)
 
 
+@pytest.mark.parametrize(('seconds', 'is_used'), [(59, True), (61, False)])
+def test_the_ambient_pressure_must_be_of_the_minute_of_the_newest_pressure(seconds, is_used):
+    taker = bench(**WEATHER)
+    taker.take('/weather', 0, fluid_pressure=9e4)
+    taker.take('/p_a', 10 * SECOND, fluid_pressure=2e6)
+    assert bool(taker.take('/p_b', seconds * SECOND, fluid_pressure=1e6)) is is_used
+
+
 def test_an_ambient_pressure_that_is_no_number_is_not_known_and_gauge_pressures_need_none():
     taker = bench(**WEATHER)
     taker.take('/weather', 5, fluid_pressure=math.nan)
