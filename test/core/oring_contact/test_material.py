@@ -58,6 +58,22 @@ def test_a_strip_pulled_along_the_hoop_carries_the_stress_of_mooney_and_rivlin(s
     assert von_mises_stress(RUBBER, pulled) == pytest.approx(abs(expected), rel=1e-12)
 
 
+@pytest.mark.parametrize('shear', [0.3, -1.2])
+@pytest.mark.parametrize('turn', [0.0, 0.9])
+def test_a_sheared_section_carries_the_stress_of_mooney_and_rivlin_however_it_is_turned(shear: float, turn: float):
+    """2 C10 B - 2 C01 / B: shear stress 2 (C10 + C01) g, normal stresses apart by 2 C10 g^2 and 2 C01 g^2."""
+    c10, c01 = mooney_rivlin_constants(RUBBER)
+    c, s = np.cos(turn), np.sin(turn)
+    sheared = np.array([c, c * shear - s, s, s * shear + c, 1.0])
+    normal, by_c10, by_c01 = (2.0 * factor * shear**2 for factor in (c10 + c01, c10, c01))
+    expected = np.sqrt(0.5 * (normal**2 + by_c10**2 + by_c01**2) + 3.0 * (2.0 * (c10 + c01) * shear) ** 2)
+    assert von_mises_stress(RUBBER, sheared) == pytest.approx(expected, rel=1e-12)
+
+
+def test_volume_is_that_of_section_and_circumference_together():
+    assert volume_response(np.array([1.2, 0.5, -0.1, 0.9, 1.1])).energy == pytest.approx((1.08 + 0.05) * 1.1)
+
+
 def test_at_small_strain_it_has_its_young_modulus():
     strain = 1e-5
     pulled = np.array([(1 + strain) ** -0.5, 0.0, 0.0, (1 + strain) ** -0.5, 1 + strain])
