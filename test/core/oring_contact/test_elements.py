@@ -7,6 +7,7 @@ from scipy.sparse import csc_array
 from seal_friction_ros.core.oring_contact.elements import (
     deformation_gradient,
     element_forces,
+    is_inside_out,
     make_elements,
     volume_ratios,
 )
@@ -18,9 +19,12 @@ from seal_friction_ros.core.oring_contact.equilibrium import (
     stiffness_matrix,
     unstressed_state,
 )
+from seal_friction_ros.core.oring_contact.loading import LoadedRing, _stretched_with_walls, wetted_nodes
 from seal_friction_ros.core.oring_contact.material import Rubber, shear_response
 from seal_friction_ros.core.oring_contact.mesh import Mesh, o_grid
+from seal_friction_ros.core.oring_contact.results import _axial_force, _upstream
 from seal_friction_ros.core.oring_contact.surroundings import (
+    SurfacePressure,
     Surroundings,
     node_areas,
     outline_freedoms,
@@ -95,6 +99,35 @@ def test_too_few_lines_are_refused():
         o_grid(SECTION, RADIUS, 4)
 
 
+@pytest.mark.parametrize(('lines', 'wall', 'layers'), [(5, 2, 2), (9, 5, 4), (33, 19, 16)])
+def test_as_many_lines_end_on_rod_and_gland_and_fewer_on_the_wall(lines: int, wall: int, layers: int):
+    """The wall has 0.6 of the edges of the rod, the layers around the core are half as many."""
+    mesh = o_grid(SECTION, RADIUS, lines)
+    edges = lines - 1
+    assert len(mesh.surface) == 2 * (edges + wall)
+    assert len(mesh.elements) == edges * wall + layers * len(mesh.surface)
+    assert len(mesh.nodes) == (edges + 1) * (wall + 1) + layers * len(mesh.surface)
+    angle = np.arctan2(*(mesh.nodes[mesh.surface] - [RADIUS, 0.0]).T[::-1])
+    assert (np.abs(angle) < 0.25 * np.pi - 1e-9).sum() == edges - 1  # between the corners on the gland
+    assert (np.abs(angle - 0.5 * np.pi) < 0.25 * np.pi - 1e-9).sum() == wall - 1
+
+
+def test_the_mesh_is_even_about_both_middles_of_the_section():
+    places = {tuple(np.round(place / 1e-9).astype(int)) for place in MESH.nodes - [RADIUS, 0.0]}
+    assert {(-r, z) for r, z in places} == {(r, -z) for r, z in places} == places
+
+
+def test_layers_are_thinner_outside_and_edges_shorter_in_the_middle_of_the_rod():
+    """On the line through the middle: outermost layer half the innermost; edges there 0.6 of even ones."""
+    mesh = o_grid(SECTION, 0.0, 33)
+    inward = np.sort(-mesh.nodes[np.abs(mesh.nodes[:, 1]) < 1e-9, 0])
+    layers = np.diff(inward)[-16:]
+    assert layers[-1] / layers[0] == pytest.approx(0.5, rel=1e-6)
+    assert layers[1:] / layers[:-1] == pytest.approx(0.5 ** (1.0 / 15.0), rel=1e-6)
+    turns = np.diff(np.unwrap(np.arctan2(*mesh.nodes[mesh.surface].T[::-1])))
+    assert turns[0] == pytest.approx(0.6 * 0.5 * np.pi / 32.0, rel=5e-3)
+
+
 # -- elements
 
 
@@ -128,6 +161,15 @@ def test_forces_are_the_derivative_of_the_energy():
             for side in (-1.0, 1.0)
         ]
         assert (energies[1] - energies[0]) / (2.0 * step) == pytest.approx(force @ direction, rel=1e-5)
+
+
+def test_an_element_is_inside_out_where_any_point_of_it_is():
+    whole = np.tile([1.0, 0.2, -0.2, 1.0, 1.0], (2, 4, 1))
+    assert not is_inside_out(whole)
+    for change in ([-1.0, 0.0, 0.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0, 1.0], [1.0, 0.0, 0.0, 1.0, 0.0]):
+        bad = whole.copy()
+        bad[1, 2] = change
+        assert is_inside_out(bad)
 
 
 # -- surroundings
@@ -172,7 +214,71 @@ def test_surface_areas_close():
     assert np.linalg.norm(areas, axis=1).sum() == pytest.approx(2 * np.pi * RADIUS * np.pi * SECTION, rel=0.02)
 
 
+def test_smooth_maximum_of_two_equal_stresses_is_ln_2_transitions_above_them_and_each_has_half():
+    at_rod = np.array([[RADIUS - 0.5e-3, 0.0]])
+    pressed = around(rod_radius=RADIUS - 0.48e-3, gland_radius=1.0, wall_position=np.inf, wetted=np.array([True]))
+    total, shares, contact = surface_pressure(pressed, at_rod)
+    assert total == pytest.approx(2e6 + 1e5 * np.log(2.0), rel=1e-9)
+    assert shares[0] == pytest.approx([0.5, 0.5, 0.0, 0.0], abs=1e-9)
+    assert contact == pytest.approx(1e6 + 1e5 * np.log(2.0), rel=1e-9)
+
+
+def test_fluid_wets_the_outline_from_the_rod_round_the_upstream_side_to_the_gland():
+    """Of a ring that touches rod and gland in its middle: every node with z <= 0, in the order of the outline."""
+    wetted = wetted_nodes(around(), OUTLINE)
+    assert wetted.tolist() == (OUTLINE[:, 1] < 1e-12).tolist()
+
+
+def test_walls_that_close_take_the_ring_with_them_at_constant_volume():
+    """From a gap of 2.6 to 2.4 mm about 9 mm: nearest to the rod stays at the rod, farthest at the gland."""
+    model = make_model(MESH, RUBBER, SECTION, 0.05)
+    before = around(rod_radius=RADIUS - 1.3e-3, gland_radius=RADIUS + 1.3e-3)
+    after = around(rod_radius=RADIUS - 1.0e-3, gland_radius=RADIUS + 1.4e-3)
+    moved = _stretched_with_walls(model, unstressed_state(model), before, after).displacement.reshape(-1, 2)
+    place = MESH.nodes + moved
+    assert (place[:, 0].min(), place[:, 0].max()) == pytest.approx((RADIUS - 1.0e-3, RADIUS + 1.4e-3))
+    weights = make_elements(Mesh(place, MESH.elements, MESH.surface)).weights
+    assert weights.sum() == pytest.approx(ELEMENTS.weights.sum(), rel=2e-4)
+
+
+# -- results
+
+
+@pytest.mark.parametrize(('pressure', 'upstream'), [(0.0, [True, False, False]), (1.0, [True, True, False])])
+def test_the_upstream_side_is_that_of_the_fluid_and_half_of_the_ring_without(pressure: float, upstream: list[bool]):
+    wet = around(wetted=np.array([True, True, False]))
+    position = np.array([[1.0, -1e-3], [1.0, 0.0], [1.0, 0.5]])
+    assert _upstream(LoadedRing(pressure, wet, None, 0), position).tolist() == upstream
+
+
+def test_axial_force_is_that_on_the_downstream_side_and_on_tilted_facets_of_rod_and_gland():
+    shares = np.array([[1.0, 0.0, 0.0, 0.0], [0.5, 0.2, 0.0, 0.3], [0.0, 0.0, 0.4, 0.6], [0.0, 0.3, 0.3, 0.4]])
+    pressure = SurfacePressure(np.array([1.0, 2.0, 3.0, 4.0]), shares, np.zeros(4))
+    areas, upstream = np.array([-5.0, 1.0, -1.0, 2.0]), np.array([True, True, True, False])
+    assert _axial_force(pressure, areas, upstream) == pytest.approx(8.0 + 0.2 * 2.0 - 0.4 * 3.0)
+
+
 # -- both together
+
+
+def test_the_guide_is_a_couple_on_the_nodes_halfway_to_rod_and_gland():
+    """Of 0.05 times 2 pi R E; forces are small below 2 pi R E d."""
+    model = make_model(MESH, RUBBER, SECTION, 0.05)
+    inner, outer = MESH.nodes[list(model.guide)]
+    assert inner == pytest.approx([RADIUS - 0.25 * SECTION, 0.0], abs=0.1 * SECTION)
+    assert outer == pytest.approx([RADIUS + 0.25 * SECTION, 0.0], abs=0.1 * SECTION)
+    assert model.guide_stiffness == pytest.approx(0.05 * 2.0 * np.pi * RADIUS * 5.5e6, rel=1e-6)
+    assert model.force_scale == pytest.approx(2.0 * np.pi * RADIUS * 5.5e6 * SECTION, rel=1e-6)
+    free, state = around(rod_radius=1e-3, gland_radius=1.0, wall_position=np.inf, pressure=0.0), shaken()
+    residuals = [
+        force_balance(make_model(MESH, RUBBER, SECTION, guide), free, OringState(state, None)).residual
+        for guide in (0.05, 0.0)
+    ]
+    couple = residuals[0] - residuals[1]
+    low, high = (2 * node + 1 for node in model.guide)
+    pull = model.guide_stiffness * (state[high] - state[low])
+    assert couple[[low, high]] == pytest.approx([-pull, pull], rel=1e-6)
+    assert np.delete(couple, [low, high]) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize('friction', [0.0, 0.1])
