@@ -159,6 +159,71 @@ def test_starved_film_is_neither_made_nor_lost():
         assert moment.wall_film.volume.min() >= -1e-20
 
 
+def test_starved_seal_goes_to_the_left_as_it_goes_to_the_right():
+    starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), numerics=LubricationNumerics(cells=64))
+    model = transient.lubrication_model(starved)
+    ends, forces = [], []
+    for direction in (1.0, -1.0):
+        moment = initial_state(model, 0.0)
+        for i in range(1, 7):
+            moment, force, *_ = transient.transient_step(model, moment, i * 2e-3, direction * i * 6e-5)
+        ends.append(moment)
+        forces.append(force)
+    right, left = ends
+    assert right.lag == pytest.approx(-left.lag, rel=1e-6)
+    assert right.lag < 0.3e-3  # it slides
+    assert right.state.gap == pytest.approx(left.state.gap[::-1], rel=1e-6)
+    assert right.state.saturation == pytest.approx(left.state.saturation[::-1], rel=1e-6)
+    assert forces[0].friction == pytest.approx(-forces[1].friction, rel=1e-6)
+    middle = slice(200, len(right.wall_film.volume) - 200)  # of the wall, about the start
+    there, mirrored = (moment.wall_film.volume[middle] for moment in ends)
+    assert there.sum() == pytest.approx(mirrored.sum(), rel=1e-6)
+
+
+@pytest.mark.parametrize('direction', [1.0, -1.0])
+def test_velocity_at_the_end_of_a_step_is_that_of_an_even_acceleration(direction):
+    """0.4 m/s^2: 4 mm/s on average over 20 ms, then 11 mm/s over 15 ms and 14 mm/s at their end."""
+    start = initial_state(lubrication_model(INNER), 0.0)
+    after = start._replace(before=StepBefore(start.state.gap, start.creep, 20e-3, direction * 4e-3))
+    assert transient._velocity_at_end(after, direction * 11e-3, 15e-3) == pytest.approx(direction * 14e-3)
+    assert transient._velocity_at_end(after, -direction * 11e-3, 15e-3) == -direction * 11e-3  # turned round
+    fast = start._replace(before=StepBefore(start.state.gap, start.creep, 20e-3, direction * 0.4))
+    assert transient._velocity_at_end(fast, direction * 1e-3, 15e-3) == direction * 1e-3  # would turn round
+    assert transient._velocity_at_end(start, direction * 11e-3, 15e-3) == direction * 11e-3  # the first step
+
+
+def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge():
+    """Two roundings of 20 um before the chamfer from 0.3 to 0.4667 mm, and two after it."""
+    model = lubrication_model(EDGE)
+    loads = initial_state(model, -1e-3)
+    solid, _ = transient.asperity_pressure(loads.state.gap, model.contact.asperities)
+    loaded = model.place[solid > 0.01 * solid.max()]
+    before, after = 0.26e-3 - loaded[-1], 0.3e-3 + 60e-6 / 0.36 + 40e-6 - loaded[0]
+
+    def may(position, *positions, lag=0.0):
+        at = loads._replace(position=position, lag=lag)
+        return transient._may_be_one_step(model, at, list(positions))
+
+    near, far = 1e-7, 1e-4
+    assert may(before - far, before - 0.5 * far, before - near)
+    assert not may(before - far, before + near)
+    assert not may(before + near, before - near)
+    assert may(after + far, after + near)
+    assert not may(after + far, after - near)
+    assert not may(after - near, after + near)
+    assert not may(before - far, after + far)
+    assert may(before + 0.5 * far, before + far - near, lag=far)  # the contact counts, not the spool
+    assert not may(before - 2.0 * far, before - far, before - 1.5 * far)  # to and fro
+    assert not may(before - far, before - far)
+    assert transient._may_be_one_step(lubrication_model(INNER), loads, [0.0, 1.0])
+
+
+def test_run_of_more_numbers_than_fit_is_refused():
+    long = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1000), numerics=LubricationNumerics(4000))
+    with pytest.raises(ValueError, match=r'case inner: \d+ steps of 4000 cells are too many to keep'):
+        run_transient(long)
+
+
 def test_creep_in_decades_has_the_whole_compliance_in_equal_shares():
     parts = Viscoelasticity(stiffening=3.0, relaxation_time=0.01, decades=3).creep
     assert [time for _, time in parts] == pytest.approx([0.01, 0.1, 1.0, 10.0])
