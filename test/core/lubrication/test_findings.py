@@ -169,6 +169,7 @@ def test_friction_after_the_edge_is_read_a_whole_film_within_the_seat_above_half
 
     found = findings(made(EDGE, 6000, solid=solid))
     assert found.after_edge == pytest.approx(2.0, rel=0.02)
+    assert found.edge_assist == 0.0  # a chamfer that does not push
     half = dataclasses.replace(EDGE, numerics=LubricationNumerics(film_width=0.3e-3))
     assert findings(made(half, 6000, solid=solid)).after_edge > 2.5
 

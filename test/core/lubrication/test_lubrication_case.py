@@ -72,7 +72,10 @@ SECTION = {'body': 'finite_elements', 'section_width': 0.8e-3, 'crown_radius_lef
 
 
 def test_section_has_to_keep_a_fifth_of_its_height_at_its_lower_flank():
-    """0.4 mm from a crown of 0.1 mm it falls by 0.8 mm: of 1 mm a fifth is left."""
+    """0.4 mm from a crown of 0.1 mm it falls by 0.8 mm: of 1 mm a fifth is left. In powers of 2 the bound is exact."""
+    height = 5.0 * 2.0**-12
+    even = {'crown_radius_left': 2.0**-11, 'crown_radius_right': 2.0**-11, 'section_width': 2.0**-9}
+    assert SealBody(**SECTION | even | {'section_height': height}).section_height == height
     assert SealBody(**SECTION | {'section_height': 1.0001e-3}).section_height == 1.0001e-3
     with pytest.raises(ValueError, match=r'section_width = 0.0008 m leaves 0.0002 m of section_height = 0.0009995 m'):
         SealBody(**SECTION | {'section_height': 0.9995e-3})

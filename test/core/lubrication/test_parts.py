@@ -214,6 +214,11 @@ def test_near_the_load_a_bonded_layer_is_a_half_plane_of_0_377_of_its_height():
     assert layer.influence == pytest.approx(plane.influence, rel=1e-3)
 
 
+def test_far_from_the_load_an_incompressible_layer_does_not_move():
+    layer = BondedLayer(300, 0.1e-3, MODULUS, 1e-3)
+    assert np.abs(layer.influence[100:]).max() < 2e-4 * layer.influence[0]  # from ten heights on
+
+
 def test_bodies_push_back_alike():
     """Reciprocity: the deflection here by a load there is that there by a load here; and no load gains energy."""
     for body in (HalfPlane(64, 1e-5, MODULUS, 1e-3), BondedLayer(64, 1e-5, MODULUS, 1e-3)):
