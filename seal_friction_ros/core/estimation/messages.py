@@ -125,7 +125,6 @@ SECOND = 1_000_000_000  # [ns]
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little endian, no options
 _LITTLE_ENDIAN = b'\x00\x01'  # begin of the encapsulation
 _SHORTEST = 16  # [bytes] encapsulation, stamp and length of the frame name
-_MOST_KNOWN = 256  # sizes of messages whose layout is kept
 
 
 def head_size(frame_length: int) -> int:
@@ -139,10 +138,6 @@ def _struct(frame_length: int, body: str) -> struct.Struct:
     return struct.Struct(f'<2s2xiI4s{frame_length}s{padding}x{body}')
 
 
-def _length(frame_length: int) -> bytes:
-    return frame_length.to_bytes(4, 'little')
-
-
 def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
     """Makes the bytes of a message from its stamp, frame name and numbers."""
     body = layout.body()
@@ -152,9 +147,7 @@ def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
         found = known.get(len(frame_id))
         if found is None:
             length = len(frame_id) + 1
-            if len(known) >= _MOST_KNOWN:
-                known.clear()
-            found = known[len(frame_id)] = _struct(length, body).pack, _length(length)
+            found = known[len(frame_id)] = _struct(length, body).pack, length.to_bytes(4, 'little')
         pack, length_bytes = found
         seconds, nanoseconds = divmod(stamp, SECOND)
         return pack(_LITTLE_ENDIAN, seconds, nanoseconds, length_bytes, frame_id, *numbers)
@@ -170,8 +163,6 @@ def _decoder(layout: Layout) -> Callable[[bytes], Any]:
     def decode_bytes(data: bytes) -> Any:
         found = known.get(len(data))
         if found is None or found[1] != data[12:16]:
-            if len(known) >= _MOST_KNOWN:
-                known.clear()
             found = known[len(data)] = _layout_of(layout, data)
         fields = found[0](data)
         nanoseconds = fields[2]
