@@ -266,6 +266,17 @@ def test_after_a_pause_the_old_readings_do_not_outvote_the_new_ones():
     assert run.state.temperature[:2] == (later + 2 * SECOND, pytest.approx(293.15))
 
 
+def test_after_a_clock_was_set_back_the_old_readings_do_not_outvote_the_new_ones():
+    run = Run(WARM)
+    run.warm(50.0)
+    earlier = START - 60 * SECOND
+    for number in range(2):
+        run.take(Temperature(earlier + number * SECOND, 20.0), START)
+        assert run.state.temperature[:2] == (START, pytest.approx(323.15))
+    run.take(Temperature(earlier + 2 * SECOND, 20.0), START)
+    assert run.state.temperature[:2] == (earlier + 2 * SECOND, pytest.approx(293.15))
+
+
 @given(st.lists(st.floats(), max_size=5), st.floats(-0.2, 0.2))
 def test_every_number_is_finite_whatever_the_sensor_says(values, velocity):
     run = Run(replace(WARM, velocity_terms=VelocityTerms(150.0)))
