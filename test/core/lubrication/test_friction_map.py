@@ -54,6 +54,14 @@ def test_map_falls_with_speed_and_rises_with_pressure(rows):
     assert law.presliding_length == pytest.approx(table[0, 0] / CASE.groove.stiffness)
 
 
+def test_shear_of_the_film_rises_with_speed_and_is_the_smaller_part_of_the_friction(rows):
+    for row in rows:
+        fluid = row.friction - row.solid
+        assert fluid[0] > 0.0
+        assert (np.diff(fluid) > 0.0).all()
+        assert (fluid < 0.5 * row.friction).all()
+
+
 def test_symmetrical_seal_without_pressure_rubs_alike_both_ways(rows):
     assert np.abs(rows[1].direction_difference).max() < 1e-6
     assert np.abs(rows[0].direction_difference).max() > 0.01

@@ -47,6 +47,17 @@ def test_the_mesh_is_the_section_and_its_face_lies_under_the_film():
     assert 0.5 * (r * np.roll(z, -1) - z * np.roll(r, -1)).sum() == pytest.approx(1.5e-6 - 1.5e-3**3 / 24e-3, rel=1e-3)
 
 
+def test_elements_grow_evenly_away_from_the_film_and_begin_at_its_width():
+    """Of 25 um under a film of 24 elements, each a third larger than the last."""
+    nodes = seal_section(SEAL, FILM, 24).model.mesh.nodes
+    along = np.unique(np.round(nodes[:, 1], 9))
+    beside = np.diff(along[along > 0.5 * FILM - 1e-9])
+    down = np.diff(np.sort(3e-3 - nodes[np.abs(nodes[:, 1]) < 1e-9, 0]))
+    for steps in (beside, down):
+        assert steps[1:] / steps[:-1] == pytest.approx(4.0 / 3.0, rel=1e-3)
+        assert 25e-6 / 1.2 < steps[0] < 25e-6 * 1.2
+
+
 def test_rigid_motion_costs_nothing():
     """Along the axis on any radius; off it and about a corner where the section is plane."""
     for seal, moves in ((SEAL, ('along',)), (FAR, ('along', 'off', 'turn'))):
