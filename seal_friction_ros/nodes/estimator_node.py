@@ -1,6 +1,7 @@
 """What the estimator of one actuator and that of a machine share: clock of receipt, recording, watch of the graph."""
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any, ClassVar
@@ -38,7 +39,7 @@ _HEALTH, _MONITOR = 'health', 'monitor'  # keys of their publishers
 _TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
 
 
-class EstimatorNode(ManagedNode):
+class EstimatorNode(ManagedNode, ABC):
     """Lifecycle node that estimates and records; a subclass has the live path.
 
     A subclass overrides what is listed first, makes ``_watch`` and calls `create_timers` in `make`, and calls `begin`
@@ -72,54 +73,54 @@ class EstimatorNode(ManagedNode):
     # --- overridden by subclasses ---
 
     @property
+    @abstractmethod
     def clock_offset(self) -> int:
         """What the clock of the stamps shows after the clock of receipt [ns]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def set_clock_offset(self, offset: int) -> None:
         """Use another offset [ns] from now on."""
-        raise NotImplementedError
 
+    @abstractmethod
     def snapshot(self) -> str:
         """All that the next answer depends on, as text."""
-        raise NotImplementedError
 
+    @abstractmethod
     def reset_adaptation(self) -> None:
         """Forget what the adaptation has learnt."""
-        raise NotImplementedError
 
+    @abstractmethod
     def input_type(self, name: str) -> str:
         """Message type of an input."""
-        raise NotImplementedError
 
+    @abstractmethod
     def on_input(self, name: str, data: bytes) -> None:
         """Take one message of an input."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def needed_inputs(self) -> Collection[str]:
         """Inputs without which there is no good estimate."""
-        raise NotImplementedError
 
+    @abstractmethod
     def received(self) -> Mapping[str, int]:
         """Messages of each input since activation."""
-        raise NotImplementedError
 
+    @abstractmethod
     def on_watchdog(self) -> bool:
         """Renew each feed-forward that no sample renews, so that it fades out; whether there was one."""
-        raise NotImplementedError
 
+    @abstractmethod
     def fade_out(self) -> None:
         """Fade every force to 0 N."""
-        raise NotImplementedError
 
+    @abstractmethod
     def health(self) -> dict[str, DiagnosticStatus]:
         """Indicators of the seals, by the name of the part."""
-        raise NotImplementedError
 
+    @abstractmethod
     def newest_answers(self) -> list[NamedAnswer]:
         """The newest answers of each actuator since the last call, see `EstimatorDiagnostics.take_newest`."""
-        raise NotImplementedError
 
     # --- lifecycle ---
 

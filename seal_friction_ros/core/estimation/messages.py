@@ -133,9 +133,9 @@ def head_size(frame_length: int) -> int:
 
 
 def _struct(frame_length: int, body: str) -> struct.Struct:
-    """Of a whole message; its first field are the two bytes that tell the encoding."""
+    """Of a whole message, with the length of the frame name as bytes."""
     padding = head_size(frame_length) - 12 - frame_length
-    return struct.Struct(f'<2s2xiI4s{frame_length}s{padding}x{body}')
+    return struct.Struct(f'<4siI4s{frame_length}s{padding}x{body}')
 
 
 def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
@@ -144,13 +144,14 @@ def _encoder(layout: Layout) -> Callable[[int, bytes, tuple[Any, ...]], bytes]:
     known: dict[int, tuple[Callable[..., bytes], bytes]] = {}  # by the length of the frame name
 
     def encode_numbers(stamp: int, frame_id: bytes, numbers: tuple[Any, ...]) -> bytes:
+        """Bytes of one message."""
         found = known.get(len(frame_id))
         if found is None:
             length = len(frame_id) + 1
             found = known[len(frame_id)] = _struct(length, body).pack, length.to_bytes(4, 'little')
         pack, length_bytes = found
         seconds, nanoseconds = divmod(stamp, SECOND)
-        return pack(_LITTLE_ENDIAN, seconds, nanoseconds, length_bytes, frame_id, *numbers)
+        return pack(_ENCAPSULATION, seconds, nanoseconds, length_bytes, frame_id, *numbers)
 
     return encode_numbers
 
@@ -161,13 +162,14 @@ def _decoder(layout: Layout) -> Callable[[bytes], Any]:
     known: dict[int, tuple[Callable[[bytes], tuple[Any, ...]], bytes]] = {}  # by the size of the message
 
     def decode_bytes(data: bytes) -> Any:
+        """Record of one message; ValueError for bytes that are none."""
+        if data[:2] != _LITTLE_ENDIAN:
+            raise ValueError(f'encapsulation {data[:4].hex()} of {len(data)} bytes is not little-endian CDR')
         found = known.get(len(data))
         if found is None or found[1] != data[12:16]:
             found = known[len(data)] = _layout_of(layout, data)
         fields = found[0](data)
         nanoseconds = fields[2]
-        if fields[0] != _LITTLE_ENDIAN:
-            raise ValueError(f'encapsulation {data[:4].hex()} is not little-endian CDR')
         if nanoseconds >= SECOND:
             raise ValueError(f'header with {nanoseconds} ns is not valid')
         stamp = fields[1] * SECOND + nanoseconds
@@ -190,8 +192,6 @@ def _layout_of(layout: Layout, data: bytes) -> tuple[Callable[[bytes], tuple[Any
     if len(data) < _SHORTEST:
         raise ValueError(f'{len(data)} bytes are too few for a stamped message')
     length = int.from_bytes(data[12:16], 'little')
-    if data[:2] != _LITTLE_ENDIAN:
-        raise ValueError(f'encapsulation {data[:4].hex()} is not little-endian CDR')
     if length > LONGEST_FRAME:
         raise ValueError(f'header with a frame name of {length} bytes is not valid')
     known = _struct(length, layout.body())

@@ -65,9 +65,12 @@ class MonotoneTable:
             raise ValueError(f'{name}: abscissae do not increase: {list(x)}')
         from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  half a second, for seals with a table only
 
-        with np.errstate(all='ignore'):
-            spline = PchipInterpolator(x, y)
-        if not np.isfinite(spline.c).all():
+        try:
+            with np.errstate(all='ignore'):
+                spline = PchipInterpolator(x, y)
+        except ValueError:  # a slope beyond the largest number
+            spline = None
+        if spline is None or not np.isfinite(spline.c).all():
             raise ValueError(f'{name}: points too close together or too far apart: {list(x)}')
         self.knots: Column = tuple(float(v) for v in spline.x)
         self.cubic, self.square, self.slope, self.value = (tuple(map(float, row)) for row in spline.c)

@@ -205,9 +205,7 @@ def design_experiment(
     """
     near = laws_not_beaten(scores)
     chosen = _richest(near)
-    speed = np.abs(readings.at.velocity)
-    is_measured = bool(np.isfinite(speed).all())
-    at = readings.at if is_measured else readings.at._replace(velocity=ASSUMED_SPEED * readings.at.direction)
+    is_measured, at = _at_a_speed(readings)
     speed = np.abs(at.velocity)
     is_varied = _is_speed_varied(at)
     used_speeds = _ends(speed) if is_varied else (float(np.median(speed)),)
@@ -237,11 +235,7 @@ def design_experiment(
     points, errors, information = _greedy(model, range_slopes, had + prior, scatter, repeats, more, count)
     freedom = 1 if readings.are_samples else len(readings.levels)
     names = [parameter.name for parameter in model.law.parameters]
-    pair = _broken_pair(had + prior, had + prior + information)
-    correlations = [
-        None if pair is None else CorrelatedPair(names[pair[0]], names[pair[1]], float(_correlation(m)[pair]))
-        for m in (had + prior, had + prior + information)
-    ]
+    correlations = _correlated_pair(names, had + prior, had + prior + information)
     disagreements = _disagreements(near, model, points)
     proposed = tuple(
         ProposedReading(*point, DIRECTIONS, error / before, disagreement, number < len(repeats))
@@ -476,6 +470,22 @@ def _correlation(information: FloatArray) -> FloatArray:
     covariance = np.linalg.pinv(information / np.outer(size, size), hermitian=True)
     std = np.sqrt(np.diag(covariance))
     return np.asarray(covariance / np.outer(std, std))
+
+
+def _at_a_speed(readings: FrictionReadings) -> tuple[bool, OperatingConditions]:
+    """Whether the speed of every reading was measured; the conditions of the readings, else at `ASSUMED_SPEED`."""
+    if np.isfinite(readings.at.velocity).all():
+        return True, readings.at
+    return False, readings.at._replace(velocity=ASSUMED_SPEED * readings.at.direction)
+
+
+def _correlated_pair(names: Sequence[str], before: FloatArray, after: FloatArray) -> list[CorrelatedPair | None]:
+    """The pair of `_broken_pair` with its correlation by the information before, and after; None for one parameter."""
+    pair = _broken_pair(before, after)
+    return [
+        None if pair is None else CorrelatedPair(names[pair[0]], names[pair[1]], float(_correlation(m)[pair]))
+        for m in (before, after)
+    ]
 
 
 def _broken_pair(before: FloatArray, after: FloatArray) -> tuple[int, int] | None:

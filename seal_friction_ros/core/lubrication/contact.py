@@ -159,6 +159,9 @@ def _factored_band(rows: FloatArray, kept: FloatArray, slope: FloatArray, stiffn
             band[2 * i + 1, 2 * (j - i) + w] = rows[0, k, i] * kept[1, j] + rows[1, k, i] * kept[3, j]
     for column in range(2 * n):
         pivot = band[column, w]
+        if pivot == 0.0:  # needs an exchange of rows: the step is repeated, as after any solution that is no number
+            band[:] = math.nan
+            return band
         for row in range(column + 1, min(2 * n, column + w + 1)):
             offset = column - row + w
             if band[row, offset] != 0.0:

@@ -53,10 +53,13 @@ def gmres(
         length = hessenberg[k + 1, k] = float(np.linalg.norm(image))
         if not math.isfinite(length):
             break
-        _, weights, _ = dgels(hessenberg[: k + 2, : k + 1], start[: k + 2])  # least squares; residual at the end
+        reduced = hessenberg[: k + 2, : k + 1]
+        _, weights, _ = dgels(reduced, start[: k + 2])  # least squares; residual at the end, if the rank is full
         left = abs(float(weights[-1]))
         if left <= tolerance:
-            return np.asarray(weights[:-1] @ vectors)
+            left = float(np.linalg.norm(start[: k + 2] - reduced @ weights[:-1]))
+            if left <= 2.0 * tolerance:  # but for rounding the same, unless the matrix is singular
+                return np.asarray(weights[:-1] @ vectors)
         if length == 0.0:
             break
         basis[k + 1] = image / length

@@ -74,16 +74,18 @@ def chosen_differentiator(step: float, rate: float, noise: float) -> Differentia
     Raises:
         ValueError: It would be older than `LONGEST_DELAY` or need more than `MOST_SAMPLES`.
     """
+    best = Differentiator(2, 1.0 / rate, step)
     for samples in range(2, MOST_SAMPLES + 1):
         found = Differentiator(samples, 1.0 / rate, step)
         if found.delay > LONGEST_DELAY and samples > 2:
             break
         if found.noise <= noise:
             return found
-    best = Differentiator(max(samples - 1, 2), 1.0 / rate, step)
+        best = found
     raise ValueError(
         f'steps of {step:g} m at {rate:g} Hz: a velocity with {noise:g} m/s of noise would be older than '
-        f'{LONGEST_DELAY:g} s; {best.noise:.2g} m/s is possible: raise noise, or use a finer encoder'
+        f'{LONGEST_DELAY:g} s or need more than {MOST_SAMPLES} samples; {best.noise:.2g} m/s is possible: '
+        'raise noise, or use a finer encoder'
     )
 
 

@@ -7,6 +7,7 @@ An example with every part; most machines need a third of it::
       /joint_states: sensor_msgs/msg/JointState
       /pressures: std_msgs/msg/Float64MultiArray
       /load_cell: geometry_msgs/msg/WrenchStamped
+      /boom/reference: trajectory_msgs/msg/JointTrajectoryPoint
       /oil_temperature: sensor_msgs/msg/Temperature
     ambient_pressure: 1.013 bar                     # taken off what is absolute; or an input, as below
     answers: each                                   # two messages for each actuator; or together, one for all
@@ -17,6 +18,7 @@ An example with every part; most machines need a third of it::
         rod: 22 mm                                  # or area_b
         inputs:                                     # TOPIC FIELD, or a mapping, or a number if it is constant
           velocity: /joint_states velocity[boom]
+          position: /joint_states position[boom]    # for spring and load_over_position, or instead of a velocity
           pressure_a: {topic: /pressures, field: 'data[0]', unit: bar, absolute: true}
           pressure_b: {topic: /pressures, field: 'data[1]', unit: bar, gain: 1.0, offset: 0.0, absolute: true}
           reference_velocity: /boom/reference velocities[0]
@@ -27,7 +29,7 @@ An example with every part; most machines need a third of it::
           weight: {mass: 80 kg, angle: 90 deg}      # angle of the rod above the horizontal; or an input
           spring: {stiffness: 200 N/m, rest_position: 0.1 m}
           load_over_position: {positions: [0.0, 0.5], forces: [900.0, 1200.0]}  # as identify finds it
-          load: none                                # no other load acts
+                                                    # without a load: load: none, or load: unknown
         output: {topic: /boom/effort, type: sensor_msgs/msg/JointState, joint: boom, gain: 1.0}
         parameters: {feedforward: {scale: 0.8}}     # of friction_estimator, for this actuator
 

@@ -72,6 +72,7 @@ def test_the_end_slope_is_the_derivative_at_the_last_point():
         ([1.0, float('nan')], [1.0, 2.0], 'not every point is finite'),
         ([1.0, 2.0], [1.0, float('inf')], 'not every point is finite'),
         ([0.0, 1e-200, 1.0], [0.0, 1e-5, 2e-5], 'points too close together or too far apart'),
+        ([0.0, 5e-324, 1.0], [0.0, 1.0, 2.0], 'points too close together or too far apart'),
     ],
 )
 def test_points_that_make_no_table_are_refused_by_name(x, y, complaint):

@@ -174,3 +174,16 @@ def test_gmres_begins_at_zero_and_ends_there_if_that_will_do():
 def test_gmres_gives_up_at_once_on_what_is_not_finite(factor):
     with np.errstate(invalid='ignore'), pytest.raises(StalledError, match='3 of 3 left after 1 iterations'):
         gmres(lambda x: factor * x, np.array([0.0, 3.0]), 1e-9, 5)
+
+
+@pytest.mark.parametrize(('matrix', 'right'), [([[0, 0], [0, 0]], [0, 3]), ([[0, 1], [0, 0]], [1, 0])])
+def test_gmres_says_so_where_the_matrix_is_singular_and_has_no_solution_in_its_reach(matrix, right):
+    with pytest.raises(StalledError):
+        gmres(lambda x: np.array(matrix, dtype=float) @ x, np.array(right, dtype=float), 1e-9, 5)
+
+
+def test_an_elimination_that_meets_a_pivot_of_zero_has_no_solution_and_does_not_divide_by_it():
+    rows, kept = np.zeros((3, 3, CELLS)), np.zeros((4, CELLS))
+    with np.errstate(all='raise'):
+        band = contact_module._factored_band(rows, kept, np.ones(CELLS), np.array([1.0, 0.5]))
+    assert np.isnan(band).all()

@@ -35,9 +35,6 @@ from seal_friction_ros.core.lubrication.transient import (
 )
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 
-pytestmark = pytest.mark.filterwarnings('ignore::RuntimeWarning')
-"""As plain Python an elimination that meets a pivot of 0 warns; compiled code does not, and the step is repeated."""
-
 INNER = LubricationCase(name='inner', numerics=LubricationNumerics(cells=96, time_step=1e-3))
 EDGE = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=2.7e-3), control_edge=ControlEdge())
 
