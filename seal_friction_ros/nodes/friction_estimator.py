@@ -191,9 +191,14 @@ class FrictionEstimator(EstimatorNode):
         self._recording.record(self._topics[TICK_TYPE], TICK_TYPE, received, encode(tick))
         self._record_answers()
 
+    @property
+    def has_force(self) -> bool:
+        """Whether a feed-forward is up."""
+        return newest_force(self._state.feedforward) != 0.0
+
     def fade_out(self) -> None:
         """Fade the force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""
-        if newest_force(self._state.feedforward) == 0.0:
+        if not self.has_force:
             return
         self._state = self._state._replace(refused=True)
         self.publish_configuration()  # a replay fades from here on

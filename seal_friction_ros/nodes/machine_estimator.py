@@ -262,6 +262,11 @@ class MachineEstimator(EstimatorNode):
         self._recording.record(self._ticks[number], TICK_TYPE, received, encode(tick))
         self._record_answers(made)
 
+    @property
+    def has_force(self) -> bool:
+        """Whether a feed-forward of any actuator is up."""
+        return any(known.force != 0.0 for known in self._state.actuators)
+
     def fade_out(self) -> None:
         """Fade every force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""
         acting = [number for number, known in enumerate(self._state.actuators) if known.force != 0.0]

@@ -1,0 +1,79 @@
+"""Periodic look of a node at itself, at the cost of a comparison for each message."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from rclpy.node import Node
+
+GRACE = 2_000_000  # [ns] in which a message is awaited before the executor has to look; messages at 500 Hz come in time
+
+_FIRST_PERIOD = 10_000_000  # [ns] until the first call
+
+
+class Watchdog:
+    """Calls a function every period, while messages come after one of them, and otherwise from the executor.
+
+    A timer of rclpy wakes two threads at each call, the executor among them. Here a thread of its own sleeps until the
+    function is late by `GRACE`, which does not happen while messages come, and only then asks the executor.
+
+    Args:
+        node: Its executor calls the function.
+        look: What is called, with the time [ns] of `time.perf_counter_ns`; returns the period until the next call [ns].
+    """
+
+    def __init__(self, node: Node, look: Callable[[int], int]) -> None:
+        self._node, self._look = node, look
+        self._period = _FIRST_PERIOD
+        self._due = time.perf_counter_ns() + self._period
+        self._is_asked = self._is_stopped = False
+        self._failure: Exception | None = None
+        self._wake = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='watchdog', daemon=True)
+        self._thread.start()
+
+    def call_if_due(self, now: int) -> bool:
+        """Call the function if it is time, after a message; whether it was.
+
+        Args:
+            now: [ns] of `time.perf_counter_ns`.
+        """
+        if now < self._due or self._is_stopped:
+            return False
+        self._due = now + self._period  # also if the function raises
+        period = self._look(now)
+        self._due = now + period
+        if period < self._period:  # the thread sleeps longer
+            self._wake.set()
+        self._period = period
+        return True
+
+    def check(self) -> None:
+        """Raise what a call from the executor has raised: the events executor does not raise what its tasks do."""
+        if self._failure is not None:
+            raise self._failure
+
+    def stop(self) -> None:
+        """Call nothing from now on, not even what the executor was asked for; ends the thread."""
+        self._is_stopped = True
+        self._wake.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._is_stopped:
+            wait = self._due + GRACE - time.perf_counter_ns()
+            executor = self._node.executor
+            if wait <= 0:
+                wait = self._period + GRACE
+                if executor is not None and not self._is_asked:
+                    self._is_asked = True
+                    executor.create_task(self._on_silence)
+            self._wake.wait(wait * 1e-9)
+            self._wake.clear()
+
+    def _on_silence(self) -> None:
+        self._is_asked = False
+        try:
+            self.call_if_due(time.perf_counter_ns())
+        except Exception as error:  # noqa: BLE001  see `check`
+            self._failure = error
