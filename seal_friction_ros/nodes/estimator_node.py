@@ -26,7 +26,7 @@ from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 
 _WATCH_PERIOD = 42_000_000  # [ns] of the graph and the clocks: every other call of the watchdog, even of an early one
 _IDLE_PERIOD = 43_000_000  # [ns] of the watchdog without a force: one that begins meanwhile has not risen far
-_FORCE_PERIOD = 23_000_000  # [ns] of the watchdog; with `GRACE` less than the default timeouts of the feed-forward
+_FORCE_PERIOD = 18_000_000  # [ns] of the watchdog; with `GRACE` less than the default timeouts of the feed-forward
 _TICK_PERIOD = 8_000_000  # [ns] while ticks keep a force up; with `GRACE` more than `pipeline.TICK_INTERVAL`
 _TICKING = 100_000_000  # [ns] after the last tick: inputs slower than the ticks need them again and again
 _HEALTH_PERIOD = 60.0  # [s]
@@ -63,7 +63,7 @@ class EstimatorNode(ManagedNode, ABC):
         self._newest_inputs: dict[str, TopicMessage] = {}
         self.has_viewer = False  # by a live view
         self._ticked = self._watched = 0  # [ns] of `time.perf_counter_ns`
-        self._watchdog: Watchdog | None = None
+        self.watchdog = Watchdog(self, self._look)
         self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
         self._recording = Recording(self.get_fully_qualified_name())
@@ -132,7 +132,7 @@ class EstimatorNode(ManagedNode, ABC):
 
     def release(self) -> None:
         """Destroy publishers, subscriptions and timers; stop the watchdog."""
-        self._stop_watchdog()
+        self.watchdog.stop()
         for subscription in self._inputs.values():
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
@@ -156,7 +156,7 @@ class EstimatorNode(ManagedNode, ABC):
             self.create_steady_timer(_HEALTH_PERIOD, self._on_health_timer),
             self.create_steady_timer(_INPUT_PERIOD, self._on_input_timer),
         ]
-        self._watchdog = Watchdog(self, self._look)
+        self.watchdog.start()
 
     def begin(self) -> None:
         """Begin to record if ``record`` is set; at the end of `start`."""
@@ -199,13 +199,8 @@ class EstimatorNode(ManagedNode, ABC):
 
     def destroy_node(self) -> None:
         """Stop the watchdog, and destroy the node."""
-        self._stop_watchdog()
+        self.watchdog.stop()
         super().destroy_node()
-
-    def _stop_watchdog(self) -> None:
-        if self._watchdog is not None:
-            self._watchdog.stop()
-        self._watchdog = None
 
     def _look(self, now: int) -> int:
         """Let the watchdog act, look at graph and clocks; [ns] until the next call.
@@ -224,12 +219,12 @@ class EstimatorNode(ManagedNode, ABC):
         return _FORCE_PERIOD if self.active and self.has_force else _IDLE_PERIOD
 
     def look_after_timers(self, now: int) -> None:
-        """Call the watchdog if it is time, and the timers that the executor has not called; after a message.
+        """Call the watchdog, and the timers that the executor has not called; after a message, when `Watchdog.due`.
 
         Args:
             now: Of `time.perf_counter_ns`.
         """
-        if self._watchdog is not None and self._watchdog.call_if_due(now):
+        if self.watchdog.call_if_due(now):
             self.call_overdue_timers()
 
     def keep_for_view(self, topic: str, type_name: str, data: bytes) -> None:
@@ -272,8 +267,7 @@ class EstimatorNode(ManagedNode, ABC):
 
     def _on_input_timer(self) -> None:
         """Say what the node waits for, which input has stopped, and which is back; raise a failure of the watchdog."""
-        if self._watchdog is not None:
-            self._watchdog.check()
+        self.watchdog.check()
         if not self.active:
             return
         for remark in self._input_watch.look(self.received(), time.monotonic()):

@@ -166,7 +166,8 @@ class FrictionEstimator(EstimatorNode):
                 state = self._state
                 self._statistics.on_adaptation(self._known.estimator, before, state.estimator, state.temperature)
             self._recording.flush_if_idle()
-        self.look_after_timers(done)
+        if done >= self.watchdog.due:
+            self.look_after_timers(done)
 
     def _record_answers(self, latency: int = 0, received: int = 0) -> None:
         """Record and count what was sent, ``latency`` [ns] after its input was taken at ``received`` [ns]."""

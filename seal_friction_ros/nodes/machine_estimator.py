@@ -195,7 +195,8 @@ class MachineEstimator(EstimatorNode):
             self._record_answers(made, done - taken, received)
             self._follow_adaptation(before)
             self._recording.flush_if_idle()
-        self.look_after_timers(done)
+        if done >= self.watchdog.due:
+            self.look_after_timers(done)
 
     def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once, if it is a message of its own; the rest waits until all answers are out."""

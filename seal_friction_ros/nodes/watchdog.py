@@ -9,6 +9,7 @@ from rclpy.node import Node
 GRACE = 2_000_000  # [ns] in which a message is awaited before the executor has to look; messages at 500 Hz come in time
 
 _FIRST_PERIOD = 10_000_000  # [ns] until the first call
+_NEVER = 1 << 62  # [ns]
 
 
 class Watchdog:
@@ -24,11 +25,18 @@ class Watchdog:
 
     def __init__(self, node: Node, look: Callable[[int], int]) -> None:
         self._node, self._look = node, look
+        self.due = _NEVER
+        """when to call the function [ns] of `time.perf_counter_ns`; never before `start` and after `stop`"""
         self._period = _FIRST_PERIOD
-        self._due = time.perf_counter_ns() + self._period
-        self._is_asked = self._is_stopped = False
+        self._is_asked = False
         self._failure: Exception | None = None
         self._wake = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin to look."""
+        self._period, self._is_asked, self._failure = _FIRST_PERIOD, False, None
+        self.due = time.perf_counter_ns() + self._period
         self._thread = threading.Thread(target=self._run, name='watchdog', daemon=True)
         self._thread.start()
 
@@ -38,11 +46,12 @@ class Watchdog:
         Args:
             now: [ns] of `time.perf_counter_ns`.
         """
-        if now < self._due or self._is_stopped:
+        if now < self.due:
             return False
-        self._due = now + self._period  # also if the function raises
+        self.due = now + self._period  # also if the function raises
         period = self._look(now)
-        self._due = now + period
+        if self.due != _NEVER:  # the function may have stopped all this
+            self.due = now + period
         if period < self._period:  # the thread sleeps longer
             self._wake.set()
         self._period = period
@@ -55,20 +64,22 @@ class Watchdog:
 
     def stop(self) -> None:
         """Call nothing from now on, not even what the executor was asked for; ends the thread."""
-        self._is_stopped = True
-        self._wake.set()
-        self._thread.join()
+        self.due = _NEVER
+        thread, self._thread = self._thread, None
+        if thread is not None:
+            self._wake.set()
+            thread.join()
 
     def _run(self) -> None:
-        while not self._is_stopped:
-            wait = self._due + GRACE - time.perf_counter_ns()
+        while self._thread is not None:
+            wait = self.due + GRACE - time.perf_counter_ns()
             executor = self._node.executor
             if wait <= 0:
                 wait = self._period + GRACE
                 if executor is not None and not self._is_asked:
                     self._is_asked = True
                     executor.create_task(self._on_silence)
-            self._wake.wait(wait * 1e-9)
+            self._wake.wait(min(wait * 1e-9, threading.TIMEOUT_MAX))
             self._wake.clear()
 
     def _on_silence(self) -> None:

@@ -63,6 +63,7 @@ def test_without_messages_the_executor_looks_again_and_again():
     looks = Looks(period=MILLISECOND)
     with node() as (made, executor):
         watchdog = Watchdog(made, looks.look)
+        watchdog.start()
         assert looks.wait_for(20)
         watchdog.stop()
         assert looks.threads == {executor}
@@ -73,6 +74,7 @@ def test_messages_look_when_it_is_time_and_not_before():
     looks = Looks(period=LONG)
     with node(spins=False) as (made, _):
         watchdog = Watchdog(made, looks.look)
+        watchdog.start()
         begin = time.perf_counter_ns() + 100 * MILLISECOND  # after the first period
         assert watchdog.call_if_due(begin)
         assert not watchdog.call_if_due(begin + LONG - 1)
@@ -85,6 +87,7 @@ def test_while_messages_look_the_executor_need_not():
     looks = Looks(period=20 * MILLISECOND)
     with node() as (made, _):
         watchdog = Watchdog(made, looks.look)
+        watchdog.start()
         assert looks.wait_for(1)
         ahead = time.perf_counter_ns() + LONG  # as if the last message had looked just then
         assert watchdog.call_if_due(ahead)
@@ -98,6 +101,7 @@ def test_a_shorter_period_holds_at_once():
     looks = Looks(period=1000 * MILLISECOND)
     with node() as (made, _):
         watchdog = Watchdog(made, looks.look)
+        watchdog.start()
         assert looks.wait_for(1)
         looks.period = MILLISECOND
         assert looks.wait_for(3)
@@ -111,6 +115,7 @@ def test_after_its_end_nothing_looks():
     looks = Looks(period=MILLISECOND)
     with node() as (made, _):
         watchdog = Watchdog(made, looks.look)
+        watchdog.start()
         assert looks.wait_for(1)
         watchdog.stop()
         count = len(looks.times)
@@ -127,6 +132,7 @@ def test_a_look_that_fails_is_not_hidden():
     failed = threading.Event()
     with node() as (made, _):
         watchdog = Watchdog(made, fail)
+        watchdog.start()
         watchdog.check()
         assert failed.wait(PATIENCE)
         failed.clear()
