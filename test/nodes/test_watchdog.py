@@ -2,13 +2,14 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
 import rclpy
 from harness.processes import free_domain
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -41,8 +42,15 @@ class Looks:
             return self._changed.wait_for(lambda: len(self.times) >= count, PATIENCE)
 
 
+def spin_single_threaded(made: Node, stopped: Future, context: Context) -> None:
+    """As `spin` on a ROS without an events executor."""
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(made)
+    executor.spin_until_future_complete(stopped)
+
+
 @contextmanager
-def node(*, spins: bool = True) -> Iterator[tuple[Node, int]]:
+def node(*, spins: bool = True, spin: Callable[..., None] = spin) -> Iterator[tuple[Node, int]]:
     """A node, and the thread in which its executor spins."""
     context = Context()
     rclpy.init(context=context, domain_id=free_domain())
@@ -59,9 +67,10 @@ def node(*, spins: bool = True) -> Iterator[tuple[Node, int]]:
     rclpy.try_shutdown(context=context)
 
 
-def test_without_messages_the_executor_looks_again_and_again():
+@pytest.mark.parametrize('spin', [spin, spin_single_threaded])
+def test_without_messages_the_executor_looks_again_and_again(spin):
     looks = Looks(period=MILLISECOND)
-    with node() as (made, executor):
+    with node(spin=spin) as (made, executor):
         watchdog = Watchdog(made, looks.look)
         watchdog.start()
         assert looks.wait_for(20)
