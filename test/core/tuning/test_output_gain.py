@@ -11,6 +11,7 @@ from seal_friction_ros.core.servo.motions import Setpoint, Sine
 from seal_friction_ros.core.servo.plant import Load
 from seal_friction_ros.core.servo.pneumatics import PneumaticValve
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, simulate
+from seal_friction_ros.core.tuning import output_gain as module
 from seal_friction_ros.core.tuning.output_gain import CommandRecord, output_gain
 from seal_friction_ros.files import default_configuration
 
@@ -111,6 +112,64 @@ def test_samples_that_are_not_finite_do_not_count():
     slow = made()._replace(time=np.arange(2000) * 1e-5)  # 0.02 s are all of its samples
     with pytest.raises(ValueError, match='2000 usable samples'):
         output_gain(slow)
+
+
+def test_a_record_slower_than_the_average_is_taken_sample_by_sample():
+    slow = made()._replace(time=np.arange(2000) * 0.05)  # 20 samples a second, the average takes 0.02 s
+    assert output_gain(slow) == pytest.approx((2e-5, 0.0, 1.5, 0.3, 2000), abs=1e-12)
+
+
+def test_a_record_is_at_least_four_averages_long():
+    for samples in (1999, 2000):
+        record = CommandRecord(*(values[:samples] for values in made(samples=2000)))
+        fast = record._replace(time=np.arange(samples) * 4e-5)  # an average of 500 samples
+        if samples == 2000:
+            assert output_gain(fast).samples == 1501
+        else:
+            with pytest.raises(ValueError, match='1999 usable samples'):
+                output_gain(fast)
+
+
+def test_one_sample_is_too_few():
+    with pytest.raises(ValueError, match='1 usable samples'):
+        output_gain(CommandRecord(*(values[:1] for values in made())))
+
+
+def test_a_rod_that_stands_cannot_tell_what_is_by_position_and_what_is_offset():
+    with pytest.raises(ValueError, match='do not change independently'):
+        output_gain(made()._replace(position=np.full(2000, 0.125)))
+
+
+def test_the_fit_solves_the_equation_of_huber():
+    r"""The sum of psi(r / s) x is 0, with psi(u) = u up to 1.345 and 1.345 beyond, s = 1.4826 median of \|r\|."""
+    rng = np.random.default_rng(11)
+    inputs = np.column_stack([rng.normal(size=(400, 3)) * [300.0, 0.02, 0.01], np.ones(400)])
+    right = np.array([2e-5, 0.3, 1.5, 0.4])
+    command = inputs @ right + 1e-3 * rng.standard_t(2, size=400)  # heavy tails: a sixth has less weight
+    found = module._robust_fit(inputs, command, np.ones(400, dtype=bool))
+    residual = command - inputs @ found
+    share = residual / (1.4826 * np.median(np.abs(residual)))
+    limited = np.clip(share, -1.345, 1.345)
+    assert 0.1 < np.mean(limited != share) < 0.4
+    size = np.abs(inputs).T @ np.abs(limited)
+    np.testing.assert_allclose(inputs.T @ limited / size, 0.0, atol=1e-6)
+    least_squares = np.linalg.lstsq(inputs, command, rcond=None)[0]
+    assert np.abs(found - right)[0] < 0.5 * np.abs(least_squares - right)[0]
+
+
+def test_the_standard_error_is_that_of_a_jackknife_over_twenty_blocks():
+    """(g - 1) / g times the sum of squares of g estimates, each without one of g equal blocks [Kunsch1989]."""
+    record = made(0.05, samples=1000)._replace(time=np.arange(1000) * 0.05)  # no average
+    inputs = np.column_stack([record.force, record.velocity, record.position, np.ones(1000)])
+    gains = []
+    for block in np.split(np.arange(1000), 20):
+        left = np.ones(1000, dtype=bool)
+        left[block] = False
+        gains.append(module._robust_fit(inputs, record.command, left)[0])
+    variance = 19.0 / 20.0 * sum((gain - np.mean(gains)) ** 2 for gain in gains)
+    found = output_gain(record)
+    assert found.standard_error == pytest.approx(variance**0.5, rel=1e-9)
+    assert found.gain == pytest.approx(2e-5, abs=4.0 * found.standard_error)
 
 
 @pytest.mark.parametrize(('variation', 'taken'), [(0.8e-6, False), (1.5e-6, True)])

@@ -9,6 +9,7 @@ import pytest
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.tuning import recorded_axis
 from seal_friction_ros.core.tuning.recorded_axis import (
     RecordedLaw,
     RecordedMotion,
@@ -23,6 +24,7 @@ from seal_friction_ros.core.tuning.recorded_axis import (
     tune_recorded_axis,
 )
 from seal_friction_ros.core.tuning.settings import FORCE_MARGIN, RecordedAxisSettings
+from seal_friction_ros.core.tuning.simulated_axis import nearest_preferred, preferred
 
 RATE, SECONDS = 500.0, 4.0  # [Hz], [s]
 TIME = np.arange(round(RATE * SECONDS)) / RATE
@@ -168,7 +170,7 @@ def test_a_law_takes_a_hundred_samples():
 
 
 @pytest.mark.parametrize('side', [1.0, -1.0])
-@pytest.mark.parametrize(('percent', 'offset'), [(11, 3.0), (9, 0.0)])
+@pytest.mark.parametrize(('percent', 'offset'), [(11, 3.0), (10, 3.0), (9, 0.0)])
 def test_an_offset_takes_a_tenth_of_the_samples_in_each_direction(percent, offset, side):
     made = recording()
     places = np.flatnonzero(fit_law(made).sliding)
@@ -315,3 +317,158 @@ def test_force_limit_falls_with_the_friction_and_a_peak_of_noise_does_not_raise_
     for each in (made, made._replace(force_sum=force)):
         limit = tune_recorded_axis(each, SETTINGS, KNOWN).feedforward.force_limit
         assert FORCE_MARGIN * 40.0 <= limit <= FORCE_MARGIN * 50.0 < SETTINGS.force_limit
+
+
+def test_time_counts_from_the_first_sample_to_the_nanosecond_with_stamps_since_1970():
+    made = recording()
+    start = 1_700_000_000_123_456_789  # [ns]
+    later = made._replace(estimates=[e._replace(stamp=e.stamp + start) for e in made.estimates])
+    np.testing.assert_allclose(later.time, TIME, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(later.coulomb_friction, made.coulomb_friction)
+
+
+def test_a_motion_without_measurements_is_that_of_the_reference_at_this_moment():
+    assert RecordedMotion(0.1) == (0.1, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize('count', [9, 10, 11, 12])
+def test_an_acceleration_takes_eleven_samples(count):
+    slope = acceleration(TIME[:count], 3.0 * TIME[:count])
+    assert np.count_nonzero(np.isfinite(slope)) == max(count - 10, 0)
+    assert slope[5 : count - 5] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(('share', 'counts'), [(0.7, False), (1.4, True)])
+def test_a_change_of_a_billionth_of_the_speed_in_a_sample_is_an_acceleration(share, counts):
+    slope = share * 1e-9 * 0.1 * RATE  # [m/s2] at 0.1 m/s
+    found = acceleration(TIME, 0.1 - slope * TIME)[5:-5]
+    np.testing.assert_allclose(found, -slope if counts else 0.0, rtol=0.1, atol=0.0)
+
+
+def test_every_reversal_has_its_neighbourhood_of_a_tenth_of_the_usual_time_between_two():
+    """Reversals at 20, 50, 60 and 90 s and 30 s between them in the median: 3 s before and after each."""
+    time = np.arange(120.0) + 0.5
+    velocity = np.select([time < 20.0, time < 50.0, time < 60.0, time < 90.0], [1.0, -1.0, 1.0, -1.0], 1.0)
+    expected = np.any([np.abs(time - moment) <= 3.0 for moment in (20.0, 50.0, 60.0, 90.0)], axis=0)
+    np.testing.assert_array_equal(near_reversals(time, velocity), expected)
+    np.testing.assert_array_equal(near_reversals(time, -velocity), expected)
+    with pytest.raises(ValueError, match='reverses 1 times'):
+        near_reversals(time[:40], velocity[:40])
+
+
+def test_a_force_that_is_not_measured_does_not_count():
+    made = recording()
+    sliding = np.flatnonzero(fit_law(made).sliding)
+    force = made.force_sum.copy()
+    force[sliding[::3]] = math.nan
+    law = fit_law(made._replace(force_sum=force))
+    assert np.count_nonzero(law.sliding) == len(sliding) - len(sliding[::3])
+    assert (law.scale, law.mass, law.offset) == pytest.approx((0.8, 5.0, 3.0), rel=3e-3)
+    assert np.isnan(law.friction[sliding[::3]]).all()
+
+
+def test_a_seal_without_friction_has_no_scale():
+    with pytest.raises(ValueError, match='cannot be separated'):
+        fit_law(recording(coulomb=0.0))
+
+
+def test_the_deviation_of_the_scale_is_that_of_least_squares():
+    """Text book: sigma^2 (X'X)^-1 with sigma^2 the squares left over n - 3, here of 100 samples."""
+    made = recording(noise=5.0)
+    places = np.flatnonzero(fit_law(made).sliding)
+    made = only(made, np.isin(np.arange(len(TIME)), places[:: len(places) // 100][:100]))
+    law = fit_law(made)
+    inputs = np.column_stack([made.coulomb_friction * np.sign(made.velocity), acceleration(TIME, made.velocity)])
+    inputs = np.column_stack([inputs, np.ones(len(TIME))])[law.sliding]
+    solution, squares, *_ = np.linalg.lstsq(inputs, made.force_sum[law.sliding], rcond=None)
+    assert (law.scale, law.mass, law.offset) == pytest.approx(solution)
+    assert law.scale_std == pytest.approx(math.sqrt(squares[0] / 97.0 * np.linalg.inv(inputs.T @ inputs)[0, 0]))
+
+
+def shuttle(speed, friction=20.0, noise=0.0):
+    """A rod at ``speed`` to and fro, always sliding, with an exact law and noise of alternating sign."""
+    made = recording(coulomb=0.0)
+    velocity = np.where(np.arange(len(TIME)) // 250 % 2, -speed, speed)
+    estimates = [e._replace(coulomb_friction=friction, state=FrictionState.SLIDING) for e in made.estimates]
+    motions = [RecordedMotion(float(v), 0.0, float(v)) for v in velocity]
+    scatter = noise * np.where(np.arange(len(TIME)) // 2 % 2, -1.0, 1.0)
+    return made._replace(
+        estimates=estimates, motions=motions, force_sum=friction * np.sign(velocity) + scatter
+    ), RecordedLaw(1.0, 0.0, 0.0, False, 0.0, friction * np.sign(velocity) + scatter, np.ones(len(TIME), bool))
+
+
+@pytest.mark.parametrize(
+    ('speed', 'noise', 'width'),
+    [
+        (0.02, 0.0, 0.01),  # 1 - tanh(v / w) = 5 % at w = 0.0109 m/s; preferred 0.01, 0.0125
+        (0.024, 40.0, 0.016),  # 5 % of 44.7 N besides the noise are 11 % of 20 N: w = 0.0170 m/s; 0.016, 0.02
+        (2.1e-5, 0.0, 1e-5),  # the sharpest of all: w = 0.0115 mm/s
+    ],
+)
+def test_the_smoothing_costs_a_twentieth_of_the_friction_and_the_next_wider_one_more(speed, noise, width):
+    assert recorded_axis._smoothing(*shuttle(speed, noise=noise)) == width
+
+
+@pytest.mark.parametrize(('speed', 'noise'), [(1e-6, 0.0), (0.02, 400.0)])
+def test_a_rod_slower_than_any_smoothing_or_mostly_noise_tells_no_smoothing(speed, noise):
+    assert recorded_axis._smoothing(*shuttle(speed, noise=noise)) is None
+
+
+def test_a_recording_that_is_mostly_noise_leaves_smoothing_and_slew_limit():
+    found = tune_recorded_axis(shuttle(0.02, noise=400.0)[0], SETTINGS, RecordedAxisSettings(mass=5.0))
+    assert not found.identified['smoothing_velocity']
+    assert not found.identified['slew_limit']
+    assert found.feedforward.smoothing_velocity == SETTINGS.smoothing_velocity
+    assert found.feedforward.slew_limit == SETTINGS.slew_limit
+
+
+def test_the_next_lower_slew_limit_costs_more_than_a_twentieth_of_the_force():
+    made = recording()
+    twice = made._replace(
+        **{name: [e for e in getattr(made, name) for _ in range(2)] for name in ('estimates', 'motions')}
+    )
+    twice = twice._replace(force_sum=np.repeat(made.force_sum, 2))  # every stamp twice
+    for each in (made, twice):
+        limit = recorded_axis._slew(each, SETTINGS)
+        free = feedforward_force(dataclasses.replace(SETTINGS, slew_limit=1e9), each)
+        for index, enough in ((0, True), (-1, False)):
+            slew = preferred(nearest_preferred(limit) + index)
+            lost = feedforward_force(dataclasses.replace(SETTINGS, slew_limit=slew), each) - free
+            assert bool(np.mean(lost**2) <= 0.05**2 * np.mean(free**2)) is enough
+
+
+def test_a_reference_that_is_always_late_tells_no_slew_limit():
+    made = recording()
+    late = made._replace(motions=[motion._replace(reference_age=1.0) for motion in made.motions])
+    assert recorded_axis._slew(late, SETTINGS) is None
+
+
+def test_a_force_by_the_measured_velocity_does_not_follow_the_reference():
+    made = recording()
+    backwards = made._replace(motions=[m._replace(measured_velocity=-m.measured_velocity) for m in made.motions])
+    settings = dataclasses.replace(SETTINGS, use_measured_velocity=True, lead_time=0.0)
+    by_reference = dataclasses.replace(settings, use_measured_velocity=False)
+    assert np.abs(feedforward_force(settings, backwards)).max() > 30.0
+    np.testing.assert_array_equal(feedforward_force(settings, backwards), -feedforward_force(by_reference, made))
+
+
+def test_cases_are_friction_then_delay_and_a_late_force_leaves_more_friction():
+    """A whole delay of 20 ms that is a fifth longer or shorter shifts the force by 4 ms to one side or the other."""
+    known = RecordedAxisSettings(whole_delay=0.02, mass=5.0)
+    made = recording()
+    found = tune_recorded_axis(made, SETTINGS, known)
+    assert (found.law.mass, found.law.mass_is_fitted) == (5.0, False)
+    errors = [case[:2] for case in found.cases]
+    assert errors == [(f, d) for f in (-0.3, 0.0, 0.3) for d in (-0.2, 0.0, 0.2)]
+    for friction, lateness, outcome in found.cases:
+        force = feedforward_force(found.feedforward, made, friction)
+        acting = np.interp(TIME - 0.02 - 0.02 * lateness, TIME, force, left=0.0)
+        left = (found.law.friction - acting)[found.law.sliding]
+        assert outcome.sliding == pytest.approx(math.sqrt(np.mean(left**2)))
+    early, nominal, late = (case.outcome.sliding for case in found.cases[3:6])
+    assert early < nominal < late  # the force never leads the reference through a reversal
+    assert found.nominal.sliding == nominal
+    np.testing.assert_allclose(found.force[10:], feedforward_force(found.feedforward, made)[:-10], atol=1e-9)
+    assert not found.force[:10].any()
+    fast = np.abs(made.velocity) > 0.02
+    assert (np.sign(found.force) == np.sign(made.velocity))[fast][20:].all()  # led by the delay, it acts in time

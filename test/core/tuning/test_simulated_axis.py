@@ -17,6 +17,7 @@ from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_frict
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.servo.closed_loop import (
     Axis,
+    AxisRun,
     Performance,
     StoppedWave,
     dwell,
@@ -224,7 +225,11 @@ def test_the_result_keeps_the_overshoot_and_does_not_limit_cycle():
 def test_a_search_in_which_every_point_is_rejected_ends(monkeypatch):
     monkeypatch.setattr(simulated_axis, 'merit', lambda *_: math.inf)
     monkeypatch.setattr(simulated_axis, 'MOST_CANDIDATES', 2)
-    assert tune(QUICK).merit == math.inf
+    counted = []
+    result = tune(QUICK, counted.append)
+    assert result.merit == math.inf
+    assert counted == [1, 1]
+    assert result.candidates == 2
 
 
 def test_the_search_starts_from_none_and_from_a_third_to_more_than_all_of_the_friction_up_to_twice_the_delay_ahead():
@@ -395,3 +400,57 @@ def test_force_limit_of_the_search_is_above_the_force_that_it_found():
     assert found().feedforward.force_limit == force_limit(found().largest_friction)
     assert 38.0 < found().largest_friction < 50.0
     assert found().nominal.largest_force < found().feedforward.force_limit
+
+
+def test_the_compass_halves_its_stride_down_to_one_step():
+    strides = simulated_axis.STRIDES
+    assert all(stride == 2 * shorter for stride, shorter in itertools.pairwise(strides))
+    assert strides[-1] == 1
+
+
+def test_the_largest_friction_is_found_without_and_with_all_of_the_friction_compensated(monkeypatch):
+    """Largest friction of six motions, whatever its direction; no limit hides it from the force."""
+    asked = []
+
+    def runs(_, settings):
+        asked.append(settings)
+        forces = ([3.0, -50.0], [20.0, 5.0], [1.0]) if settings.scale == 0.0 else ([-7.0], [40.0, 2.0], [0.0])
+        return tuple(AxisRun(*(np.array(values),) * 6) for values in forces)
+
+    monkeypatch.setattr(TuningProblem, 'runs', runs)
+    assert simulated_axis._largest_friction(DEFAULT) == 50.0
+    assert [(settings.scale, settings.force_limit) for settings in asked] == [(0.0, 150.0), (1.0, 1e6)]
+
+
+def test_a_candidate_that_cannot_be_the_best_is_not_tried_in_every_case(monkeypatch):
+    """More cases cannot lower J: a point is known to be worse from the first one that is 5 % above the best so far."""
+    cases = []
+
+    def case(self, feedforward, friction_error, delay_error, hold_time):
+        cases.append((round(feedforward.scale, 2), friction_error, delay_error, hold_time, feedforward.force_limit))
+        return RobustnessCase(friction_error, delay_error, None)
+
+    def merit(problem, without, outcomes):
+        scale = cases[-1][0]
+        return abs(scale - 0.6) + 0.5 + (0.02 if len(outcomes) > 1 else 0.0)
+
+    outcome = Performance(1.0, 1.0, 1.0, 0.0, 0, 0.0, 0.0)
+    monkeypatch.setattr(TuningProblem, 'case', case)
+    monkeypatch.setattr(TuningProblem, 'without', lambda _: outcome)
+    monkeypatch.setattr(simulated_axis, 'merit', merit)
+    monkeypatch.setattr(simulated_axis, '_largest_friction', lambda _: 50.0)
+    counted = []
+    result = tune(DEFAULT, counted.append)
+    assert result.feedforward.scale == 0.6
+    assert result.merit == pytest.approx(0.52)
+    assert result.candidates == sum(counted) == len(counted)
+    assert result.largest_friction == 50.0
+    assert {c[4] for c in cases} == {75.0}  # half as large again
+    last = cases[-9:]
+    assert [c[1:3] for c in last] == list(itertools.product((-0.3, 0.0, 0.3), (-0.2, 0.0, 0.2)))
+    assert {c[3] for c in last} == {DEFAULT.settings.hold_time}
+    assert {c[3] for c in cases[:-9]} == {0.2}
+    tried = [c[0] for c in cases[:-9]]
+    assert tried.count(0.0) == 9  # the first is compared with nothing
+    assert tried.count(0.3) == 3 * 9  # 0.82 is better than 1.12
+    assert tried.count(1.2) == 3  # 1.1 is worse than 0.52 with the first case
