@@ -203,8 +203,8 @@ def air_gains(
         f = p_1 \psi(p_2 / p_1) / p_0
 
     with absolute pressures, supply to chamber a and chamber b to exhaust while the rod ``extends``, and the other way
-    round. A tenth of the supply pressure is the least f p_0, so that a full chamber does not ask for an infinite
-    opening (our choice).
+    round. A tenth of the supply pressure is the least f p_0, so that a chamber that is full, or fuller than its source
+    (psi < 0), does not ask for an infinite opening (our choice).
 
     Args:
         valve: The valve.
@@ -220,15 +220,9 @@ def air_gains(
     volume_a = cylinder.mid_volume_a + cylinder.area_a * position
     volume_b = cylinder.mid_volume_b - cylinder.area_b * position
     if extends:
-        flow_a, flow_b = (
-            supply * flow_function(valve, min(a / supply, 1.0)),
-            b * flow_function(valve, min(AMBIENT / b, 1.0)),
-        )
+        flow_a, flow_b = supply * flow_function(valve, a / supply), b * flow_function(valve, AMBIENT / b)
     else:
-        flow_a, flow_b = (
-            a * flow_function(valve, min(AMBIENT / a, 1.0)),
-            supply * flow_function(valve, min(b / supply, 1.0)),
-        )
+        flow_a, flow_b = a * flow_function(valve, AMBIENT / a), supply * flow_function(valve, b / supply)
     by_opening = max(flow_a, least) / volume_a + ratio * max(flow_b, least) / volume_b
     by_motion = a * cylinder.area_a / volume_a + ratio * b * cylinder.area_b / volume_b
     conductance = ADIABATIC_INDEX * REFERENCE_PRESSURE * valve.sonic_conductance

@@ -198,10 +198,11 @@ def air_pressures_at_rest(valve: PneumaticValve, cylinder: Cylinder) -> tuple[fl
 def air_chamber_rate(valve: PneumaticValve, cylinder: Cylinder) -> float:
     """Largest rate of a chamber [1/s], at its stop: slope of one open land near equal pressures, and heat.
 
-    The heat is that of the least air, at ambient pressure.
+    The heat is that of the least air, at ambient pressure. Choked leakage has a smaller slope, 1, than any land near
+    equal pressures: 4 and more within the bounds of the parameters.
     """
     ratio = valve.laminar_ratio
     slope = flow_function(for_compiler(valve), ratio) / (1.0 - ratio)
-    flow = (valve.sonic_conductance + 2.0 * valve.null_conductance) * REFERENCE_PRESSURE * max(slope, 1.0)
+    flow = (valve.sonic_conductance + 2.0 * valve.null_conductance) * REFERENCE_PRESSURE * slope
     heat = valve.heat_conductance * (ADIABATIC_INDEX - 1.0) * valve.temperature / AMBIENT
     return (ADIABATIC_INDEX * flow + ADIABATIC_INDEX * heat) / cylinder.dead_volume

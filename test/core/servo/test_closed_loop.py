@@ -7,21 +7,30 @@ import numpy as np
 import pytest
 from paths import ROOT
 
+from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
+from seal_friction_ros.core.friction.force_sum_correction import ForceSumCorrection
+from seal_friction_ros.core.servo import closed_loop
 from seal_friction_ros.core.servo.closed_loop import (
     EVALUATED_PERIODS,
     SETTLING_PERIODS,
     Axis,
     AxisRun,
+    AxisSensors,
     EvaluationMotions,
     Performance,
     StoppedWave,
     performance_of,
     run_closed_loop,
+    with_wrong_friction,
     without_feedforward,
 )
-from seal_friction_ros.core.servo.motions import RoundedWave, Setpoint, Sine, Trapezoid
-from seal_friction_ros.core.servo.position_servo import ServoParameters
+from seal_friction_ros.core.servo.controller import Measurement
+from seal_friction_ros.core.servo.cylinder import pressure_force
+from seal_friction_ros.core.servo.motions import RoundedWave, Setpoint, Sine, Step, Trapezoid
+from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step, step_measured
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.tracking import reversals, tracking_rms
 from seal_friction_ros.files import default_configuration, read_yaml
@@ -170,3 +179,129 @@ def test_the_evaluated_part_is_whole_periods_of_the_sine():
     part = EvaluationMotions(Sine(1e-3, 2.0), 1.0).evaluated_part(AxisRun(*(time,) * len(AxisRun._fields)))
     assert len(part.time) == round(EVALUATED_PERIODS / 2.0 / PERIOD)
     assert part.time[0] == pytest.approx(SETTLING_PERIODS / 2.0 + PERIOD)
+
+
+# --- messages, sensors and delay of the loop ---
+
+NOISE = np.array([[1e3, 2e3, 0.5, 1e-3], [-1e3, 3e3, -0.25, 0.0], [0.0, 0.0, 0.0, -2e-3]])  # [Pa], [Pa], [N], [m/s]
+
+
+@pytest.fixture
+def sent(monkeypatch):
+    """Messages to the estimator, which answers the velocity of sample i = 0, 1, ... with a force of 10 (i + 1) N."""
+    messages = []
+
+    def receive(_parameters, state, message, stamp, emit):
+        assert message.stamp == stamp
+        messages.append(message)
+        if isinstance(message, Velocity):
+            emit(FeedForward(stamp, 10.0 * (stamp // 1_000_000 + 1), 1.0, 0), b'')
+        else:
+            emit(message, b'')  # another output of the estimator
+        return state
+
+    monkeypatch.setattr(pipeline, 'receive', receive)
+    return messages
+
+
+def of_type(kind, messages):
+    return [message for message in messages if isinstance(message, kind)]
+
+
+@pytest.mark.parametrize(
+    ('delay', 'forces'),
+    [
+        (0.0, [10.0, 20.0, 30.0, 40.0, 50.0]),
+        (1e-3, [0.0, 10.0, 20.0, 30.0, 40.0]),
+        (1.25e-3, [0.0, 7.5, 17.5, 27.5, 37.5]),
+        (3e-3, [0.0, 0.0, 0.0, 10.0, 20.0]),
+    ],
+)
+def test_the_force_is_in_the_controller_after_its_delay_and_between_samples_in_proportion(sent, delay, forces):
+    run = run_closed_loop(Axis(SERVO, PIPELINE), Sine(), 5, delay)
+    assert run.feedforward == pytest.approx(forces, abs=1e-6)
+    state, reference = init(SERVO), []
+    for i, force in enumerate(forces):
+        state, out = step(SERVO, state, Sine().at(i * PERIOD), force)
+        reference.append(out.position)
+    assert run.position == pytest.approx(reference, rel=1e-6)
+    assert len(sent) == 5 * 4
+
+
+def test_the_estimator_has_every_signal_of_a_sample_with_its_noise_and_the_controller_has_none(sent):
+    still = Step(size=0.0, offset=0.002)
+    run = run_closed_loop(Axis(SERVO, PIPELINE), still, 5, 0.1, NOISE)
+    assert not run.velocity.any()
+    np.testing.assert_array_equal(run.position, 0.002)
+    out = outputs(SERVO, init(SERVO, 0.002).plant)
+    errors = [NOISE[i % 3] for i in range(5)]  # three rows, repeated
+    for i, (pressure, force, reference, velocity) in enumerate(zip(*[iter(sent)] * 4, strict=True)):
+        a, b, f, v = errors[i]
+        assert pressure == pytest.approx((i * 1_000_000, out.pressure_a + a, out.pressure_b + b), rel=1e-9)
+        assert force == pytest.approx((i * 1_000_000, out.force_sum + f), abs=1e-6)
+        assert reference == ServoReference(i * 1_000_000, 0.002, 0.0, 0.0)
+        assert velocity == Velocity(i * 1_000_000, v)
+    assert list(run.time) == pytest.approx([1e-3, 2e-3, 3e-3, 4e-3, 5e-3])
+    np.testing.assert_array_equal(run.reference, 0.002)
+
+
+def test_noise_beyond_the_last_sample_is_not_used(sent):
+    run_closed_loop(Axis(SERVO, PIPELINE), Step(), 2, 0.0, NOISE)
+    assert [velocity.velocity for velocity in of_type(Velocity, sent)] == [1e-3, 0.0]
+
+
+def test_a_machine_that_measures_too_little_sends_the_force_sum_without_what_is_lacking(sent):
+    lacking = ForceSumCorrection(area_a=1e-5, area_b=-2e-5, offset=3.0)
+    seals = tuple(replace(m, seal=replace(m.seal, force_sum_correction=lacking)) for m in PIPELINE.estimator.seals)
+    estimator = replace(PIPELINE.estimator, seals=seals)
+    run_closed_loop(Axis(SERVO, PIPELINE._replace(estimator=estimator)), Step(size=0.0), 1, 0.0)
+    out = outputs(SERVO, init(SERVO).plant)
+    expected = out.force_sum - 1e-5 * out.pressure_a + 2e-5 * out.pressure_b - 3.0
+    assert of_type(Force, sent)[0].force == pytest.approx(expected)
+
+
+def test_without_a_force_sensor_the_force_sum_is_that_of_the_measured_pressures(sent):
+    axis = Axis(SERVO, PIPELINE, AxisSensors(force_sensor=False))
+    run_closed_loop(axis, Step(size=0.0), 3, 0.0, NOISE)
+    for pressure, force in zip(of_type(Pressure, sent), of_type(Force, sent), strict=True):
+        pushed = pressure_force(SERVO.cylinder, pressure.chamber_a, pressure.chamber_b)
+        assert force.force == pytest.approx(pushed, rel=1e-12)
+        assert force.force != 0.0
+
+
+def test_an_encoder_counts_its_steps_and_its_velocity_is_their_difference_over_ten_samples(sent):
+    count = 5e-6  # [m]
+    wave, noise = Sine(1e-3, 5.0), np.array([[1e3, 2e3, 0.5, 9.0]])  # the noise of a velocity sensor is not there
+    run = run_closed_loop(Axis(SERVO, PIPELINE, AxisSensors(encoder_step=count)), wave, 40, 0.0, noise)
+    state = init(SERVO)
+    out = outputs(SERVO, state.plant)
+    counts = []
+    for i, velocity in enumerate(of_type(Velocity, sent)):
+        counts.append(count * round(out.position / count))
+        ten = counts[-11:]
+        expected = (ten[-1] - ten[0]) / (PERIOD * (len(ten) - 1)) if i else 0.0
+        assert velocity.velocity == pytest.approx(expected, abs=1e-12)
+        measured = Measurement(counts[-1], expected, out.pressure_a + 1e3, out.pressure_b + 2e3)
+        state, out = step_measured(SERVO, state, measured, wave.at(i * PERIOD), 10.0 * (i + 1))
+        assert (run.position[i], run.velocity[i]) == pytest.approx((out.position, out.velocity), rel=1e-6, abs=1e-12)
+        assert run.friction_force[i] == pytest.approx(out.friction_force, rel=1e-6)
+    assert len(set(counts)) > 5
+    assert AxisSensors() == (True, 0.0)
+
+
+def test_a_wrong_model_scales_the_friction_of_every_seal():
+    half = with_wrong_friction(with_wrong_friction(PIPELINE, -0.5), 0.2)
+    assert [m.friction_scale for m in half.estimator.seals] == pytest.approx([0.6] * len(PIPELINE.estimator.seals))
+    assert half.feedforward == PIPELINE.feedforward
+    assert without_feedforward(PIPELINE.feedforward).scale == 0.0
+
+
+def test_evaluation_is_a_sine_a_move_and_a_step_each_with_a_tenth_of_a_second_and_the_hold(monkeypatch):
+    asked = []
+    monkeypatch.setattr(closed_loop, 'run_closed_loop', lambda *arguments: asked.append(arguments) or len(asked))
+    axis = Axis(SERVO, PIPELINE)
+    assert MOTIONS.runs(axis, 0.003, NOISE) == (1, 2, 3)
+    waves, samples = [a[1] for a in asked], [a[2] for a in asked]
+    assert waves == [StoppedWave(MOTIONS.sine, 3.375), MOTIONS.move, Step(0.01, 0.02, 0.05)]
+    assert samples == [3375 + 600, 1000 + 600, 20 + 600]  # at 1 kHz
+    assert {(a[0], a[3], id(a[4])) for a in asked} == {(axis, 0.003, id(NOISE))}

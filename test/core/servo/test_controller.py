@@ -17,6 +17,7 @@ from seal_friction_ros.core.servo.controller import (
     gains,
     limit_reference,
     oil_opening,
+    spectral_radius,
     transition_matrix,
 )
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
@@ -192,6 +193,19 @@ def test_a_full_chamber_of_air_counts_as_a_tenth_of_the_supply():
     assert found == pytest.approx(wanted / (1.4 * 1e5 * AIR.sonic_conductance * by_volume), rel=1e-3)
 
 
+@pytest.mark.parametrize(('force', 'pressures'), [(1000.0, (8e5, -0.5 * AMBIENT)), (-1000.0, (-0.5 * AMBIENT, 8e5))])
+def test_a_chamber_fuller_than_its_source_counts_as_a_tenth_of_the_supply_too(force, pressures):
+    """Whether the rod extends or retracts: no air comes from the supply, none goes to the exhaust."""
+    c = compiled(AIR, AIR_CYLINDER, load=Load(mass=3.0))
+    found = air_opening(c.valve, c.cylinder, 20.0, Measurement(0.0, 0.0, *pressures), 20.0 * force, 0.0)
+    load_pressure = pressures[0] - AIR_CYLINDER.area_ratio * pressures[1]
+    wanted = 20.0 * (20.0 * force / AIR_CYLINDER.area_a - load_pressure)
+    least = 0.1 * (6e5 + AMBIENT)
+    by_volume = least / AIR_CYLINDER.mid_volume_a + AIR_CYLINDER.area_ratio * least / AIR_CYLINDER.mid_volume_b
+    assert wanted * force > 0.0
+    assert found == pytest.approx(wanted / (1.4 * 1e5 * AIR.sonic_conductance * by_volume))
+
+
 # --- linear model ---
 
 OIL_AXIS = {
@@ -237,3 +251,29 @@ def test_small_motions_of_the_servo_are_those_of_its_transition_matrix(parts, he
 def test_air_at_rest_is_symmetric_in_a_balanced_cylinder():
     a, b = air_pressures_at_rest(AIR, AIR_AXIS['cylinder'])
     assert a == b
+
+
+def test_without_an_integrator_its_state_is_no_part_of_the_loop():
+    servo = ServoParameters(seals=())
+    matrix = transition_matrix(servo.gains, servo.constants)
+    assert not matrix[5].any()
+    with_integrator = transition_matrix(SERVO.gains, SERVO.constants)[5]
+    assert with_integrator == pytest.approx([-1e6 * 5e-4, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+def test_a_force_loop_that_swings_against_a_held_rod_is_unstable_though_the_free_rod_is_not_judged_alone():
+    """Discrete first-order lag with gain omega_F T: a fast spool holds up to 2 / T, with a delay of T / 2 less."""
+    fast = ServoValve(natural_frequency=2e4, damping_ratio=0.7)
+    soft = ServoController(position_gain=0.0, velocity_gain=0.0, velocity_compensation=1.0, force_bandwidth=1.0)
+    radii = {}
+    for bandwidth in (1.0, 1000.0, 8000.0):
+        servo = ServoParameters(valve=fast, seals=(), controller=soft, control_period=5e-4, inner_step=5e-5)
+        g = gains(dataclasses.replace(soft, force_bandwidth=bandwidth), servo.constants, 5e-4)
+        held = transition_matrix(g, servo.constants, held=True)
+        assert not held[0, 1:5].any()
+        assert not held[1, 2:5].any()
+        force_loop = np.abs(np.linalg.eigvals(held[2:5, 2:5])).max()
+        free = np.abs(np.linalg.eigvals(transition_matrix(g, servo.constants))).max()
+        radii[bandwidth] = spectral_radius(g, servo.constants), force_loop, free
+        assert radii[bandwidth][0] == pytest.approx(max(force_loop, free))
+    assert radii[1000.0][1] < 1.0 < radii[8000.0][1]

@@ -1,5 +1,6 @@
 """Servo with elastic seals: energy balance, limits, a rod that is held by its springs."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -9,16 +10,21 @@ from paths import ROOT
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.presliding import Presliding, Slide
 from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.servo.controller import ServoController
+from seal_friction_ros.core.servo.cylinder import Cylinder
 from seal_friction_ros.core.servo.elastic_plant import (
     NO_SHEAR,
     ElasticSeals,
     elastic_seals,
+    elastic_step,
     energy_of_seals,
+    for_elastic_step,
     seals_of_plant,
     sheared,
 )
+from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.motions import Setpoint, Sine
-from seal_friction_ros.core.servo.plant import stored_energy
+from seal_friction_ros.core.servo.plant import Load, stored_energy
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, simulate, step
 from seal_friction_ros.files import read_yaml
 
@@ -27,6 +33,7 @@ SEAL = parse_seal(DOCUMENT)
 SEALS = (MountedSeal(SEAL, 'a'), MountedSeal(SEAL, 'b'))
 WAVE = Sine(amplitude=1e-3, frequency=5.0)
 SOFT = Presliding(stiffness=1e5)
+GENTLE = ServoController(position_gain=1e3, velocity_gain=0.0, force_bandwidth=50.0)
 PLANTS = {
     'elements': ElasticSeals(SOFT),
     'two seals unlike each other': ElasticSeals(Presliding(stiffness=1.5e5, yield_exponent=3.0), SOFT, 0.6),
@@ -145,3 +152,88 @@ def test_refusals_name_the_remedy():
     servo = ServoParameters(seals=SEALS, elastic=ElasticSeals(SOFT))
     with pytest.raises(ValueError, match='use step'):
         advance(servo, init(servo).plant, 0.0)
+
+
+def test_the_longest_inner_step_of_elastic_seals_is_that_of_the_mass_on_them():
+    """0.625 kg on 1e9 N/m swing at 4e4 rad/s, with a bristle damping of 12500 N s/m the rate is 6e4 1/s."""
+    stiff = ElasticSeals(replace(SOFT, stiffness=1e9))
+    for elastic, rate in ((stiff, 4e4), (replace(stiff, bristle_damping=12500.0), 6e4)):
+        for share, taken in ((0.99, True), (1.01, False)):
+            time = share * 2.5 / rate
+            parts = {'elastic': elastic, 'inner_step': time, 'control_period': 8.0 * time}
+            with nullcontext() if taken else pytest.raises(ValueError, match='for the mass on its elastic seals'):
+                ServoParameters(seals=SEALS, load=Load(mass=0.625), controller=GENTLE, **parts)
+
+
+def test_a_mass_on_elastic_seals_swings_as_on_a_spring():
+    """Far below yielding: omega^2 = K / m, with chambers as one; 4e5 N/m under 10 kg swing at 200 rad/s."""
+    spring = Presliding(stiffness=4e5, yield_exponent=0.0)
+    servo = ServoParameters(
+        valve=ServoValve(null_leakage=0.0, rated_flow=1e-8),
+        cylinder=Cylinder(internal_leakage=1e-8, stroke=0.2, dead_volume=1e-2),
+        load=Load(mass=10.0, viscous_damping=0.0),
+        seals=SEALS,
+        elastic=ElasticSeals(spring),
+    )
+    state, positions = init(servo), []
+    state = state._replace(plant=state.plant._replace(velocity=1e-4))  # amplitude 0.5 um, 0.2 N
+    for _ in range(400):
+        plant, seals = state.plant, state.seals
+        for _ in range(5):
+            plant, seals = elastic_step(
+                servo.constants, for_elastic_step(servo.elastic, servo.constants), plant, seals, 0.0, 0.0, 1e-4
+            )
+        state = state._replace(plant=plant, seals=seals)
+        positions.append(plant.position)
+    time = 5e-4 * np.arange(1, 401)
+    np.testing.assert_allclose(positions, 5e-7 * np.sin(200.0 * time), atol=2e-8)
+
+
+def test_a_rod_on_elastic_seals_counts_its_starts_and_its_stops():
+    servo = ServoParameters(seals=SEALS, elastic=ElasticSeals(SOFT))
+    still = init(servo)
+    for _ in range(3):
+        still, out = step(servo, still, Setpoint(0.0))
+    assert (still.plant.direction, still.plant.transitions, still.plant.velocity) == (0, 0, 0.0)
+    for side in (1, -1):
+        limit = side * servo.cylinder.limit
+        state = init(servo, limit - side * 1e-3)
+        seen = []
+        for _ in range(30):
+            state, out = step(servo, state, Setpoint(limit), side * 2000.0, side * 500.0)
+            seen.append((state.plant.direction, state.plant.transitions))
+            assert state.plant.direction == np.sign(state.plant.velocity)
+        assert seen[0] == (side, 1)
+        assert (0, 2) in seen
+        assert state.plant.position == limit
+
+
+def test_a_spool_that_overshoots_ends_at_full_opening_with_elastic_seals_too():
+    valve = ServoValve(damping_ratio=0.2)
+    servo = ServoParameters(valve=valve, controller=GENTLE, seals=SEALS, elastic=ElasticSeals(SOFT))
+    seal_less = for_elastic_step(servo.elastic, servo.constants)
+    for side in (1.0, -1.0):
+        plant, seals, spool = init(servo).plant, NO_SHEAR, []
+        for _ in range(60):
+            plant, seals = elastic_step(servo.constants, seal_less, plant, seals, side, 0.0, 1e-4)
+            spool.append(side * plant.spool)
+            assert plant.spool_rate == 0.0 or spool[-1] < 1.0
+        assert max(spool) == 1.0
+        assert spool[-1] > 0.9
+
+
+def test_halving_the_step_of_elastic_seals_reduces_the_error_to_a_sixteenth():
+    """Runge-Kutta of fourth order where the law is smooth: below yielding, with a spool that moves."""
+    spring = Presliding(stiffness=2e6, yield_exponent=0.0)
+    servo = ServoParameters(seals=SEALS, elastic=ElasticSeals(spring), load=Load(spring_stiffness=2e4))
+    seal_less = for_elastic_step(servo.elastic, servo.constants)
+    ends = []
+    for steps in (20, 40, 80, 640):
+        plant, seals = init(servo).plant, NO_SHEAR
+        for _ in range(steps):
+            plant, seals = elastic_step(servo.constants, seal_less, plant, seals, 1e-3, 5.0, 4e-3 / steps)
+        ends.append(np.array(plant[:8]) / [1e-6, 1e-3, 1e6, 1e6, 1e-3, 1.0, 1e-3, 1e-3])
+    errors = [np.abs(end - ends[-1]).max() for end in ends[:3]]
+    assert errors[0] > 1e-9
+    assert errors[1] < errors[0] / 12.0
+    assert errors[2] < errors[1] / 12.0

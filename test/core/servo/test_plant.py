@@ -15,6 +15,8 @@ from scipy.integrate import solve_ivp
 
 from seal_friction_ros.core.foundation.units import PSI
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
@@ -395,3 +397,93 @@ def test_one_seal_with_viscous_friction_makes_the_friction_steep():
     assert steepest_friction(SEALS, 20e6) == 0.0
     mixed = (MountedSeal(rigid, 'a'), MountedSeal(viscous, 'b'))
     assert steepest_friction(mixed, 20e6) == pytest.approx(500.0, rel=1e-6)
+
+
+CALM = {
+    'valve': ServoValve(null_leakage=0.0, rated_flow=1e-8),
+    'cylinder': Cylinder(internal_leakage=1e-8, stroke=0.2, dead_volume=1e-2),  # both chambers at one pressure
+    'load': Load(mass=5.0, viscous_damping=500.0),
+}
+
+
+@pytest.mark.parametrize('side', [1, -1])
+def test_a_rod_that_slows_down_for_ever_is_at_rest_below_a_nanometre_per_second(side):
+    """A force of 10 N against friction of 10 N: v falls by e every 10 ms, from 3 nm/s it is at rest after 11 ms."""
+    seal = dataclasses.replace(SEAL, coulomb_law=ConstantCoulomb(10.0), stiction=1.0)
+    servo = ServoParameters(**CALM, seals=(MountedSeal(seal, 'a'),))
+    state, speeds = plant(servo, velocity=side * 3e-9, direction=side), []
+    for _ in range(40):
+        state = advance(servo, state, 0.0, side * 10.0)
+        speeds.append(side * state.velocity)
+    moving = [speed for speed in speeds if speed]
+    assert 20 <= len(moving) <= 22  # half milliseconds
+    assert min(moving) < 1.1e-9
+    assert (speeds[-1], state.direction, state.transitions) == (0.0, 0, 1)
+
+
+@pytest.mark.parametrize('side', [1, -1])
+def test_a_rod_without_seals_starts_with_the_smallest_force(side):
+    servo = ServoParameters(**CALM, seals=())
+    state = plant(servo)
+    for i in range(1, 6):
+        state = advance(servo, state, 0.0, side * 1e-6)
+        elapsed = i * servo.control_period
+        speed = 1e-6 / 500.0 * (1.0 - math.exp(-100.0 * elapsed))  # below 1 nm/s: it accelerates
+        assert side * state.velocity == pytest.approx(speed, rel=2e-2)
+    assert speed < 1e-9
+    assert (state.direction, state.transitions) == (side, 1)
+
+
+def test_a_servo_starts_at_rest_with_nothing_done_and_its_valve_closed():
+    """Half the sum of 1000 psi and 1 bar in both chambers of a balanced cylinder, oil at 20 degrees Celsius."""
+    state = init(SERVO, -SERVO.cylinder.limit)
+    middle = 0.5 * (1000.0 * PSI + 1e5)
+    assert state.plant == pytest.approx((-0.025, 0.0, middle, middle, 0.0, 0.0, 0.0, 0.0, 293.15, 293.15, 0, 0))
+    assert state.controller == (-0.025, 0.0)
+    out = outputs(SERVO, init(SERVO).plant)
+    assert (out.command.spool, out.command.force, out.command.limited) == (0.0, 0.0, 0)
+    assert (out.position, out.velocity, out.spool, out.direction) == (0.0, 0.0, 0.0, 0)
+
+
+def test_a_spool_command_beyond_full_opening_is_full_opening():
+    start = plant(SERVO)
+    for command in (1.0, -1.0):
+        full = advance(SERVO, start, command)
+        assert advance(SERVO, start, 7.0 * command) == full
+        assert advance(SERVO, start, 0.9 * command) != full
+        assert full.spool * command > 0.1
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_a_rod_at_a_stop_is_carried_by_it_while_it_presses_and_not_while_it_is_drawn_away(side):
+    state = plant(SERVO, position=side * SERVO.cylinder.limit)
+    assert outputs(SERVO, state, load_force=side * 30.0).force_sum == 0.0
+    assert outputs(SERVO, state, load_force=-side * 30.0).force_sum == pytest.approx(-side * 30.0)
+    inside = state._replace(position=side * 0.999 * SERVO.cylinder.limit)
+    assert outputs(SERVO, inside, load_force=side * 30.0).force_sum == pytest.approx(side * 30.0)
+    leaving = state._replace(velocity=side * 0.1, direction=int(side))  # a moving rod is not carried
+    assert outputs(SERVO, leaving, load_force=side * 30.0).force_sum == pytest.approx(side * 28.0)  # 20 N s/m
+
+
+def test_the_kinetic_energy_is_lost_at_a_stop():
+    """5 kg at 0.2 m/s: 0.1 J, in one inner step, before anything else takes energy."""
+    limit = SERVO.cylinder.limit
+    state = plant(SERVO, position=limit - 1e-9, velocity=0.2, direction=1)
+    new = inner_step(SERVO.constants, state, 0.0, 0.0, 1e-6)
+    assert (new.position, new.velocity, new.direction, new.transitions) == (limit, 0.0, 0, 1)
+    assert new.energy_dissipated == pytest.approx(0.5 * 5.0 * 0.2**2, rel=1e-3)
+
+
+def test_a_seal_that_sees_the_pressure_difference_is_steepest_with_one_chamber_empty():
+    """The rise over speed is in proportion to the pressure: four times as large at 20 MPa as at 5 MPa."""
+    law = FrictionMap(speeds=(1e-3, 1.0), pressures=(0.0, 2e7), frictions=(1.0, 1.0, 1.0, 301.0), reference_speed=0.02)
+    seal = dataclasses.replace(SEALS[0].seal, coulomb_law=law)
+    steepest = {
+        (sees, pressure): steepest_friction((MountedSeal(seal, sees),), pressure)
+        for sees in ('a', 'b', 'difference')
+        for pressure in (5e6, 2e7)
+    }
+    for sees in ('a', 'b', 'difference'):
+        assert steepest[sees, 2e7] == pytest.approx(4.0 * steepest[sees, 5e6], rel=1e-6)
+        assert steepest[sees, 2e7] == pytest.approx(steepest['a', 2e7], rel=1e-6)
+    assert steepest['a', 2e7] > 300.0  # [N s/m] over the whole range of speeds it is 300 N in 1 m/s

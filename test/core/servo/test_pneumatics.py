@@ -16,6 +16,7 @@ from seal_friction_ros.core.servo.plant import Load, fastest_rate, inner_step, s
 from seal_friction_ros.core.servo.pneumatics import (
     GAS_CONSTANT,
     PneumaticValve,
+    air_chamber_rate,
     air_pressures_at_rest,
     chamber_rates,
     iso6358_flow,
@@ -312,3 +313,28 @@ def test_air_brings_the_enthalpy_of_where_it_comes_from(pressure):
     source = valve.temperature if pressure < 0.0 else hot
     assert power == pytest.approx(1.4 / 0.4 * GAS_CONSTANT * flow_in * source, rel=1e-9)
     assert rate * pressure < 0.0
+
+
+def test_rate_of_a_chamber_is_the_slope_of_its_pressure_near_that_of_the_supply():
+    """One open land, at the stop; the standard atmosphere of ISO 8778 and R T_0 rho_0 differ by 0.05 %."""
+    valve, supply, volume = axis(valve=TIGHT).constants.valve, 6e5, CYLINDER.dead_volume
+    rates = [chamber_rates(valve, 1.0, 0.0, supply - below, 293.15, volume, 0.0)[0] for below in (100.0, 200.0)]
+    assert air_chamber_rate(TIGHT, CYLINDER) == pytest.approx((rates[1] - rates[0]) / 100.0, rel=1e-3)
+
+
+def test_leakage_of_both_closed_lands_and_heat_add_their_rates():
+    rate, volume = air_chamber_rate(TIGHT, CYLINDER), CYLINDER.dead_volume
+    leaking = dataclasses.replace(TIGHT, null_conductance=0.5 * TIGHT.sonic_conductance)
+    assert air_chamber_rate(leaking, CYLINDER) == pytest.approx(2.0 * rate)
+    warm = dataclasses.replace(TIGHT, heat_conductance=3.0)
+    # 3 W/K over the heat capacity at constant pressure of the least air, p V / (R T) c_v, times gamma
+    capacity = AMBIENT * volume / (GAS_CONSTANT * 293.15) * GAS_CONSTANT / 0.4
+    assert air_chamber_rate(warm, CYLINDER) - rate == pytest.approx(1.4 * 3.0 / capacity, rel=1e-6)
+
+
+def test_fastest_rate_of_air_has_the_mass_on_air_at_supply_pressure_at_a_stop():
+    load = Load(mass=3.0, spring_stiffness=2e3, viscous_damping=12.0)
+    a, b, v = CYLINDER.area_a, CYLINDER.area_b, CYLINDER.dead_volume
+    stiffness = 1.4 * (6e5 + AMBIENT) * (a**2 / v + b**2 / (b * 0.2 + v)) + 2e3
+    expected = air_chamber_rate(AIR, CYLINDER) + math.sqrt(stiffness / 3.0) + 12.0 / 3.0
+    assert fastest_rate(AIR, CYLINDER, load)[0] == pytest.approx(expected)

@@ -61,3 +61,33 @@ def test_spool_cycles_run_and_the_9th_gives_the_friction(distance):
     assert sliding.sum() > 50
     np.testing.assert_allclose(friction[sliding], coulomb[sliding] * np.sign(velocity[sliding]))
     assert (velocity == 0.0).mean() > 0.4  # rest at both ends
+
+
+SHORT = PullTest(pressure_max=4e6, intervals=2, repetitions=2, rest_time=0.01, pull_time=0.02, carriage_speed=0.01)
+
+
+def test_every_pressure_of_the_plan_has_its_rig_with_both_lines_at_it():
+    for period, inner in ((1e-3, 2e-4), (1e-4, 1e-4), (7e-4, 7e-4 / 4)):  # near 0.2 ms, a part of the sample time
+        rig = pull_rig(SHORT, SEALS, period)
+        assert [servo.valve.supply_pressure for servo in rig.servos] == [0.0, 2e6, 4e6]
+        for servo in rig.servos:
+            assert servo.valve.return_pressure == servo.valve.supply_pressure
+            assert servo.inner_step == pytest.approx(inner)
+            assert servo.control_period == period
+
+
+def test_a_new_test_begins_at_rest_with_its_pressure_where_the_rod_was_left():
+    rig = pull_rig(SHORT, SEALS, 1e-3)
+    state = init_pull_rig(rig)
+    assert (state.test, state.plant.charge_a, state.plant.charge_b) == (0, 0.0, 0.0)
+    moved = state._replace(plant=state.plant._replace(position=0.0005, velocity=0.01, direction=1))
+    same, _ = step_pull_rig(rig, moved, 0.005)
+    assert same.test == 0
+    assert same.plant.velocity != 0.0
+    for test, pressure in ((1, 2e6), (2, 4e6), (3, 0.0), (4, 2e6), (5, 4e6)):  # the plan, twice
+        new, out = step_pull_rig(rig, moved, 0.05 * test + 0.001)
+        assert new.test == test
+        assert (out.pressure_a, out.pressure_b) == pytest.approx((pressure, pressure), abs=1.0)
+        assert new.plant.position == 0.0005
+        assert out.velocity == 0.0
+        assert out.force_sum == pytest.approx(-5.0)  # the scale of 10 N/mm, relaxed at 0

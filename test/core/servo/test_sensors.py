@@ -82,3 +82,12 @@ def test_resolution_rounds_to_the_nearest_step():
 def test_invalid_settings_are_rejected():
     with pytest.raises(ValueError, match=r'SensorSettings\.drop_out = 1\.5 1 is above its upper bound'):
         SensorSettings(drop_out=1.5)
+
+
+def test_a_sample_has_the_random_numbers_of_its_place_in_a_block_of_64():
+    """A recording can be made again later: numpy's generator with seed and block, five normal numbers each."""
+    settings = SensorSettings(velocity_noise=1.0, position_noise=0.1, seed=7)
+    for index, block, place in ((0, 0, 0), (63, 0, 63), (64, 1, 0), (200, 3, 8)):
+        normal = np.random.default_rng([7, block]).standard_normal((64, 5))[place]
+        reading = read(settings, index, Readings((0.0, 0.0), 0.0, 0.0, 0.0))
+        assert (reading.velocity, reading.position) == (normal[2], 0.1 * normal[4])

@@ -9,7 +9,7 @@ import pytest
 
 from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.cylinder import Cylinder, pressure_force
-from seal_friction_ros.core.servo.hydraulics import ServoValve
+from seal_friction_ros.core.servo.hydraulics import ServoValve, oil_pressures_at_rest
 from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.plant import Load, inner_step, stored_energy
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs, simulate
@@ -156,3 +156,32 @@ def test_servo_holds_a_sine_with_both_areas_to_a_thousandth_of_the_amplitude():
     reference = np.array([wave.at((i + 1) * 1e-3).position for i in range(4000)])
     assert tracking_rms(reference[1000:], track.position[1000:]) < 1e-3 * 0.03
     assert not track.limited.any()
+
+
+def test_a_bore_is_wider_than_its_rod():
+    with pytest.raises(ValueError, match='not above rod_diameter'):
+        Cylinder(bore_diameter=0.02, rod_diameter=0.02)
+    assert Cylinder(bore_diameter=0.0201, rod_diameter=0.02).area_a == pytest.approx(
+        math.pi / 4 * 0.0201 * 2e-4, rel=0.01
+    )
+
+
+def test_supply_and_return_push_the_pressures_at_rest():
+    """Supply 14 MPa, return 2 MPa: 8 MPa in both chambers of a balanced cylinder; single rod by the areas."""
+    valve = dataclasses.replace(VALVE, return_pressure=2e6)
+    balanced = dataclasses.replace(CYLINDER, type='balanced')
+    assert oil_pressures_at_rest(valve, balanced) == pytest.approx((8e6, 8e6))
+    a, b = oil_pressures_at_rest(valve, CYLINDER)
+    alpha = CYLINDER.area_ratio
+    assert a * CYLINDER.area_a == pytest.approx(b * CYLINDER.area_b)
+    # The lands let 16 MPa - 2 p through their leakage, into chamber a as much as out of b per area.
+    assert alpha * (16e6 - 2.0 * a) == pytest.approx(2.0 * b - 16e6)
+
+
+def test_oil_keeps_its_temperature():
+    servo = single_rod()
+    state = init(servo).plant
+    for _ in range(20):
+        state = advance(servo, state, 0.2)
+    assert (state.temperature_a, state.temperature_b) == (293.15, 293.15)
+    assert state.velocity > 0.0
