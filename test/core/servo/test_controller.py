@@ -16,12 +16,13 @@ from seal_friction_ros.core.servo.controller import (
     control,
     gains,
     limit_reference,
+    oil_gains,
     oil_opening,
     spectral_radius,
     transition_matrix,
 )
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
-from seal_friction_ros.core.servo.hydraulics import ServoValve
+from seal_friction_ros.core.servo.hydraulics import ServoValve, oil_rates
 from seal_friction_ros.core.servo.motions import Setpoint
 from seal_friction_ros.core.servo.plant import Load
 from seal_friction_ros.core.servo.pneumatics import PneumaticValve, air_pressures_at_rest, chamber_rates
@@ -277,3 +278,34 @@ def test_a_force_loop_that_swings_against_a_held_rod_is_unstable_though_the_free
         radii[bandwidth] = spectral_radius(g, servo.constants), force_loop, free
         assert radii[bandwidth][0] == pytest.approx(max(force_loop, free))
     assert radii[1000.0][1] < 1.0 < radii[8000.0][1]
+
+
+@pytest.mark.parametrize('cylinder', [SINGLE_ROD, dataclasses.replace(SINGLE_ROD, type='balanced')])
+def test_the_linear_model_of_oil_is_that_of_the_flows(cylinder):
+    """Opening as `oil_opening` inverts it without load, motion and leakage as the chambers have them."""
+    leaking = dataclasses.replace(cylinder, internal_leakage=2e-13, external_leakage=5e-13)
+    valve = dataclasses.replace(VALVE, null_leakage=3e-13)
+    c = compiled(valve, leaking)
+    found, alpha = oil_gains(c.valve, c.cylinder), cylinder.area_ratio
+    b = 6e6
+    at_null = Measurement(0.0, 0.0, alpha * b, b)
+    spool = oil_opening(c.valve, c.cylinder, 200.0, at_null, 100.0, 0.0)
+    assert found.opening * spool == pytest.approx(200.0 * 100.0 / cylinder.area_a)
+
+    def load_rate(velocity, change):
+        y = (0.0, velocity, alpha * b + change, b - change, 0.0, 0.0, 0.0, 0.0, 293.15, 293.15)
+        rates = oil_rates(c.valve, c, y)
+        return rates.pressure_a - alpha * rates.pressure_b
+
+    assert load_rate(0.1, 0.0) - load_rate(0.0, 0.0) == pytest.approx(-0.1 * found.motion)
+    if alpha == 1.0:  # of a single rod the leakage is a balanced one's: our choice
+        assert load_rate(0.0, 1e5) - load_rate(0.0, 0.0) == pytest.approx(-2e5 * found.leakage)
+    volumes = 1.0 / cylinder.mid_volume_a + alpha**2 / cylinder.mid_volume_b
+    assert found.leakage == pytest.approx(cylinder.bulk_modulus * volumes * (2e-13 + 2.5e-13 + 3e-13))
+
+
+def test_a_valve_without_pressure_drop_has_the_gain_of_the_least_drop_of_its_inverse():
+    level = ServoValve(supply_pressure=5e5, return_pressure=5e5, rated_flow=3e-4, transition_pressure=3e5)
+    found = oil_gains(level, dataclasses.replace(SINGLE_ROD, type='balanced'))
+    stiffness = 2.0 * SINGLE_ROD.bulk_modulus / dataclasses.replace(SINGLE_ROD, type='balanced').mid_volume_a
+    assert found.opening == pytest.approx(stiffness * level.orifice_gain * math.sqrt(3e5))

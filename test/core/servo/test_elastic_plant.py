@@ -193,14 +193,14 @@ def test_a_rod_on_elastic_seals_counts_its_starts_and_its_stops():
     servo = ServoParameters(seals=SEALS, elastic=ElasticSeals(SOFT))
     still = init(servo)
     for _ in range(3):
-        still, out = step(servo, still, Setpoint(0.0))
+        still, _ = step(servo, still, Setpoint(0.0))
     assert (still.plant.direction, still.plant.transitions, still.plant.velocity) == (0, 0, 0.0)
     for side in (1, -1):
         limit = side * servo.cylinder.limit
         state = init(servo, limit - side * 1e-3)
         seen = []
         for _ in range(30):
-            state, out = step(servo, state, Setpoint(limit), side * 2000.0, side * 500.0)
+            state, _ = step(servo, state, Setpoint(limit), side * 2000.0, side * 500.0)
             seen.append((state.plant.direction, state.plant.transitions))
             assert state.plant.direction == np.sign(state.plant.velocity)
         assert seen[0] == (side, 1)

@@ -17,11 +17,13 @@ from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_frict
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
+from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.closed_loop import Axis, run_closed_loop, with_wrong_friction
 from seal_friction_ros.core.servo.controller import ControllerState, Limited, ServoController, control, limit_reference
 from seal_friction_ros.core.servo.cylinder import Cylinder
+from seal_friction_ros.core.servo.elastic_plant import ElasticSeals
 from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.motions import Setpoint, Sine, Step
 from seal_friction_ros.core.servo.plant import Load, stored_energy
@@ -33,6 +35,7 @@ from seal_friction_ros.core.servo.position_servo import (
     outputs,
     simulate,
     step,
+    step_measured,
 )
 from seal_friction_ros.core.servo.tracking import dwell_per_reversal, reversals, tracking_peak, tracking_rms
 
@@ -278,3 +281,60 @@ def test_friction_that_rises_too_steeply_for_the_inner_step_is_rejected_with_the
     seal = dataclasses.replace(SEAL, velocity_terms=VelocityTerms(viscous_friction=1e6))
     with pytest.raises(ValueError, match=r'inner_step = 0.0001 s is too long: at most .*damping'):
         ServoParameters(seals=(MountedSeal(seal, 'a'),))
+
+
+ASYMMETRIC = dataclasses.replace(
+    SEAL, coulomb_law=ConstantCoulomb(10.0), stiction=0.5, velocity_terms=VelocityTerms(asymmetry=0.3)
+)
+CALM = {
+    'valve': ServoValve(null_leakage=0.0, rated_flow=1e-8),
+    'cylinder': Cylinder(internal_leakage=1e-8, stroke=0.2, dead_volume=1e-2),  # both chambers at one pressure
+    'seals': (MountedSeal(ASYMMETRIC, 'a'),),
+}
+
+
+@pytest.mark.parametrize(('side', 'held', 'moved'), [(1.0, 12.9, 13.1), (-1.0, 10.4, 10.6)])
+def test_a_rod_is_held_by_the_larger_of_breakaway_and_slowest_friction_of_the_direction(side, held, moved):
+    """Friction of 13 N on extension and 7 N on retraction, breakaway of 10.5 N both ways."""
+    servo = ServoParameters(**CALM)
+    for force, moves in ((held, False), (moved, True)):
+        state = init(servo).plant
+        for _ in range(20):
+            state = advance(servo, state, 0.0, side * force)
+        assert (side * state.position > 0.0) is moves
+        assert state.transitions == int(moves)
+
+
+@pytest.mark.parametrize('elastic', [None, ElasticSeals(Presliding(stiffness=1e5))])
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_a_sliding_rod_has_the_friction_of_its_direction(side, elastic):
+    """30 % more than Coulomb friction on extension, 30 % less on retraction."""
+    seals = tuple(MountedSeal(dataclasses.replace(SEAL, velocity_terms=VelocityTerms(asymmetry=0.3)), s) for s in 'ab')
+    servo = ServoParameters(**(CALM | {'seals': seals}), elastic=elastic, load=Load(mass=5.0, viscous_damping=20.0))
+    _, track = simulate(servo, init(servo), [Setpoint(0.0)] * 60, 0.0, side * 300.0)
+    friction, coulomb = track.friction_force[-1], track.coulomb_friction[-1]
+    assert coulomb > 10.0
+    assert friction == pytest.approx(side * (1.0 + 0.3 * side) * coulomb, rel=1e-6)
+    assert track.breakaway_force[-1] == pytest.approx(coulomb + 2.0 * SEAL.stiction)
+    # m a = F - b v - friction; the oil takes no more than a hundredth
+    acceleration = (track.velocity[-1] - track.velocity[-2]) / servo.control_period
+    assert 5.0 * acceleration == pytest.approx(side * 300.0 - friction - 20.0 * track.velocity[-1], rel=0.01)
+
+
+def test_a_step_without_feed_forward_and_load_has_none_and_ideal_sensors_measure_the_truth():
+    state = init(SERVO)
+    for i in range(20):
+        setpoint = WAVE.at(i * SERVO.control_period)
+        ideal = measure(SERVO.constants, state.plant)
+        assert step_measured(SERVO, state, ideal, setpoint, 5.0) == step(SERVO, state, setpoint, 5.0, 0.0)
+        assert step_measured(SERVO, state, ideal, setpoint) == step(SERVO, state, setpoint)
+        assert step(SERVO, state, setpoint)[1].command.force == pytest.approx(
+            step(SERVO, state, setpoint, 5.0)[1].command.force - 5.0
+        )
+        state, out = step(SERVO, state, setpoint)
+    assert advance(SERVO, state.plant, 0.1) == advance(SERVO, state.plant, 0.1, 0.0)
+    assert outputs(SERVO, state.plant).force_sum == pytest.approx(out.force_sum)
+    last, track = simulate(SERVO, state, [WAVE.at(0.01)])
+    assert last == step(SERVO, state, WAVE.at(0.01), 0.0, 0.0)[0]
+    assert simulate(SERVO, state, [])[0] == state
+    assert len(track.position) == 1
