@@ -23,7 +23,17 @@ from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
 from seal_friction_ros.core.servo.hydraulics import ServoValve, oil_chamber_rate, oil_rates, port_flow, signed_root
-from seal_friction_ros.core.servo.plant import Load, fastest_rate, inner_step, steepest_friction, stored_energy
+from seal_friction_ros.core.servo.plant import (
+    Load,
+    cavity_margin,
+    fastest_rate,
+    inner_step,
+    margin,
+    smooth_step,
+    steepest_friction,
+    stored_energy,
+    time_of_event,
+)
 from seal_friction_ros.core.servo.position_servo import ServoParameters, advance, init, outputs
 
 SEAL = parse_seal(yaml.safe_load((ROOT / 'config/seals/ms28775_114.yaml').read_text()))
@@ -487,3 +497,34 @@ def test_a_seal_that_sees_the_pressure_difference_is_steepest_with_one_chamber_e
         assert steepest[sees, 2e7] == pytest.approx(4.0 * steepest[sees, 5e6], rel=1e-6)
         assert steepest[sees, 2e7] == pytest.approx(steepest['a', 2e7], rel=1e-6)
     assert steepest['a', 2e7] > 300.0  # [N s/m] over the whole range of speeds it is 300 N in 1 m/s
+
+
+EVENTS = {  # each within 0.1 ms: friction of 40 N stops 5 kg at 8 m/s2, an open valve adds 15 N
+    'rest': ({'velocity': 5e-4, 'direction': 1}, 0.0, 0.0, 1e-9),
+    'rest from the other side': ({'velocity': -5e-4, 'direction': -1}, 0.0, 0.0, 1e-9),
+    'end stop': ({'position': SERVO.cylinder.limit - 1e-6, 'velocity': 0.02, 'direction': 1}, 0.0, 0.0, 1e-9),
+    'breakaway': ({'spool': 1.0}, 1.0, outputs(SERVO, plant(SERVO)).breakaway_force - 8.0, 1e-9),
+    'cavity': ({'velocity': 0.2, 'direction': 1, 'charge_a': 0.0}, 0.0, 0.0, 0.02),  # of a sliding rod: less sharp
+    'collapse': ({'velocity': -0.2, 'direction': -1, 'charge_a': -2e5}, 0.0, 0.0, 0.02),
+}
+
+
+@pytest.mark.parametrize(('changes', 'command', 'load_force', 'sharpness'), EVENTS.values(), ids=EVENTS)
+def test_the_time_of_an_event_is_that_of_a_bisection_and_not_before_it(changes, command, load_force, sharpness):
+    c, h = SERVO.constants, 1e-4
+    state = plant(SERVO, **changes)
+    y, direction = state[:10], state.direction
+
+    def left(time):
+        new = smooth_step(c, y, direction, command, load_force, time)
+        return min(margin(c, new, direction, load_force), cavity_margin(c, y, new))
+
+    early, late = 0.0, h
+    for _ in range(60):
+        middle = 0.5 * (early + late)
+        early, late = (middle, late) if left(middle) > 0.0 else (early, middle)
+    assert 0.1 * h < late < 0.9 * h
+    found = time_of_event(c, y, direction, command, load_force, h)
+    assert left(found) <= 0.0
+    assert late <= found * (1.0 + 1e-12)
+    assert found == pytest.approx(late, abs=sharpness * h)

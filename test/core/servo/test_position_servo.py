@@ -305,6 +305,18 @@ def test_a_rod_is_held_by_the_larger_of_breakaway_and_slowest_friction_of_the_di
         assert state.transitions == int(moves)
 
 
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_a_rod_without_stiction_is_held_by_exactly_its_friction(side):
+    seal = dataclasses.replace(SEAL, coulomb_law=ConstantCoulomb(10.0), stiction=0.0)
+    servo = ServoParameters(**(CALM | {'seals': (MountedSeal(seal, 'a'),)}))
+    for force, moves in ((10.0, False), (10.001, True)):
+        state = init(servo).plant
+        for _ in range(20):
+            state = advance(servo, state, 0.0, side * force)
+        assert (side * state.position > 0.0) is moves
+        assert (state.transitions, state.direction) == (int(moves), side * moves)
+
+
 @pytest.mark.parametrize('elastic', [None, ElasticSeals(Presliding(stiffness=1e5))])
 @pytest.mark.parametrize('side', [1.0, -1.0])
 def test_a_sliding_rod_has_the_friction_of_its_direction(side, elastic):
