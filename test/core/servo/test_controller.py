@@ -16,6 +16,7 @@ from seal_friction_ros.core.servo.controller import (
     control,
     gains,
     limit_reference,
+    load_pressure_gains,
     oil_gains,
     oil_opening,
     spectral_radius,
@@ -309,3 +310,24 @@ def test_a_valve_without_pressure_drop_has_the_gain_of_the_least_drop_of_its_inv
     found = oil_gains(level, dataclasses.replace(SINGLE_ROD, type='balanced'))
     stiffness = 2.0 * SINGLE_ROD.bulk_modulus / dataclasses.replace(SINGLE_ROD, type='balanced').mid_volume_a
     assert found.opening == pytest.approx(stiffness * level.orifice_gain * math.sqrt(3e5))
+
+
+def test_the_linear_model_of_air_is_that_of_the_chambers_while_the_valve_extends_the_rod():
+    """In mid-stroke at the pressures of rest; REFERENCE_PRESSURE is 0.05 % from that of the reference density."""
+    c = compiled(AIR, AIR_CYLINDER, load=Load(mass=3.0))
+    a, b = air_pressures_at_rest(AIR, AIR_CYLINDER)
+    alpha = AIR_CYLINDER.area_ratio
+
+    def load_rate(opening, speed):
+        rate_a = chamber_rates(
+            c.valve, opening, 0.0, a, AIR.temperature, AIR_CYLINDER.mid_volume_a, AIR_CYLINDER.area_a * speed
+        )[0]
+        rate_b = chamber_rates(
+            c.valve, 0.0, opening, b, AIR.temperature, AIR_CYLINDER.mid_volume_b, -AIR_CYLINDER.area_b * speed
+        )[0]
+        return rate_a - alpha * rate_b
+
+    found = load_pressure_gains(c.valve, c.cylinder)
+    assert found.opening == pytest.approx(load_rate(0.2, 0.0) / 0.2, rel=1e-3)
+    assert found.motion == pytest.approx(-load_rate(0.0, 0.3) / 0.3, rel=1e-9)
+    assert found.leakage == 0.0
