@@ -121,6 +121,7 @@ def test_two_groups_share_friction_excess_and_stiction():
     held = sheared(numbers, slid, Slide(0.0, 0.1, 20.0, 4.0, 6.0), 0.0)
     assert (slid.first.excess, slid.second.excess) == pytest.approx((0.3 * 4.0, 0.7 * 4.0))
     assert (held.first.excess, held.second.excess) == pytest.approx((0.3 * 6.0, 0.7 * 6.0))
+    assert held.deflection == 0.0  # elements have no bristles
     lugre = ElasticSeals(SOFT, bristle_damping=0.0).numbers
     bent = sheared(lugre, NO_SHEAR, Slide(1.0, 0.1, 20.0, 4.0, 6.0), 0.1)
     assert (bent.friction, bent.deflection) == pytest.approx((24.0, 24.0 / 1e5))
