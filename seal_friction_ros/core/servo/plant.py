@@ -353,7 +353,7 @@ def fastest_rate(
     """Largest rate of the equations [1/s], which limits the inner step, and the part of the plant with this rate.
 
     Spool: its natural frequency. Chamber: `oil_chamber_rate` or `air_chamber_rate`; plus oscillation of the mass on
-    oil or air at a stop; plus damping of load and seals.
+    oil or air at the stop of chamber a, which has the larger area; plus damping of load and seals.
     """
     if isinstance(valve, PneumaticValve):
         chamber, modulus = air_chamber_rate(valve, cylinder), ADIABATIC_INDEX * (valve.supply_pressure + AMBIENT)
@@ -361,12 +361,9 @@ def fastest_rate(
     else:
         chamber, modulus = oil_chamber_rate(valve, cylinder), cylinder.bulk_modulus
         remedy = 'lower rated_flow, or higher dead_volume or transition_pressure'
-    volume = cylinder.dead_volume
-    at_a_stop = (
-        cylinder.area_a**2 / volume + cylinder.area_b**2 / (2.0 * cylinder.mid_volume_b - volume),
-        cylinder.area_b**2 / volume + cylinder.area_a**2 / (2.0 * cylinder.mid_volume_a - volume),
-    )
-    stiffness = modulus * max(at_a_stop) + load.spring_stiffness
+    smallest, other = cylinder.dead_volume, 2.0 * cylinder.mid_volume_b - cylinder.dead_volume
+    springs = cylinder.area_a**2 / smallest + cylinder.area_b**2 / other
+    stiffness = modulus * springs + load.spring_stiffness
     damping = (load.viscous_damping + steepest_friction(seals, valve.supply_pressure)) / load.mass
     oscillation = math.sqrt(stiffness / load.mass) + damping
     spool = valve.natural_frequency * max(1.0, 2.0 * valve.damping_ratio)

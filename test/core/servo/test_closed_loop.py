@@ -257,7 +257,9 @@ def test_a_machine_that_measures_too_little_sends_the_force_sum_without_what_is_
     run_closed_loop(Axis(SERVO, PIPELINE._replace(estimator=estimator)), Step(size=0.0), 1, 0.0)
     out = outputs(SERVO, init(SERVO).plant)
     expected = out.force_sum - 1e-5 * out.pressure_a + 2e-5 * out.pressure_b - 3.0
-    assert of_type(Force, sent)[0].force == pytest.approx(expected)
+    assert sent[0] == Pressure(0, out.pressure_a, out.pressure_b)  # no noise on anything
+    assert sent[1].force == pytest.approx(expected)
+    assert sent[3] == Velocity(0, 0.0)
 
 
 def test_without_a_force_sensor_the_force_sum_is_that_of_the_measured_pressures(sent):
@@ -269,12 +271,13 @@ def test_without_a_force_sensor_the_force_sum_is_that_of_the_measured_pressures(
         assert force.force != 0.0
 
 
-def test_an_encoder_counts_its_steps_and_its_velocity_is_their_difference_over_ten_samples(sent):
-    count = 5e-6  # [m]
+@pytest.mark.parametrize(('count', 'seals'), [(5e-6, PIPELINE.estimator.seals), (1e-8, ())])
+def test_an_encoder_counts_its_steps_and_its_velocity_is_their_difference_over_ten_samples(sent, count, seals):
+    machine = replace(SERVO, seals=seals)
     wave, noise = Sine(1e-3, 5.0), np.array([[1e3, 2e3, 0.5, 9.0]])  # the noise of a velocity sensor is not there
-    run = run_closed_loop(Axis(SERVO, PIPELINE, AxisSensors(encoder_step=count)), wave, 40, 0.0, noise)
-    state = init(SERVO)
-    out = outputs(SERVO, state.plant)
+    run = run_closed_loop(Axis(machine, PIPELINE, AxisSensors(encoder_step=count)), wave, 40, 0.0, noise)
+    state = init(machine)
+    out = outputs(machine, state.plant)
     counts = []
     for i, velocity in enumerate(of_type(Velocity, sent)):
         counts.append(count * round(out.position / count))
@@ -282,11 +285,19 @@ def test_an_encoder_counts_its_steps_and_its_velocity_is_their_difference_over_t
         expected = (ten[-1] - ten[0]) / (PERIOD * (len(ten) - 1)) if i else 0.0
         assert velocity.velocity == pytest.approx(expected, abs=1e-12)
         measured = Measurement(counts[-1], expected, out.pressure_a + 1e3, out.pressure_b + 2e3)
-        state, out = step_measured(SERVO, state, measured, wave.at(i * PERIOD), 10.0 * (i + 1))
+        state, out = step_measured(machine, state, measured, wave.at(i * PERIOD), 10.0 * (i + 1))
         assert (run.position[i], run.velocity[i]) == pytest.approx((out.position, out.velocity), rel=1e-6, abs=1e-12)
         assert run.friction_force[i] == pytest.approx(out.friction_force, rel=1e-6)
     assert len(set(counts)) > 5
+    assert seals or counts[1] != counts[0]  # without friction it moves in the first sample
     assert AxisSensors() == (True, 0.0)
+
+
+def test_the_loop_begins_at_the_start_of_the_wave_without_a_force(monkeypatch):
+    monkeypatch.setattr(pipeline, 'receive', lambda _parameters, state, *_: state)  # an estimator that says nothing
+    run = run_closed_loop(Axis(SERVO, PIPELINE), Step(size=0.001, start_time=0.5, offset=0.002), 3, 0.0)
+    np.testing.assert_array_equal(run.position, 0.002)
+    assert not run.feedforward.any()
 
 
 def test_a_wrong_model_scales_the_friction_of_every_seal():

@@ -238,3 +238,15 @@ def test_halving_the_step_of_elastic_seals_reduces_the_error_to_a_sixteenth():
     assert errors[0] > 1e-9
     assert errors[1] < errors[0] / 12.0
     assert errors[2] < errors[1] / 12.0
+
+
+@pytest.mark.parametrize(
+    ('name', 'lowest', 'highest', 'beyond'),
+    [('first_share', 0.0, 1.0, (-0.01, 1.01)), ('bristle_damping', -1.0, 1e6, (-1.01, 1.01e6))],
+)
+def test_a_share_is_between_none_and_all_and_a_damping_is_not_infinite(name, lowest, highest, beyond):
+    for value in (lowest, highest):
+        assert getattr(ElasticSeals(SOFT, **{name: value}), name) == value
+    for value in beyond:
+        with pytest.raises(ValueError, match=f'ElasticSeals.{name} = {value}'):
+            ElasticSeals(SOFT, **{name: value})

@@ -496,6 +496,10 @@ def test_a_seal_that_sees_the_pressure_difference_is_steepest_with_one_chamber_e
     for sees in ('a', 'b', 'difference'):
         assert steepest[sees, 2e7] == pytest.approx(4.0 * steepest[sees, 5e6], rel=1e-6)
         assert steepest[sees, 2e7] == pytest.approx(steepest['a', 2e7], rel=1e-6)
+    for asymmetry in (0.3, -0.3):  # 30 % more in one direction
+        terms = VelocityTerms(viscous_friction=500.0, asymmetry=asymmetry)
+        uneven = dataclasses.replace(SEALS[0].seal, velocity_terms=terms)
+        assert steepest_friction((MountedSeal(uneven, 'a'),), 20e6) == pytest.approx(650.0, rel=1e-6)
     assert steepest['a', 2e7] > 300.0  # [N s/m] over the whole range of speeds it is 300 N in 1 m/s
 
 

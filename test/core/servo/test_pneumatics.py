@@ -338,3 +338,7 @@ def test_fastest_rate_of_air_has_the_mass_on_air_at_supply_pressure_at_a_stop():
     stiffness = 1.4 * (6e5 + AMBIENT) * (a**2 / v + b**2 / (b * 0.2 + v)) + 2e3
     expected = air_chamber_rate(AIR, CYLINDER) + math.sqrt(stiffness / 3.0) + 12.0 / 3.0
     assert fastest_rate(AIR, CYLINDER, load)[0] == pytest.approx(expected)
+
+
+def test_air_without_supply_rests_at_ambient():
+    assert air_pressures_at_rest(PneumaticValve(supply_pressure=0.0), CYLINDER) == (0.0, 0.0)

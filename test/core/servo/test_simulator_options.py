@@ -2,12 +2,18 @@
 
 import pytest
 
+from seal_friction_ros.core.estimation.node_options import StartOptions
 from seal_friction_ros.core.servo.controller import ServoController
 from seal_friction_ros.core.servo.cylinder import Cylinder
 from seal_friction_ros.core.servo.hydraulics import ServoValve
 from seal_friction_ros.core.servo.plant import Load
 from seal_friction_ros.core.servo.pneumatics import PneumaticValve
-from seal_friction_ros.core.servo.simulator_options import SimulatorSettings, StandardMessages, servo_parameters
+from seal_friction_ros.core.servo.simulator_options import (
+    SERVO_SIMULATOR_PARAMETERS,
+    SimulatorSettings,
+    StandardMessages,
+    servo_parameters,
+)
 
 PARTS = {part: part() for part in (ServoValve, PneumaticValve, Load)} | {
     Cylinder: Cylinder(dead_volume=2e-5),
@@ -72,3 +78,20 @@ def test_the_inner_step_is_the_longest_that_divides_the_sample_time_and_is_not_a
 def test_the_fluid_chooses_the_valve():
     for fluid, valve in (('hydraulic', ServoValve), ('pneumatic', PneumaticValve)):
         assert type(servo_parameters(SimulatorSettings(fluid=fluid), PARTS, ()).valve) is valve
+
+
+def test_waves_sensors_and_what_is_followed_change_while_the_simulator_runs_and_the_machine_does_not():
+    changing = {
+        prefix
+        for group in SERVO_SIMULATOR_PARAMETERS
+        for prefix in [group.prefix]
+        if group.record_type is not StartOptions and group.names().keys() - group.fixed()
+    }
+    assert changing == {'', 'sine.', 'step.', 'trapezoid.', 'chirp.', 'sensors.'}
+    for group in SERVO_SIMULATOR_PARAMETERS:
+        if group.record_type is SimulatorSettings:
+            assert group.names().keys() - group.fixed() == {
+                'wave', 'reference_resolution', 'use_feedforward', 'feedforward_timeout', 'reference_timeout'
+            }  # fmt: skip
+        elif group.prefix in changing - {''}:
+            assert not group.fixed()
