@@ -257,19 +257,23 @@ def cavity_margin(c: Constants, before: Integrated, after: Integrated) -> float:
 def time_of_event(c: Constants, y: Integrated, direction: int, command: float, load_force: float, h: float) -> float:
     """Time within ``h`` [s] at or just after which the friction state ends or a cavity begins or collapses.
 
-    The smaller of `margin` and `cavity_margin` must be positive at 0 and not positive at ``h``. Illinois method.
+    `margin` and `cavity_margin` must be positive at 0, and one of them not positive at ``h``. Illinois method on the
+    smaller of the two; if a cavity begins or collapses, in shares of their values at 0, since their units differ.
     """
     early, late, side = 0.0, h, 0
-    margin_early = min(margin(c, y, direction, load_force), cavity_margin(c, y, y))
+    margin_early, cavity_early = margin(c, y, direction, load_force), cavity_margin(c, y, y)
     new = smooth_step(c, y, direction, command, load_force, h)
-    margin_late = min(margin(c, new, direction, load_force), cavity_margin(c, y, new))
+    margin_late, cavity_late = margin(c, new, direction, load_force), cavity_margin(c, y, new)
+    scale = margin_early / cavity_early if cavity_late <= 0.0 else 1.0
+    margin_early = min(margin_early, scale * cavity_early)
+    margin_late = min(margin_late, scale * cavity_late)
     for _ in range(60):
         if late - early <= 1e-9 * h:
             break
         middle = early + (late - early) * margin_early / (margin_early - margin_late)
         middle = min(max(middle, early + 4e-10 * h), late - 4e-10 * h)
         new = smooth_step(c, y, direction, command, load_force, middle)
-        margin_middle = min(margin(c, new, direction, load_force), cavity_margin(c, y, new))
+        margin_middle = min(margin(c, new, direction, load_force), scale * cavity_margin(c, y, new))
         if margin_middle > 0.0:
             early, margin_early = middle, margin_middle
             margin_late *= 0.5 if side == 1 else 1.0

@@ -98,7 +98,9 @@ def _robust_fit(inputs: FloatArray, command: FloatArray, used: BoolArray) -> Flo
     matrix, wanted = inputs[used], command[used]
     spread = matrix.std(axis=0)
     spread[-1] = 1.0
-    deviations = (matrix - matrix.mean(axis=0))[:, :-1] / np.maximum(spread[:-1], 1e-300)
+    deviations = (matrix - matrix.mean(axis=0))[:, :-1]
+    rounding = 1e-12 * np.abs(matrix[:, :-1]).max(axis=0)  # a constant deviates from its mean by as much
+    deviations = np.where(spread[:-1] > rounding, deviations / np.maximum(spread[:-1], 1e-300), 0.0)
     if np.linalg.matrix_rank(deviations, 1e-6 * np.sqrt(len(wanted))) < deviations.shape[1]:
         raise ValueError(f'force, velocity and position do not change independently: {WHAT_TO_RECORD}')
     scaled = matrix / spread

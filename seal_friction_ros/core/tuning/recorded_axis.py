@@ -43,6 +43,7 @@ NEAR_REVERSAL = 0.1  # of the time between two reversals of the reference, befor
 NEARLY = 0.05  # of the friction: a smaller RMS difference counts as none
 IDENTIFIED = 0.05  # largest relative standard deviation of an identified parameter
 SHARPEST_SMOOTHING = 1e-5  # [m/s]
+SLOW_SHARE = 0.01  # of the sliding samples: so many must be slower than an identified smoothing
 NOISE_SHARE = 0.01  # of the sliding samples: larger frictions count as noise
 
 
@@ -285,7 +286,7 @@ def _with_values(settings: FeedForwardSettings, values: dict[str, float | None])
 
 
 def _smoothing(recording: Recording, law: RecordedLaw) -> float | None:
-    """Widest smoothing that is nearly as good as the best [m/s]; None if all are: the rod was never slow."""
+    """Widest smoothing that is nearly as good as the best [m/s]; None if the rod was never as slow as that."""
     velocity = recording.velocity[law.sliding]
     friction = law.friction[law.sliding]
     coulomb = law.scale * recording.coulomb_friction[law.sliding]
@@ -294,7 +295,8 @@ def _smoothing(recording: Recording, law: RecordedLaw) -> float | None:
     left = [_rms(friction - coulomb * np.tanh(velocity / width)) for width in widths]
     most = math.hypot(min(left), NEARLY * _rms(friction))
     widest = max(width for width, value in zip(widths, left, strict=True) if value <= most)
-    return widest if widest < widths[-1] else None
+    slow = float(np.quantile(np.abs(velocity), SLOW_SHARE))
+    return widest if slow < widest < widths[-1] else None
 
 
 def _slew(recording: Recording, settings: FeedForwardSettings) -> float | None:

@@ -511,14 +511,8 @@ EVENTS = {  # each within 0.1 ms: friction of 40 N stops 5 kg at 8 m/s2, an open
     'end stop': (SERVO, {'position': SERVO.cylinder.limit - 1e-6, 'velocity': 0.02, 'direction': 1}, 0.0, 0.0, 1e-9),
     'breakaway': (SERVO, {'spool': 1.0}, 1.0, outputs(SERVO, plant(SERVO)).breakaway_force - 8.0, 1e-9),
     'breakaway by a valve that opens': (SERVO, {}, 1.0, outputs(SERVO, plant(SERVO)).breakaway_force - 0.007, 1e-9),
-    'cavity': (
-        SERVO,
-        {'velocity': 0.2, 'direction': 1, 'charge_a': 0.0},
-        0.0,
-        0.0,
-        0.02,
-    ),  # of a sliding rod: less sharp
-    'collapse': (SERVO, {'velocity': -0.2, 'direction': -1, 'charge_a': -2e5}, 0.0, 0.0, 0.02),
+    'cavity': (SERVO, {'velocity': 0.2, 'direction': 1, 'charge_a': 0.0}, 0.0, 0.0, 1e-9),
+    'collapse': (SERVO, {'velocity': -0.2, 'direction': -1, 'charge_a': -2e5}, 0.0, 0.0, 1e-9),
 }
 
 

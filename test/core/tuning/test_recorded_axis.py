@@ -275,7 +275,8 @@ def test_slew_limit_lets_the_force_through_but_no_more():
 def test_fast_rod_cannot_tell_the_smoothing_and_keeps_it():
     velocity = 0.03 * np.sign(np.cos(4.0 * math.pi * TIME)) * (1.0 + 0.2 * np.sin(40.0 * TIME))
     found = tune_recorded_axis(recording(velocity=velocity, mass=0.0), SETTINGS, KNOWN)
-    assert found.feedforward.smoothing_velocity >= SETTINGS.smoothing_velocity
+    assert not found.identified['smoothing_velocity']  # never slower than 24 mm/s
+    assert found.feedforward.smoothing_velocity == SETTINGS.smoothing_velocity
 
 
 def test_given_delay_is_the_lead_time_and_else_it_stays():
@@ -385,16 +386,22 @@ def test_the_deviation_of_the_scale_is_that_of_least_squares():
     assert law.scale_std == pytest.approx(math.sqrt(squares[0] / 97.0 * np.linalg.inv(inputs.T @ inputs)[0, 0]))
 
 
-def shuttle(speed, friction=20.0, noise=0.0):
-    """A rod at ``speed`` to and fro, always sliding, with an exact law and noise of alternating sign."""
+def shuttle(speed, friction=20.0, noise=0.0, slow=0):
+    """A rod at ``speed`` to and fro, always sliding, with an exact law and noise of alternating sign.
+
+    Of 100 samples ``slow`` are at 1 nm/s, without friction.
+    """
     made = recording(coulomb=0.0)
-    velocity = np.where(np.arange(len(TIME)) // 250 % 2, -speed, speed)
+    number = np.arange(len(TIME))
+    velocity = np.where(number // 250 % 2, -speed, speed)
+    acts = number % 100 >= slow
+    velocity = np.where(acts, velocity, 1e-9)
     estimates = [e._replace(coulomb_friction=friction, state=FrictionState.SLIDING) for e in made.estimates]
     motions = [RecordedMotion(float(v), 0.0, float(v)) for v in velocity]
     scatter = noise * np.where(np.arange(len(TIME)) // 2 % 2, -1.0, 1.0)
     return made._replace(
-        estimates=estimates, motions=motions, force_sum=friction * np.sign(velocity) + scatter
-    ), RecordedLaw(1.0, 0.0, 0.0, False, 0.0, friction * np.sign(velocity) + scatter, np.ones(len(TIME), bool))
+        estimates=estimates, motions=motions, force_sum=friction * np.sign(velocity) * acts + scatter
+    ), RecordedLaw(1.0, 0.0, 0.0, False, 0.0, friction * np.sign(velocity) * acts + scatter, np.ones(len(TIME), bool))
 
 
 @pytest.mark.parametrize(
@@ -406,7 +413,12 @@ def shuttle(speed, friction=20.0, noise=0.0):
     ],
 )
 def test_the_smoothing_costs_a_twentieth_of_the_friction_and_the_next_wider_one_more(speed, noise, width):
-    assert recorded_axis._smoothing(*shuttle(speed, noise=noise)) == width
+    assert recorded_axis._smoothing(*shuttle(speed, noise=noise, slow=2)) == width
+
+
+@pytest.mark.parametrize(('slow', 'width'), [(0, None), (1, None), (2, 0.01)])
+def test_a_smoothing_is_known_only_where_a_hundredth_of_the_motion_was_slower(slow, width):
+    assert recorded_axis._smoothing(*shuttle(0.02, slow=slow)) == width
 
 
 @pytest.mark.parametrize(('speed', 'noise'), [(1e-6, 0.0), (0.02, 400.0)])
