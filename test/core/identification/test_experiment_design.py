@@ -8,12 +8,40 @@ from scipy.stats import t as student_t
 
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, Variation, candidate_laws
-from seal_friction_ros.core.identification.experiment_design import RUN_TO_RUN, design_experiment, repeated_run
-from seal_friction_ros.core.identification.fitting import fit
+from seal_friction_ros.core.identification.experiment_design import (
+    RUN_TO_RUN,
+    _broken_pair,
+    _condition,
+    _correlated_pair,
+    _correlation,
+    _disagreements,
+    _ends,
+    _error,
+    _greedy,
+    _grid,
+    _grid_speeds,
+    _Information,
+    _is_speed_varied,
+    _levels,
+    _Model,
+    _model,
+    _prior,
+    _range_points,
+    _readings_worth_one,
+    _relative_slopes,
+    _richest,
+    _scatter,
+    _three_digits,
+    _without_offsets,
+    design_experiment,
+    laws_not_beaten,
+    repeated_run,
+)
+from seal_friction_ros.core.identification.fitting import LawFit, fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.runs import BetweenRuns, between_runs
-from seal_friction_ros.core.identification.selection import score_laws, with_velocity_terms
-from seal_friction_ros.core.identification.validation import cross_validate, jackknife_errors
+from seal_friction_ros.core.identification.selection import LawScore, score_laws, with_velocity_terms
+from seal_friction_ros.core.identification.validation import CrossValidation, cross_validate, jackknife_errors
 
 BASE = next(law for law in candidate_laws(Variation()) if law.name == 'pressure_power_law_2_3')
 VISCOUS = with_velocity_terms(BASE, Variation())[0]
@@ -173,3 +201,341 @@ def test_where_speed_was_not_varied_others_are_proposed(speed):
     assert design.speed_is_measured == np.isfinite(speed)
     assert not design.speed_is_varied
     assert design.shrink < 0.5
+
+
+# --- readings to choose from ---
+
+
+def test_a_value_to_be_set_has_three_digits_and_is_not_above():
+    values = {0.0: 0.0, -2.0: 0.0, 0.0123456: 0.0123, 123999.0: 123000.0, 9.999: 9.99, 0.3: 0.3, 1.0: 1.0, 0.57: 0.57}
+    assert {value: _three_digits(value) for value in values} == values
+
+
+def test_speeds_to_choose_from_go_from_slowest_to_fastest_or_are_multiples_of_the_only_one():
+    assert _ends(np.linspace(0.0, 1.0, 101)) == pytest.approx((0.05, 0.95))
+    assert _grid_speeds((0.01, 0.1601)) == pytest.approx([0.01, 0.02, 0.04, 0.08, 0.16], rel=0.01)
+    assert _grid_speeds((0.0, 0.5))[0] == 5e-4  # a thousandth of the fastest
+    assert _grid_speeds((0.0, 0.05))[0] == 1e-4  # no speed is slower than 0.1 mm/s
+    assert _grid_speeds((0.02,)) == pytest.approx([0.004, 0.01, 0.02, 0.04, 0.1])
+    assert _grid_speeds((0.5,)) == pytest.approx([0.1, 0.25, 0.5, 1.0])  # nor faster than 1 m/s
+    assert _grid_speeds((2e-4,)) == pytest.approx([1e-4, 2e-4, 4e-4, 1e-3])
+    assert _grid_speeds((2.0,)) == pytest.approx([0.4, 1.0, 2.0])  # but the one that was used
+    assert _grid_speeds((5e-5,)) == pytest.approx([5e-5, 1e-4, 2.5e-4])
+
+
+@pytest.mark.parametrize(('fast', 'varied'), [(0.0149, False), (0.0151, True)])
+def test_speed_is_varied_where_the_fastest_is_half_as_fast_again_in_one_direction(fast, varied):
+    speed = np.repeat([0.01, fast], 40)
+    direction = np.tile([1.0, -1.0], 40)
+    at = OperatingConditions(np.zeros((80, 1)), None, direction * speed, direction)
+    assert _is_speed_varied(at) is varied
+    one_way = np.where(direction > 0.0, direction * speed, -0.01)
+    assert _is_speed_varied(at._replace(velocity=one_way)) is varied
+    few = np.where(np.arange(80) < 3, 0.1, 0.01) * direction
+    assert not _is_speed_varied(at._replace(velocity=few))  # single strokes do not count
+
+
+def test_pressures_to_choose_from_go_from_none_to_the_highest():
+    assert _grid(60.0 * BAR, (0.01, 0.02)) == [(p * BAR, v) for p in (0.0, 12.0, 24.0, 36.0, 48.0, 60.0)
+                                               for v in (0.01, 0.02)]  # fmt: skip
+    points = _range_points((1e5, 5e5), (0.1, 0.5))
+    expected = [(p * 1e5, v / 10.0) for p in range(1, 6) for v in range(1, 6)]
+    assert np.array(points) == pytest.approx(np.array(expected))
+
+
+def test_a_repeated_run_takes_ten_of_the_pressures_each_at_its_middle_speed():
+    levels = np.arange(12.0) * 3.0456 * BAR
+    speed = np.tile([0.01, 0.02, 0.0901], 12)
+    readings = measured(np.repeat(levels, 3), speed, np.random.default_rng(0))
+    found = _levels(readings, np.abs(readings.at.velocity))
+    places = [0, 1, 2, 4, 5, 6, 7, 9, 10, 11]  # evenly
+    assert [p / BAR for p, _ in found] == pytest.approx([_three_digits(3.0456 * i) for i in places])
+    assert {v for _, v in found} == {0.02}
+    close = replace(readings, at=readings.at._replace(pressure=np.full_like(readings.at.pressure, 1e6)))
+    assert _levels(close, np.abs(close.at.velocity)) == [(1e6, 0.02)]  # the same one only once
+
+
+# --- information ---
+
+
+def test_information_with_an_unknown_offset_is_the_inverse_of_the_covariance_of_the_parameters():
+    rng = np.random.default_rng(3)
+    rows, offsets = rng.normal(size=(9, 2)), rng.normal(size=9)
+    found = _Information(np.zeros((2, 2)), np.zeros(2), 0.0)
+    assert found.matrix.tolist() == np.zeros((2, 2)).tolist()
+    found = found.plus(rows[:4], offsets[:4]).plus(rows[4:], offsets[4:])
+    everything = np.column_stack((rows, offsets))
+    covariance = np.linalg.inv(everything.T @ everything)[:2, :2]
+    assert np.linalg.inv(found.matrix) == pytest.approx(covariance)
+    without = _Information(np.zeros((2, 2)), np.zeros(2), 0.0).plus(rows, np.zeros(9))
+    assert without.matrix == pytest.approx(rows.T @ rows)
+
+
+def test_the_error_is_the_root_mean_square_of_the_standard_errors():
+    slopes = np.array([[1.0, 0.0], [0.0, 3.0]])
+    assert _error(slopes, np.diag([4.0, 16.0])) == pytest.approx(np.sqrt((1.0 / 4.0 + 9.0 / 16.0) / 2.0))
+    information = np.array([[4.0, 1.0], [1.0, 9.0]])
+    expected = [g @ np.linalg.inv(information) @ g for g in slopes]
+    assert _error(slopes, information) == pytest.approx(np.sqrt(np.mean(expected)))
+
+
+def tied(r, other=0.0):
+    """Information on three parameters of unlike size; the correlation of the first two is -r, of the last two 0."""
+    size = np.diag([1.0, 10.0, 0.1])
+    return size @ np.array([[1.0, r, 0.0], [r, 1.0, other], [0.0, other, 1.0]]) @ size
+
+
+def test_the_pair_is_that_whose_correlation_falls_most():
+    assert _correlation(tied(0.9))[0, 1] == pytest.approx(-0.9)
+    assert np.diag(_correlation(tied(0.9, 0.1))) == pytest.approx(np.ones(3))
+    assert _broken_pair(tied(0.9), tied(0.1)) == (0, 1)
+    assert _broken_pair(tied(0.1, 0.9), tied(0.3, 0.1)) == (1, 2)
+    assert _broken_pair(tied(0.5, 0.8), tied(0.0, 0.75)) == (0, 1)
+    assert _broken_pair(np.eye(1), np.eye(1)) is None
+    before, after = _correlated_pair(('a', 'b', 'c'), tied(0.9), tied(0.1))
+    assert (before, after) == (('a', 'b', pytest.approx(-0.9)), ('a', 'b', pytest.approx(-0.1)))
+    assert _correlated_pair(('a',), np.eye(1), np.eye(1)) == [None, None]
+
+
+def test_the_condition_number_is_that_of_columns_of_unit_length():
+    rng = np.random.default_rng(5)
+    jacobian = rng.normal(size=(9, 3)) * [1.0, 1e3, 1e-3]
+    unit = jacobian / np.linalg.norm(jacobian, axis=0)
+    assert _condition(jacobian.T @ jacobian) == pytest.approx(np.linalg.cond(unit))
+    assert _condition(np.diag([1.0, 0.0])) == np.inf
+    assert _condition(np.ones((2, 2))) == np.inf
+    near = 1.0 - 1e-13
+    assert _condition(np.array([[1.0, near], [near, 1.0]])) == pytest.approx(np.sqrt(2e13), rel=0.01)
+    nearer = 1.0 - 3e-15
+    assert _condition(np.array([[1.0, nearer], [nearer, 1.0]])) == np.inf
+
+
+# --- the law linearised ---
+
+KNOWN = TRUE | {'pressure_exponent': 2.0 / 3.0}
+
+
+def linearised(values=KNOWN, held_scale=float('nan'), mean=100.0, law=VISCOUS):
+    return _Model(law, values, np.full(len(law.parameters), 1e-4), 2, mean, held_scale)
+
+
+def test_slopes_of_the_friction_are_those_of_its_formula():
+    """Two seals: 2 f_0 + 2 F_1 (P / 1 bar)^(2/3) + 2 sigma v."""
+    at = linearised().conditions([(8.0 * BAR, 0.03), (27.0 * BAR, 0.05)])
+    assert at.pressure.tolist() == [[8.0 * BAR] * 2] * 2 + [[27.0 * BAR] * 2] * 2
+    assert at.direction.tolist() == [-1.0, 1.0] * 2
+    assert at.velocity.tolist() == [-0.03, 0.03, -0.05, 0.05]
+    names = [parameter.name for parameter in VISCOUS.parameters]
+    expected = {
+        'friction_at_no_pressure': [2.0] * 4, 'friction_at_one_bar': [8.0, 8.0, 18.0, 18.0],
+        'viscous_friction': [0.06, 0.06, 0.1, 0.1],
+    }  # fmt: skip
+    assert linearised().slopes(at) == pytest.approx(np.column_stack([expected[name] for name in names]), rel=1e-6)
+    at_bound = KNOWN | {p.name: p.upper for p in VISCOUS.parameters if p.name == 'friction_at_one_bar'}
+    assert linearised(at_bound).slopes(at)[:, names.index('friction_at_one_bar')] == pytest.approx(
+        [8.0, 8.0, 18.0, 18.0], rel=1e-3
+    )  # from inside
+    friction = np.array([10.0 + 8.0 + 7.2] * 2 + [10.0 + 18.0 + 12.0] * 2)
+    assert linearised().friction(at) == pytest.approx(friction)
+    assert linearised(mean=600.0).friction(at) == pytest.approx([30.0, 30.0, 40.0, 40.0])  # 5 % of the mean at least
+    assert linearised().scale(at) == pytest.approx(friction)
+    assert linearised(held_scale=70.0).scale(at).tolist() == [70.0] * 4
+    uneven = linearised(KNOWN | {'asymmetry': 0.25}, law=ASYMMETRIC)
+    out, back = uneven.friction(at)[:2][::-1]
+    assert out != pytest.approx(back, rel=0.1)
+    assert uneven.scale(at)[:2] == pytest.approx([(out + back) / 2.0] * 2)  # both directions have one divisor
+    grid = linearised().conditions(_range_points((8.0 * BAR, 27.0 * BAR), (0.03, 0.05)))
+    relative = linearised().slopes(grid) / linearised().friction(grid)[:, np.newaxis]
+    assert _relative_slopes(linearised(), (8.0 * BAR, 27.0 * BAR), (0.03, 0.05)) == pytest.approx(relative)
+
+
+def test_before_any_reading_each_parameter_changes_the_friction_by_all_of_it():
+    """Mean friction 100 N; the rise with 27 bar changes it by at most 18 N each unit."""
+    names = [parameter.name for parameter in VISCOUS.parameters]
+    found = _prior(linearised(), 0.0, 27.0 * BAR, (0.01, 0.05))
+    assert found == pytest.approx(np.diag(np.diag(found)))
+    strongest = {'friction_at_no_pressure': 2.0, 'friction_at_one_bar': 18.0, 'viscous_friction': 0.1}
+    assert np.diag(found) == pytest.approx([(strongest[name] / 100.0) ** 2 for name in names], rel=1e-5)
+
+
+CONSTANT = next(law for law in candidate_laws(Variation()) if law.name == 'constant_coulomb')
+ASYMMETRIC = with_velocity_terms(BASE, Variation())[-1]
+LEVEL = 'coulomb_friction_at_any_pressure'
+
+
+def constant(off, n=8):
+    """Readings of 20 N of two seals that are alternately off by this share, with their fit."""
+    direction = np.repeat([1.0, -1.0], n // 2)
+    at = OperatingConditions(np.full((n, 2), 1e6), None, 0.02 * direction, direction)
+    force = direction * 20.0 * (1.0 + off * np.tile([1.0, -1.0], n // 2)) + 3.0
+    zeros = np.zeros(n, int)
+    readings = FrictionReadings(at, force, zeros, np.arange(n) % 4, zeros, ('log',), 'block', False)
+    found = LawFit(CONSTANT, {LEVEL: 10.0}, np.array([3.0]), np.full((n, 1), 0.1))
+    return readings, LawScore(CONSTANT, found, losses=np.ones(4))
+
+
+def test_scatter_is_the_standard_deviation_about_the_law_less_what_is_fitted_and_a_hundredth_at_least():
+    readings, score = constant(0.06)
+    assert _scatter(score, readings) == pytest.approx(0.06 * np.sqrt(8.0 / 6.0))  # one parameter and one offset
+    readings, score = constant(0.001)
+    assert _scatter(score, readings) == 0.01
+
+
+def test_readings_are_worth_as_many_independent_ones_as_the_jackknife_says():
+    readings, score = constant(0.06)
+    assert _readings_worth_one(score, readings, 0.06) == 1.0  # there is no jackknife
+    estimates = np.array([[9.0], [10.0], [11.0], [10.0]])
+    validation = CrossValidation(np.zeros(8), np.zeros(8), np.ones(4), estimates)
+    # Of two seals 2 N out of 20 N: jackknife variance 3/4 * 2 * 0.1^2; of 8 independent readings 0.06^2 / 8 each.
+    expected = 0.75 * 2.0 * 0.1**2 / (0.06**2 / 8.0)
+    assert _readings_worth_one(replace(score, validation=validation), readings, 0.06) == pytest.approx(expected)
+    same = replace(validation, parameters=np.full((4, 1), 10.0))
+    assert _readings_worth_one(replace(score, validation=same), readings, 0.06) == 1.0
+
+
+def test_without_offsets_the_derivatives_are_those_of_a_fit_with_an_offset():
+    rng = np.random.default_rng(2)
+    readings = measured(np.linspace(5.0, 60.0, 6) * BAR, np.full(6, 0.02), rng)
+    slopes = rng.normal(size=(12, 2))
+    rows, column = slopes / readings.scale[:, np.newaxis], readings.at.direction / readings.scale
+    expected = rows - np.outer(column, column @ rows) / (column @ column)
+    assert _without_offsets(slopes, readings) == pytest.approx(expected)
+    one_way = readings.taken(readings.at.direction > 0.0)
+    part = slopes[readings.at.direction > 0.0]
+    assert _without_offsets(part, one_way) == pytest.approx(part / one_way.scale[:, np.newaxis])
+
+
+def test_a_law_gets_the_viscous_friction_and_the_friction_at_no_pressure_that_were_not_told():
+    readings = measured(np.array([30.0, 30.0]) * BAR, np.full(2, 0.02), np.random.default_rng(0), scatter=0.0)
+    (prior,) = candidate_laws(Variation(pressures=1))
+    values = {'friction_at_one_bar': 1.5, 'pressure_exponent': 2.0 / 3.0, 'friction_at_no_pressure': 0.0}
+    score = LawScore(prior, LawFit(prior, values, np.zeros(1), np.ones((4, 1))))
+    found = _model(score, readings, readings.at)
+    names = [p.name for p in found.law.parameters]
+    assert names == ['friction_at_no_pressure', 'friction_at_one_bar', 'viscous_friction']
+    assert [found.values[name] for name in names] == [0.0, 1.5, 0.0]
+    friction = 2.0 * 1.5 * 30.0 ** (2.0 / 3.0)
+    assert (found.mean, found.seals) == (pytest.approx(friction), 2)
+    typical = readings.at.typical(friction / 2.0)
+    starts = [p.start(typical) for p in found.law.parameters]
+    assert found.steps == pytest.approx([1e-7 * abs(starts[0]), 1.5e-4, 1e-7 * abs(starts[2])])
+    assert np.isnan(found.held_scale)
+    swept = replace(readings, are_samples=True)
+    assert _model(score, swept, swept.at).held_scale == pytest.approx(np.abs(readings.force).mean())
+    full = LawScore(VISCOUS, LawFit(VISCOUS, KNOWN, np.zeros(1), np.ones((4, 3))))
+    same = _model(full, readings, readings.at)
+    assert same.law is VISCOUS
+    assert same.values == KNOWN
+
+
+def test_laws_disagree_by_their_largest_difference_over_their_mean():
+    def of(level):
+        return LawScore(CONSTANT, LawFit(CONSTANT, {LEVEL: level}, np.zeros(1), np.ones((4, 1))))
+
+    points = [(1e6, 0.02), (2e6, 0.02)]
+    assert _disagreements([of(10.0), of(11.0), of(15.0)], linearised(), points) == pytest.approx([5.0 / 12.0] * 2)
+    assert _disagreements([of(10.0), of(15.0)], linearised(mean=1000.0), points) == pytest.approx([10.0 / 50.0] * 2)
+    uneven = LawScore(ASYMMETRIC, LawFit(ASYMMETRIC, KNOWN | {'asymmetry': 0.25, 'viscous_friction': 0.0},
+                                         np.zeros(1), np.ones((4, 1))))  # fmt: skip
+    same = LawScore(BASE, LawFit(BASE, KNOWN, np.zeros(1), np.ones((4, 1))))
+    (one,) = _disagreements([uneven, same], linearised(), points[:1])
+    at = linearised().conditions(points[:1])
+    both = np.array([uneven.fit.friction(at), same.fit.friction(at)])
+    assert one == pytest.approx((np.ptp(both, axis=0) / both.mean(axis=0)).max())
+    assert _disagreements([of(10.0)], linearised(), []) == []
+
+
+def scored(law, losses, condition=1.0, **values):
+    jacobian = np.eye(max(len(law.parameters), 3))[:, : len(law.parameters)] * condition
+    inside = {p.name: 0.5 * (p.lower + p.upper) for p in law.parameters} | values
+    return LawScore(law, LawFit(law, inside, np.zeros(1), jacobian), losses=np.asarray(losses, float))
+
+
+def test_the_richest_law_that_is_not_beaten_and_not_at_its_bound_is_designed_for():
+    even = np.ones(4)
+    scores = [scored(CONSTANT, 1.3 * even), scored(BASE, 1.05 * even), scored(VISCOUS, even)]
+    near = laws_not_beaten([LawScore(CONSTANT, why_not='too few'), *scores])
+    assert near == scores[1:]
+    assert _richest(near) is scores[2]
+    at_bound = scored(VISCOUS, even, friction_at_one_bar=VISCOUS.parameters[1].upper)
+    assert _richest([scores[1], at_bound]) is scores[1]
+    assert _richest([at_bound]) is at_bound
+    other = scored(VISCOUS, 0.9 * even)
+    assert _richest([scores[2], other]) is other
+    without_effect = scored(VISCOUS, even, condition=0.0)
+    assert laws_not_beaten([scores[1], without_effect]) == [scores[1]]
+    assert laws_not_beaten([without_effect]) == [without_effect]
+    wild = scored(BASE, [9.0, 0.1, 0.1, 0.1])  # twice as far off in the mean, though no test tells it
+    assert laws_not_beaten([wild, scores[2]]) == [scores[2]]
+    with pytest.raises(ValueError, match='no law was fitted'):
+        laws_not_beaten([LawScore(CONSTANT, why_not='too few')])
+
+
+# --- the design ---
+
+
+def test_the_points_that_come_first_are_taken_in_turn_and_then_the_best_of_the_grid():
+    model = linearised()
+    slopes = _relative_slopes(model, (0.0, 27.0 * BAR), (0.01, 0.05))
+    prior = _prior(model, 0.0, 27.0 * BAR, (0.01, 0.05))
+    first, grid = [(8.0 * BAR, 0.02)], [(0.0, 0.01), (27.0 * BAR, 0.05), (27.0 * BAR, 0.01)]
+    points, errors, information = _greedy(model, slopes, prior, 0.05, first, grid, 2)
+    assert points[0] == first[0]
+    assert len(points) == 3
+    assert len(set(points)) == 3
+
+    def error(chosen):
+        at = model.conditions(chosen)
+        weight = 0.05 * model.friction(at)
+        rows = np.column_stack((model.slopes(at), at.direction)) / weight[:, np.newaxis]
+        full = rows.T @ rows
+        matrix = full[:3, :3] - np.outer(full[:3, 3], full[3, :3]) / full[3, 3]
+        return _error(slopes, prior + matrix), matrix
+
+    for count in (1, 2, 3):
+        assert errors[count - 1] == pytest.approx(error(points[:count])[0])
+    second = min(grid, key=lambda point: error([*first, point])[0])
+    assert points[1] == second
+    third = min((point for point in grid if point != second), key=lambda point: error([*first, second, point])[0])
+    assert points[2] == third
+    assert information == pytest.approx(error(points)[1])
+    assert len(_greedy(model, slopes, prior, 0.05, first, grid, 9)[0]) == 4
+    assert _greedy(model, slopes, prior, 0.05, [], [], 9)[:2] == ([], [])
+
+
+def test_a_design_says_what_it_is_for(designed):
+    readings, design = designed
+    speed = np.abs(readings.at.velocity)
+    assert design.pressures == (5.0 * BAR, 70.0 * BAR)
+    assert design.speeds == pytest.approx((np.quantile(speed, 0.05), np.quantile(speed, 0.95)), rel=0.01)
+    assert len(design.readings) == 8
+    assert all(reading.directions == (-1, 1) for reading in design.readings)
+    assert not any(reading.is_repeated for reading in design.readings)
+    assert (design.speed_is_varied, design.speed_is_measured) == (True, True)
+    assert design.parts['run to run'] == 0.0
+    assert design.parts['scatter'] == pytest.approx(SCATTER, rel=0.2)
+    assert design.limit == 'law'
+    assert design.parts['law'] == pytest.approx(design.error_before, rel=0.01)  # where it is identified is the range
+    assert design.error_after == pytest.approx(design.shrink * design.error_before)
+    assert design.condition_after < 0.5 * design.condition_before
+    found = fit(VISCOUS, readings, TRUE)
+    assert design.condition_before == pytest.approx(found.condition_number, rel=0.02)
+    assert abs(design.correlation_before.correlation) == pytest.approx(abs(correlation(readings)), abs=0.02)
+    assert abs(design.correlation_after.correlation) < abs(design.correlation_before.correlation)
+    assert design.repeated.freedom == len(readings.levels)
+    stated = design_experiment(score_laws([VISCOUS], readings), readings, None, 0.5, 3)
+    assert stated.repeated is None
+    assert stated.limit == 'run to run'
+    assert all(reading.is_repeated for reading in stated.readings)  # speed was varied: nothing else is asked
+    assert len(stated.readings) == 10
+    none = design_experiment(score_laws([VISCOUS], readings), replace(readings, are_samples=True), NO_RUNS, 0.0, 0)
+    assert none.readings == ()
+    assert none.error_after == none.error_before
+    assert none.repeated.freedom == 1
+
+
+def test_of_one_pressure_the_range_goes_down_to_none():
+    readings = held((59.0, 60.0))
+    low = design_experiment(score_laws([BASE], held()), readings, NO_RUNS, 0.0, 1)
+    assert low.pressures == (0.0, 60.0 * BAR)
+    assert design_experiment(score_laws([BASE], held()), held(), NO_RUNS, 0.0, 1).pressures == (20.0 * BAR, 60.0 * BAR)

@@ -408,7 +408,7 @@ def test_standard_errors_are_those_of_the_jackknife_over_twenty_groups_of_revers
     ],
 )
 def test_a_parameter_stays_within_its_bounds(place, true, start, bound, length):
-    """ln K, p, epsilon, ln L, ln tau, and f_c of the one log: made beyond the bound, found at it."""
+    """Logarithm of K, p, epsilon, logarithms of L and tau, f_c of the log: made beyond the bound, found at it."""
     truth = np.array([np.log(1e5), 1.0, 0.3, np.log(5e-4), np.log(0.5), 20.0, -1.5])
     if place == 0:
         truth[[2, 4]] = 0.0, -np.inf  # no lag
