@@ -10,6 +10,7 @@ from seal_friction_ros.core.identification.candidate_laws import OperatingCondit
 from seal_friction_ros.core.identification.diagnostics import (
     RunChange,
     collinear_regressors,
+    outlying_level,
     repeatability,
     shared_levels,
     swept_logs_compared,
@@ -110,3 +111,65 @@ def test_swept_logs_are_compared_by_their_share_of_the_law_of_all():
     (found,) = swept_logs_compared(readings, fit(constant, readings))
     assert found == (None, 'a', pytest.approx(10.0), 'b', pytest.approx(14.0))
     assert swept_logs_compared(replace(readings, are_samples=False), fit(constant, readings)) == []
+
+
+# --- outliers ---
+
+CONSTANT = next(law for law in candidate_laws(Variation()) if law.name == 'constant_coulomb')
+LINE = next(law for law in candidate_laws(Variation()) if law.name == 'pressure_power_law_1')
+
+
+def test_an_outlier_is_so_many_standard_errors_of_a_new_pressure_from_the_law_of_the_others():
+    """A constant from three pressures of 20 N; the fourth is off by 30 % and 8 % are expected, and its own error."""
+    readings = made([10, 20, 30, 40], [20.0, 20.0, 20.0, 26.0])
+    found = outlying_level([CONSTANT], readings)
+    assert found == (
+        3,
+        pytest.approx(26.0),
+        pytest.approx(20.0),
+        pytest.approx(0.3 / (0.08 * np.sqrt(4.0 / 3.0)), rel=1e-3),
+    )
+    assert outlying_level([CONSTANT], readings, 0.07) == found
+    assert outlying_level([CONSTANT], readings, 0.087) is None  # 2.99 of them
+    low = outlying_level([CONSTANT], made([10, 20, 30, 40], [14.0, 20.0, 20.0, 20.0]))
+    assert low == (
+        0,
+        pytest.approx(14.0),
+        pytest.approx(20.0),
+        pytest.approx(0.3 / (0.08 * np.sqrt(4.0 / 3.0)), rel=1e-3),
+    )
+    assert outlying_level([CONSTANT], readings.taken(readings.level > 0)) is None  # of three pressures none
+
+
+def test_what_the_other_pressures_scatter_by_counts_as_noise():
+    frictions = np.array([18.0, 22.0, 21.0, 19.0, 40.0])
+    found = outlying_level([CONSTANT], made([10, 20, 30, 40, 50], frictions))
+    others = frictions[:4]
+    expected = np.sum(1.0 / others) / np.sum(1.0 / others**2)  # each weighted with its own friction
+    residual = np.sqrt(np.sum((others / expected - 1.0) ** 2) / 3.0)
+    noise = np.hypot(residual, 0.08)
+    size = (40.0 / expected - 1.0) / (noise * np.sqrt(1.0 + 1.0 / 4.0))
+    assert found == (4, pytest.approx(40.0), pytest.approx(expected), pytest.approx(size, rel=1e-3))
+
+
+def test_an_extrapolated_pressure_is_less_sure_and_the_law_that_fits_the_others_best_is_asked():
+    """Friction 2 N + 0.5 N/bar at five pressures; the sixth is far away. Its leverage is that of a weighted line."""
+    bars = np.array([10.0, 20.0, 30.0, 40.0, 50.0, 150.0])
+    line = 2.0 + 0.5 * bars
+    frictions = np.where(bars > 100.0, 1.6 * line, line)
+    found = outlying_level([CONSTANT, LINE], made(bars, frictions))
+    x = np.column_stack((np.ones(6), bars)) / line[:, np.newaxis]
+    leverage = x[5] @ np.linalg.inv(x[:5].T @ x[:5]) @ x[5]
+    assert (found.level, found.expected) == (5, pytest.approx(line[5], rel=1e-6))
+    assert found.standard_deviations == pytest.approx(0.6 / (0.08 * np.sqrt(1.0 + leverage)), rel=0.01)
+
+
+def test_repeatability_of_samples_is_compared_in_cells_of_speed_pressure_and_direction():
+    """Twelve speeds times six pressures: within each cell two readings each way, 1 N off their mean of 20 N."""
+    bars, speeds = np.repeat(10.0 * np.arange(1, 7), 24), np.tile(np.repeat(0.01 * np.arange(1, 13), 2), 6)
+    level = 100.0 * bars + 1e4 * speeds  # far more between the cells than within them
+    readings = made(bars, level + np.tile([1.0, -1.0], 72), speeds, samples=True)
+    force = readings.force + np.where(readings.at.direction > 0.0, 5e3, 0.0)
+    readings = replace(readings, force=force)
+    mean = readings.magnitudes(np.zeros(1)).mean()
+    assert repeatability(readings, np.zeros(1)) == pytest.approx(np.sqrt(2.0) / mean)

@@ -494,3 +494,23 @@ def test_repeatability_is_the_deviation_from_the_mean_at_equal_displacement():
     unseen = [curve(way, [13.0, 12.0, 11.0, 99.0]), curve(way, [-4.0] * 4, direction=-1), curve([0.25], [2.0], log=1)]
     found = _deviations_from_mean(seen, unseen, 1.0)
     assert found == pytest.approx([1.0, 0.0, -1.0, 1.0, 1.0, 1.0, -0.5])
+
+
+@pytest.mark.parametrize(('step', 'told'), [(1.1e-4, True), (1.9e-4, False)])
+def test_a_position_needs_five_steps_on_the_way_to_sliding(step, told):
+    """The last of the elements slides after 0.73 mm: 5.5 of 18 parts of 40 N over a sixth of 1e5 N/m."""
+    made = [log([Presliding(stiffness=1e5)], noise=0.05, step=step)]
+    if told:
+        assert fit_presliding(made).full_yield == pytest.approx(0.73e-3, rel=0.3)
+    else:
+        with pytest.raises(PreslidingRefusedError, match=r'steps or noise of the position of 0.00019 m are too coarse'):
+            fit_presliding(made)
+
+
+def test_curves_are_twenty_steps_long_of_the_coarsest_position():
+    """Seals that slide after 0.29 mm would take 0.73 mm."""
+    seal = Presliding(stiffness=2.5e5)
+    alone = fit_presliding([log([seal])])
+    assert alone.length < 0.77e-3
+    both = fit_presliding([log([seal]), log([seal], step=4e-5)])
+    assert both.length == pytest.approx(20.0 * 4e-5, rel=0.01)

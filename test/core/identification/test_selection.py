@@ -17,11 +17,16 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.selection import (
     LawScore,
     Rise,
+    _errors_of_levels,
+    choose_anew,
     choose_without,
+    collinear_spread,
     is_beaten,
     recommended,
     regroupings,
     rise_over_pressures,
+    score_ladder,
+    score_laws,
     variation_of,
 )
 
@@ -254,3 +259,138 @@ def test_a_parameter_without_effect_is_not_identifiable():
     assert found.condition_number == np.inf
     assert 'ill-conditioned' in found.why_unsound
     assert np.isnan(found.correlation).all()
+
+
+def test_pressures_that_scatter_by_themselves_make_the_rise_less_sure():
+    """Strokes repeat within 0.1 %, and no power law meets the pressures: prior 5 % of weight 4, and the residuals."""
+    bars = np.array([10.0, 20.0, 30.0, 40.0])
+    friction = np.array([10.0, 14.0, 11.0, 16.0])
+    alternating = np.tile([1.001, 0.999, 0.999, 1.001], 8)
+    made = readings(bars, count=4, force=np.repeat(friction, 8) * alternating)
+    found = rise_over_pressures(made)
+    misses = []
+    for exponent in (2.0 / 3.0, 1.0, 1.5, 2.0):
+        x = bars**exponent
+        line = np.polyval(np.polyfit(x, friction, 1, w=1.0 / friction), x)  # each error is a share of the friction
+        misses.append(float(np.sum((1.0 - line / friction) ** 2)))
+    scatter = np.sqrt((4.0 * 0.05**2 + min(misses)) / (4.0 + 2.0))
+    (slope, _), covariance = np.polyfit(bars, friction, 1, w=1.0 / (scatter * friction), cov='unscaled')
+    assert found.rise == pytest.approx(slope * 30.0, rel=1e-3)
+    assert found.standard_error == pytest.approx(np.sqrt(covariance[0, 0]) * 30.0, rel=1e-3)
+    # Friction of a power law does not scatter by itself: its rise is as sure as the strokes repeat.
+    curved = readings(bars, count=4, force=np.repeat(5.0 + 0.1 * bars**1.5, 8) * alternating)
+    assert rise_over_pressures(curved).standard_error < 0.1 * found.standard_error
+
+
+def test_one_repeated_pair_of_strokes_tells_no_scatter_and_strokes_that_follow_each_other_count_as_one():
+    bars = np.array([10.0, 20.0, 40.0])
+    made = readings(bars, count=2)
+    one = made.taken(np.array([0, 2, 4, 6, 8, 9]))
+    assert _errors_of_levels(one, np.full(3, 10.0)) is None
+    both = made.taken(np.array([0, 1, 4, 5, 8, 9]))
+    force = both.force * np.tile([1.02, 0.98], 3)
+    errors = _errors_of_levels(replace(both, force=force), np.full(3, 10.0))
+    # Three pairs, 0.2 N off: standard deviation 0.2 * sqrt(6 / 3) N, over the root of two strokes.
+    assert errors == pytest.approx(np.full(3, 0.2 * np.sqrt(2.0) / np.sqrt(2.0)))
+    drifting = readings(bars, count=200, force=np.tile(10.0 + np.linspace(-0.1, 0.1, 200), 6))
+    share = np.linspace(-0.01, 0.01, 200)
+    std = 10.0 * np.sqrt(6.0 * np.sum(share**2) / (6.0 * 199.0))
+    worth = 400.0 * 0.1 / 1.9  # the lag-one correlation counts up to 0.9
+    assert _errors_of_levels(drifting, np.full(3, 10.0)) == pytest.approx(np.full(3, std / np.sqrt(worth)))
+    few = readings(bars, count=12, force=np.tile(np.repeat([9.9, 10.1], 6), 6))
+    correlation = 9.0 / 12.0  # ten neighbours of a kind less one of two kinds, of twelve squares: (10 - 1) / 12
+    worth = max(24.0 * (1.0 - correlation) / (1.0 + correlation), 1.0)
+    std = 0.1 * np.sqrt(72.0 / 66.0)
+    assert _errors_of_levels(few, np.full(3, 10.0)) == pytest.approx(np.full(3, std / np.sqrt(worth)))
+
+
+# --- the ladder ---
+
+
+def test_the_best_sound_law_that_depends_on_pressure_is_tried_again_with_speeds():
+    rng = np.random.default_rng(3)
+    bars, speeds = [5.0, 10.0, 20.0, 30.0, 40.0, 50.0], (0.01, 0.04)
+    plain = readings(bars, speeds, count=2)
+    law = LAWS['pressure_power_law_1']
+    values = {'friction_at_no_pressure': 3.0, 'friction_at_one_bar': 0.5}
+    friction = law.friction(plain.at, values) * (1.0 + 0.01 * rng.normal(size=plain.count))
+    made = replace(plain, force=plain.at.direction * friction)
+    ticks = []
+    chosen = [LAWS[name] for name in ('constant_coulomb', 'pressure_power_law_1', 'pressure_power_law_2')]
+    scores = score_ladder(chosen, made, Variation(), ticks.append)
+    names = [each.law.name for each in scores]
+    assert names == ['constant_coulomb', 'pressure_power_law_1', 'pressure_power_law_2',
+                     *(f'pressure_power_law_1_{more}' for more in ('viscous', 'stribeck', 'asymmetric'))]  # fmt: skip
+    assert ticks == [1] * 6
+    assert all(len(each.losses) == 6 for each in scores)
+    only = score_ladder(chosen[:1], made, Variation())
+    assert [each.law.name for each in only] == ['constant_coulomb']
+    two = made.taken(made.level < 2)
+    (too_few,) = score_laws([chosen[1]], two)
+    assert too_few.why_not == '2 parameters need 3 pressures, there are 2'
+    assert (too_few.fit, too_few.losses) == (None, None)
+    by_test = replace(made.taken(made.level < 2), group=np.arange(16) % 2, left_out_by='test')
+    assert score_laws([chosen[1]], by_test)[0].why_not == ''  # each test has both pressures
+    (broken,) = score_laws([chosen[0]], replace(made, force=np.full(made.count, np.nan)))
+    assert broken.fit is None
+    assert broken.why_not
+
+
+def test_groups_may_be_computed_by_another_and_stay_in_order():
+    made = readings([10, 20, 40], count=2, force=np.repeat([10.0, 20.0, 30.0], 4))
+    calls = []
+
+    def run(tasks):
+        calls.append(len(tasks))
+        return [task() for task in tasks]
+
+    def choose(left):
+        return recommended(score_laws([LAWS[CONSTANT]], left))
+
+    found = choose_anew(made, choose, run)
+    assert calls == [3]
+    assert found.laws == (CONSTANT,) * 3
+    # The friction of the others, each weighted with 1 / friction^2: sum of 1/f over sum of 1/f^2.
+    others = [(20.0, 30.0), (10.0, 30.0), (10.0, 20.0)]
+    expected = [sum(1.0 / f for f in pair) / sum(1.0 / f**2 for f in pair) for pair in others]
+    assert found.predicted == pytest.approx(np.repeat(expected, 4))
+
+
+# --- what speed and pressure cannot tell ---
+
+
+def near(slope, power, times=1.0):
+    """A score of a law of 20 N that also follows speed and pressure."""
+    friction = SimpleNamespace(
+        friction=lambda at: 20.0 + slope * np.abs(at.velocity) + power * at.pressure.mean(axis=1) / BAR
+    )
+    return LawScore(LAWS[CONSTANT], friction, None, times * EVEN)
+
+
+def test_laws_that_fit_nearly_as_well_spread_where_speed_and_pressure_part():
+    bars = np.linspace(0.0, 80.0, 41)
+    made = readings(bars, np.linspace(0.01, 0.09, 41), samples=True)
+    chosen = near(0.0, 0.0).fit
+    speeds = np.quantile(np.abs(made.at.velocity), (0.125, 0.375, 0.625, 0.875))
+    assert collinear_spread([near(0.0, 0.0)], chosen, made) == 0.0
+    of_speed = collinear_spread([near(100.0, 0.0)], chosen, made)
+    assert of_speed == pytest.approx(np.sqrt(np.mean((100.0 * speeds / 20.0) ** 2)))
+    pressures = np.array([10.0, 30.0, 50.0, 70.0])  # [bar] quartiles
+    of_pressure = collinear_spread([near(0.0, 0.1)], chosen, made)
+    assert of_pressure == pytest.approx(np.sqrt(np.mean((0.1 * pressures / 20.0) ** 2)), rel=0.02)
+    every_pair = (100.0 * speeds[:, np.newaxis] - 0.1 * pressures) / 20.0  # also fast at low pressure
+    assert collinear_spread([near(100.0, -0.1)], chosen, made) == pytest.approx(
+        np.sqrt(np.mean(every_pair**2)), rel=0.02
+    )
+    mean = collinear_spread([near(100.0, 0.0), near(0.0, 0.0)], chosen, made)
+    assert mean == pytest.approx(of_speed / np.sqrt(2.0))
+    best = near(0.0, 0.0, 1.0)
+    assert collinear_spread([best, near(100.0, 0.0, 1.9)], chosen, made) == pytest.approx(mean)
+    assert collinear_spread([best, near(100.0, 0.0, 2.1)], chosen, made) == 0.0
+    assert collinear_spread([best, LawScore(LAWS[CONSTANT], why_not='too few')], chosen, made) == 0.0
+    assert collinear_spread([near(100.0, 0.0)], chosen, replace(made, are_samples=False)) == 0.0
+    uneven = SimpleNamespace(friction=lambda at: np.where(at.direction > 0.0, 24.0, 20.0) + 0.0 * at.velocity)
+    one = LawScore(LAWS[CONSTANT], uneven, None, EVEN)
+    assert collinear_spread([one], chosen, made) == pytest.approx(np.sqrt(np.mean([0.2**2, 0.0])))  # both directions
+    signed = SimpleNamespace(friction=lambda at: 20.0 + 1e3 * (at.direction != np.sign(at.velocity)))
+    assert collinear_spread([LawScore(LAWS[CONSTANT], signed, None, EVEN)], chosen, made) == 0.0
