@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import norm, t
 
 from seal_friction_ros.core.identification.calibration import (
     NOMINAL,
+    _in_parts,
     between_runs,
     calibration,
     repeated_runs,
+    run_numbers,
     runs_of,
     shares_inside,
     within_run,
@@ -18,7 +20,7 @@ from seal_friction_ros.core.identification.calibration import (
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, Variation, candidate_laws
 from seal_friction_ros.core.identification.fitting import fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.validation import deviations_in_std
+from seal_friction_ros.core.identification.validation import deviations_in_std, deviations_of_left_out
 
 LAW = next(law for law in candidate_laws(Variation()) if law.name == 'pressure_power_law_2_3')
 TRUTH = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 2.0 / 3.0}
@@ -156,3 +158,54 @@ def test_a_stated_deviation_between_runs_makes_the_band():
     parts = readings.taken(others), readings.taken(left_out)
     narrow, wide = (between_runs(LAW, *parts, values, stated).max() for stated in (0.1, 1.0))
     assert wide < 0.3 * narrow
+
+
+def test_a_run_is_its_test_or_file_if_those_are_left_out_and_else_its_source():
+    made = strokes(runs=2, pressures=2)
+    grouped = replace(made, group=made.group + 7)
+    for by, numbers in (('test', {7, 8}), ('file', {7, 8}), ('block', {0, 1}), ('pressure', {0, 1})):
+        assert set(run_numbers(replace(grouped, left_out_by=by)).tolist()) == numbers
+    assert [run.count for run in runs_of(made)] == [16, 16]
+
+
+def test_a_run_has_four_contiguous_parts_in_each_direction():
+    run = strokes(runs=1, pressures=1, count=16)
+    found = _in_parts(run)
+    for side in (-1.0, 1.0):
+        assert found.group[run.at.direction == side].tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert found.left_out_by == 'block'
+    one_way = _in_parts(run.taken(run.at.direction > 0.0))
+    assert one_way.group.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+
+
+def test_within_a_run_the_band_is_that_of_its_pressures_or_its_blocks():
+    run = replace(strokes(runs=1, pressures=5), left_out_by='block')
+    by_pressure = replace(run, group=run.level, left_out_by='pressure')
+    ratios, groups = within_run(LAW, run, TRUTH)
+    assert groups == 5
+    assert ratios == pytest.approx(deviations_of_left_out(LAW, by_pressure, TRUTH))
+    blocks = replace(run, are_samples=True, group=np.arange(run.count) // 20)
+    ratios, groups = within_run(LAW, blocks, TRUTH)
+    assert groups == 2
+    assert ratios == pytest.approx(deviations_of_left_out(LAW, blocks, TRUTH))
+    one_block, groups = within_run(LAW, replace(blocks, group=np.zeros(run.count, int)), TRUTH)
+    assert (len(one_block), groups) == (0, 0)
+
+
+def test_between_runs_the_band_is_that_of_the_other_runs_or_has_the_prior():
+    readings = strokes(runs=3, run_scatter=0.1)
+    values = fit(LAW, readings).values
+    (others, left_out), *_ = repeated_runs(readings)
+    two, out = readings.taken(others), readings.taken(left_out)
+    # Two other runs show how runs differ; a stated deviation takes the place of that.
+    assert between_runs(LAW, two, out, values) == pytest.approx(deviations_in_std(LAW, two, out, values))
+    assert between_runs(LAW, two, out, values, 0.3) == pytest.approx(deviations_in_std(LAW, two, out, values, 0.3))
+    # One other run shows none: its pressures are left out, and the prior of 15 % is added.
+    one = readings.taken(readings.source == 1)
+    by_pressure = replace(one, group=one.level, left_out_by='pressure')
+    prior = 0.15 * t.ppf(0.975, 8.0) / 1.96
+    expected = deviations_in_std(LAW, by_pressure, out, values, prior)
+    assert between_runs(LAW, one, out, values) == pytest.approx(expected, rel=1e-5)
+    found = calibration(LAW, readings, values, 0.3)
+    stated = [between_runs(LAW, readings.taken(a), readings.taken(b), values, 0.3) for a, b in repeated_runs(readings)]
+    assert found.between_runs == pytest.approx(shares_inside(np.concatenate(stated)))

@@ -1,6 +1,7 @@
 """The scale over temperature is found where temperature varied by itself, and refused elsewhere."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,18 @@ from scipy import stats
 from seal_friction_ros.core.friction.temperature import scale_at
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.temperature import at_reference, fit_temperature
+from seal_friction_ros.core.identification.temperature import (
+    _centred,
+    _left,
+    _line,
+    _means,
+    _numbered,
+    _offsets,
+    _others,
+    _runs,
+    at_reference,
+    fit_temperature,
+)
 
 BAR = 1e5
 
@@ -152,3 +164,92 @@ def test_what_does_not_identify_it_is_refused(name, made):
 def test_readings_without_temperature_have_no_fit():
     plain = readings(RUNS)
     assert fit_temperature(plain.taken(np.arange(0))) is None
+
+
+# --- parts of it ---
+
+
+def test_from_four_runs_on_cells_reach_across_them_and_else_a_run_has_eight_parts():
+    four, three = readings((290.0, 300.0, 310.0, 320.0), strokes=2), readings((290.0, 300.0, 310.0), strokes=8)
+    run, part, across = _runs(four)
+    assert across
+    assert run.tolist() == part.tolist() == four.source.tolist()
+    run, part, across = _runs(three)
+    assert not across
+    assert run.tolist() == three.source.tolist()
+    assert part.tolist() == [i // 3 for i in range(72)]  # 24 strokes in eight parts, of three runs
+    by_test = replace(three, group=np.arange(72) // 18, left_out_by='test')
+    assert _runs(by_test)[2]
+    assert _runs(by_test)[0].tolist() == by_test.group.tolist()
+
+
+def test_what_else_varied_counts_from_2_percent_on_and_the_way_of_the_rod_within_a_run():
+    made = readings((290.0, 300.0), strokes=8)
+    cells = _numbered(made.level, made.at.direction.astype(int), made.source)
+    assert len(np.unique(cells)) == 12
+    alternating = np.where(np.arange(48) // 2 % 2 == 0, 1.0, -1.0)  # within each cell
+    for off, counts in ((0.019, 0), (0.021, 1)):
+        speed = 0.02 * (1.0 + off * alternating)
+        varied = replace(made, at=made.at._replace(velocity=made.at.direction * speed))
+        assert len(_others(varied, cells, across=True)) == counts
+        pressure = made.at.pressure.mean() * (1.0 + off * alternating)[:, np.newaxis] + 0.0 * made.at.pressure
+        pressed = replace(made, at=made.at._replace(pressure=pressure))
+        assert len(_others(pressed, cells, across=True)) == counts
+    unknown = replace(made, at=made.at._replace(velocity=np.full(48, np.nan)))
+    assert _others(unknown, cells, across=True) == []
+    columns = _others(made, cells, across=False)
+    assert len(columns) == 4
+    for source in (0, 1):
+        here = made.source == source
+        way, square = columns[2 * source : 2 * source + 2]
+        share = made.travel[here] / np.ptp(made.travel[here])
+        assert way[here] == pytest.approx(share)
+        assert square[here] == pytest.approx(share**2)
+        assert (way[~here] == 0.0).all()
+    assert _others(replace(made, travel=np.empty(0)), cells, across=False) == []
+
+
+def test_cells_and_other_columns_are_taken_off_as_by_a_regression_on_them():
+    rng = np.random.default_rng(1)
+    cells, column, other = np.repeat([0, 1, 2], 5), rng.normal(size=15), rng.normal(size=15)
+    dummies = (cells[:, np.newaxis] == np.arange(3)).astype(float)
+    assert _centred(column, cells) == pytest.approx(column - dummies @ [column[cells == c].mean() for c in range(3)])
+    design = np.column_stack((dummies, other))
+    left = column - design @ np.linalg.lstsq(design, column, rcond=None)[0]
+    assert _left(column, cells, [other]) == pytest.approx(left)
+    assert _left(column, cells, [other, np.ones(15), 1e6 * other]) == pytest.approx(left)  # nothing new
+    assert _left(column, cells, []) == pytest.approx(_centred(column, cells))
+    assert _means(column, cells) == pytest.approx([column[cells == c].mean() for c in range(3)])
+    x, y = rng.normal(size=9), rng.normal(size=9)
+    line = stats.linregress(x, y)
+    assert _line(x, y) == pytest.approx((line.slope, line.stderr * stats.t.ppf(0.975, 7) / 1.96))
+
+
+def test_the_samples_behind_the_readings_and_their_offset_go_to_the_reference_with_them():
+    made = readings(RUNS, noise=0.0)
+    made = replace(made, samples=tuple(np.array([force - 1.0, force, force + 1.0]) for force in made.force))
+    found = fit_temperature(made)
+    assert _offsets(made) == pytest.approx(np.full(6, 5.0))
+    cold = at_reference(made, found)
+    share = np.exp(0.012 * (made.temperature - found.reference))
+    assert cold.force == pytest.approx(5.0 + share * (made.force - 5.0))
+    for samples, force, one in zip(cold.samples, cold.force, share, strict=True):
+        assert samples == pytest.approx(force + one * np.array([-1.0, 0.0, 1.0]))
+    part = made.taken(made.source < 5)
+    assert _offsets(part).tolist()[5] == 0.0  # of a run without readings
+
+
+@pytest.mark.parametrize(('noise', 'told'), [(0.09, True), (0.11, False)])
+def test_friction_at_the_ends_of_the_temperatures_has_to_be_known_to_a_tenth(noise, told):
+    """One point a run; the runs are off the line by a pattern with no slope. Half a band at the ends is ``noise``."""
+    kelvin = np.array([290.0, 300.0, 310.0, 320.0, 330.0])
+    pattern = np.array([1.0, -2.0, 0.0, 2.0, -1.0])
+    pattern = pattern - np.polyval(np.polyfit(kelvin, pattern, 1), kelvin)
+    error = np.sqrt(pattern @ pattern / 3.0 / np.sum((kelvin - 310.0) ** 2)) * stats.t.ppf(0.975, 3)
+    pattern = pattern * noise / (error * 20.0)
+    made = readings(tuple(kelvin), noise=0.0, scale=lambda one: np.exp(-0.012 * (one - 310.0)))
+    off = np.exp(pattern)[made.source]
+    found = fit_temperature(replace(made, force=5.0 + off * (made.force - 5.0)))
+    assert found.coefficient == pytest.approx(0.012, rel=1e-3)
+    assert (found.why_not == '') is told
+    assert told or 'known to 11 % only' in found.why_not
