@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
+from seal_friction_ros.core.identification.prepare_readings import (
+    _parts_of_strokes,
+    _swept,
+    _travel,
+    prepare_logs,
+    prepare_manual_readings,
+)
 from seal_friction_ros.core.identification.readings import ManualReadings, RecordedLog
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 
@@ -145,3 +151,121 @@ def test_a_swept_log_gives_samples_in_ten_blocks_and_too_few_are_refused():
     short = log((0,), swept=True)
     with pytest.raises(ValueError, match='samples of even sliding, 200 are needed'):
         prepare_logs([short._replace(signals=short.signals.taken(np.r_[0:150, 190:340]))], ('a',))
+
+
+# --- parts of it ---
+
+
+def test_the_way_of_the_rod_counts_no_pause_and_no_missing_velocity():
+    signals = Signals(np.array([0.0, 1.0, 1.25, 1.5, 4.0]), np.array([9.0, 1.0, -2.0, np.nan, 3.0]), *np.zeros((3, 5)))
+    assert _travel(signals).tolist() == [0.0, 0.5, 1.0, 1.0, 2.5]  # after a pause half a second
+
+
+def test_strokes_of_one_log_at_one_pressure_have_four_parts():
+    source, level = np.repeat([0, 1], 10), np.tile(np.repeat([0, 1], 5), 2)
+    assert _parts_of_strokes(source, level).tolist() == [0, 0, 1, 2, 3] * 4
+    one = prepare_logs([log((15,) * 4)], ('a',))
+    assert one.readings.left_out_by == 'block'
+    assert one.readings.group.tolist() == one.breakaway.group.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+
+
+def test_a_reading_has_the_mean_temperature_way_and_dwell_of_its_samples():
+    made = log((5, 15, 30))
+    kelvin = 300.0 + np.arange(len(made.signals.time))
+    prepared = prepare_logs([made._replace(temperature=kelvin)], ('a',))
+    middle = 190.0 * np.arange(6) + 50.0 + 20.0 + 49.5  # rest, ramp, middle of the even samples
+    assert prepared.readings.temperature == pytest.approx(300.0 + middle, abs=1.5)
+    stroke = 0.03 * (1.0 + 0.2)  # [m] 1 s even, two ramps of 0.2 s
+    assert prepared.readings.travel == pytest.approx(stroke * (np.arange(6) + 0.5), abs=1e-3)
+    assert prepared.breakaway.dwell[1:] == pytest.approx(np.full(5, 0.5), abs=0.06)
+    assert prepared.breakaway.temperature == pytest.approx(300.0 + 190.0 * np.arange(6) + 49.0)
+    assert len(prepared.breakaway.travel) == 0
+    without = prepare_logs([made._replace(temperature=kelvin), log((5, 15, 30), 'cold')], ('a',))
+    assert len(without.readings.temperature) == 0
+
+
+def test_samples_are_counted_once_by_the_first_reason():
+    one = log((5, 15, 30))
+    prepared = prepare_logs([one], ('a',))
+    speed = np.abs(one.signals.velocity)
+    moving, even = speed > 3e-3, np.abs(np.gradient(one.signals.velocity, 0.01)) < 0.05
+    used = sum(prepared.used.values())
+    assert prepared.left_out == {
+        'at rest': np.count_nonzero(~moving),
+        'accelerated': np.count_nonzero(moving & ~even),
+    } | ({'in no even stroke': np.count_nonzero(moving & even) - used} if (moving & even).sum() > used else {})
+    assert sum(prepared.left_out.values()) + used == len(speed)
+
+
+def even_log(name, count, bar=20.0, warm=True):
+    """Even sliding throughout, half of it each way, at pressures that rise."""
+    k = np.arange(count)
+    velocity = np.where(k < count // 2, 0.03, -0.03)
+    pressure = (1.0 + bar * k / count) * BAR
+    force = np.sign(velocity) * (FRICTION + pressure / BAR) + OFFSET
+    signals = Signals(k / RATE, velocity, pressure, pressure, force)
+    return RecordedLog(name, signals, Sliding(), 300.0 + 0.0 * k if warm else None)
+
+
+def test_of_long_sweeps_every_nth_sample_is_taken_but_200_of_each():
+    logs = [even_log('long', 9000), even_log('short', 300)]
+    even = [np.ones(9000, bool), np.ones(300, bool)]
+    readings, chambers = _swept(logs, even, ('a',))
+    assert np.bincount(readings.source).tolist() == [3000, 300]  # of 9300 every third, so that it is 4000 at most
+    assert readings.force[:2].tolist() == logs[0].signals.force_sum[[0, 3]].tolist()
+    assert chambers.shape == (3300, 2)
+    assert readings.temperature.tolist() == [300.0] * 3300
+    assert readings.at.direction.tolist() == np.sign(readings.at.velocity).tolist()
+    longer = _swept([even_log('long', 9000), even_log('short', 599)], [even[0], np.ones(599, bool)], ('a',))[0]
+    assert np.bincount(longer.source).tolist() == [3000, 300]  # every second: of 599 every third are 200 at least
+    assert len(_swept([even_log('cold', 4000, warm=False)], [np.ones(4000, bool)], ('a',))[0].temperature) == 0
+    assert _swept([even_log('all', 4000)], [np.ones(4000, bool)], ('a',))[0].count == 4000
+    enough = _swept([even_log('few', 200)], [np.ones(200, bool)], ('a',))[0]
+    assert [np.count_nonzero(group) for group in enough.groups] == [20] * 10
+    assert [np.count_nonzero(level) for level in enough.levels.values()] == [20] * 10
+    with pytest.raises(ValueError, match='few: 199 samples of even sliding, 200 are needed'):
+        _swept([even_log('all', 400), even_log('few', 199)], [np.ones(400, bool), np.ones(199, bool)], ('a',))
+
+
+@pytest.mark.parametrize(('longer', 'held'), [(1.4, True), (1.6, False)])
+def test_a_log_is_held_where_four_fifths_of_its_even_samples_are(longer, held):
+    """Six strokes of 1 s at held pressure, and one while the pressure rises by 9 bar."""
+    strokes = log((5, 15, 30)).signals
+    count = round(RATE * longer)
+    k = np.arange(count)
+    more = np.full(count, 0.03)
+    rise = Signals(k, more, (30.0 + 20.0 * k / count) * BAR, 0.0 * k, FRICTION + 30.0 + 20.0 * k / count + OFFSET)
+    joined = Signals(*(np.concatenate(columns) for columns in zip(strokes, rise, strict=True)))
+    joined = joined._replace(time=np.arange(len(joined.time)) / RATE)
+    # Six times a second and the rise: 6 of 7.4 s are 81 %, 6 of 7.6 s are 79 %.
+    prepared = prepare_logs([RecordedLog('log', joined, Sliding())], ('a',))
+    assert prepared.readings.are_samples is not held
+
+
+def test_breakaway_of_several_files_is_left_out_by_file_and_of_one_by_its_parts():
+    files = prepare_logs([log((15,) * 4, 'one'), log((15,) * 4, 'two')], ('a',))
+    assert files.readings.left_out_by == 'file'
+    assert files.breakaway.group.tolist() == files.breakaway.source.tolist() == [0] * 8 + [1] * 8
+    assert files.breakaway.level.tolist() == [0] * 16
+
+
+def test_the_dwell_of_manual_readings_is_known_if_every_sheet_has_it():
+    sheet = manual([(0, 10, 20)])
+    noted = sheet._replace(dwell=np.arange(6.0))
+    both = prepare_manual_readings([manual([(0, 10, 20)])], [noted, noted._replace(name='other')], 1).breakaway
+    assert both.dwell.tolist() == [0, 1, 2, 3, 4, 5] * 2
+    assert len(prepare_manual_readings([sheet], [noted, sheet], 1).breakaway.dwell) == 0
+
+
+def test_manual_breakaway_at_one_pressure_keeps_its_tests_and_at_several_those_of_the_sliding_readings():
+    sliding = manual([(0, 10, 20)] * 2)
+    one = prepare_manual_readings([sliding], [manual([(10, 10), (10, 10)], more=3.0)], 1).breakaway
+    assert (one.left_out_by, one.group.tolist()) == ('test', [0] * 4 + [1] * 4)
+    tests = prepare_manual_readings([sliding], [manual([(0, 10, 20)] * 2, more=3.0)], 1).breakaway
+    assert (tests.left_out_by, tests.group.tolist()) == ('test', [0] * 6 + [1] * 6)
+    by_pressure = prepare_manual_readings([manual([(0, 10, 20)])], [manual([(0, 10, 20)] * 2, more=3.0)], 1).breakaway
+    assert (by_pressure.left_out_by, by_pressure.group.tolist()) == ('pressure', [0, 0, 1, 1, 2, 2] * 2)
+    empty = manual([(0, 10, 20)])
+    none = ManualReadings(empty.name, *(column[:0] for column in empty[1:6]))
+    with pytest.raises(ValueError, match='0 readings are too few'):
+        prepare_manual_readings([empty], [none], 1)

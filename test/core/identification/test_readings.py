@@ -12,6 +12,7 @@ from seal_friction_ros.core.identification.readings import (
     ManualReadings,
     RecordedLog,
     are_far_apart,
+    check_clipping,
     check_log,
     check_manual_readings,
     check_readings,
@@ -268,3 +269,64 @@ def test_a_log_has_twenty_samples(samples, reason):
     log = strokes()
     with refused(reason):
         check_log(log._replace(signals=log.signals.taken(np.arange(20, 20 + samples))))
+
+
+def long_log(seconds=60.0):
+    """Strokes to and fro that take long, at 100 Hz."""
+    log = strokes(seconds=seconds / 2.0)
+    n = len(log.signals.time)
+    return log, n
+
+
+@pytest.mark.parametrize(
+    ('count', 'reason'), [(51, None), (52, r'52 of \d+ samples have no force sum, 0.51 s in a row')]
+)
+def test_a_signal_may_be_lost_for_half_a_second(count, reason):
+    """From the first to the last lost sample, where they are far less than a hundredth of the log."""
+    log, _ = long_log(200.0)
+    force = log.signals.force_sum.copy()
+    force[5000 : 5000 + count] = np.nan
+    with refused(reason):
+        check_log(log._replace(signals=log.signals._replace(force_sum=force)))
+
+
+@pytest.mark.parametrize(('share', 'reason'), [(0.0095, None), (0.0105, 'samples have no velocity')])
+def test_a_hundredth_of_a_signal_may_be_lost_here_and_there(share, reason):
+    log, n = long_log()
+    velocity = log.signals.velocity.copy()
+    velocity[np.linspace(20, n - 20, round(share * n)).astype(int)] = np.nan
+    with refused(reason):
+        check_log(log._replace(signals=log.signals._replace(velocity=velocity)))
+
+
+@pytest.mark.parametrize(('share', 'reason'), [(0.015, None), (0.005, 'the rod does not move: 99 % of the speeds')])
+def test_a_rod_moves_where_a_hundredth_of_the_speeds_are_above_rest(share, reason):
+    log, n = long_log()
+    slow = np.arange(n) % 2000 >= round(share * 2000)
+    velocity = np.where(slow, 0.0, np.where(np.arange(n) % 4000 < 2000, 0.02, -0.02))
+    with refused(reason):
+        check_log(log._replace(signals=log.signals._replace(velocity=velocity)))
+
+
+@pytest.mark.parametrize(('back', 'reason'), [(0.02, None), (0.006, r'the rod moves one way only')])
+def test_a_hundredth_of_the_way_has_to_be_back(back, reason):
+    with refused(reason):
+        check_log(strokes(seconds=30.0, back=back))
+
+
+def test_a_sensor_that_is_clipped_at_rest_alone_is_not():
+    log = strokes()
+    resting = np.abs(log.signals.velocity) < 3e-3
+    check_log(log._replace(signals=log.signals._replace(force_sum=np.where(resting, 99.0, log.signals.force_sum))))
+
+
+def test_a_pressure_may_stand_at_that_of_the_air_and_a_force_at_no_end():
+    wave = 40e4 * np.maximum(np.sin(np.arange(2000) * 0.3), 0.0)
+    check_clipping('log', 'pressure', wave, is_pressure=True)
+    with pytest.raises(ValueError, match=r'^log: the force stays at its extreme .0 or 400000. in 50 % of the samples'):
+        check_clipping('log', 'force', wave)
+    with pytest.raises(ValueError, match='the pressure stays at its extreme'):
+        check_clipping('log', 'pressure', 3e5 + wave, is_pressure=True)
+    lost = wave.copy()
+    lost[::50] = np.nan
+    check_clipping('log', 'pressure', lost, is_pressure=True)

@@ -8,7 +8,15 @@ import pytest
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, Variation, candidate_laws
 from seal_friction_ros.core.identification.fitting import fit, offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.run_in import as_measured, drifts, settled_readings
+from seal_friction_ros.core.identification.run_in import (
+    _Approach,
+    _approaches,
+    _determined,
+    _settled,
+    as_measured,
+    drifts,
+    settled_readings,
+)
 from seal_friction_ros.core.identification.validation import cross_validate
 
 STROKE = 0.04  # [m]
@@ -213,3 +221,94 @@ def test_a_run_that_ran_in_alone_is_predicted_as_it_was_measured():
         assert left_out.deviation[inside].mean() == pytest.approx(mean - left_out.predicted[inside].mean(), abs=0.01)
     plain = cross_validate(line, one_ran_in, fit(line, one_ran_in).values)
     assert np.abs(plain.deviation).max() > 3.0 * np.abs(left_out.deviation[one_ran_in.source < 3]).max()
+
+
+# --- approaches of one length ---
+
+
+def pairs(count):
+    """Scatter that neither direction nor travel explains: two strokes up, two strokes down."""
+    return np.tile([1.0, 1.0, -1.0, -1.0], count)[:count]
+
+
+def test_each_length_is_fitted_by_least_squares_with_the_offset_that_is_left():
+    rng = np.random.default_rng(3)
+    travel, direction = 0.5 + STROKE * np.arange(12), np.tile([1.0, -1.0], 6)
+    friction = 10.0 + 2.0 * np.exp(-(travel - 0.5) / 0.1) + 0.3 * direction + 0.1 * rng.normal(size=12)
+    found = _approaches(travel, friction, direction, 0.05, 1.0)
+    spanned = 11 * STROKE
+    assert [one.length for one in found] == pytest.approx(spanned * np.geomspace(0.05, 1.0, 15))
+    for one in found:
+        design = np.column_stack((np.ones(12), np.exp(-(travel - 0.5) / one.length), direction))
+        values = np.linalg.lstsq(design, friction, rcond=None)[0]
+        left = friction - design @ values
+        covariance = np.linalg.inv(design.T @ design) * (left @ left) / (12 - 4)
+        follows = min(max(left[1:] @ left[:-1] / (left @ left), 0.0), 0.9)
+        worse = np.sqrt((1.0 + follows) / (1.0 - follows))
+        assert (one.asymptote, one.height) == pytest.approx(values[:2])
+        assert one.error == pytest.approx(np.sqrt(covariance[0, 0]))
+        assert one.height_error == pytest.approx(np.sqrt(covariance[1, 1]) * worse)
+        assert one.last == pytest.approx(values[0] + values[1] * np.exp(-spanned / one.length))
+        assert one.square == pytest.approx(left @ left)
+
+
+def test_the_settled_friction_is_the_mean_over_the_lengths_by_their_likelihood():
+    def one(asymptote, square):
+        return _Approach(0.1, asymptote, 0.4, asymptote + 0.2, -1.0, 0.1, square)
+
+    # Eight strokes: twice the squares have the likelihood 2^(-8/4).
+    settled, std = _settled([one(10.0, 1.0), one(12.0, 2.0)], 8)
+    assert settled == pytest.approx((10.0 + 12.0 / 4.0) / (1.0 + 1.0 / 4.0))
+    spread = 0.8 * (10.0 - settled) ** 2 + 0.2 * (12.0 - settled) ** 2
+    assert std == pytest.approx(np.sqrt(0.4**2 + spread + (0.5 * 0.2) ** 2 + (0.15 * 1.0) ** 2))
+
+
+@pytest.mark.parametrize(('share', 'found'), [(0.029, True), (0.031, False)])
+def test_an_asymptote_is_determined_with_a_standard_error_of_three_percent(share, found):
+    travel, direction = STROKE * np.arange(24), np.tile([1.0, -1.0], 12)
+    length = travel.max() * np.geomspace(0.05, 0.5, 15)[9]
+    course = 10.0 + 30.0 * np.exp(-travel / length)
+    unit = _approaches(travel, course + 0.01 * pairs(24), direction, 0.05, 0.5)[9]
+    friction = course + 0.01 * share * 10.0 / unit.error * pairs(24)
+    asymptote, determined = _determined(travel, friction, direction)
+    assert np.isfinite(asymptote) == found
+    if found:
+        assert (asymptote, determined) == pytest.approx((10.0, length), rel=0.05)
+
+
+def test_an_asymptote_is_determined_where_the_course_bends():
+    """Squares about the approach have to be below 70 % of those about a line."""
+    travel, direction = STROKE * np.arange(24), np.tile([1.0, -1.0], 12)
+    length = travel.max() * np.geomspace(0.05, 0.5, 15)[9]
+    bend = np.exp(-travel / length)
+    straight = np.column_stack((np.ones(24), travel, direction))
+    curved = bend - straight @ np.linalg.lstsq(straight, bend, rcond=None)[0]
+    scatter = pairs(24) - straight @ np.linalg.lstsq(straight, pairs(24), rcond=None)[0]
+    for share, found in ((0.6, True), (0.8, False)):
+        # Squares of the scatter s and of the bend b that a line leaves: s / (s + b) = share.
+        size = np.sqrt(scatter @ scatter * (1.0 - share) / share / (curved @ curved))
+        friction = 100.0 + 0.1 * (pairs(24) + size * bend)
+        assert np.isfinite(_determined(travel, friction, direction)[0]) == found
+
+
+@pytest.mark.parametrize(('times', 'evident'), [(2.5, False), (6.0, True)])
+def test_an_approach_is_evident_from_four_standard_errors_on(times, evident):
+    course = approach(0.3, LENGTHS[3])
+    clean = run(course, count=30, scatter=0.0)
+    friction = np.abs(clean.force)
+    found = _approaches(WAY, friction + 0.01 * pairs(30), clean.at.direction, 0.05, 1.0)
+    unit = min(found, key=lambda one: one.square)
+    noisy = friction + 0.01 * 3.0 / times / unit.height_error * pairs(30)
+    (drift,) = drifts(replace(clean, force=clean.at.direction * noisy), np.zeros(1))
+    assert drift.is_evident is evident
+
+
+def test_the_change_of_a_source_in_one_direction_is_its_own():
+    made = run(lambda s: 1.0 + 0.2 * s / s.max(), count=12, scatter=0.0)
+    forward = made.taken(made.at.direction > 0.0)
+    (drift,) = drifts(forward, np.zeros(1))
+    friction = forward.force
+    assert drift.change == pytest.approx((friction[-1] - friction[0]) / friction.mean())
+    one_back = made.taken((made.at.direction > 0.0) | (np.arange(12) == 1))
+    (same,) = drifts(one_back, np.zeros(1))
+    assert same.change == pytest.approx((friction[-1] - friction[0]) / one_back.magnitudes(np.zeros(1)).mean())

@@ -9,7 +9,13 @@ from seal_friction_ros.core.friction.mounting import pressures_at_seals
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.several_kinds import (
+    KindsRung,
     SealKind,
+    _fit,
+    _left_out,
+    _multiple_correlation,
+    _rivals,
+    _rows,
     _rungs,
     advice,
     fit_kinds,
@@ -249,3 +255,138 @@ def test_what_is_tried_follows_what_was_varied():
     assert kinds_of(speeds=(0.02, 0.031))[0] == everything
     assert kinds_of(pairs=[(30.0, 30.0), (30.4, 30.4)])[0] == {(False, False), (True, False)}
     assert kinds_of(kinds=(ROD, PISTON, SealKind('other rod seal', ('b',))))[1] == 4 * 4**3
+
+
+# --- parts of the fit ---
+
+
+def other_source(data, offset):
+    """The same strokes of a second log with another offset [N]."""
+    r = data.readings
+    at = r.at._replace(pressure=np.tile(r.at.pressure, (2, 1)), velocity=np.tile(r.at.velocity, 2),
+                       direction=np.tile(r.at.direction, 2))  # fmt: skip
+    force = np.concatenate((r.force, r.force + offset - OFFSET))
+    source = np.repeat([0, 1], r.count)
+    joined = replace(r, at=at, force=force, source=source, group=source, level=np.tile(r.level, 2), names=('a', 'b'))
+    return replace(data, readings=joined, chamber_pressures=np.tile(data.chamber_pressures, (2, 1)))
+
+
+RUNG = KindsRung((0.85, 1.0), viscous=True, areas=True)
+
+
+def test_each_log_has_its_own_offset_also_if_it_was_left_out():
+    data = other_source(cylinder(), -30.0)
+    rows = _rows(data)
+    gram = rows.matrix.T @ rows.matrix
+    found = _fit(data, rows, gram, RUNG)
+    assert found.offsets == pytest.approx([OFFSET, -30.0])
+    assert found.rises == pytest.approx([0.5, 1.5])
+    assert found.areas == pytest.approx(AREAS)
+    predicted, deviation, parameters = _left_out(rows, data.readings, RUNG, gram)
+    assert deviation == pytest.approx(np.zeros(72), abs=1e-5)
+    assert predicted == pytest.approx(found.frictions(data.readings.at).sum(axis=1))
+    scaled = parameters / rows.scale[rows.chosen(RUNG)[0]]
+    assert scaled == pytest.approx(np.tile([0.5, 1.5, CONSTANT, VISCOUS], (2, 1)))
+    # A log in one direction has none: its offset of -30 N is friction of it.
+    forward = (data.readings.source == 0) | (data.readings.at.direction > 0.0)
+    one_way = replace(data, readings=data.readings.taken(forward), chamber_pressures=data.chamber_pressures[forward])
+    rows = _rows(one_way)
+    assert (rows.sources, rows.kinds) == (1, 2)
+    gram = rows.matrix.T @ rows.matrix
+    assert _fit(one_way, rows, gram, RUNG).offsets[1] == 0.0
+    deviation = _left_out(rows, one_way.readings, RUNG, gram)[1]
+    assert deviation[one_way.readings.source == 1] == pytest.approx(np.full(18, -30.0), rel=1e-4)
+
+
+def test_held_pressures_of_both_directions_of_a_log_are_one_condition():
+    """A regulator holds 30 bar on extension and 31 bar on retraction; in another log 40 and 30 bar are two."""
+    plain = cylinder([(30, 5), (60, 5), (60, 60)]).readings
+    chambers = cylinder([(30, 5), (60, 5), (60, 60)]).chamber_pressures.copy()
+    off = (chambers[:, 0] == 30e5) & (plain.at.direction < 0.0)
+    chambers[off, 0] = 31e5
+    pressure = pressures_at_seals(('a', 'a', 'difference'), *chambers.T)
+    data = kinds_readings(replace(plain, at=plain.at._replace(pressure=pressure)), chambers, (ROD, PISTON))
+    assert len(data.readings.levels) == 3
+    chambers[off, 0] = 40e5
+    pressure = pressures_at_seals(('a', 'a', 'difference'), *chambers.T)
+    data = kinds_readings(replace(plain, at=plain.at._replace(pressure=pressure)), chambers, (ROD, PISTON))
+    assert len(data.readings.levels) == 4
+
+
+def test_a_rival_weighs_as_much_as_its_loss_is_likely():
+    """Nine conditions: a loss of 1.2 times the least has the likelihood 1.2^-9, one of 4 times none."""
+    data = cylinder()
+    rows = _rows(data)
+    left = [(RUNG, np.full(9, 2.0)), (RUNG._replace(viscous=False), np.full(9, 2.4)), (RUNG, np.full(9, 8.0))]
+    found = _rivals(data, rows, rows.matrix.T @ rows.matrix, left)
+    total = 1.0 + 1.2**-9 + 4.0**-9
+    assert [weight for weight, _ in found] == pytest.approx([1.0 / total, 1.2**-9 / total])
+    assert [fit.rung.viscous for _, fit in found] == [True, False]
+    assert found[1][1].viscous == 0.0
+
+
+def test_the_spread_of_a_kind_is_that_of_its_rivals_by_their_weight(exact):
+    steeper = replace(exact.fit, rises=np.array([0.5, 3.0]))
+    found = replace(exact, rivals=((0.75, exact.fit), (0.25, steeper)))
+    at = exact.fit.data.readings.at
+    off = steeper.frictions(at).mean(axis=0) - exact.fit.frictions(at).mean(axis=0)
+    assert found.spread == pytest.approx(np.abs(off) * 0.5)
+
+
+@pytest.mark.parametrize(('share', 'poor'), [(0.099, False), (0.101, True)])
+def test_a_kind_is_poorly_told_apart_beyond_a_tenth_of_it_and_a_twentieth_of_all(exact, share, poor):
+    means = exact.fit.frictions(exact.fit.data.readings.at).mean(axis=0)
+    assert means[1] > 0.5 * means.sum()  # the piston seal
+    errors = np.array([0.0, share * means[1]])
+    certain = replace(exact, rivals=())
+    found = poorly_told_apart(replace(certain, errors=errors))
+    assert found == ([('piston seal', pytest.approx(means[1]), pytest.approx(errors[1]))] if poor else [])
+    for of_all, counts in ((0.049, 0), (0.051, 1)):
+        small = np.array([of_all * means.sum(), 0.0])
+        assert small[0] > 0.1 * means[0]
+        assert len(poorly_told_apart(replace(certain, errors=small))) == counts
+        assert poorly_told_apart(replace(certain, errors=small), 0.9) == []
+
+
+def test_a_pressure_is_held_if_it_changes_by_less_than_a_fiftieth_of_the_highest():
+    x, z = np.array([-1.0, -1.0, 1.0, 1.0]), np.array([-1.0, 1.0, -1.0, 1.0])
+    for std, held in ((0.0199, True), (0.0206, False)):  # of the highest, which is 1 + std
+        pressures = np.column_stack((1.0 + std * x, 1.0 + 0.5 * z))
+        assert (_multiple_correlation(pressures) == 1.0).all() == held
+    skew = np.column_stack((10.0 + x, 10.0 + 0.6 * x + 0.8 * z))
+    assert _multiple_correlation(skew) == pytest.approx([0.6, 0.6])
+    assert _multiple_correlation(np.column_stack((10.0 + x, 10.0 + z))) == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def test_the_first_condition_is_that_which_parts_the_kinds_most():
+    """Twelve readings with b at 0 bar: a condition weighs as much as three of them."""
+    data = cylinder([(5, 0), (30, 0), (60, 0)])
+    conditions, largest = proposed_conditions(data)
+    grid = [(a, b) for a in (0.0, 30.0, 60.0) for b in (0.0, 30.0, 60.0)]
+    rows = [(2.0 * a, abs(a - b)) for a, b in (data.chamber_pressures / BAR).tolist()]
+
+    def correlation(chosen):
+        more = [(2.0 * a, abs(a - b)) for a, b in chosen for _ in range(3)]
+        return abs(np.corrcoef(np.array(rows + more).T)[0, 1])
+
+    expected = []
+    while correlation(expected) > 0.5:
+        expected.append(min((p for p in grid if p not in expected), key=lambda p: correlation([*expected, p])))
+    assert np.array(conditions) / BAR == pytest.approx(np.array(expected))
+    assert largest == pytest.approx(correlation(expected))
+
+
+def test_advice_names_the_pressures_of_both_chambers(exact):
+    steeper = replace(exact.fit, rises=np.array([0.5, 2.0]))
+    text = advice(exact.fit.data, ((0.5, exact.fit), (0.5, steeper)))
+    pairs = '0 and 60, 0 and 30, 60 and 0, 30 and 0'
+    assert text == f'drive both directions also with chambers a and b at {pairs} bar'
+
+
+@pytest.mark.parametrize(('off', 'noticed'), [(0.0199, False), (0.0201, True)])
+def test_laws_disagree_from_a_fiftieth_on(exact, off, noticed):
+    """Two laws of equal weight, each as much off their middle of 100 N at every pressure."""
+    flat = replace(exact.fit, rises=np.zeros(2), viscous=0.0)
+    rivals = tuple((0.5, replace(flat, constant=100.0 * (1.0 + side * off))) for side in (1.0, -1.0))
+    conditions, _ = proposed_conditions(exact.fit.data, rivals)
+    assert len(conditions) == (4 if noticed else 0)
