@@ -312,3 +312,96 @@ def test_a_clipped_sensor_shows_and_a_coarse_or_held_one_does_not():
     assert clipped_share(wave) == 0.0
     assert clipped_share(np.round(wave)) == 0.0
     assert clipped_share(np.repeat([1.0, 2.0, 3.0], 1000)) == 0.0
+
+
+def test_a_slope_of_a_cubic_takes_an_order_of_three():
+    time = np.arange(200) / RATE
+    cubic = SavitzkyGolay(window=0.2, order=3, largest_gap=0.05)
+    assert slope(time, time**3, cubic) == pytest.approx(3.0 * time**2, abs=1e-9)
+    square = SavitzkyGolay(window=0.2, order=2, largest_gap=0.05)
+    # A parabola through 21 samples of t^3 has the slope 3 t^2 + (sum of i^4 / sum of i^2) of the steps.
+    i = np.arange(-10.0, 11.0) / RATE
+    extra = np.sum(i**4) / np.sum(i**2)
+    assert slope(time, time**3, square)[50] == pytest.approx(3.0 * time[50] ** 2 + extra)
+    assert SavitzkyGolay(window=0.2, largest_gap=0.05).order == 2
+    uneven = time + 0.3 / RATE * np.sin(np.arange(200.0))
+    assert slope(uneven, 2.0 * uneven, square) == pytest.approx(np.full(200, 2.0))
+    with pytest.raises(ValueError, match='order 2 needs 3'):
+        slope(time, time, SavitzkyGolay(window=1e-4, order=2, largest_gap=0.05))
+    assert np.isfinite(slope(time, time, SavitzkyGolay(window=0.03, order=2, largest_gap=0.05))).all()
+    one_short = np.concatenate((time[:3], time[3:] + 1.0))  # three samples before a pause
+    found = slope(one_short, one_short, square)
+    assert np.flatnonzero(np.isnan(found)).tolist() == [0, 1, 2]
+
+
+def test_a_motion_has_its_direction_its_samples_and_its_place_in_time():
+    velocity = np.array([0.0, 0.0, 0.02, 0.02, np.nan, 0.02, -0.02, 0.0, 0.003, 0.02])
+    time = np.arange(10) * 0.1
+    found = motions(Signals(time, velocity, *np.zeros((3, 10))), SLIDING)
+    assert [(side, run.tolist()) for side, run in found] == [
+        (0, [0, 1]), (1, [2, 3, 5]), (-1, [6]), (0, [7, 8]), (1, [9])
+    ]  # fmt: skip
+    paused = np.where(np.arange(10) >= 3, time + 0.41, time)
+    split = motions(Signals(paused, velocity, *np.zeros((3, 10))), SLIDING)
+    assert [(side, run.tolist()) for side, run in split][1:3] == [(1, [2]), (1, [3, 5])]
+    assert motions(Signals(*np.full((5, 4), np.nan)), SLIDING) == []
+
+
+def test_a_peak_is_looked_for_from_the_rest_to_the_first_even_sample():
+    signals = trapezoid([0.02])
+    rest, ramp = 50, 20
+    for place, counts in ((0, True), (rest + 3, True), (rest + ramp + 5, False)):
+        force = signals.force_sum.copy()
+        force[place] = 77.0
+        (start,) = breakaways(signals._replace(force_sum=force), SLIDING)
+        assert (start.force_sum == 77.0) is counts
+        assert not counts or start.samples.tolist() == [place]
+        assert start.velocity == 0.0
+        assert (start.pressure_a, start.pressure_b) == (PRESSURE, 0.0)
+    lost = signals.force_sum.copy()
+    lost[rest - 1] = np.nan  # where the peak was
+    (start,) = breakaways(signals._replace(force_sum=lost), SLIDING)
+    assert start.force_sum == pytest.approx(np.nanmax(lost[: rest + ramp]))
+    gone = signals._replace(pressure_b=np.where(np.arange(len(signals.time)) < rest + ramp, np.nan, 0.0))
+    assert breakaways(gone, SLIDING) == []  # it is not known under which pressure
+    late = signals.time + np.where(np.arange(len(signals.time)) >= rest + 3, 0.6, 0.0)
+    assert breakaways(signals._replace(time=late), SLIDING) == []  # the start was not seen
+    (start,) = breakaways(signals, SLIDING)
+    assert start.dwell == pytest.approx(0.53, abs=0.02)  # the rod is at rest up to 3 mm/s
+
+
+def test_directions_with_unlike_numbers_of_levels_stay_apart():
+    direction = np.tile([1.0, -1.0], 3)
+    three = np.array([1e6, 1.01e6, 2e6, 2.02e6, 3e6, 2.02e6])
+    assert held_pressures(three, direction).tolist() == three.tolist()
+    even = np.array([1e6, 1.02e6, 2e6, 2.02e6, 2e6, 2.04e6])
+    assert held_pressures(even, direction) == pytest.approx([1.01e6, 1.01e6, 2.015e6, 2.015e6, 2.015e6, 2.015e6])
+
+
+def test_a_ramp_is_cut_from_a_tenth_of_the_highest_pressure_on_and_levels_are_numbered_on():
+    step = np.linspace(0.0, 1.0, 11)
+    narrow = np.concatenate(([1e6], 9e6 + 0.99e6 * step))
+    assert pressure_levels(narrow).tolist() == [0] + [1] * 11
+    wide = np.concatenate(([1e6], 9e6 + 1.02e6 * step, [12e6]))
+    # The highest is 12 MPa: 1.02 MPa are less than a tenth of it.
+    assert pressure_levels(wide).tolist() == [0] + [1] * 11 + [2]
+    cut = np.concatenate(([1e6], 8.9e6 + 1.1e6 * step, [0.5e6]))
+    assert pressure_levels(cut).tolist() == [1] + [2] * 5 + [3] * 6 + [0]
+    low = 1.9e4 * step  # near zero two tenths of a bar are one level
+    assert pressure_levels(low).tolist() == [0] * 11
+    assert pressure_levels(np.array([5e5])).tolist() == [0]
+
+
+def test_a_line_through_offsets_has_the_rms_of_what_it_leaves():
+    pressures = np.array([0.0, 1e5, 2e5, 3e5])
+    scatter = np.array([1.0, -1.0, -1.0, 1.0])  # no line explains any of it
+    found = offset_line(pressures, 4.0 - 2e-5 * pressures + scatter)
+    assert found == pytest.approx((4.0, -2e-5, 1.0))
+
+
+def test_friction_is_of_medians_for_samples_and_of_means_for_readings():
+    force, side = np.array([8.0, 9.0, 40.0, -4.0, -5.0, -36.0]), np.array([1, 1, 1, -1, -1, -1])
+    assert half_range(force, side) == pytest.approx((7.0, 2.0))
+    assert half_range(force, side, of_medians=False) == pytest.approx((17.0, 2.0))
+    with pytest.raises(ValueError, match='one direction only'):
+        half_range(np.ones(3), -np.ones(3, dtype=int))

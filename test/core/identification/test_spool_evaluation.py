@@ -150,3 +150,72 @@ def test_too_few_cycles_and_too_short_strokes_are_refused():
         evaluate_cycles(time, np.where(time > 1.0, np.nan, displacement), force, PAPER)
     with pytest.raises(ValueError, match='evaluated_cycle = 12 is above cycles = 10'):
         SpoolEvaluation(evaluated_cycle=12)
+
+
+# --- the resonance in a spectrum ---
+
+
+def lines(humps=(), seconds=2.0, rate=2000.0, fundamental=2.0):
+    """Force whose spectrum has lines at multiples of 2 Hz that fall as 1 / f, times what ``humps`` add.
+
+    Each hump is a frequency [Hz], a height, and a width [Hz] of even height.
+    """
+    time = np.arange(round(seconds * rate)) / rate
+    force = np.zeros(len(time))
+    for f in fundamental * np.arange(1, int(0.5 * rate / fundamental)):
+        height = 1.0 / f
+        for middle, times, width in humps:
+            if abs(f - middle) <= width / 2.0:
+                height *= times
+        force += height * np.sin(2.0 * np.pi * f * time + 0.1 * f)
+    return time, force
+
+
+def test_a_resonance_is_a_hump_that_is_higher_than_its_sides_by_the_prominence():
+    """Lines fall as 1 / f: at two thirds of the frequency, within 10 Hz, they are f / (2 f / 3 - 10 Hz) higher."""
+    for middle in (120.0, 300.0):
+        side = middle / (middle / 1.5 - 10.0)  # [-] the envelope there over the lines without a hump
+        for times, found in ((1.85 * side, False), (2.6 * side, True)):
+            frequency = resonance_frequency(*lines([(middle, times, 4.0)]), PAPER)
+            assert (frequency is not None) is found, (middle, times)
+            assert not found or frequency == pytest.approx(middle, abs=3.0)
+    assert resonance_frequency(*lines(), PAPER) is None
+
+
+def test_a_resonance_is_looked_for_between_the_motion_and_two_thirds_of_the_highest_frequency():
+    for middle, found in ((44.0, False), (60.0, True), (640.0, True), (690.0, False)):
+        frequency = resonance_frequency(*lines([(middle, 30.0, 4.0)]), PAPER)
+        assert (frequency is not None and frequency == pytest.approx(middle, abs=4.0)) is found, middle
+    low = SpoolEvaluation(lowest_resonance=30.0)
+    assert resonance_frequency(*lines([(44.0, 30.0, 4.0)]), low) == pytest.approx(44.0, abs=4.0)
+
+
+def test_the_frequency_is_the_mean_of_the_lines_under_the_hump_by_their_power():
+    """Two lines of 1 and 2 in amplitude at 200 and 210 Hz, nothing else within 15 %: mean weighted with 1 and 4."""
+    time = np.arange(8000) / 2000.0
+    force = np.sin(2.0 * np.pi * 200.0 * time) + 2.0 * np.sin(2.0 * np.pi * 210.0 * time)
+    assert resonance_frequency(time, force, PAPER) == pytest.approx((200.0 + 4.0 * 210.0) / 5.0, abs=0.05)
+    beyond = force + 1.5 * np.sin(2.0 * np.pi * 250.0 * time)  # 19 % above the largest
+    assert resonance_frequency(time, beyond, PAPER) == pytest.approx((200.0 + 4.0 * 210.0) / 5.0, abs=0.05)
+    offset = resonance_frequency(time, 1e3 + force, PAPER)
+    assert offset == pytest.approx(208.0, abs=0.05)  # the mean of the force is no line
+
+
+def test_a_record_too_short_or_too_slow_shows_no_resonance():
+    time, force = lines([(60.0, 30.0, 4.0)], rate=160.0)
+    assert resonance_frequency(time, force, PAPER) is None  # 50 Hz to two thirds of 80 Hz: six lines
+    with pytest.raises(ValueError, match='a resonance of 80.1 Hz is not below half the sampling rate of 160 Hz'):
+        without_resonance(time, force, 80.1, PAPER)
+    with pytest.raises(ValueError, match='a resonance of 0 Hz'):
+        without_resonance(time, force, 0.0, PAPER)
+    assert len(without_resonance(time, force, 79.0, PAPER)) == len(time)
+
+
+def test_the_notch_is_as_wide_as_the_resonance_over_its_quality_and_has_no_delay():
+    """At the edges of the width, 157 Hz +/- a tenth, one pass leaves 1 / sqrt(2); to and fro it is a half."""
+    time = np.arange(20000) / RATE
+    for frequency, gain in ((157.0, 0.0), (157.0 * 0.905, 0.5), (157.0 * 1.105, 0.5), (15.7, 1.0), (1570.0, 1.0)):
+        wave = np.sin(2.0 * np.pi * frequency * time)
+        left = without_resonance(time, wave, 157.0, PAPER)[5000:-5000]
+        assert np.std(left) * np.sqrt(2.0) == pytest.approx(gain, abs=0.02)
+        assert left == pytest.approx(gain * wave[5000:-5000], abs=0.03)
