@@ -45,7 +45,7 @@ ASSUMED_SPEED = 0.01  # [m/s] of readings without a speed: a slow pull by hand (
 PRIOR_CHANGE = 1.0  # [-] standard deviation by which a parameter changes the friction, before any reading (our choice)
 SMALLEST_SCATTER = 0.01  # [-] of a reading: no load cell repeats within less (our choice)
 MOST_REPEATED = 10  # pressures of a repeated run (our choice)
-SINGULAR = 1e8  # condition number above which parameters are not identifiable
+SINGULAR = 1e-14  # [-] smallest eigenvalue of columns of unit length below which parameters are not identifiable
 DIRECTIONS = (-1, 1)
 
 RUN_TO_RUN, LAW, SCATTER = 'run to run', 'law', 'scatter'
@@ -501,7 +501,7 @@ def _condition(information: FloatArray) -> float:
     if not np.all(size > 0.0):
         return math.inf
     values = np.linalg.eigvalsh(information / np.outer(size, size))
-    if values[0] <= values[-1] / SINGULAR**2 or values[0] <= 1e-14:
+    if values[0] <= SINGULAR:
         return math.inf
     return math.sqrt(float(values[-1] / values[0]))
 

@@ -38,7 +38,7 @@ from seal_friction_ros.core.identification.load_over_position import (
     load_at,
     without_load,
 )
-from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
+from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding, motions
 
 BAR = boom.BAR
 LIGHT = Boom(moment=21.0e3, tilt=2.35, inertia=4.0e3, exponent=1.0, gain=40.0, coulomb=2.5e3)
@@ -693,3 +693,42 @@ def test_a_spline_has_an_eighth_as_many_knots_as_there_are_rows_at_most(pairs, k
     """A stroke of 0.5 m at 0.4 m/s has eight rows: of four strokes a bend in the load is not fitted."""
     signals, x = known_machine(bent, rubbing(), lambda x: 0.0 * x, noise=2.0, pairs=pairs, speeds=(0.4, 0.4))
     assert len(fit_load(signals, x, ('a',), SLIDING).knots) == knots
+
+
+def test_what_is_left_without_load_and_inertia_is_the_friction():
+    """A load of 1000 N + 600 N/m x and 200 kg; friction of 20 N. A mean over equal values is the value."""
+    time = 0.01 * np.arange(400)
+    velocity = 0.1 * np.sin(2.0 * np.pi * time / 4.0 + 1e-3)
+    position = 0.5 + 0.01 * np.cumsum(velocity)
+    acceleration = np.gradient(velocity, time)
+    load = replace(told(0.1), forces=1000.0 + 600.0 * np.linspace(0.0, 1.0, 4), mass=200.0)
+    force = 1000.0 + 600.0 * position + 200.0 * acceleration + 20.0 * np.sign(velocity)
+    moving = np.abs(velocity) > SLIDING.slowest
+    signals = Signals(time, velocity, np.full(400, 2e6), np.full(400, 1e6), force)
+    left = without_load(signals, position, load, SLIDING)
+    slides = np.abs(left.velocity) > SLIDING.slowest
+    assert left.force_sum[slides] == pytest.approx(20.0 * np.sign(left.velocity[slides]))
+    first = [run[0] for side, run in motions(signals, SLIDING) if side]
+    assert {round(100.0 * t) for t in left.time[slides]} >= {int(i) for i in first}  # of each motion the first one
+    assert np.count_nonzero(slides) == pytest.approx(np.count_nonzero(moving) / 5.0, abs=2)
+    # Beyond the knots nothing is left; where the position is lost, the sample stays, but without a force.
+    away = np.where(np.arange(400) >= 300, 7.0, position)
+    assert without_load(signals, away, load, SLIDING).time.max() < 3.0
+    lost = position.copy()
+    lost[100] = np.nan
+    kept = without_load(signals, lost, load, SLIDING)
+    assert np.isnan(kept.force_sum[kept.time == 1.0]).all()
+    assert np.isfinite(kept.force_sum[kept.time != 1.0]).all()
+
+
+def test_means_do_not_reach_across_a_lost_sample_or_a_reversal():
+    time = 0.01 * np.arange(200)
+    velocity = np.where(time < 1.5, 0.1, -0.1)
+    force = np.where(time < 1.0, 0.0, np.where(time < 1.5, 8.0, -5.0))
+    force[100] = np.nan
+    load = replace(told(0.1), mass=0.0)
+    signals = Signals(time, velocity, np.full(200, 2e6), np.full(200, 1e6), force)
+    left = without_load(signals, np.full(200, 0.5), load, SLIDING)
+    found = left.force_sum[np.isfinite(left.force_sum)]
+    assert {round(value, 9) for value in found.tolist()} == {0.0, 8.0, -5.0}
+    assert [np.count_nonzero(np.isclose(found, value)) for value in (0.0, 8.0, -5.0)] == [20, 10, 10]

@@ -68,6 +68,25 @@ def test_a_speed_is_varied_where_it_is_half_as_fast_again_at_one_pressure(fast, 
     assert not variation_of(replace(made, at=made.at._replace(velocity=unknown))).speeds
 
 
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_speeds_of_both_directions_count_alike(side):
+    """Varied at all four pressures in one direction, and at one of them in the other: five of eight."""
+    made = readings([0, 10, 20, 30], (0.02, 0.05))
+    steady = (made.at.direction != side) & (made.level > 0)
+    velocity = np.where(steady, 0.02 * made.at.direction, made.at.velocity)
+    assert variation_of(replace(made, at=made.at._replace(velocity=velocity))).speeds
+    none = np.where(made.at.direction != side, 0.02 * made.at.direction, made.at.velocity)
+    assert not variation_of(replace(made, at=made.at._replace(velocity=none))).speeds
+    once = readings([0, 10, 20, 30], (0.02, 0.05))
+    single = (once.level < 2) | (np.abs(once.at.velocity) > 0.03)  # at two pressures one reading each way: no speed
+    assert variation_of(once.taken(single)).speeds
+
+
+def test_pressures_that_are_one_level_are_one_pressure():
+    made = readings([20, 30])
+    assert variation_of(replace(made, level=np.zeros(made.count, int))).pressures == 1
+
+
 def test_a_speed_that_follows_pressure_or_direction_is_not_varied():
     made = readings([0, 10, 20, 30])
     for speed in (0.01 * (1.0 + made.level), np.where(made.at.direction > 0.0, 0.02, 0.09)):
@@ -170,6 +189,8 @@ RISES, DOES_NOT = Rise(5.0, 1.0), Rise(1.0, 1.0)
         ([score(CONSTANT, EVEN)], RISES, CONSTANT),  # there is no other
         ([score(ONE, 1.9 * EVEN), score(FREE, EVEN, sound=False)], None, ONE),
         ([score(ONE, 2.1 * EVEN), score(FREE, EVEN, sound=False)], None, FREE),
+        ([score(ONE, 0.19 * EVEN), score(FREE, 0.1 * EVEN, sound=False)], None, ONE),
+        ([score(ONE, 0.21 * EVEN), score(FREE, 0.1 * EVEN, sound=False)], None, FREE),
         (
             [score('pressure_power_law_2', 5.0 * EVEN), score(ONE, 1.9 * EVEN), score(FREE, EVEN, sound=False)],
             None,
@@ -292,6 +313,8 @@ def test_one_repeated_pair_of_strokes_tells_no_scatter_and_strokes_that_follow_e
     errors = _errors_of_levels(replace(both, force=force), np.full(3, 10.0))
     # Three pairs, 0.2 N off: standard deviation 0.2 * sqrt(6 / 3) N, over the root of two strokes.
     assert errors == pytest.approx(np.full(3, 0.2 * np.sqrt(2.0) / np.sqrt(2.0)))
+    two = both.level < 2
+    assert _errors_of_levels(replace(both, force=force).taken(two), np.full(2, 10.0)) == pytest.approx(errors[:2])
     drifting = readings(bars, count=200, force=np.tile(10.0 + np.linspace(-0.1, 0.1, 200), 6))
     share = np.linspace(-0.01, 0.01, 200)
     std = 10.0 * np.sqrt(6.0 * np.sum(share**2) / (6.0 * 199.0))
@@ -323,6 +346,11 @@ def test_the_best_sound_law_that_depends_on_pressure_is_tried_again_with_speeds(
                      *(f'pressure_power_law_1_{more}' for more in ('viscous', 'stribeck', 'asymmetric'))]  # fmt: skip
     assert ticks == [1] * 6
     assert all(len(each.losses) == 6 for each in scores)
+    # Friction that rises with P^2.5 is best met by a free exponent, which stays at its bound of 2: it is not sound.
+    steep = replace(made, force=made.at.direction * (3.0 + 0.01 * (made.seal_pressure / BAR) ** 2.5))
+    bound = score_ladder([LAWS['pressure_power_law_2_3'], LAWS['pressure_power_law']], steep, Variation())
+    assert bound[1].losses.mean() < bound[0].losses.mean()
+    assert bound[2].law.name == 'pressure_power_law_2_3_viscous'
     only = score_ladder(chosen[:1], made, Variation())
     assert [each.law.name for each in only] == ['constant_coulomb']
     two = made.taken(made.level < 2)
@@ -387,6 +415,7 @@ def test_laws_that_fit_nearly_as_well_spread_where_speed_and_pressure_part():
     best = near(0.0, 0.0, 1.0)
     assert collinear_spread([best, near(100.0, 0.0, 1.9)], chosen, made) == pytest.approx(mean)
     assert collinear_spread([best, near(100.0, 0.0, 2.1)], chosen, made) == 0.0
+    assert collinear_spread([near(0.0, 0.0, 0.1), near(100.0, 0.0, 0.21)], chosen, made) == 0.0
     assert collinear_spread([best, LawScore(LAWS[CONSTANT], why_not='too few')], chosen, made) == 0.0
     assert collinear_spread([near(100.0, 0.0)], chosen, replace(made, are_samples=False)) == 0.0
     uneven = SimpleNamespace(friction=lambda at: np.where(at.direction > 0.0, 24.0, 20.0) + 0.0 * at.velocity)

@@ -204,7 +204,7 @@ def test_the_frequency_is_the_mean_of_the_lines_under_the_hump_by_their_power():
 def test_a_record_too_short_or_too_slow_shows_no_resonance():
     time, force = lines([(60.0, 30.0, 4.0)], rate=160.0)
     assert resonance_frequency(time, force, PAPER) is None  # 50 Hz to two thirds of 80 Hz: six lines
-    with pytest.raises(ValueError, match='a resonance of 80.1 Hz is not below half the sampling rate of 160 Hz'):
+    with pytest.raises(ValueError, match=r'a resonance of 80.1 Hz is not below half the sampling rate of 160 Hz'):
         without_resonance(time, force, 80.1, PAPER)
     with pytest.raises(ValueError, match='a resonance of 0 Hz'):
         without_resonance(time, force, 0.0, PAPER)
