@@ -115,6 +115,7 @@ def test_pressures_are_apart_by_half_a_bar_and_a_tenth_of_the_highest(pressures,
 def test_without_pressure_there_is_nothing_to_fit(bar, reason):
     with refused(reason):
         check_readings(held([bar], [20.0]))
+    check_readings(held([0.45, 0.55], [20.0, 20.0]))  # the highest counts
 
 
 @pytest.mark.parametrize(('scatter', 'reason'), [(0.29, None), (0.31, 'at 20 bar readings scatter by 31 %')])

@@ -333,7 +333,7 @@ def test_a_slope_of_a_cubic_takes_an_order_of_three():
     one_short = np.concatenate((time[:3], time[3:] + 1.0))  # three samples before a pause
     found = slope(one_short, one_short, square)
     assert np.flatnonzero(np.isnan(found)).tolist() == [0, 1, 2]
-    narrow = SavitzkyGolay(window=0.03, order=2, largest_gap=0.05)
+    narrow = SavitzkyGolay(window=0.022, order=2, largest_gap=0.05)
     assert np.isnan(slope(one_short, one_short, narrow)[:3]).all()  # a parabola meets three samples whatever they are
     four = np.concatenate((time[:4], time[4:] + 1.0))
     assert np.isfinite(slope(four, four, narrow)).all()
