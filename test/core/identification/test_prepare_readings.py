@@ -269,3 +269,12 @@ def test_manual_breakaway_at_one_pressure_keeps_its_tests_and_at_several_those_o
     none = ManualReadings(empty.name, *(column[:0] for column in empty[1:6]))
     with pytest.raises(ValueError, match='0 readings are too few'):
         prepare_manual_readings([empty], [none], 1)
+
+
+def test_both_directions_of_a_regulator_are_one_level_of_a_log():
+    """20 bar on extension and 22 bar on retraction."""
+    made = log((20, 40, 60))
+    regulated = np.where(made.signals.force_sum - OFFSET < 0.0, 1.1, 1.0) * made.signals.pressure_a
+    one = prepare_logs([made._replace(signals=made.signals._replace(pressure_a=regulated))], ('a',)).readings
+    assert one.level.tolist() == [0, 0, 1, 1, 2, 2]
+    assert one.level_pressures == pytest.approx(np.array([21.0, 42.0, 63.0]) * BAR)

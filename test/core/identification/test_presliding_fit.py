@@ -120,6 +120,7 @@ def test_lag_and_dwell_are_found_where_the_rests_tell_them():
     assert fit.presliding.dwell_time == pytest.approx(0.5, rel=0.35)
     assert fit.relative_dwell_time_std < 0.3
     assert fit.presliding.stiffness == pytest.approx(2e5, rel=0.1)
+    assert fit.length == pytest.approx(2.5 * fit.full_yield + 4.0 * 3e-4, rel=0.15)
 
 
 def test_friction_after_a_reversal_is_that_of_the_elements():
@@ -443,6 +444,13 @@ def test_curves_made_by_the_equation_give_its_parameters_back():
     )  # fmt: skip
 
 
+def test_four_reversals_of_each_log_are_needed():
+    made = curves_of((np.log(2e5), 1.0, 0.0, 0.0, -np.inf), (0.1, 0.1), noise=0.02)
+    assert fit_curves(made, ['log'], 3e-3).reversals == 4
+    with pytest.raises(PreslidingRefusedError, match=r'^log: 2 and 1 reversals out and back .* but 4 are needed'):
+        fit_curves(made[:3], ['log'], 3e-3)
+
+
 @pytest.mark.parametrize(('longer', 'told'), [(2.9, False), (3.1, True)])
 def test_a_dwell_time_is_told_where_the_rests_differ_three_times(longer, told):
     fit = fit_curves(curves_of(LAG, (0.7, 0.7, 0.7 * longer, 0.7 * longer), noise=0.02), ['log'], 3e-3)
@@ -511,6 +519,6 @@ def test_curves_are_twenty_steps_long_of_the_coarsest_position():
     """Seals that slide after 0.29 mm would take 0.73 mm."""
     seal = Presliding(stiffness=2.5e5)
     alone = fit_presliding([log([seal])])
-    assert alone.length < 0.77e-3
+    assert alone.length == pytest.approx(2.5 * 0.293e-3, rel=0.1)
     both = fit_presliding([log([seal]), log([seal], step=4e-5)])
     assert both.length == pytest.approx(20.0 * 4e-5, rel=0.01)

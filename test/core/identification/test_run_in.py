@@ -232,17 +232,18 @@ def pairs(count):
 
 
 def test_each_length_is_fitted_by_least_squares_with_the_offset_that_is_left():
+    """Seven strokes out and six back: the friction is that of the mean direction."""
     rng = np.random.default_rng(3)
-    travel, direction = 0.5 + STROKE * np.arange(12), np.tile([1.0, -1.0], 6)
-    friction = 10.0 + 2.0 * np.exp(-(travel - 0.5) / 0.1) + 0.3 * direction + 0.1 * rng.normal(size=12)
+    travel, direction = 0.5 + STROKE * np.arange(13), np.tile([1.0, -1.0], 7)[:13]
+    friction = 10.0 + 2.0 * np.exp(-(travel - 0.5) / 0.1) + 0.3 * direction + 0.1 * rng.normal(size=13)
     found = _approaches(travel, friction, direction, 0.05, 1.0)
-    spanned = 11 * STROKE
+    spanned = 12 * STROKE
     assert [one.length for one in found] == pytest.approx(spanned * np.geomspace(0.05, 1.0, 15))
     for one in found:
-        design = np.column_stack((np.ones(12), np.exp(-(travel - 0.5) / one.length), direction))
+        design = np.column_stack((np.ones(13), np.exp(-(travel - 0.5) / one.length), direction - 1.0 / 13.0))
         values = np.linalg.lstsq(design, friction, rcond=None)[0]
         left = friction - design @ values
-        covariance = np.linalg.inv(design.T @ design) * (left @ left) / (12 - 4)
+        covariance = np.linalg.inv(design.T @ design) * (left @ left) / (13 - 4)
         follows = min(max(left[1:] @ left[:-1] / (left @ left), 0.0), 0.9)
         worse = np.sqrt((1.0 + follows) / (1.0 - follows))
         assert (one.asymptote, one.height) == pytest.approx(values[:2])
@@ -312,3 +313,13 @@ def test_the_change_of_a_source_in_one_direction_is_its_own():
     one_back = made.taken((made.at.direction > 0.0) | (np.arange(12) == 1))
     (same,) = drifts(one_back, np.zeros(1))
     assert same.change == pytest.approx((friction[-1] - friction[0]) / one_back.magnitudes(np.zeros(1)).mean())
+
+
+def test_the_samples_behind_the_strokes_settle_with_them_about_the_offset():
+    readings = run(approach(-0.3, LENGTHS[3]), count=30, scatter=0.0, offset=-7.0)
+    readings = replace(readings, samples=tuple(np.array([force - 1.0, force + 2.0]) for force in readings.force))
+    settled = settled_readings(readings, np.array([-7.0]))
+    share = settled.share[0]
+    assert share > 1.02
+    for samples, force in zip(settled.readings.samples, readings.force, strict=True):
+        assert samples == pytest.approx(-7.0 + share * (force + 7.0 + np.array([-1.0, 2.0])))

@@ -1,5 +1,7 @@
 """Strokes, reversals, starts, offsets and levels of signals whose truth is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -410,3 +412,25 @@ def test_friction_is_of_medians_for_samples_and_of_means_for_readings():
     assert half_range(force, side, of_medians=False) == pytest.approx((17.0, 2.0))
     with pytest.raises(ValueError, match='one direction only'):
         half_range(np.ones(3), -np.ones(3, dtype=int))
+
+
+@pytest.mark.parametrize(
+    ('law', 'name', 'lower', 'upper'),
+    [
+        (SavitzkyGolay(window=1.0, largest_gap=1.0), 'window', 1e-6, 3600.0),
+        (SavitzkyGolay(window=1.0, largest_gap=1.0), 'largest_gap', 1e-6, 3600.0),
+        (SavitzkyGolay(window=1.0, largest_gap=1.0), 'order', 1, 6),
+        (SLIDING, 'slowest', 0.0, 10.0),
+        (SLIDING, 'largest_acceleration', 1e-6, 1e4),
+    ],
+)
+def test_a_setting_is_taken_at_its_bounds_and_refused_beyond_them(law, name, lower, upper):
+    for value in (lower, upper):
+        assert getattr(replace(law, **{name: value}), name) == value
+    for value in (lower - (1 if name == 'order' else 1e-9), upper + (1 if name == 'order' else 1e-3)):
+        with pytest.raises(ValueError, match=name):
+            replace(law, **{name: value})
+
+
+def test_a_rod_rests_up_to_3_mm_a_second_and_slides_evenly_below_0_05_m_a_second_squared():
+    assert (SLIDING.slowest, SLIDING.largest_acceleration) == (3e-3, 0.05)

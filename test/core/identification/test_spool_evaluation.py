@@ -142,6 +142,11 @@ def test_too_few_cycles_and_too_short_strokes_are_refused():
     third = len(time) // 3
     with pytest.raises(ValueError, match='but cycle 9 is to be evaluated'):
         evaluate_cycles(time[:third], displacement[:third], force[:third], PAPER)
+    eight = slice(0, len(time) * 8 // 10)
+    with pytest.raises(ValueError, match=r'^8 cycles, but cycle 9 is to be evaluated: drive 10 cycles'):
+        evaluate_cycles(time[eight], displacement[eight], force[eight], PAPER)
+    nine = slice(0, len(time) * 9 // 10)
+    assert len(evaluate_cycles(time[nine], displacement[nine], force[nine], PAPER).force) > 1000
     with pytest.raises(ValueError, match='no cycle: drive in both directions'):
         cycle_starts(np.linspace(0.0, 1.0, 100))
     with pytest.raises(ValueError, match='does not reach'):
@@ -219,3 +224,38 @@ def test_the_notch_is_as_wide_as_the_resonance_over_its_quality_and_has_no_delay
         left = without_resonance(time, wave, 157.0, PAPER)[5000:-5000]
         assert np.std(left) * np.sqrt(2.0) == pytest.approx(gain, abs=0.02)
         assert left == pytest.approx(gain * wave[5000:-5000], abs=0.03)
+
+
+def test_without_a_choice_the_evaluation_is_that_of_the_paper():
+    """Ninth of ten cycles, average of 50 samples, reference within 0.5 mm; resonance and notch are our choice."""
+    assert (PAPER.cycles, PAPER.evaluated_cycle, PAPER.moving_average) == (10, 9, 50)
+    assert PAPER.reference_half_width == 0.5e-3
+    assert (PAPER.lowest_resonance, PAPER.resonance_prominence, PAPER.notch_quality) == (50.0, 2.2, 5.0)
+
+
+@pytest.mark.parametrize(
+    ('name', 'lower', 'upper'),
+    [
+        ('cycles', 1, 10**6),
+        ('moving_average', 1, 10**6),
+        ('reference_half_width', 1e-6, 1.0),
+        ('lowest_resonance', 0.1, 1e5),
+        ('resonance_prominence', 1.0, 1e6),
+        ('notch_quality', 0.5, 1e3),
+    ],
+)
+def test_a_setting_is_taken_at_its_bounds_and_refused_beyond_them(name, lower, upper):
+    more = 1 if isinstance(lower, int) else 1e-3 * lower
+    for value in (lower, upper):
+        assert getattr(SpoolEvaluation(**{'evaluated_cycle': 1} | {name: value}), name) == value
+    for value in (lower - more, upper + (1 if isinstance(upper, int) else 1e-3 * upper)):
+        with pytest.raises(ValueError, match=name):
+            SpoolEvaluation(**{'evaluated_cycle': 1} | {name: value})
+
+
+def test_any_of_a_million_cycles_may_be_evaluated():
+    assert SpoolEvaluation(cycles=10**6, evaluated_cycle=10**6).evaluated_cycle == 10**6
+    with pytest.raises(ValueError, match='evaluated_cycle'):
+        SpoolEvaluation(evaluated_cycle=0)
+    with pytest.raises(ValueError, match='evaluated_cycle'):
+        SpoolEvaluation(cycles=10**6, evaluated_cycle=10**6 + 1)

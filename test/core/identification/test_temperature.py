@@ -253,3 +253,20 @@ def test_friction_at_the_ends_of_the_temperatures_has_to_be_known_to_a_tenth(noi
     assert found.coefficient == pytest.approx(0.012, rel=1e-3)
     assert (found.why_not == '') is told
     assert told or 'known to 11 % only' in found.why_not
+
+
+@pytest.mark.parametrize(('coefficient', 'taken'), [(0.099, True), (0.101, False), (-0.099, True), (-0.101, False)])
+def test_a_coefficient_above_a_tenth_a_kelvin_is_no_scale(coefficient, taken):
+    made = readings(RUNS, noise=0.0, scale=lambda kelvin: np.exp(-coefficient * (kelvin - 300.0)))
+    found = fit_temperature(made)
+    assert found.coefficient == pytest.approx(coefficient)
+    assert (found.why_not == '') is taken
+
+
+def test_friction_may_be_as_low_as_it_is_but_not_nothing():
+    made = readings(RUNS, noise=1e-3, offset=0.0)
+    low = replace(made, force=1e-3 * made.force)  # 10 to 50 mN
+    assert fit_temperature(low).coefficient == pytest.approx(fit_temperature(made).coefficient)
+    none = made.force.copy()
+    none[3] = 0.0
+    assert 'friction near zero' in fit_temperature(replace(made, force=none)).why_not
