@@ -66,6 +66,7 @@ def test_each_group_is_predicted_by_the_others_and_counted():
     mean = plain_mean(readings)
     assert mean.predicted == pytest.approx(np.repeat(expected, 4))
     assert mean.losses == pytest.approx(found.losses)
+    assert mean.deviation == pytest.approx(found.deviation)
     assert mean.parameters.shape == (3, 0)
 
 
@@ -110,3 +111,22 @@ def test_the_band_of_a_group_is_made_from_the_others_and_that_of_two_groups_from
     ticks = []
     deviations_of_left_out(CONSTANT, readings, values, ticks.append)
     assert ticks == [1] * 6  # of each group both others
+
+
+def test_the_offset_of_a_run_is_told_whatever_pressures_its_directions_have():
+    """Friction 2 N + 0.5 N/bar; the run to predict has 10 bar out and 30 bar back, an offset of 4 N, and scatter."""
+    line = next(law for law in candidate_laws(Variation()) if law.name == 'pressure_power_law_1')
+    values = {'friction_at_no_pressure': 2.0, 'friction_at_one_bar': 0.5, 'pressure_exponent': 1.0}
+    bars = np.array([10.0, 10.0, 20.0, 20.0, 30.0, 30.0, *[10.0] * 3, *[30.0] * 3])
+    direction = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, *[1.0] * 3, *[-1.0] * 3])
+    source = np.repeat([0, 1], 6)
+    scatter = np.array([0.0] * 6 + [0.0, 0.0, 3.0, 0.0, 0.0, -6.0])
+    at = OperatingConditions(1e5 * bars[:, np.newaxis], None, 0.02 * direction, direction)
+    force = direction * line.friction(at, values) + 4.0 * source + scatter
+    level = np.searchsorted([10.0, 20.0, 30.0], bars)
+    readings = FrictionReadings(at, force, source, source, level, ('a', 'b'), 'file', are_samples=False)
+    found, friction, deviation = predict(line, readings.taken(source == 0), readings.taken(source == 1), values)
+    assert found['friction_at_one_bar'] == pytest.approx(0.5)
+    assert friction == pytest.approx([7.0] * 3 + [17.0] * 3)
+    # The scatter is 1 N in the mean out and -2 N back: half of the sum, -0.5 N, counts as offset.
+    assert deviation == pytest.approx(direction[6:] * (scatter[6:] + 0.5))
