@@ -155,3 +155,61 @@ def test_squeeze_force_of_the_thesis_ring_is_near_that_of_its_finite_elements():
 def test_squeeze_force_rises_with_squeeze():
     tight = SealGeometry(0.110 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
     assert squeeze_force(tight) > 1.5 * squeeze_force(THESIS_RING)
+
+
+def test_typical_magnitudes_are_the_highest_pressure_and_speed_and_the_mean_normal_force():
+    at = OperatingConditions(
+        np.array([[1e5, 3e5], [5e5, 2e5], [0.0, 0.0]]),
+        None,
+        np.array([0.02, -0.05, np.nan]),
+        np.array([1.0, -1.0, 1.0]),
+    )
+    found = at.typical(7.0)
+    assert found[:3] == (7.0, 5e5, 0.05)
+    assert np.isnan(found[3])
+    loaded = at._replace(normal_force=np.array([[10.0, 30.0], [50.0, 20.0], [4.0, 6.0]]))
+    assert loaded.typical(7.0)[3] == 20.0
+    assert at._replace(velocity=np.full(3, np.nan)).typical(7.0)[2] == 0.0
+    taken = loaded.taken(np.array([2, 0]))
+    assert taken.pressure.tolist() == [[0.0, 0.0], [1e5, 3e5]]
+    assert taken.normal_force.tolist() == [[4.0, 6.0], [10.0, 30.0]]
+    assert taken.direction.tolist() == [1.0, 1.0]
+    assert at.taken(np.array([1])).normal_force is None
+
+
+def test_an_unknown_speed_counts_as_none():
+    law = next(law for law in ALL if law.name == 'coulomb_viscous')
+    at = OperatingConditions(np.zeros((2, 2)), None, np.array([np.nan, -0.1]), np.array([1.0, -1.0]))
+    assert law.friction(at, VALUES) == pytest.approx([24.0, 24.0 + 2.0 * 15.0])
+    assert law.coulomb_friction(at, VALUES) == pytest.approx([24.0, 24.0])
+    assert law.velocity_terms == ('viscous_friction',)
+
+
+def test_a_formula_says_what_was_added_and_which_exponent_was_fixed():
+    formulas = {law.name: law.formula for law in ALL}
+    power = formulas['pressure_power_law']
+    assert '^m' in power
+    for name, exponent in (('2_3', '^(2/3)'), ('1', ''), ('3_2', '^(3/2)'), ('2', '^2')):
+        assert formulas[f'pressure_power_law_{name}'] == power.replace('^m', exponent)
+    assert formulas['coulomb_stribeck'] == formulas['constant_coulomb'] + ' + viscous + Stribeck'
+    (prior,) = candidate_laws(Variation(pressures=1))
+    assert prior.formula == power.replace('^m', '^(2/3)') + ', rise over pressure from a prior'
+    assert (prior.name, prior.fixed['friction_at_no_pressure']) == ('pressure_power_law_2_3', 0.0)
+    assert 'friction_at_no_pressure' not in candidate_laws(Variation(pressures=2))[0].fixed
+    (alone,) = with_velocity_terms(BASES[0], Variation(speeds=False))
+    assert (alone.name, alone.formula) == ('coulomb_asymmetric', formulas['constant_coulomb'] + ' + asymmetry')
+    assert [p.name for p in alone.parameters] == ['coulomb_friction_at_any_pressure', 'asymmetry']
+    terms = [[p.name for p in law.parameters][1:] for law in with_velocity_terms(BASES[0], Variation())]
+    assert terms == [['viscous_friction'], ['viscous_friction', 'stribeck_friction', 'stribeck_velocity'],
+                     ['viscous_friction', 'asymmetry']]  # fmt: skip
+    symmetric = [law.name for law in candidate_laws(Variation(asymmetry=False))]
+    assert 'coulomb_asymmetric' not in symmetric
+    assert 'coulomb_stribeck' in symmetric
+
+
+def test_normal_forces_are_those_of_each_pressure():
+    pressure = np.array([[0.0, 1e6], [1e6, 2e6]])
+    found = normal_forces(pressure, THESIS_RING, NORMAL_FORCE_LAW)
+    zero, one, two = (normal_forces(np.array([[p]]), THESIS_RING, NORMAL_FORCE_LAW)[0, 0] for p in (0.0, 1e6, 2e6))
+    assert zero < one < two
+    assert found.tolist() == [[zero, one], [one, two]]

@@ -487,3 +487,51 @@ def test_breakaway_is_constant_or_follows_the_load_or_both(law, stiction, ratio)
     found = fit_breakaway(static, friction, np.zeros(1))
     assert found.law == law
     assert (found.stiction, found.ratio) == pytest.approx((stiction, ratio), rel=0.1)
+
+
+# --- one fit ---
+
+
+def test_a_source_in_one_direction_has_no_offset_and_its_force_is_friction():
+    readings = noted(law=LAWS['constant_coulomb'], values={CONSTANT: 20.0}, offset=6.0, seals=1)
+    assert fit(LAWS['constant_coulomb'], readings).offsets == pytest.approx([6.0])
+    forward = readings.taken(readings.at.direction > 0.0)
+    found = fit(LAWS['constant_coulomb'], forward)
+    assert (found.offsets.tolist(), found.values[CONSTANT]) == ([0.0], pytest.approx(26.0))
+
+
+@pytest.mark.parametrize('name', ['coulomb_stribeck', 'pressure_power_law'])
+def test_the_jacobian_holds_how_each_deviation_follows_each_parameter_with_the_offset_fitted_anew(name):
+    values = POWER | {CONSTANT: 90.0, 'viscous_friction': 300.0, 'stribeck_friction': 60.0, 'stribeck_velocity': 0.03}
+    law, readings = LAWS[name], swept(values, LAWS[name], scatter=5.0, n=300)
+    readings = readings.taken((readings.at.direction > 0.0) | (np.arange(300) % 3 > 0))
+    found = fit(law, readings)
+
+    def deviations(values):
+        friction = law.friction(readings.at, values)
+        offset = np.mean(readings.force - readings.at.direction * friction)
+        return (readings.at.direction * (readings.force - offset) - friction) / readings.scale
+
+    for column, parameter in zip(found.jacobian.T, law.parameters, strict=True):
+        step = 1e-5 * found.values[parameter.name]
+        moved = {**found.values, parameter.name: found.values[parameter.name] + step}
+        expected = (deviations(moved) - deviations(found.values)) / step
+        assert column == pytest.approx(expected, rel=1e-3, abs=1e-4 * np.abs(expected).max())
+
+
+def test_a_fit_close_to_its_start_gives_the_same():
+    values = {CONSTANT: 90.0, 'viscous_friction': 300.0, 'stribeck_friction': 60.0, 'stribeck_velocity': 0.03}
+    law = LAWS['coulomb_stribeck']
+    readings = swept(values, law, scatter=2.0, n=600)
+    found = fit(law, readings)
+    near = {name: 1.05 * value for name, value in found.values.items()}
+    assert fit(law, readings, near, is_close=True).values == pytest.approx(found.values, rel=1e-4)
+    assert fit(law, readings, {'something else': 3.0}).values == pytest.approx(found.values, rel=1e-6)
+
+
+def test_a_law_whose_friction_no_reading_shows_has_none_of_it():
+    readings = noted(law=LAWS['constant_coulomb'], values={CONSTANT: 20.0}, pressures=4)
+    flat = replace(readings, at=readings.at._replace(pressure=0.0 * readings.at.pressure))
+    found = fit(LAWS['pressure_power_law_1'], flat)
+    assert (found.values['friction_at_no_pressure'], found.values['friction_at_one_bar']) == (pytest.approx(20.0), 0.0)
+    assert found.condition_number == np.inf
