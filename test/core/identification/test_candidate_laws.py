@@ -95,7 +95,8 @@ def test_the_candidates_are_ordered_from_constant_to_physics_based():
     order = ['constant_coulomb', 'coulomb_viscous', 'pressure_power_law', 'physics_based', 'physics_based_stribeck']
     assert [name for name in names if name in order] == order
     assert names[-1] == 'physics_based_asymmetric'
-    assert all(law.depends_on_pressure != law.name.startswith(('constant', 'coulomb')) for law in ALL)
+    assert all(law.depends_on_pressure is not law.name.startswith(('constant', 'coulomb')) for law in ALL)
+    assert not any(law.depends_on_pressure is None for law in ALL)
 
 
 def test_without_geometry_or_speeds_the_laws_that_need_them_are_not_there():
@@ -175,6 +176,16 @@ def test_typical_magnitudes_are_the_highest_pressure_and_speed_and_the_mean_norm
     assert taken.normal_force.tolist() == [[4.0, 6.0], [10.0, 30.0]]
     assert taken.direction.tolist() == [1.0, 1.0]
     assert at.taken(np.array([1])).normal_force is None
+
+
+def test_a_fit_has_the_bounds_of_physics():
+    bounds = {p.name: (p.lower, p.upper) for law in ALL for p in law.parameters}
+    assert bounds['coulomb_friction_at_any_pressure'] == (0.0, 1e6)  # [N]
+    assert bounds['friction_at_one_bar'] == (0.0, 1e6)
+    assert bounds['pressure_exponent'] == (0.05, 2.0)
+    assert bounds['viscous_friction'] == (0.0, 1e7)  # [N s/m]
+    assert bounds['stribeck_velocity'] == (1e-4, 1.0)  # [m/s]
+    assert bounds['asymmetry'] == (-0.9, 0.9)
 
 
 def test_an_unknown_speed_counts_as_none():

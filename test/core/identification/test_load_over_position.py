@@ -163,6 +163,7 @@ def test_a_load_shows_where_the_middle_changes_by_twice_the_friction(times, foll
     assert follows_position(signals, x, loose) is follows
     lost = np.where(np.arange(len(x)) % 7 == 0, np.nan, x)  # a position that is missing now and then
     assert follows_position(signals, lost, loose) is follows
+    assert follows_position(signals, x + 5.0, loose) is follows  # wherever the zero of the sensor is
     assert follows_position(signals, np.full(len(x), np.nan), loose) is False
     assert follows_position(signals, np.full(len(x), 0.3), loose) is False
     one_way, there = held_load(times, sides=(1.0,))
@@ -337,6 +338,11 @@ def test_one_sample_in_a_hundred_may_lack_its_position(missing, told):
     else:
         with pytest.raises(ValueError, match=r'^11 of 1000 samples have no position'):
             _strokes(signals, x, SLIDING)
+
+
+def test_a_rod_that_rests_does_not_change_its_position():
+    with pytest.raises(ValueError, match=r'^the position does not change'):
+        _strokes(*drive((0.0, 100)), SLIDING)
 
 
 @pytest.mark.parametrize(
@@ -719,6 +725,14 @@ def test_what_is_left_without_load_and_inertia_is_the_friction():
     kept = without_load(signals, lost, load, SLIDING)
     assert np.isnan(kept.force_sum[kept.time == 1.0]).all()
     assert np.isfinite(kept.force_sum[kept.time != 1.0]).all()
+
+
+@pytest.mark.parametrize(('step', 'every'), [(0.05, 1), (0.04, 1), (0.025, 2), (0.01, 5)])
+def test_of_a_motion_one_sample_is_kept_in_50_ms(step, every):
+    time = step * np.arange(100)
+    signals = Signals(time, np.full(100, 0.1), np.full(100, 2e6), np.full(100, 1e6), np.full(100, 20.0))
+    left = without_load(signals, np.full(100, 0.5), replace(told(0.1), mass=0.0), SLIDING)
+    assert left.time == pytest.approx(time[::every])
 
 
 def test_means_do_not_reach_across_a_lost_sample_or_a_reversal():
