@@ -746,3 +746,28 @@ def test_means_do_not_reach_across_a_lost_sample_or_a_reversal():
     found = left.force_sum[np.isfinite(left.force_sum)]
     assert {round(value, 9) for value in found.tolist()} == {0.0, 8.0, -5.0}
     assert [np.count_nonzero(np.isclose(found, value)) for value in (0.0, 8.0, -5.0)] == [20, 10, 10]
+
+
+def test_a_term_that_takes_away_a_hundredth_of_the_loss_is_taken_although_it_is_within_one_standard_error():
+    """Of three pairs of strokes the loss has a large standard error, which alone would allow a coarser spline."""
+    signals, x = known_machine(bent, rubbing(), lambda x: 400.0 + 0.0 * x, noise=10.0, pairs=3)
+    load = fit_load(signals, x, ('a', 'b'), SLIDING)
+    assert (load.friction.names, load.mass_change) == (('constant',), (0.0, 0.0))
+    motion = _strokes(signals, x, SLIDING)
+    low, high = _shared_positions(motion)
+    means = _means(signals, x, motion, low, high)
+
+    def losses(intervals):
+        knots = _spline_knots(low, high, intervals)
+        spline = means.of(CubicSpline(knots, np.eye(len(knots)), bc_type='not-a-knot')(means.position))
+        columns = np.column_stack((spline, means.acceleration, means.direction))
+        return _left_out_losses(_normal(columns, means), np.arange(columns.shape[1]))
+
+    tried = {intervals: losses(intervals) for intervals in (1, 2, 3, 4, 6, 8)}
+    least = min(each.mean() for each in tried.values())
+    chosen = len(load.knots) - 3
+    assert tried[chosen].mean() <= 1.01 * least
+    assert all(tried[intervals].mean() > 1.01 * least for intervals in tried if intervals < chosen)
+    best = min(tried.values(), key=np.mean)
+    coarser = [tried[intervals] - best for intervals in tried if intervals < chosen]
+    assert any(0.0 < each.mean() <= each.std(ddof=1) / np.sqrt(3.0) for each in coarser)
