@@ -51,6 +51,7 @@ NOTICED_INERTIA = 0.04  # [m/s2] RMS: 2 % of a load on a lever of 5 to 1 (our ch
 ILL_CONDITIONED = 30.0  # condition number of a model that the log does not determine; after [Belsley1980]_
 NEGLIGIBLE_LOSS = 0.01  # of the loss: for less, no term is added (our choice)
 INTERVALS = (1, 2, 3, 4, 6, 8, 12)  # of the spline
+ROWS_PER_KNOT = 8  # means of `MEAN_OVER`; our choice
 EXPONENTS = (2.0 / 3.0, 1.0, 1.5, 2.0)  # of the pressure
 STRIBECK_SPEEDS = (0.05, 0.15, 0.4)  # of the fastest speed
 _RIDGE = 1e-10  # of the squared length of a column: keeps a collinear fit finite
@@ -394,10 +395,16 @@ def _choose(means: _Means, chambers: Sequence[str], low: float, high: float) -> 
     frictions = [
         (0, *(1 + i for i in p), *(1 + len(over_pressure) + i for i in v)) for p, v in product(pressures, speeds)
     ]
+    needed = ROWS_PER_KNOT * (INTERVALS[0] + 3)
+    if len(means.force) < needed:
+        raise ValueError(
+            f'{len(means.force) * MEAN_OVER:.1f} s of motion over the same positions are too few to tell a load that '
+            f'follows position from friction, {needed * MEAN_OVER:.1f} s are needed: drive more strokes out and back'
+        )
     choices: list[tuple[FloatArray, FloatArray, int, tuple[int, ...]]] = []
     losses: list[FloatArray] = []
     for intervals in INTERVALS:
-        if intervals + 3 > len(means.force) // 8:
+        if intervals + 3 > len(means.force) // ROWS_PER_KNOT:
             break
         knots = _spline_knots(low, high, intervals)
         of_load = means.of(CubicSpline(knots, np.eye(len(knots)), bc_type='not-a-knot')(means.position))
@@ -411,7 +418,8 @@ def _choose(means: _Means, chambers: Sequence[str], low: float, high: float) -> 
     excess = np.array(losses) - min(losses, key=np.mean)
     error = excess.std(axis=1, ddof=1) / np.sqrt(excess.shape[1])
     count = np.array([len(knots) + masses + len(chosen) for knots, _, masses, chosen in choices])
-    near = np.flatnonzero(excess.mean(axis=1) <= np.minimum(error, NEGLIGIBLE_LOSS * min(map(np.mean, losses))))
+    least = max(min(map(np.mean, losses)), 0.0)  # of exact data it is rounding, of either sign
+    near = np.flatnonzero(excess.mean(axis=1) <= np.minimum(error, NEGLIGIBLE_LOSS * least))
     knots, everything, masses, chosen = choices[min(near, key=lambda i: (count[i], excess[i].mean()))]
     k = len(knots)
     columns = everything[:, [*range(k + masses), *(k + 3 + i for i in chosen)]]

@@ -89,8 +89,10 @@ def rise_over_pressures(readings: FrictionReadings) -> Rise | None:
         return None
     pressure = readings.level_pressures
     friction = np.array([readings.half_range(inside).friction for inside in readings.levels.values()])
+    if (friction <= 0.0).any():
+        return None
     errors = _errors_of_levels(readings, friction)
-    if errors is None or (friction <= 0.0).any():
+    if errors is None:
         return None
     residuals = min(
         (_line(pressure**exponent, friction, errors)[2] for exponent in EXPONENTS.values()),

@@ -86,6 +86,11 @@ def fit_temperature(readings: FrictionReadings) -> TemperatureFit | None:
     slope, error = _line(warmth, friction)
     ends = BAND_95 * error * max(high - reference, reference - low)
     found = TemperatureFit(reference, -slope, error, low, high, '')
+    if abs(slope) - BAND_95 * error > LARGEST_COEFFICIENT:
+        return found._replace(
+            why_not=f'the friction changes by {100.0 * abs(slope):.0f} % a kelvin, more than that of any seal: check '
+            'the temperatures and their unit, and whether something else changed with them'
+        )
     if ends > LARGEST_ERROR or abs(slope) > LARGEST_COEFFICIENT or error > LARGEST_COEFFICIENT:
         return found._replace(
             why_not=f'the friction at the ends of the temperatures is known to {100.0 * ends:.0f} % only: '

@@ -288,6 +288,19 @@ def test_friction_below_the_noise_is_refused():
         fit_load(signals._replace(force_sum=lost), log.position, ('a', 'b'), SLIDING)
 
 
+@pytest.mark.parametrize(('seconds', 'enough'), [(5.6, False), (6.4, True)])
+def test_exact_signals_of_32_means_of_a_fifth_of_a_second_tell_the_simplest_load_and_fewer_are_refused(seconds, enough):
+    half = ((1.0, round(25 * seconds)), (0.0, 20), (-1.0, round(25 * seconds)), (0.0, 20))  # 10 ms a sample
+    signals, x = drive((0.0, 20), *half, *half)
+    if enough:
+        assert fit_load(signals, x, ('a', 'b'), SLIDING) is not None
+    else:
+        with pytest.raises(
+            ValueError, match=r'^5\.6 s of motion .* are too few .*6\.4 s are needed: drive more strokes'
+        ):
+            fit_load(signals, x, ('a', 'b'), SLIDING)
+
+
 # --- strokes, their shared positions and their means ---
 
 

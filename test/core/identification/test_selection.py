@@ -152,6 +152,8 @@ def test_a_rise_takes_three_held_pressures_with_repeated_strokes_and_friction_at
     assert rise_over_pressures(made.taken(made.level < 2)) is None
     assert rise_over_pressures(readings([10, 20, 40])) is None
     assert rise_over_pressures(replace(made, force=np.where(made.level == 1, -made.force, made.force))) is None
+    none = made.at.direction * np.where(made.level == 1, 0.0, np.abs(made.force))
+    assert rise_over_pressures(replace(made, force=none)) is None  # and without a warning of a division by 0
     once = made.taken((made.level < 2) | (np.arange(made.count) % 2 == 0))
     assert rise_over_pressures(once) is None  # nothing was repeated at one of them
 

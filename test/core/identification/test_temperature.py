@@ -114,6 +114,11 @@ def test_a_temperature_has_to_vary_by_eight_kelvin(span, enough):
     assert enough or '8 K are needed' in found.why_not
 
 
+def test_a_coefficient_that_no_seal_has_is_refused_for_that_and_not_for_its_error():
+    found = fit_temperature(readings(RUNS, scale=lambda kelvin: np.exp(-0.15 * (kelvin - 300.0)), noise=1e-3))
+    assert found.why_not.startswith('the friction changes by 15 % a kelvin, more than that of any seal')
+
+
 @pytest.mark.parametrize(('spread', 'enough'), [(1.9, False), (2.1, True)])
 def test_what_is_left_of_the_temperature_has_a_standard_deviation_of_two_kelvin(spread, enough):
     half = math.sqrt(6.0) * spread  # two of twelve runs are off by as much
