@@ -95,7 +95,6 @@ _INPUT_TYPES = {
 }
 _NUMBERS = tuple(len(_LAYOUTS[_INPUT_TYPES[kind]].codes) if kind in _INPUT_TYPES else 0 for kind in Kind)
 """How many numbers an input of each kind has, all of them float64."""
-_MOST_NUMBERS = max(_NUMBERS)
 _ANSWERS: dict[type, tuple[int, Layout]] = {
     FrictionEstimate: (0, _LAYOUTS[ESTIMATE_TYPE]),
     FeedForward: (1, _LAYOUTS[FEEDFORWARD_TYPE]),

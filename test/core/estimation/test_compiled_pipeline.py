@@ -19,6 +19,7 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.compiled_pipeline import Kind, Messages, UnsuitedError, receive_all
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters
+from seal_friction_ros.core.estimation.feedforward import FADED_IN
 from seal_friction_ros.core.estimation.messages import (
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
@@ -369,3 +370,73 @@ def test_the_live_node_does_not_load_the_compiler():
     )
     found = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True)
     assert 'numba' not in json.loads(found.stdout)
+
+
+# -- blocks of messages
+
+
+def test_kinds_count_up_from_zero_and_each_has_a_number_of_its_own():
+    """Compiled code finds the size of an input by its kind, and bags hold kinds as numbers."""
+    assert [kind.value for kind in Kind.__members__.values()] == list(range(12))
+
+
+def test_part_of_a_block_has_its_messages_and_its_times():
+    pieces = [serialised(Force(stamp, 2.0), b'x' * stamp) for stamp in (1, 2, 3, 4)]
+    block = in_memory(pieces, [10, 20, 30, 40])
+    assert [block.message(number) for number in range(4)] == [data for _, data in pieces]
+    part = block.taken(1, 3)
+    assert [part.message(number) for number in range(2)] == [data for _, data in pieces[1:3]]
+    assert (part.received.tolist(), part.kinds.tolist()) == ([20, 30], [Kind.FORCE, Kind.FORCE])
+
+
+@pytest.mark.parametrize('received', [0, 1, 2**61])
+def test_time_of_receipt_may_be_any_that_fits(received):
+    pieces = [serialised(Velocity(1, 0.01), b'rod')]
+    state, answers = one_by_one(DEFAULT, init(DEFAULT), pieces, [received])
+    found = all_at_once(DEFAULT, init(DEFAULT), pieces, [received])
+    assert (repr(found[0]), found[1]) == (repr(state), answers)
+
+
+@pytest.mark.parametrize('received', [-1, 2**61 + 1])
+def test_time_of_receipt_out_of_bounds_is_refused_with_the_number_of_its_message(received):
+    pieces = [serialised(Force(1, 2.0), b'rod'), serialised(Force(2, 2.0), b'rod')]
+    with pytest.raises(UnsuitedError, match=r'^message 1$'):
+        receive_all(DEFAULT, init(DEFAULT), in_memory(pieces, [5, received]))
+
+
+@pytest.mark.parametrize('frame', [b'', b'rod', b'frame', b'y' * 300])
+def test_answers_lie_one_after_the_other_and_fill_their_room(frame):
+    """Each begins after 4 bytes, so that its numbers are aligned to 8; less than 8 bytes are free after it."""
+    parameters = with_seals(ACTUATORS['default'], use_measured_velocity=True)
+    records = [Pressure(1, 2e6, 0.0), Velocity(2, 0.01), WatchdogTick(3, 0.0), Velocity(4, 0.01)]
+    pieces = [serialised(record, frame) for record in records]
+    _, found = receive_all(parameters, init(parameters), in_memory(pieces))
+    places = [(found.estimate_offsets[i], found.estimate_sizes[i]) for i in (1, 3)]
+    places += [(found.feedforward_offsets[i], found.feedforward_sizes[i]) for i in (1, 2, 3)]
+    end = 0
+    for offset, size in sorted(places):
+        assert offset == end + 4
+        end = (offset + size + 7) // 8 * 8
+    assert end == len(found.data)
+
+
+@pytest.mark.parametrize('frame', [b'', b'rod', b'frame'])
+def test_bytes_that_mean_nothing_are_not_passed_on(frame):
+    """The end of the name, and what is between the name and the numbers."""
+    kind, good = serialised(Velocity(1, 0.01), frame)
+    begin, end = 16 + len(frame), len(good) - 8
+    junk = good[:begin] + b'z' * (end - begin) + good[end:]
+    (expected,), (found,) = (all_at_once(DEFAULT, init(DEFAULT), [(kind, data)], [1])[1] for data in (good, junk))
+    assert found == expected
+    assert_same(DEFAULT, init(DEFAULT), [(kind, junk)])
+
+
+@pytest.mark.parametrize('before', [0, 2])
+@pytest.mark.parametrize('force', [math.inf, -math.inf])
+def test_answer_that_is_not_finite_is_refused_with_the_number_of_its_message(force, before):
+    """No settings make one; a state that somebody else wrote may."""
+    parameters = with_seals(ACTUATORS['default'], scale=1.0)
+    state = init(parameters)._replace(feedforward=FADED_IN._replace(force=force))
+    pieces = [serialised(Force(1, 2.0), b'rod')] * before + [serialised(WatchdogTick(2, 0.0), b'rod')] * 2
+    with pytest.raises(UnsuitedError, match=f'^an answer to message {before} is not finite$'):
+        receive_all(parameters, state, in_memory(pieces))
