@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,10 +20,17 @@ from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.core.lubrication import friction_map as module
 from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_friction
 from seal_friction_ros.core.lubrication.grease import Grease
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, LubricationNumerics, MapGrid
+from seal_friction_ros.core.lubrication.lubrication_case import (
+    AirPressure,
+    LubricationCase,
+    LubricationNumerics,
+    MapGrid,
+    Viscoelasticity,
+)
 from seal_friction_ros.core.lubrication.oring_film import oring_film
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.lubrication.transient import initial_state, lubrication_model
+from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 
@@ -132,6 +140,108 @@ def test_step_of_the_map_that_fails_is_taken_in_halves_and_counted(monkeypatch):
     assert math.isinf(asked[12])
     assert math.isinf(asked[14])
     assert state.gap == pytest.approx(smoothly.gap, rel=1e-9)
+
+
+@pytest.mark.parametrize(('failures', 'gives_up'), [(20, False), (21, True)])
+def test_map_gives_up_when_more_than_twenty_steps_have_failed(monkeypatch, failures, gives_up):
+    asked = []
+
+    def fails_often(_contact, state, *arguments):
+        asked.append(arguments[4])
+        if len(asked) <= failures:
+            raise NotConvergedError('told to')
+        return SimpleNamespace(state=state)
+
+    model = lubrication_model(CASE)
+    start = initial_state(model, 0.0).state
+    monkeypatch.setattr(module, 'contact_step', fails_often)
+    if gives_up:
+        with pytest.raises(NotConvergedError, match=r'^told to$'):
+            module._slid(model, start, 0.1, [1e-3])
+    else:
+        assert module._slid(model, start, 0.1, [1e-3])[2] == 20
+        assert asked[20] == 1e-3 / 2**20
+
+
+def test_step_to_the_steady_film_that_fails_is_led_by_one_of_250_passages(monkeypatch):
+    """0.6 mm at 0.1 m/s: 6 ms a passage."""
+    asked = []
+
+    def fails_at_first(_contact, state, *arguments):
+        asked.append(arguments[4])
+        if len(asked) == 1:
+            raise NotConvergedError('told to')
+        return SimpleNamespace(state=state)
+
+    model = lubrication_model(CASE)
+    start = initial_state(model, 0.0).state
+    monkeypatch.setattr(module, 'contact_step', fails_at_first)
+    _, states, retried = module._slid(model, start, -0.1, [math.inf])
+    assert asked == [math.inf, pytest.approx(1.5), math.inf]
+    assert (len(states), retried) == (1, 1)
+
+
+def test_map_takes_both_ways_from_rest_speed_after_speed_and_its_mean(monkeypatch):
+    """The film of a speed is the number of speeds before it. 10 N the one way and 14 N towards the pressure."""
+    begun = []
+
+    def steady(_model, state, velocity):
+        begun.append((state, velocity))
+        return state + 1, 2
+
+    def friction(_model, state, velocity):
+        return (10.0 if velocity > 0.0 else 14.0) + state, (4.0 if velocity > 0.0 else 5.0) + state
+
+    rest = SimpleNamespace(case=CASE), 0, 7.0
+    monkeypatch.setattr(module, '_at_rest', lambda case, pressure: rest if (case, pressure) == (CASE, 2e5) else None)
+    monkeypatch.setattr(module, 'steady_state', steady)
+    monkeypatch.setattr(module, '_friction', friction)
+    row = steady_friction(CASE, 2e5)
+    after = np.arange(1.0, 6.0)
+    assert row.friction == pytest.approx(12.0 + after)
+    assert row.solid == pytest.approx(4.5 + after)
+    assert row.direction_difference == pytest.approx(np.full(5, 4.0))  # the pressure is on the left
+    assert (row.pressure, row.stiffness, row.retried_steps) == (2e5, 7.0, 20)
+    speeds = np.geomspace(1e-3, 0.1, 5)
+    assert [state for state, _ in begun] == [0, 1, 2, 3, 4] * 2
+    assert [velocity for _, velocity in begun] == pytest.approx([*speeds, *-speeds])
+
+
+def test_memory_of_a_friction_that_falls_exponentially_is_the_length_of_its_exponential(monkeypatch):
+    """From 5 to 2 N over 0.1 mm; from steady sliding at a fifth of 34 mm/s, without pressure."""
+    asked = []
+
+    def steady(_model, state, velocity):
+        asked.append((state, velocity))
+        return (2.0, 10) if velocity == 34e-3 else (5.0, 1)
+
+    def slid(_model, start, velocity, durations):
+        states = (2.0 + (start - 2.0) * np.exp(-np.cumsum(durations) * velocity / 0.1e-3)).tolist()
+        return states[-1], states, 100
+
+    rest = SimpleNamespace(case=CASE), 0.0, 7.0
+    monkeypatch.setattr(module, '_at_rest', lambda _, pressure: rest if pressure == 0.0 else None)
+    monkeypatch.setattr(module, 'steady_state', steady)
+    monkeypatch.setattr(module, '_slid', slid)
+    monkeypatch.setattr(module, '_friction', lambda _model, state, velocity: (state, velocity))
+    found = memory_length(CASE)
+    assert found.length == pytest.approx(0.1e-3, rel=2e-3)
+    assert found.retried_steps == 111
+    assert asked == [(0.0, pytest.approx(6.8e-3)), (5.0, 34e-3)]
+
+
+def test_map_is_of_the_seal_on_a_plain_flooded_wall_with_the_pressure_on_its_left():
+    case = dataclasses.replace(
+        CASE, control_edge=ControlEdge(), film_supply=FilmSupply(), viscoelasticity=Viscoelasticity()
+    )
+    model, start, stiffness = module._at_rest(case, 2e5)
+    plain = model.case
+    assert (plain.control_edge, plain.film_supply, plain.viscoelasticity) == (None, None, None)
+    assert stiffness == case.groove.stiffness
+    assert start.saturation.min() == 1.0
+    under_air = dataclasses.replace(CASE, air=AirPressure(pressure_left=1e5, pressure_right=3e5))
+    air = module._at_rest(under_air, 2e5).model.case.air
+    assert (air.pressure_left, air.pressure_right) == (2e5, 0.0)
 
 
 def test_map_that_does_not_converge_is_an_error_that_says_where(monkeypatch):

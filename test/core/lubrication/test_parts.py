@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
 from seal_friction_ros.core.lubrication.contact import film_properties
-from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane
+from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane, condensed_body, hat_functions
 from seal_friction_ros.core.lubrication.flow_factors import (
     PEKLENIK_NUMBERS,
     flow_factor_coefficients,
@@ -133,6 +133,12 @@ def test_surfaces_far_apart_do_not_touch(filling):
     assert 0.0 < contact_pressure(1e6, 1e-6, filling, 0.69e-3)[0] < 1e-290
 
 
+@pytest.mark.parametrize('filling', [False, True])
+def test_asperities_bear_nothing_from_700_decay_lengths_on(filling):
+    assert contact_pressure(1e6, 1.0, filling, 700.0) == (0.0, 0.0)
+    assert contact_pressure(1e6, 1.0, filling, 699.9)[0] > 0.0
+
+
 @given(st.floats(-2e-6, 6e-6), st.booleans())
 def test_asperities_push_less_the_farther_apart_and_have_their_slope(gap, filling):
     pressure, slope = contact_pressure(1e6, 1e-6, filling, gap)
@@ -189,6 +195,13 @@ def test_half_plane_shallower_than_wide_is_refused():
         HalfPlane(100, 1e-5, MODULUS, 1e-4)
 
 
+def test_half_plane_may_be_as_deep_as_its_film_is_wide_and_has_sixteen_cells_at_least():
+    width = 2.0**-16  # [m]
+    assert HalfPlane(16, width, MODULUS, 16.0 * width).influence.shape == (16,)
+    with pytest.raises(ValueError, match=r'^HalfPlane.cells = 15 is too few: take 16 at least$'):
+        HalfPlane(15, width, MODULUS, 1.0)
+
+
 @pytest.mark.parametrize('wave_number', [0.5, 1.0, 2.0, 5.0])  # times the height of the layer
 def test_a_bonded_layer_gives_way_to_a_wave_as_the_closed_form_says(wave_number):
     height, cells = 1e-3, 2400
@@ -225,6 +238,50 @@ def test_bodies_push_back_alike():
         matrix = body.matrix()
         assert np.array_equal(matrix, matrix.T)
         assert np.linalg.eigvalsh(matrix).min() > 0.0
+
+
+def test_hat_functions_are_one_at_their_node_and_fall_to_the_next():
+    values = hat_functions(np.array([0.0, 0.25, 1.0, 2.5]), np.array([0.0, 1.0, 3.0]))
+    assert values == pytest.approx(np.array([[1.0, 0.0, 0.0], [0.75, 0.25, 0.0], [0.0, 1.0, 0.0], [0.0, 0.25, 0.75]]))
+
+
+CIRCUMFERENCE = 20e-3  # [m]
+
+
+def condensed(compliance_of, cells: int = 32, width: float = 5e-6):
+    """A body whose nodes answer to a force as ``compliance_of`` their half-plane; and that half-plane.
+
+    A force F on a node is F / (width * circumference) of pressure, shared by the cells as the hat function says.
+    """
+    plane = HalfPlane(cells, width, MODULUS, 2.0 * cells * width)
+    places = (np.arange(cells) + 0.5) * width
+    nodes = np.linspace(0.0, cells * width, 9)
+    follows = np.linalg.pinv(hat_functions(places, nodes))
+    compliance = follows @ plane.matrix() @ follows.T / (CIRCUMFERENCE * width)
+    return condensed_body(places, nodes, compliance_of(compliance), MODULUS, CIRCUMFERENCE), plane
+
+
+def test_body_whose_nodes_give_way_as_a_half_plane_is_that_half_plane_whatever_the_mesh():
+    body, plane = condensed(lambda compliance: compliance)
+    assert body.matrix() == pytest.approx(plane.matrix(), rel=1e-9)
+    pressure = 1e6 * np.sin(np.arange(32.0))
+    assert body.deflection(pressure) == pytest.approx(plane.deflection(pressure), rel=1e-6)
+    assert body.stiffness_band == pytest.approx(plane.stiffness_band)
+    assert (body.cells, body.modulus) == (32, MODULUS)
+    assert body.cell_width == pytest.approx(5e-6)
+
+
+def test_body_gives_way_alike_both_ways_even_where_its_nodes_do_not():
+    """Half of what is unsymmetric goes to either side, so it leaves the body as it is."""
+    twist = 1e-9 * np.triu(np.ones((9, 9)), 1)  # [m/N]
+    body, plane = condensed(lambda compliance: compliance + twist - twist.T)
+    assert body.matrix() == pytest.approx(plane.matrix(), rel=1e-9)
+
+
+def test_no_pressure_meets_a_stiffer_body_than_the_stiffest_half_plane():
+    body, plane = condensed(lambda compliance: -compliance)
+    stiffest = np.linalg.eigvalsh(plane.matrix()).min()
+    assert np.linalg.eigvalsh(body.matrix()).min() == pytest.approx(stiffest, rel=1e-6)
 
 
 def test_gmres_solves_and_says_when_it_cannot():
@@ -461,3 +518,18 @@ def test_transducer_follows_a_ramp_the_same_with_any_step():
     assert transducer_force(chain, fine, 3.0 * fine)[::100] == pytest.approx(
         transducer_force(chain, coarse, 3.0 * coarse)
     )
+
+
+@pytest.mark.parametrize('start', [0.0, 5.0, -5.0])
+def test_transducer_starts_at_rest_under_the_first_force_whenever_that_is(start):
+    """A force of 3 N shows 3 N; undamped, a ramp of 100 N/s shows the ramp less 100 N/s / w sin(w t)."""
+    chain = MeasuringChain(natural_frequency=100.0, damping_ratio=0.0)
+    time = start + 1e-3 * np.arange(6)  # half an oscillation lasts 5 ms
+    assert transducer_force(chain, time, np.full(6, 3.0)) == pytest.approx(np.full(6, 3.0), rel=1e-12)
+    ramp = transducer_force(chain, time, 3.0 + 100.0 * (time - start))
+    omega_t = 2.0 * math.pi * 100.0 * (time - start)
+    assert ramp == pytest.approx(3.0 + 100.0 * (time - start) - 100.0 / (200.0 * math.pi) * np.sin(omega_t), rel=1e-9)
+
+
+def test_transducer_gives_one_reading_for_one_sample():
+    assert transducer_force(MeasuringChain(), np.array([0.0]), np.array([2.0])).tolist() == [2.0]
