@@ -94,14 +94,15 @@ class LubricatedContact:
 @compiled
 def film_properties(
     gap: FloatArray,
-    sliding_speed: float,
+    sliding_velocity: float,
     grease: tuple[float, float, float, float, float],
     rough: tuple[float, float, tuple[float, ...]],
 ) -> FloatArray:
     """Mobility M, dM/dh, carried height c and dc/dh of each cell, shape (4, n).
 
-    The viscosity is that at the mean shear rate |U| / h (our choice). c = h + sigma (wall - seal) phi_s: roughness of
-    the wall, which moves in the frame of the seal, carries more; roughness of the seal carries less.
+    The viscosity is that at the mean shear rate U / h, U of either sign (our choice). c = h + sigma (wall - seal)
+    phi_s: roughness of the wall, which moves in the frame of the seal, carries more; roughness of the seal carries
+    less.
     """
     n = gap.shape[0]
     properties = np.empty((4, n))
@@ -111,7 +112,7 @@ def film_properties(
         h = max(gap[i], THINNEST)
         ratio = h / rms
         phi, phi_slope = pressure_flow_factor(coefficients, ratio)
-        shear_rate = sliding_speed / h
+        shear_rate = sliding_velocity / h
         viscosity = apparent_viscosity(grease, shear_rate)
         rate = math.sqrt(shear_rate * shear_rate + floor * floor)
         by_rate = (consistency * (index - 1.0) * rate**index - yield_stress) / (rate * rate)
@@ -278,9 +279,8 @@ def contact_step(
     plane, rough, numbers = contact.body, contact.rough, contact.grease.numbers
     rate = 1.0 / time_step
     gap, pressure, saturation = (np.array(values) for values in guess)
-    speed = abs(wall_velocity)
     for iteration in range(_ITERATIONS):
-        properties = film_properties(gap, speed, numbers, rough)
+        properties = film_properties(gap, wall_velocity, numbers, rough)
         residual, rows, flow = reynolds_rows(
             gap, pressure, saturation, properties, 0.5 * wall_velocity, rate, old_thickness, plane.cell_width, ends
         )

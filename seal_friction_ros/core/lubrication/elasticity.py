@@ -130,8 +130,7 @@ class CondensedBody:
     stiffness_band: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        plane = HalfPlane(self.cells, self.cell_width, self.modulus, 2.0 * self.cells * self.cell_width)
-        object.__setattr__(self, 'stiffness_band', plane.stiffness_band)
+        object.__setattr__(self, 'stiffness_band', _stiffness_band(self.cells, self.cell_width, self.modulus))
 
     def deflection(self, pressure: FloatArray) -> FloatArray:
         """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,)."""

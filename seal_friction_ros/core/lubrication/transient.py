@@ -343,7 +343,7 @@ def _supply(model: LubricationModel, moment: TransientState, way: float, step: f
     taken = moment.wall_film.ahead(*swept, left, right)
     end = -1 if way > 0.0 else 0
     numbers, rough = model.case.grease.numbers, model.contact.rough
-    height = film_properties(moment.state.gap, abs(way) / step, numbers, rough)[2, end]
+    height = film_properties(moment.state.gap, way / step, numbers, rough)[2, end]
     filled = min(1.0, float(taken.sum()) / (0.5 * abs(way) * float(height)))
     return (model.ends(right=filled) if way > 0.0 else model.ends(left=filled)), taken
 

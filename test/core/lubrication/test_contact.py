@@ -261,8 +261,46 @@ def test_compiled_and_plain_python_agree():
 def test_a_number_that_is_not_finite_never_comes_out():
     contact = made(64)
     state = dry(contact)
-    with pytest.raises(NotConvergedError):
+    with pytest.raises(NotConvergedError, match='not converged after 1 iterations'):
         contact_step(contact, state._replace(gap=np.full(64, np.nan)), profile(64), 0.01, FilmEnds(), state.gap, 1e-3)
+
+
+def test_what_does_not_converge_says_which_part_of_it(monkeypatch):
+    contact = made(64)
+    state = dry(contact)
+    monkeypatch.setattr(contact_module, '_GMRES_TOLERANCE', 1e-12)
+    monkeypatch.setattr(contact_module, '_GMRES_ITERATIONS', 1)
+    with pytest.raises(NotConvergedError, match=r'^contact step: GMRES: .* left after 1 iterations$'):
+        contact_step(contact, state, profile(64), -0.02, FilmEnds(), state.gap, 1e-3)
+    monkeypatch.setattr(contact_module, '_ITERATIONS', 1)
+    with pytest.raises(NotConvergedError, match=r'^dry contact: .* m left after 1 iterations$'):
+        dry_contact(contact, profile(64))
+
+
+class Counted:
+    """A body that counts how often it is deflected."""
+
+    def __init__(self, body: HalfPlane) -> None:
+        self._body, self.deflections = body, 0
+
+    def __getattr__(self, name):
+        return getattr(self._body, name)
+
+    def deflection(self, pressure):
+        self.deflections += 1
+        return self._body.deflection(pressure)
+
+
+@pytest.mark.parametrize('compliance_factor', [1.0, 0.25, 0.0625])
+def test_banded_stiffness_prepares_the_elastic_equation_whatever_share_of_the_compliance_acts(compliance_factor):
+    """A solve of GMRES that is well prepared needs few products, each one deflection; so does the whole step."""
+    body = Counted(HalfPlane(96, LENGTH / 96, MODULUS, DEPTH))
+    contact = LubricatedContact(body, ROUGH, GREASE)
+    start = dry(contact)
+    rigid = profile(96) + (1.0 - compliance_factor) * (start.gap - profile(96))  # the rest has crept
+    body.deflections = 0
+    step = contact_step(contact, start, rigid, -0.02, FilmEnds(), start.gap, 1e-3, compliance_factor)
+    assert body.deflections <= 6 * (step.iterations + 1)
 
 
 def test_grease_is_thinned_by_shear_in_the_mobility():

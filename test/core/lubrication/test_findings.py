@@ -191,7 +191,118 @@ def test_friction_at_speed_is_read_in_the_seat_where_there_is_an_edge():
     assert found.solid_fast == pytest.approx(2.5, abs=0.01)
 
 
+def unlike(place, velocity):
+    """A friction that is larger at slow speed and twice as large on the way to the left."""
+    return np.where(velocity < 0.0, 2.0, 1.0) * (6.0 - 100.0 * np.abs(velocity)) * np.sign(velocity)
+
+
+@pytest.mark.parametrize('case', [CASE, EDGE], ids=['plain', 'edge'])
+def test_only_the_last_cycle_is_read(case):
+    """What was a hundred times as large in the first one, and slid or not, changes nothing."""
+
+    def edge(place, velocity):
+        return np.where((velocity > 0.0) & (place > 0.5e-3), -2.0, 0.0)
+
+    run = made(case, 1200, solid=unlike, fluid=along(0.5), **({'edge': edge} if case is EDGE else {}))
+    last = last_cycle(run)
+    odd = {name: np.where(last, getattr(run, name), 100.0 * getattr(run, name)) for name in ('solid', 'fluid', 'edge')}
+    other = run._replace(friction=np.where(last, run.friction, -100.0 * run.friction), **odd)
+    assert findings(other) == findings(run)
+    assert findings(other._replace(sliding_velocity=np.where(last, run.velocity, 0.0))) == findings(run)
+
+
+def test_both_strokes_count_alike_on_slowing_down():
+    """At 4 mm/s 5.6 and 11.2 N, at 20 mm/s 4 and 8 N."""
+    found = findings(made(steps=6000, solid=unlike))
+    assert found.solid_slow == pytest.approx(8.4, abs=0.02)
+    assert found.solid_fast == pytest.approx(4.0, abs=0.01)
+    assert found.rise_on_deceleration == pytest.approx(0.4, abs=0.01)  # the last fast step is slower by 1 %
+    one_way = dataclasses.replace(CASE, motion=dataclasses.replace(MOTION, cycles=1))
+    run = made(one_way, 6000, solid=unlike)
+    assert findings(run._replace(velocity=np.abs(run.velocity))).rise_on_deceleration == pytest.approx(0.4, abs=0.01)
+
+
+def test_friction_on_slowing_down_is_that_of_the_last_step_at_each_speed():
+    """Steps of 0.5 ms, 0.2 mm/s slower each: 19.9 mm/s in the first (1 % is 0.2 mm/s), 4.1 mm/s in the eightieth."""
+    run = made(steps=1200, solid=along(4.0))
+    solid = run.solid.copy()
+    for turn in (900, 1200):
+        solid[turn - 100] *= 5.0 / 4.0
+        solid[turn - 100 + 79] *= 7.0 / 4.0
+    found = findings(run._replace(solid=solid, friction=solid))
+    assert found.rise_on_deceleration == pytest.approx(7.0 / 5.0 - 1.0)
+    assert found.solid_slow == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize('force', [2.0, 0.02])
+@pytest.mark.parametrize('mirror', [1.0, -1.0])
+def test_a_seal_assists_over_the_same_way_whatever_its_friction_and_whichever_way_it_turns(force, mirror):
+    """Over 0.1 mm, with a groove that is stiffer the stronger the friction."""
+    stiff = dataclasses.replace(CASE, groove=GrooveSpring(stiffness=1e4 * force))
+
+    def sprung(place, velocity):
+        end = np.where(velocity > 0.0, -1e-3, 1e-3)
+        return np.clip(1e4 * force * (place - end) - force * np.sign(velocity), -force, force)
+
+    run = made(stiff, 6000, solid=sprung)
+    columns = {name: mirror * getattr(run, name) for name in ('position', 'velocity', 'friction', 'solid')}
+    found = findings(run._replace(**columns))
+    assert found.assisted_length == pytest.approx(0.1e-3, rel=0.01)
+    assert found.elastic_length == pytest.approx(0.1e-3, rel=0.01)
+
+
+@pytest.mark.parametrize(('share', 'counts'), [(0.04, False), (0.08, True)])
+def test_friction_before_a_reversal_counts_from_a_twentieth_of_the_largest_on(share, counts):
+    found = findings(
+        made(solid=lambda place, velocity: np.where(np.abs(place) > 0.9e-3, share, 1.0) * 2.0 * np.sign(velocity))
+    )
+    assert (found.elastic_length is not None) == counts
+
+
+@pytest.mark.parametrize('force', [1.0, 0.01])
+def test_second_lobe_is_the_first_maximum_above_zero_and_between_two_steps_if_they_are_equal(force):
+    """On the way to the right from -1 mm: a maximum of -1 below zero, then 3, 3 about the middle of two steps."""
+    run = made(BISTABLE, solid=along(2.0), sliding_velocity=lambda *_: 0.0)
+    middle = np.abs(run.position) < 0.3e-3
+    first = int(np.flatnonzero(last_cycle(run) & (run.velocity > 0.0))[0])
+    friction = run.friction.copy()
+    friction[first : first + 10] = force * np.array([-2.0, -1.0, -2.0, 1.0, 2.0, 3.0, 3.0, 2.0, 5.0, 1.0])
+    moved = run._replace(friction=friction, sliding_velocity=np.where(middle, run.velocity, 0.0))
+    exact = 0.5 * (run.position[first + 5] + run.position[first + 6])
+    assert findings(moved).second_lobe == pytest.approx(exact, rel=1e-12)
+
+
+def test_friction_on_leaving_is_read_while_the_chamfer_pushes_with_half_of_its_most():
+    """It pushes with 2 N, then 1.2 N, then 0.8 N, against 1, 0.1 and 0.01 N of friction."""
+
+    def edge(place, velocity):
+        return np.where(velocity > 0.0, np.where(place > 0.7e-3, -2.0, np.where(place > 0.6e-3, -1.2, -0.8)), 0.0)
+
+    def solid(place, velocity):
+        return np.where(place > 0.7e-3, 1.0, np.where(place > 0.6e-3, 0.1, 0.01)) * np.sign(velocity)
+
+    run = made(EDGE, 6000, edge=edge, solid=solid)
+    found = findings(run._replace(friction=run.solid))
+    assert (found.edge_assist, found.friction_on_leaving) == (2.0, 0.1)
+
+
 # -- errors
+
+
+def test_number_that_a_level_does_not_have_has_no_error():
+    """The second lobe: there at 0.5 ms and at 1 ms, and on the grids, not at 2 ms."""
+
+    def stuck(place, velocity):
+        return np.where(place < 0.0, 0.0, velocity)
+
+    def run(case: LubricationCase) -> TransientResult:
+        return made(case, solid=lobed if case.numerics.time_step < 2e-3 else along(2.0), sliding_velocity=stuck)
+
+    case = dataclasses.replace(BISTABLE, numerics=LubricationNumerics(cells=160, time_step=5e-4))
+    by_step, by_grid = discretisation_errors(case, findings(run(case)), run)
+    assert 'second_lobe' not in by_step
+    assert by_grid['second_lobe'] == 0.0
+    assert 'friction' in by_step
 
 
 def test_time_step_may_pass_the_rounding_of_the_edge_in_four():
@@ -262,6 +373,21 @@ def test_study_is_in_order_of_shear_stress_and_relative_to_its_mean():
     assert table.curve_deviation == pytest.approx((1.0 - 2.0 / 3.25, 4.5 / 3.25 - 1.0), rel=1e-6)
 
 
+def test_study_looks_at_the_last_cycle_within_half_a_millimetre_of_the_middle_of_the_way():
+    """About 5 mm: there 2 and 4 N at 1 and 2 MPa, so in proportion; elsewhere and before 7 N."""
+    away = dataclasses.replace(CASE, motion=dataclasses.replace(MOTION, centre=5e-3))
+
+    def solid(force):
+        def friction(place, velocity):
+            return np.where(np.abs(place - 5e-3) < 0.51e-3, force, 7.0) * np.sign(velocity)
+
+        return friction
+
+    runs = [made(with_solid_shear_stress(away, 1e6 * n), solid=solid(2.0 * n), fluid=along(0.0)) for n in (1, 2)]
+    runs = [run._replace(friction=np.where(last_cycle(run), run.friction, 7.0)) for run in runs]
+    assert study_table(runs).curve_deviation == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
 def test_study_of_nothing_is_refused():
     with pytest.raises(ValueError, match='study_table: there is no run'):
         study_table([])
@@ -299,6 +425,8 @@ def test_seals_of_other_time_steps_are_refused(steps):
     members = (SpoolSeal('made'), SpoolSeal('made'))
     with pytest.raises(ValueError, match='superposed: the seals have different time steps'):
         superposed(members, [made(), made(steps=steps)])
+    with pytest.raises(ValueError, match='longer than argument 1'):
+        superposed(members[:1], [made(), made()])
     later = made()
     with pytest.raises(ValueError, match='different time steps'):
         superposed(members, [made(), later._replace(time=later.time + 0.01)])
@@ -327,3 +455,6 @@ def test_spool_that_does_not_move_that_way_has_no_stroke():
     with pytest.raises(ValueError, match=r'stroke_friction: the spool does not move in direction -1$'):
         stroke_friction(spool, -1.0)
     assert math.isclose(stroke_friction(spool, 1.0).peak, 2.0)
+    still = superposed((SpoolSeal('made'),), [run._replace(position=np.zeros(600))])
+    with pytest.raises(ValueError, match=r'does not move in direction 1$'):
+        stroke_friction(still, 1.0)

@@ -18,6 +18,7 @@ from seal_friction_ros.core.lubrication.seal_section import (
     face_compliance,
     seal_body,
     seal_section,
+    section_rubber,
 )
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, element_forces
 
@@ -94,6 +95,42 @@ def test_the_more_the_groove_holds_the_stiffer_is_the_section():
     ]
     assert (np.diff([c.off_wall.sum() for c in compliances]) < 0.0).all()
     assert (np.diff([c.axial_stiffness for c in compliances]) > 0.0).all()
+
+
+@pytest.mark.parametrize(('c10', 'c01', 'ratio'), [(1e6, 0.5e6, 0.5), (0.1e6, 0.9e6, 9.0), (0.0, 2e6, 10.0)])
+def test_rubber_of_the_section_is_as_stiff_in_shear_as_that_of_the_seal(c10, c01, ratio):
+    """G = 2 (C_10 + C_01) = E / 3; beyond a ratio of 10, which small displacements do not feel, it stays at 10."""
+    rubber = section_rubber(SealBody(mooney_c10=c10, mooney_c01=c01))
+    assert rubber.elastic_modulus == pytest.approx(6.0 * (c10 + c01))
+    assert rubber.mooney_ratio == pytest.approx(ratio)
+
+
+def test_section_hardly_wider_than_its_film_has_one_element_beside_it():
+    section = seal_section(dataclasses.replace(SEAL, section_width=0.6002e-3), FILM, 8)
+    assert len(np.unique(section.model.mesh.nodes[:, 1])) == 9 + 2
+    assert mesh_width(section) == pytest.approx(0.6002e-3)
+
+
+def mesh_width(section: SealSection) -> float:
+    """Width of the mesh along the wall [m]."""
+    return float(np.ptp(section.model.mesh.nodes[:, 1]))
+
+
+def test_even_section_gives_way_alike_on_both_sides_of_its_crown():
+    body = seal_body(SEAL, LubricationNumerics(cells=32, section_elements=8))
+    matrix = body.matrix()
+    assert matrix[::-1, ::-1] == pytest.approx(matrix, rel=1e-9)
+
+
+def test_wide_flat_section_is_sheared_along_the_axis_by_half_of_its_face():
+    """It is G A / h under the pulled half of the film; the rubber beside it adds less than a fifth."""
+    height = 1e-3
+    seal = dataclasses.replace(
+        FAR, section_height=height, section_width=24.0 * height, crown_radius_left=1.0, crown_radius_right=1.0
+    )
+    found = face_compliance(seal_section(seal, 20.0 * height, 64)).axial_stiffness
+    even = seal.modulus / 4.0 * 10.0 * height * np.pi * seal.sealing_diameter / height
+    assert even < found < 1.2 * even
 
 
 def flat(height: float, width: float, film: float, elements: int, cells: int):

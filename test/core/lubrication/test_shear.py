@@ -97,6 +97,26 @@ def test_seal_that_nothing_holds_has_no_sliding_velocity():
         sliding_velocity(10.0, 4.0, lambda _: 0.0, lambda _: 10.0, 1e-3)
 
 
+@pytest.mark.parametrize(('balance', 'is_found'), [(5.1e5, True), (1.02e6, False)])
+def test_balance_is_sought_up_to_half_a_million_times_the_first_speed_and_never_beyond_a_million(balance, is_found):
+    """6 N over the film, from 1 m/s on."""
+    sought = (10.0, 4.0, lambda v: 6.0 * v / balance, lambda _: 10.0, 1.0)
+    if is_found:
+        assert sliding_velocity(*sought) == pytest.approx(balance)
+    else:
+        with pytest.raises(ValueError, match=r'no sliding velocity below 1\.05e'):
+            sliding_velocity(*sought)
+
+
+def test_rough_surfaces_closer_than_a_nanometre_have_its_stress_factors():
+    """At 0.5 nm the film is sheared twice as fast as at 1 nm, with the same factor."""
+    even, rough = np.ones(CELLS), (2e-6, shear_stress_coefficients(1.0))
+    forces = [
+        fluid_shear(gap * even, 0.0 * even, even, 0.03, OIL.numbers, WIDTH, FilmEnds(), rough) for gap in (5e-10, 1e-9)
+    ]
+    assert forces[0] == pytest.approx(2.0 * forces[1], rel=1e-9)
+
+
 @pytest.mark.parametrize('share', [-1.0, 0.5])
 def test_film_of_rough_surfaces_flows_by_the_factors_of_patir_and_cheng(share):
     """M = phi_x h^3 / (12 eta), c = h + sigma (wall - seal) phi_s, eta at the mean shear rate."""
@@ -112,7 +132,7 @@ def test_closed_gap_flows_like_one_of_a_nanometre_whatever_it_does():
     rough = (1e-6, 0.5, flow_factor_coefficients(1.0))
     closed, thinnest = (film_properties(np.array([h]), 0.03, OIL.numbers, rough)[:, 0] for h in (-1e-6, 1e-9))
     assert closed[[0, 2]] == pytest.approx(thinnest[[0, 2]], rel=1e-12)
-    assert closed[[1, 3]].tolist() == [0.0, 0.0]
+    assert closed[[1, 3]].tolist() == thinnest[[1, 3]].tolist() == [0.0, 0.0]
 
 
 def test_share_of_the_wall_in_the_roughness_goes_from_all_on_the_seal_to_all_on_the_wall():
