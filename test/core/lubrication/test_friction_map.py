@@ -18,6 +18,7 @@ from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.core.lubrication import friction_map as module
+from seal_friction_ros.core.lubrication.contact import ContactState
 from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_friction
 from seal_friction_ros.core.lubrication.grease import Grease
 from seal_friction_ros.core.lubrication.lubrication_case import (
@@ -29,7 +30,7 @@ from seal_friction_ros.core.lubrication.lubrication_case import (
 )
 from seal_friction_ros.core.lubrication.oring_film import oring_film
 from seal_friction_ros.core.lubrication.topography import Topography
-from seal_friction_ros.core.lubrication.transient import initial_state, lubrication_model
+from seal_friction_ros.core.lubrication.transient import initial_state, lubrication_model, solid_limit
 from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
@@ -205,6 +206,18 @@ def test_map_takes_both_ways_from_rest_speed_after_speed_and_its_mean(monkeypatc
     speeds = np.geomspace(1e-3, 0.1, 5)
     assert [state for state, _ in begun] == [0, 1, 2, 3, 4] * 2
     assert [velocity for _, velocity in begun] == pytest.approx([*speeds, *-speeds])
+
+
+@pytest.mark.parametrize('velocity', [0.03, -0.03])
+def test_friction_is_that_of_asperities_and_film_whichever_way(velocity):
+    """Oil of 0.5 Pa s in an even gap of 2 um."""
+    oil = Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.5)
+    model = lubrication_model(dataclasses.replace(CASE, grease=oil))
+    state = ContactState(np.full(96, 2e-6), np.zeros(96), np.ones(96))
+    friction, solid = module._friction(model, state, velocity)
+    assert solid == solid_limit(model, state)
+    assert solid > 0.0
+    assert friction - solid == pytest.approx(0.5 * 0.03 / 2e-6 * math.pi * 6e-3 * 0.6e-3)
 
 
 def test_memory_of_a_friction_that_falls_exponentially_is_the_length_of_its_exponential(monkeypatch):
