@@ -222,13 +222,14 @@ def test_both_strokes_count_alike_on_slowing_down():
     assert findings(run._replace(velocity=np.abs(run.velocity))).rise_on_deceleration == pytest.approx(0.4, abs=0.01)
 
 
-def test_friction_on_slowing_down_is_that_of_the_last_step_at_each_speed():
+@pytest.mark.parametrize('sense', [1.0, -1.0])
+def test_friction_on_slowing_down_is_that_of_the_last_step_at_each_speed_resisting_or_not(sense):
     """Steps of 0.5 ms, 0.2 mm/s slower each: 19.9 mm/s in the first (1 % is 0.2 mm/s), 4.1 mm/s in the eightieth."""
     run = made(steps=1200, solid=along(4.0))
     solid = run.solid.copy()
     for turn in (900, 1200):
         solid[turn - 100] *= 5.0 / 4.0
-        solid[turn - 100 + 79] *= 7.0 / 4.0
+        solid[turn - 100 + 79] *= sense * 7.0 / 4.0
     found = findings(run._replace(solid=solid, friction=solid))
     assert found.rise_on_deceleration == pytest.approx(7.0 / 5.0 - 1.0)
     assert found.solid_slow == pytest.approx(7.0)
@@ -240,9 +241,9 @@ def test_a_seal_assists_over_the_same_way_whatever_its_friction_and_whichever_wa
     """Over 0.1 mm, with a groove that is stiffer the stronger the friction."""
     stiff = dataclasses.replace(CASE, groove=GrooveSpring(stiffness=1e4 * force))
 
-    def sprung(place, velocity):
+    def sprung(place, velocity):  # slowly at first about its zero
         end = np.where(velocity > 0.0, -1e-3, 1e-3)
-        return np.clip(1e4 * force * (place - end) - force * np.sign(velocity), -force, force)
+        return force * np.clip((place - end) / 0.1e-3 - np.sign(velocity), -1.0, 1.0) ** 3
 
     run = made(stiff, 6000, solid=sprung)
     columns = {name: mirror * getattr(run, name) for name in ('position', 'velocity', 'friction', 'solid')}
@@ -270,6 +271,17 @@ def test_second_lobe_is_the_first_maximum_above_zero_and_between_two_steps_if_th
     moved = run._replace(friction=friction, sliding_velocity=np.where(middle, run.velocity, 0.0))
     exact = 0.5 * (run.position[first + 5] + run.position[first + 6])
     assert findings(moved).second_lobe == pytest.approx(exact, rel=1e-12)
+
+
+def test_second_lobe_may_be_in_the_second_step():
+    """A parabola through 2, 3 and 1 N has its vertex a sixth of a step before its middle."""
+    run = made(BISTABLE, solid=along(2.0))
+    first = int(np.flatnonzero(last_cycle(run) & (run.velocity > 0.0))[0])
+    friction, sliding = run.friction.copy(), run.velocity.copy()
+    friction[first : first + 3], sliding[first : first + 3] = (2.0, 3.0, 1.0), 0.0
+    exact = run.position[first + 1] - (run.position[first + 1] - run.position[first]) / 6.0
+    found = findings(run._replace(friction=friction, sliding_velocity=sliding))
+    assert found.second_lobe == pytest.approx(exact, rel=1e-12)
 
 
 def test_friction_on_leaving_is_read_while_the_chamfer_pushes_with_half_of_its_most():

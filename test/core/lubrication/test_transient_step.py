@@ -147,6 +147,14 @@ def test_seal_at_rest_under_air_touches_as_without_it_and_has_crept_under_all_of
     assert (start.time, start.before) == (0.0, None)
 
 
+def test_seal_on_its_left_seat_stands_to_the_right_of_its_spool_at_the_edge():
+    """A clearance of twice 0.05 mm: the crown is 0.05 mm ahead of the spool."""
+    loose = dataclasses.replace(EDGE, groove=GrooveSpring(half_clearance=0.05e-3))
+    leaning, standing = at_rest(loose, 0.2e-3), at_rest(EDGE, 0.25e-3)
+    assert leaning.contact_place == pytest.approx(standing.contact_place)
+    assert leaning.state.gap == pytest.approx(standing.state.gap, rel=1e-9)
+
+
 def test_seal_gives_way_at_once_by_a_quarter_and_creeps_towards_the_rest():
     """Stiffening 3: a quarter at once, 3 / 8 with 10 ms and 3 / 8 with 0.1 s: tau c' = 3 / 8 K p - c."""
     model = lubrication_model(CREEPING)
