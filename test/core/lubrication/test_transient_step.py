@@ -232,10 +232,11 @@ def starved(place: float) -> TransientState:
 def test_seal_takes_the_film_ahead_of_it_and_is_fed_by_half_of_its_speed(way):
     """0.1 um on the wall is 0.2 um under a seal, over the height that shear carries at its end."""
     model = lubrication_model(STARVED)
-    ends, taken = transient._supply(model, initial_state(model, 0.0), way, 1e-3)
+    moment = initial_state(model, 0.0)
+    wedge = np.linspace(4e-6, 8e-6, 32)  # [m] which shear carries, as the roughness of wall and seal cancel
+    ends, taken = transient._supply(model, moment._replace(state=moment.state._replace(gap=wedge)), way, 1e-3)
     assert taken.sum() == pytest.approx(0.1e-6 * 30e-6)
-    gap = initial_state(model, 0.0).state.gap[0]  # the roughness of wall and seal cancel: it carries the gap
-    filled = (1.0, 0.2e-6 / gap) if way > 0.0 else (0.2e-6 / gap, 1.0)
+    filled = (1.0, 0.2e-6 / 8e-6) if way > 0.0 else (0.2e-6 / 4e-6, 1.0)
     assert (ends.saturation_left, ends.saturation_right) == pytest.approx(filled)
     rich = dataclasses.replace(STARVED, film_supply=FilmSupply(1e-3))
     ends, _ = transient._supply(lubrication_model(rich), at_rest(rich), way, 1e-3)
