@@ -105,6 +105,25 @@ def test_rubber_of_the_section_is_as_stiff_in_shear_as_that_of_the_seal(c10, c01
     assert rubber.mooney_ratio == pytest.approx(ratio)
 
 
+@pytest.mark.parametrize(('body', 'kind'), [('half_plane', HalfPlane), ('bonded_layer', BondedLayer)])
+def test_body_of_a_seal_that_has_no_elements_is_the_known_one_of_its_height(body, kind):
+    found = seal_body(SealBody(body=body, section_height=2e-3), LubricationNumerics(cells=40, film_width=0.4e-3))
+    assert found.matrix() == pytest.approx(kind(40, 1e-5, 8.0 * 1.785e6, 2e-3).matrix())
+
+
+@pytest.mark.parametrize('hold', ['bottom', 'bottom_and_flanks', 'sliding_bottom'])
+def test_groove_holds_the_bottom_off_the_wall_and_along_it_what_it_says(hold):
+    """Off the wall it holds the bottom alone; a sliding bottom is held along the wall at its middle, or it would go."""
+    section = seal_section(dataclasses.replace(SEAL, section_hold=hold), FILM, 8)
+    nodes, held = section.model.mesh.nodes, np.array(section.held)
+    bottom = np.isclose(nodes[:, 0], nodes[:, 0].min())
+    flanks = np.isclose(np.abs(nodes[:, 1]), nodes[:, 1].max())
+    along = {'bottom': bottom, 'bottom_and_flanks': bottom | flanks, 'sliding_bottom': bottom & (nodes[:, 1] == 0.0)}
+    assert (held[held % 2 == 0] // 2).tolist() == np.flatnonzero(bottom).tolist()
+    assert (held[held % 2 == 1] // 2).tolist() == np.flatnonzero(along[hold]).tolist()
+    assert len(held) > bottom.sum()
+
+
 def test_section_hardly_wider_than_its_film_has_one_element_beside_it():
     section = seal_section(dataclasses.replace(SEAL, section_width=0.6002e-3), FILM, 8)
     assert len(np.unique(section.model.mesh.nodes[:, 1])) == 9 + 2
