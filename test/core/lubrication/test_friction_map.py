@@ -182,6 +182,24 @@ def test_step_to_the_steady_film_that_fails_is_led_by_one_of_250_passages(monkey
     assert (len(states), retried) == (1, 1)
 
 
+@pytest.mark.parametrize('velocity', [0.1, -0.1])
+def test_film_is_led_to_the_steady_one_by_steps_each_two_to_five_times_as_long_as_the_last(monkeypatch, velocity):
+    """From a fiftieth of a passage on: 0.6 mm at 0.1 m/s last 6 ms."""
+    led: list[float] = []
+
+    def slid(_model, start, _velocity, durations):
+        led.extend(durations)
+        return start, [start], 0
+
+    monkeypatch.setattr(module, '_slid', slid)
+    assert module.steady_state(SimpleNamespace(case=CASE), 1.0, velocity) == (1.0, 0)
+    growth = np.array(led[1:-1]) / np.array(led[:-2])
+    assert growth.min() >= 2.0 - 1e-9
+    assert growth.max() <= 5.0 + 1e-9
+    assert led[0] == pytest.approx(0.02 * 6e-3)
+    assert led[-2:] == [pytest.approx(100.0 * 6e-3), math.inf]
+
+
 def test_map_takes_both_ways_from_rest_speed_after_speed_and_its_mean(monkeypatch):
     """The film of a speed is the number of speeds before it. 10 N the one way and 14 N towards the pressure."""
     begun = []

@@ -533,3 +533,11 @@ def test_transducer_starts_at_rest_under_the_first_force_whenever_that_is(start)
 
 def test_transducer_gives_one_reading_for_one_sample():
     assert transducer_force(MeasuringChain(), np.array([0.0]), np.array([2.0])).tolist() == [2.0]
+
+
+def test_body_prints_as_the_numbers_it_is_made_of():
+    body, _ = condensed(lambda compliance: compliance)
+    assert (
+        repr(HalfPlane(16, 1e-6, 1e7, 1e-3)) == 'HalfPlane(cells=16, cell_width=1e-06, modulus=10000000.0, depth=0.001)'
+    )
+    assert 'stiffness_band' not in repr(body)
