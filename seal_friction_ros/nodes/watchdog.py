@@ -73,14 +73,18 @@ class Watchdog:
     def _run(self) -> None:
         while self._thread is not None:
             wait = self.due + GRACE - time.perf_counter_ns()
-            executor = self._node.executor
             if wait <= 0:
                 wait = self._period + GRACE
-                if executor is not None and not self._is_asked:
-                    self._is_asked = True
-                    executor.create_task(self._on_silence)
+                self._ask()
             self._wake.wait(min(wait * 1e-9, threading.TIMEOUT_MAX))
             self._wake.clear()
+
+    def _ask(self) -> None:
+        """Ask the executor; this thread must not keep it for longer, since its end belongs to the thread that spins."""
+        executor = self._node.executor
+        if executor is not None and not self._is_asked:
+            self._is_asked = True
+            executor.create_task(self._on_silence)
 
     def _on_silence(self) -> None:
         self._is_asked = False

@@ -418,7 +418,7 @@ def _choose(means: _Means, chambers: Sequence[str], low: float, high: float) -> 
     excess = np.array(losses) - min(losses, key=np.mean)
     error = excess.std(axis=1, ddof=1) / np.sqrt(excess.shape[1])
     count = np.array([len(knots) + masses + len(chosen) for knots, _, masses, chosen in choices])
-    least = max(min(map(np.mean, losses)), 0.0)  # of exact data it is rounding, of either sign
+    least = max(min(float(loss.mean()) for loss in losses), 0.0)  # of exact data it is rounding, of either sign
     near = np.flatnonzero(excess.mean(axis=1) <= np.minimum(error, NEGLIGIBLE_LOSS * least))
     knots, everything, masses, chosen = choices[min(near, key=lambda i: (count[i], excess[i].mean()))]
     k = len(knots)
