@@ -37,7 +37,8 @@ class Findings(NamedTuple):
     edge_peak: float | None  # largest friction at the control edge over the mean in the seat after it
     edge_assist: float | None  # [N] largest force of the chamfer along the motion, on leaving the seat
     friction_on_leaving: float | None
-    """[N] lowest friction while that force is above half of its maximum; negative: it assists the motion"""
+    """[N] lowest friction while that force is above half of its maximum; negative: it assists the motion; None: no such
+    force"""
     after_edge: float | None  # [N] mean friction well inside the seat, after the control edge
 
 
@@ -60,7 +61,7 @@ def findings(result: TransientResult) -> Findings:
     assisted, elastic = _assisted(result, last)
     edge = case.control_edge
     pushed = np.where(last & (result.velocity > 0.0), result.edge, 0.0)
-    leaving = pushed <= 0.5 * pushed.min()
+    leaving = (pushed < 0.0) & (pushed <= 0.5 * pushed.min())
     return Findings(
         friction=float(np.abs(result.friction[middle]).mean()),
         solid_share=float(solid[sliding].sum() / (solid[sliding] + fluid[sliding]).sum()),
@@ -76,7 +77,7 @@ def findings(result: TransientResult) -> Findings:
         second_lobe=_second_lobe(result, last),
         edge_peak=_edge_peak(result, last) if edge else None,
         edge_assist=max(0.0, -float(pushed.min())) if edge else None,
-        friction_on_leaving=float(result.friction[leaving].min()) if edge else None,
+        friction_on_leaving=float(result.friction[leaving].min()) if leaving.any() else None,
         after_edge=_after_edge(result, last) if edge else None,
     )
 

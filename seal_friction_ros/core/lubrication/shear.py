@@ -65,6 +65,9 @@ def fluid_shear(
     return total * width
 
 
+LARGEST_RATIO = 1e6  # [-] of a sliding velocity to the speed of the motion: beyond, nothing holds the seal (our choice)
+
+
 def sliding_velocity(
     drive: float, solid: float, fluid_at: Callable[[float], float], spring_at: Callable[[float], float], fastest: float
 ) -> float:
@@ -81,7 +84,7 @@ def sliding_velocity(
         fastest: A speed to begin the search with [m/s].
 
     Raises:
-        ValueError: There is no balance below a million times ``fastest``.
+        ValueError: There is no balance below `LARGEST_RATIO` times ``fastest``.
     """
     direction = math.copysign(1.0, drive)
 
@@ -90,9 +93,9 @@ def sliding_velocity(
 
     high = fastest
     while surplus(high) > 0.0:
-        high *= 2.0
-        if high > 1e6 * fastest:
+        if high >= LARGEST_RATIO * fastest:
             raise ValueError(
                 f'no sliding velocity below {high:.3g} m/s balances {drive:.4g} N: is the seal held at all?'
             )
+        high = min(2.0 * high, LARGEST_RATIO * fastest)
     return direction * float(brentq(surplus, 0.0, high, xtol=1e-9 * fastest))

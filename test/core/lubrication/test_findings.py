@@ -470,3 +470,10 @@ def test_spool_that_does_not_move_that_way_has_no_stroke():
     still = superposed((SpoolSeal('made'),), [run._replace(position=np.zeros(600))])
     with pytest.raises(ValueError, match=r'does not move in direction 1$'):
         stroke_friction(still, 1.0)
+
+
+def test_where_no_chamfer_pushes_there_is_no_friction_on_leaving():
+    run = made(EDGE, 6000, edge=lambda place, _: np.zeros_like(place), solid=along(2.0))
+    friction = np.where(last_cycle(run), run.friction, -50.0)  # of another cycle
+    found = findings(run._replace(friction=friction))
+    assert (found.edge_assist, found.friction_on_leaving) == (0.0, None)

@@ -97,14 +97,14 @@ def test_seal_that_nothing_holds_has_no_sliding_velocity():
         sliding_velocity(10.0, 4.0, lambda _: 0.0, lambda _: 10.0, 1e-3)
 
 
-@pytest.mark.parametrize(('balance', 'is_found'), [(5.1e5, True), (1.02e6, False)])
-def test_balance_is_sought_up_to_half_a_million_times_the_first_speed_and_never_beyond_a_million(balance, is_found):
+@pytest.mark.parametrize(('balance', 'is_found'), [(9.9e5, True), (1.01e6, False)])
+def test_balance_is_sought_up_to_a_million_times_the_first_speed(balance, is_found):
     """6 N over the film, from 1 m/s on."""
     sought = (10.0, 4.0, lambda v: 6.0 * v / balance, lambda _: 10.0, 1.0)
     if is_found:
         assert sliding_velocity(*sought) == pytest.approx(balance)
     else:
-        with pytest.raises(ValueError, match=r'no sliding velocity below 1\.05e'):
+        with pytest.raises(ValueError, match=r'no sliding velocity below 1e\+06'):
             sliding_velocity(*sought)
 
 
