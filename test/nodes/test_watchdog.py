@@ -1,5 +1,6 @@
 """The watchdog of a node: after messages while they come, by the executor when they stop, never after its end."""
 
+import gc
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -19,6 +20,12 @@ from seal_friction_ros.nodes.watchdog import Watchdog
 MILLISECOND = 1_000_000  # [ns]
 LONG = 3_600 * 1000 * MILLISECOND  # [ns] longer than any test
 PATIENCE = 20.0  # [s] for what has to come at some time
+
+
+@pytest.fixture(autouse=True)
+def _nodes_are_collected():
+    yield
+    gc.collect()  # nodes hold reference cycles: collected in a process that is forked later, they would end it
 
 
 class Looks:
