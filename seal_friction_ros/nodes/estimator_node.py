@@ -27,7 +27,7 @@ from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 _WATCH_PERIOD = 42_000_000  # [ns] of the graph and the clocks: every other call of the watchdog, even of an early one
 _IDLE_PERIOD = 43_000_000  # [ns] of the watchdog without a force: one that begins meanwhile has not risen far
 _FORCE_PERIOD = 18_000_000  # [ns] of the watchdog; with `GRACE` less than the default timeouts of the feed-forward
-_TICK_PERIOD = 9_500_000  # [ns] while ticks keep a force up; more than `pipeline.TICK_INTERVAL`, so that each look makes one
+_TICK_PERIOD = 9_500_000  # [ns] while ticks keep a force up; above `pipeline.TICK_INTERVAL`: each look makes one
 _TICKING = 100_000_000  # [ns] after the last tick: inputs slower than the ticks need them again and again
 _HEALTH_PERIOD = 60.0  # [s]
 _INPUT_PERIOD = 0.5  # [s]
