@@ -19,16 +19,15 @@ from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE, TopicMes
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
-from seal_friction_ros.nodes.managed_node import ManagedNode, message_class
+from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
-from seal_friction_ros.nodes.watchdog import Watchdog
 from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 
-_WATCH_PERIOD = 42_000_000  # [ns] of the graph and the clocks: every other call of the watchdog, even of an early one
-_IDLE_PERIOD = 43_000_000  # [ns] of the watchdog without a force: one that begins meanwhile has not risen far
-_FORCE_PERIOD = 18_000_000  # [ns] of the watchdog; with `GRACE` less than the default timeouts of the feed-forward
-_TICK_PERIOD = 9_500_000  # [ns] while ticks keep a force up; above `pipeline.TICK_INTERVAL`: each look makes one
+_WATCH_PERIOD = 45_000_000  # [ns] of the graph and the clocks: every other call of the watchdog, even of an early one
+_WATCHDOG_PERIOD = 0.025  # [s] less than the default timeouts of the feed-forward; a call costs 0.3 ms, mostly waking
+_TICK_PERIOD = 0.01  # [s] while ticks keep a force up; more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
 _TICKING = 100_000_000  # [ns] after the last tick: inputs slower than the ticks need them again and again
+_STARVED = round(_TICK_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog
 _HEALTH_PERIOD = 60.0  # [s]
 _INPUT_PERIOD = 0.5  # [s]
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
@@ -62,8 +61,8 @@ class EstimatorNode(ManagedNode, ABC):
         self._topics: dict[Any, str] = {}
         self._newest_inputs: dict[str, TopicMessage] = {}
         self.has_viewer = False  # by a live view
-        self._ticked = self._watched = 0  # [ns] of `time.perf_counter_ns`
-        self.watchdog = Watchdog(self, self._look)
+        self._watchdog_called = self._ticked = self._watched = 0  # [ns] of `time.perf_counter_ns`
+        self._is_ticking = False
         self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
         self._recording = Recording(self.get_fully_qualified_name())
@@ -111,11 +110,6 @@ class EstimatorNode(ManagedNode, ABC):
     def on_watchdog(self) -> bool:
         """Renew each feed-forward that no sample renews, so that it fades out; whether there was one."""
 
-    @property
-    @abstractmethod
-    def has_force(self) -> bool:
-        """Whether a feed-forward is up."""
-
     @abstractmethod
     def fade_out(self) -> None:
         """Fade every force to 0 N."""
@@ -131,8 +125,7 @@ class EstimatorNode(ManagedNode, ABC):
     # --- lifecycle ---
 
     def release(self) -> None:
-        """Destroy publishers, subscriptions and timers; stop the watchdog."""
-        self.watchdog.stop()
+        """Destroy publishers, subscriptions and timers."""
         for subscription in self._inputs.values():
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
@@ -152,15 +145,20 @@ class EstimatorNode(ManagedNode, ABC):
         self.has_viewer = False
         self._newest_inputs.clear()
         self._state_topic = self.resolve_topic_name(f'~/{STATE_NAME}')
+        self._tick_timer = self.create_steady_timer(_TICK_PERIOD, self._on_watchdog_timer)
+        self._tick_timer.cancel()
+        self._is_ticking = False
         self._timers = [
+            self._tick_timer,
+            self.create_steady_timer(_WATCHDOG_PERIOD, self._on_watchdog_timer),
             self.create_steady_timer(_HEALTH_PERIOD, self._on_health_timer),
             self.create_steady_timer(_INPUT_PERIOD, self._on_input_timer),
         ]
-        self.watchdog.start()
 
     def begin(self) -> None:
         """Begin to record if ``record`` is set; at the end of `start`."""
         self._logged_errors.clear()
+        self._watchdog_called = time.perf_counter_ns()
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
         self._received = 0
         self._now = self._receipt_clock()
@@ -197,34 +195,30 @@ class EstimatorNode(ManagedNode, ABC):
         )
         self._topics[name] = self._inputs[name].topic_name
 
-    def destroy_node(self) -> None:
-        """Stop the watchdog, and destroy the node."""
-        self.watchdog.stop()
-        super().destroy_node()
+    def _on_watchdog_timer(self) -> None:
+        """Let the watchdog act; every `_TICK_PERIOD` while it has to or somebody looks on, else seldom.
 
-    def _look(self, now: int) -> int:
-        """Let the watchdog act, look at graph and clocks; [ns] until the next call.
-
-        The watchdog acts every `_TICK_PERIOD` while it has to or somebody looks on, seldom without a force. Graph and
-        clocks have no timer of their own, as each call of one wakes two threads.
+        Graph and clocks have no timer of their own: each call of one wakes two threads.
         """
+        now = self._watchdog_called = time.perf_counter_ns()
         if self.on_watchdog():
             self._ticked = now
         self.publish_newest()
+        is_ticking = self.has_viewer or now - self._ticked < _TICKING
+        if is_ticking != self._is_ticking:
+            self._is_ticking = is_ticking
+            (self._tick_timer.reset if is_ticking else self._tick_timer.cancel)()
         if now - self._watched >= _WATCH_PERIOD:
             self._watched = now
             self._look_at_graph()
-        if self.has_viewer or now - self._ticked < _TICKING:
-            return _TICK_PERIOD
-        return _FORCE_PERIOD if self.active and self.has_force else _IDLE_PERIOD
 
     def look_after_timers(self, now: int) -> None:
-        """Call the watchdog, and the timers that the executor has not called; after a message, when `Watchdog.due`.
+        """Call what is overdue, if the watchdog was not called for long; after a message, at ``now`` [ns].
 
         Args:
             now: Of `time.perf_counter_ns`.
         """
-        if self.watchdog.call_if_due(now):
+        if now - self._watchdog_called > _STARVED:
             self.call_overdue_timers()
 
     def keep_for_view(self, topic: str, type_name: str, data: bytes) -> None:
@@ -266,8 +260,7 @@ class EstimatorNode(ManagedNode, ABC):
                 self._follow_clock(offset)
 
     def _on_input_timer(self) -> None:
-        """Say what the node waits for, which input has stopped, and which is back; raise a failure of the watchdog."""
-        self.watchdog.check()
+        """Say what the node waits for, which input has stopped, and which is back."""
         if not self.active:
             return
         for remark in self._input_watch.look(self.received(), time.monotonic()):

@@ -33,7 +33,6 @@ def spin(node: Node, stopped: Future, context: Context | None = None) -> None:
     executor.add_node(node)
     while rclpy.ok(context=context) and not stopped.done():
         executor.spin_until_future_complete(stopped, timeout_sec=_LONG_WAIT)
-    executor.remove_node(node)  # no other thread finds it from now on
 
 
 def run(

@@ -166,8 +166,7 @@ class FrictionEstimator(EstimatorNode):
                 state = self._state
                 self._statistics.on_adaptation(self._known.estimator, before, state.estimator, state.temperature)
             self._recording.flush_if_idle()
-        if done >= self.watchdog.due:
-            self.look_after_timers(done)
+        self.look_after_timers(done)
 
     def _record_answers(self, latency: int = 0, received: int = 0) -> None:
         """Record and count what was sent, ``latency`` [ns] after its input was taken at ``received`` [ns]."""
@@ -192,14 +191,9 @@ class FrictionEstimator(EstimatorNode):
         self._recording.record(self._topics[TICK_TYPE], TICK_TYPE, received, encode(tick))
         self._record_answers()
 
-    @property
-    def has_force(self) -> bool:
-        """Whether a feed-forward is up."""
-        return newest_force(self._state.feedforward) != 0.0
-
     def fade_out(self) -> None:
         """Fade the force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""
-        if not self.has_force:
+        if newest_force(self._state.feedforward) == 0.0:
             return
         self._state = self._state._replace(refused=True)
         self.publish_configuration()  # a replay fades from here on

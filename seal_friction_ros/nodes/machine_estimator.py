@@ -195,8 +195,7 @@ class MachineEstimator(EstimatorNode):
             self._record_answers(made, done - taken, received)
             self._follow_adaptation(before)
             self._recording.flush_if_idle()
-        if done >= self.watchdog.due:
-            self.look_after_timers(done)
+        self.look_after_timers(done)
 
     def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once, if it is a message of its own; the rest waits until all answers are out."""
@@ -262,11 +261,6 @@ class MachineEstimator(EstimatorNode):
         made = self._command(received)
         self._recording.record(self._ticks[number], TICK_TYPE, received, encode(tick))
         self._record_answers(made)
-
-    @property
-    def has_force(self) -> bool:
-        """Whether a feed-forward of any actuator is up."""
-        return any(known.force != 0.0 for known in self._state.actuators)
 
     def fade_out(self) -> None:
         """Fade every force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""

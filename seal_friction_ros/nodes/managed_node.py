@@ -22,7 +22,7 @@ from seal_friction_ros.nodes.realtime import take_realtime_priority
 Record = TypeVar('Record')
 
 _DIAGNOSTICS_PERIOD = 1.0  # [s]
-_OVERDUE = 50_000_000  # [ns] by which a timer may be late
+OVERDUE = 50_000_000  # [ns] by which a timer may be late
 
 
 def message_class(type_name: str) -> Any:
@@ -61,7 +61,7 @@ class _SteadyTimer:
 
     def is_overdue(self, now: int) -> bool:
         """Whether the executor is late."""
-        return now - self._called > self._period + _OVERDUE
+        return now - self._called > self._period + OVERDUE
 
 
 class ManagedNode(LifecycleNode):

@@ -184,7 +184,7 @@ def test_lifecycle_services_start_and_stop_it():
 def test_a_timer_that_was_due_before_a_cleanup_does_nothing_after_it():
     with graph() as g:
         due = [timer.callback for timer in g.estimator.timers]
-        assert len(due) == 3  # diagnostics, health, inputs
+        assert len(due) == 5  # diagnostics, ticks, watchdog with the graph, health, inputs
         g.estimator.trigger_deactivate()
         g.estimator.trigger_cleanup()
         for callback in due:
