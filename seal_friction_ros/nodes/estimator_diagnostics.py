@@ -50,7 +50,6 @@ _MOST_REVERSALS = 50  # [1/s] of the force; faster motion is not compensated, so
 _LARGEST_DELAY = 1_000_000_000  # [ns] a stamp further back than this means that its clock was set
 _LARGEST_LATENESS = 50_000_000  # [ns] of a velocity: controllers are to refuse what is older (docs/interfaces.md)
 _LATENESS_MEMORY = 60  # intervals that tell what is usual
-_BATCH = 20  # messages that are counted together; the last one waits some 30 us longer for the next
 
 
 class MissingSamples:
@@ -138,9 +137,6 @@ class Lateness:
 class EstimatorDiagnostics:
     """Counts since activation, and rates, ages and latencies of the present interval.
 
-    What comes is kept, and counted `_BATCH` at a time, or when somebody asks: one alone, with the caches cold after the
-    answer, takes three times as long.
-
     Args:
         inputs: Names of the inputs.
     """
@@ -160,14 +156,10 @@ class EstimatorDiagnostics:
         self._adaptation = NOT_ADAPTED
         self._newest: dict[type, FrictionEstimate | FeedForward] = {}
         self._status = self._limited = 0  # bits of all answers since the newest were taken
-        self._new_stamps: dict[str, list[int]] = {name: [] for name in inputs}
-        self._new_estimates: list[tuple[FrictionEstimate, int, int]] = []
-        self._new_feedforwards: list[FeedForward] = []
         self.start_interval()
 
     def start_interval(self) -> None:
         """Start a new interval."""
-        self._count_new()
         self._estimated_before = bool(self._latencies)
         self._started = time.monotonic()
         self._received_before = self._received.copy()
@@ -180,10 +172,8 @@ class EstimatorDiagnostics:
 
     def on_input(self, name: str, stamp: int) -> None:
         """Count one message of an input with its stamp [ns]."""
-        stamps = self._new_stamps[name]
-        stamps.append(stamp)
-        if len(stamps) >= _BATCH:
-            self._count_new()
+        self._received[name] += 1
+        self._missing[name].on_stamp(stamp)
 
     def on_received(self, name: str) -> None:
         """Count one message of an input whose stamps do not tell what is missing."""
@@ -201,10 +191,11 @@ class EstimatorDiagnostics:
             latency: [ns] since its velocity was taken.
             received: When the velocity was taken [ns], on the clock of the stamps.
         """
-        self._estimate = estimate
-        self._new_estimates.append((estimate, latency, received - estimate.stamp))
-        if len(self._new_estimates) >= _BATCH:
-            self._count_new()
+        self._by_status[estimate.status] += 1
+        self._latencies.append(latency)
+        self._lateness.on_velocity(received - estimate.stamp)
+        self._estimate = self._newest[FrictionEstimate] = estimate
+        self._status |= estimate.status
 
     def on_adaptation(
         self,
@@ -230,28 +221,6 @@ class EstimatorDiagnostics:
 
     def on_feedforward(self, feedforward: FeedForward) -> None:
         """Count one feed-forward."""
-        self._new_feedforwards.append(feedforward)
-
-    def _count_new(self) -> None:
-        """Count what has come since the last call."""
-        for name, stamps in self._new_stamps.items():
-            self._received[name] += len(stamps)
-            add = self._missing[name].on_stamp
-            for stamp in stamps:
-                add(stamp)
-            stamps.clear()
-        for estimate, latency, age in self._new_estimates:
-            self._by_status[estimate.status] += 1
-            self._latencies.append(latency)
-            self._lateness.on_velocity(age)
-            self._status |= estimate.status
-            self._newest[FrictionEstimate] = estimate
-        self._new_estimates.clear()
-        for feedforward in self._new_feedforwards:
-            self._count_feedforward(feedforward)
-        self._new_feedforwards.clear()
-
-    def _count_feedforward(self, feedforward: FeedForward) -> None:
         self._feedforwards_by_limit[feedforward.limited] += 1
         force, before = feedforward.force, self._feedforward_force
         self._travel += abs(force - before)
@@ -265,7 +234,6 @@ class EstimatorDiagnostics:
 
     def take_newest(self, actuator: str) -> list[NamedAnswer]:
         """The newest answers since the last call, for who looks on: each with the bits of all answers since then."""
-        self._count_new()
         bits = {FrictionEstimate: {'status': self._status}, FeedForward: {'limited': self._limited}}
         found = [NamedAnswer(actuator, answer._replace(**bits[kind]), b'') for kind, answer in self._newest.items()]
         self._newest.clear()
@@ -275,13 +243,11 @@ class EstimatorDiagnostics:
     @property
     def received(self) -> dict[str, int]:
         """Messages of each input since activation, well-formed or not."""
-        self._count_new()
         return {name: self._received[name] + self._malformed[name] for name in self._inputs}
 
     @property
     def silent_inputs(self) -> list[str]:
         """Inputs without a message in this interval."""
-        self._count_new()
         return [name for name in self._inputs if self._received[name] == self._received_before[name]]
 
     def report(
@@ -301,7 +267,6 @@ class EstimatorDiagnostics:
             graph: State of the graph.
             swing: Of the newest sample.
         """
-        self._count_new()
         seconds = max(time.monotonic() - self._started, 1e-3)
         level, message = self._level(seconds, parameters, swing) if active else (DiagnosticStatus.OK, 'inactive')
         if refused:

@@ -26,7 +26,7 @@ from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 _WATCH_PERIOD = 45_000_000  # [ns] of the graph and the clocks: every other call of the watchdog, even of an early one
 _WATCHDOG_PERIOD = 0.025  # [s] less than the default timeouts of the feed-forward; a call costs 0.3 ms, mostly waking
 _TICK_PERIOD = 0.01  # [s] while ticks keep a force up; more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
-_TICKING = 100_000_000  # [ns] after the last tick: inputs slower than the ticks need them again and again
+_TICKING = 1_000_000_000  # [ns] after the last tick: inputs slower than the ticks need them again and again
 _STARVED = round(_TICK_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog
 _HEALTH_PERIOD = 60.0  # [s]
 _INPUT_PERIOD = 0.5  # [s]

@@ -141,12 +141,14 @@ class Tool:
 
     def parameters(self, name: str) -> AsyncParameterClient:
         """Client for the parameters of a node."""
-        nodes = self.node.get_node_names_and_namespaces
-        names = lambda: [f'{space}/{node}'.replace('//', '/') for node, space in nodes()]  # noqa: E731
-        client = AsyncParameterClient(self.node, self.found(name, names, 'node'))
+        client = AsyncParameterClient(self.node, self.found(name, self._node_names, 'node'))
         if not self.spin(self._wait, client.services_are_ready):
             raise NotThereError(f'{name} has no parameter services')
         return client
+
+    def _node_names(self) -> list[str]:
+        found = self.node.get_node_names_and_namespaces()
+        return [f'{space}/{node}'.replace('//', '/') for node, space in found]
 
     def answer(self, future: Any, who: str) -> Any:
         """Result of a call.
@@ -167,11 +169,13 @@ class Tool:
         """Names of all parameters of a node."""
         return sorted(self.answer(client.list_parameters(), who).result.names)
 
+    def _services(self) -> dict[str, list[str]]:
+        return dict(self.node.get_service_names_and_types())
+
     def call(self, name: str, request: Mapping[str, Any]) -> Any:
         """Response of a service."""
-        services = lambda: dict(self.node.get_service_names_and_types())  # noqa: E731
-        service = self.found(name, services, 'service')
-        package, _, kind = services()[service][0].partition('/srv/')
+        service = self.found(name, self._services, 'service')
+        package, _, kind = self._services()[service][0].partition('/srv/')
         service_class = getattr(import_module(f'{package}.srv'), kind)
         client = self.node.create_client(service_class, service)
         if not self.spin(self._wait, client.service_is_ready):

@@ -117,24 +117,3 @@ def test_wrong_stamps_for_a_moment_do_not_make_the_others_late():
 def test_a_clock_that_was_set_is_not_late():
     assert lateness_of([[0, 1], [0, 5000, 5001], [5000, 5020], [5000, 5001]]) == [1, 0, 20, 1]
     assert lateness_of([[0, 1], [0, -5000], [-5000, -4980], [-5000, -4999]])[-1] == 1
-
-
-@pytest.mark.parametrize('count', [1, 19, 20, 21, 1000])
-def test_whoever_asks_hears_of_every_message_although_they_are_counted_twenty_at_a_time(count):
-    diagnostics = EstimatorDiagnostics()
-    for number in range(count):
-        diagnostics.on_input('rod_velocity', number * PERIOD)
-        diagnostics.on_estimate(NO_ESTIMATE._replace(stamp=number * PERIOD, status=0), 1000, number * PERIOD)
-        diagnostics.on_feedforward(FeedForward(number * PERIOD, 30.0 * (-1.0) ** number, 0.0, int(Limited.SLEW)))
-        assert max(map(len, (diagnostics._new_estimates, diagnostics._new_stamps['rod_velocity']))) < 20
-    assert diagnostics.received['rod_velocity'] == count
-    graph = GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {})
-    values = {value.key: value.value for value in diagnostics.report(True, False, graph).values}
-    assert values['estimates'] == values['estimates all good'] == values['feed-forwards'] == str(count)
-    assert values['feed-forwards SLEW'] == values['rod_velocity received'] == str(count)
-    assert values['feed-forward SLEW share'] == '1.000'
-    assert values['feed-forward [N]'] == f'{30.0 * (-1.0) ** (count - 1):.3f}'
-    diagnostics.start_interval()
-    assert 'rod_velocity' in diagnostics.silent_inputs
-    diagnostics.on_input('rod_velocity', count * PERIOD)
-    assert 'rod_velocity' not in diagnostics.silent_inputs

@@ -62,9 +62,12 @@ def run(domain: int, *arguments: str) -> tuple[int, str]:
 
 
 def test_list_names_type_publisher_and_subscriber_of_each_topic(tool):
-    code, said = tool('list', '--json')
-    listed = json.loads(said)
-    assert code == 0
+    for _ in range(10):  # it lists what it hears within its wait, which is not all on a busy machine
+        code, said = tool('list', '--json')
+        listed = json.loads(said)
+        assert code == 0
+        if '/servo_simulator' in listed.get('/rod_velocity', {}).get('publishers', []):
+            break
     assert listed['/rod_velocity'] == {
         'type': 'seal_friction_msgs/msg/RodVelocity',
         'publishers': ['/servo_simulator'],

@@ -211,16 +211,14 @@ def design_experiment(
     used_speeds = _ends(speed) if is_varied else (float(np.median(speed)),)
     model = _model(chosen, readings, at)
     scatter = _scatter(chosen, readings)
-    identified = (float(readings.seal_pressure.min()), float(readings.seal_pressure.max()))
-    low = identified[0] if are_far_apart(np.array(identified)) else 0.0
+    identified, pressures = _pressure_ranges(readings)
     speeds = _grid_speeds(used_speeds)
-    prior = _prior(model, low, identified[1], speeds)
+    prior = _prior(model, *pressures, speeds)
     slopes = model.slopes(at)
     known = _without_offsets(slopes, readings) / scatter
     worth = _readings_worth_one(chosen, readings, scatter)
     had = known.T @ known / worth
 
-    pressures = (low, identified[1])
     range_slopes = _relative_slopes(model, pressures, speeds)
     at_readings = slopes / model.friction(at)[:, np.newaxis]
     identified_slopes = _relative_slopes(model, identified, used_speeds) if is_varied else at_readings
@@ -477,6 +475,12 @@ def _at_a_speed(readings: FrictionReadings) -> tuple[bool, OperatingConditions]:
     if np.isfinite(readings.at.velocity).all():
         return True, readings.at
     return False, readings.at._replace(velocity=ASSUMED_SPEED * readings.at.direction)
+
+
+def _pressure_ranges(readings: FrictionReadings) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Lowest and highest pressure [Pa] of the readings, and of the range: down to 0 if they hold one pressure."""
+    low, high = float(readings.seal_pressure.min()), float(readings.seal_pressure.max())
+    return (low, high), (low if are_far_apart(np.array([low, high])) else 0.0, high)
 
 
 def _correlated_pair(names: Sequence[str], before: FloatArray, after: FloatArray) -> list[CorrelatedPair | None]:

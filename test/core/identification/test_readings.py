@@ -315,10 +315,15 @@ def test_a_hundredth_of_the_way_has_to_be_back(back, reason):
         check_log(strokes(seconds=30.0, back=back))
 
 
-def test_a_sensor_that_is_clipped_at_rest_alone_is_not():
+def test_a_sensor_may_stand_at_its_end_while_the_rod_rests_and_not_while_it_moves():
     log = strokes()
-    resting = np.abs(log.signals.velocity) < 3e-3
-    check_log(log._replace(signals=log.signals._replace(force_sum=np.where(resting, 99.0, log.signals.force_sum))))
+    force, resting = log.signals.force_sum, np.abs(log.signals.velocity) < 3e-3
+    end = 0.9 * float(np.abs(force[~resting]).max())
+    at_rest, in_motion = np.where(resting, 99.0, force), np.clip(force, -end, end)
+    with refused(None):
+        check_log(log._replace(signals=log.signals._replace(force_sum=at_rest)))
+    with refused('the force sum stays at its extreme'):
+        check_log(log._replace(signals=log.signals._replace(force_sum=in_motion)))
 
 
 def test_a_pressure_may_stand_at_that_of_the_air_and_a_force_at_no_end():
