@@ -28,6 +28,7 @@ BAGS_KEPT = 10  # as many bags fit into ``keep_size`` (our choice)
 RESUME_PERIOD = 5.0  # [s] between two looks for room on the disk
 _RESUME_ROOM = 1 << 20  # [bytes] that have to be free in addition, and a tenth of ``free_space`` (our choice)
 _END_SIZE = 1 << 18  # [bytes] reserved for the last chunk, the end of the file and metadata.yaml
+_LOOK_SIZE, _LOOK_PERIOD = 1 << 16, 0.1  # [bytes] of messages, [s]: the more often of both; a look takes 4 us
 _INDEX_SHARE = 200  # a file is at least as many times larger than its index
 _IDLE_PERIOD = 0.05  # [s] between checks of the queue without `flush_if_idle`; more wake-ups slow the estimator
 _BACKLOG_PERIOD = 0.002  # [s] the same while there is a backlog
@@ -96,7 +97,8 @@ class Recorder:
             custom_data={'recorded_by': owner} if owner else {},
         )
         self._stop = threading.Event()
-        self._wake = threading.Event()
+        self._sleep = threading.Lock()  # held while nothing is to be done; half the work of an Event
+        self._sleep.acquire()
         self._writer = self._make(path)
         try:
             self._check_space()
@@ -119,7 +121,12 @@ class Recorder:
         Python runs one thread at a time, so writing while a sample arrives would delay its estimate.
         """
         if len(self._queue) >= _WAKE_LENGTH:
-            self._wake.set()
+            self._wake()
+
+    def _wake(self) -> None:
+        """Wake the thread; one thread at a time may call this."""
+        if self._sleep.locked():
+            self._sleep.release()
 
     @property
     def is_next_due(self) -> bool:
@@ -132,7 +139,7 @@ class Recorder:
         self._queue.append(_NextBag(path, self._offered, self._refused))
         self._offered = self._refused = 0
         self._newest += 1
-        self._wake.set()
+        self._wake()
         return path
 
     @property
@@ -158,7 +165,7 @@ class Recorder:
     def stop(self) -> None:
         """Write the queue and finish the bag, without waiting for it."""
         self._stop.set()
-        self._wake.set()
+        self._wake()
 
     def close(self) -> None:
         """Write the queue and finish the bag; its metadata hold the number of dropped messages."""
@@ -182,22 +189,26 @@ class Recorder:
         return following
 
     def _write_until_next(self) -> _NextBag | None:
-        flushed = time.monotonic()
+        flushed = looked = time.monotonic()
+        unlooked = _LOOK_SIZE  # [bytes] written since the last look at the disk
         while self._queue or not self._stop.is_set():
-            self._check_space()
+            now = time.monotonic()
+            if unlooked >= _LOOK_SIZE or now - looked >= _LOOK_PERIOD:
+                self._check_space()
+                unlooked, looked = 0, now
             for _ in range(min(len(self._queue), _BATCH)):
                 item = self._queue.popleft()
                 if isinstance(item, _NextBag):
                     return item
                 topic, type_name, log_time, data, wall_time = item
                 self._writer.write(topic, type_name, log_time, data, publish_time=wall_time)
+                unlooked += len(data)
             if time.monotonic() - flushed >= FLUSH_PERIOD - _IDLE_PERIOD:  # the next look would be too late
                 self._writer.flush()
                 flushed = time.monotonic()
             if self._keep_size and self._writer.size > self._keep_size // BAGS_KEPT:
                 self._due = self._present
-            if self._wake.wait(_BACKLOG_PERIOD if self._queue else _IDLE_PERIOD):
-                self._wake.clear()
+            self._sleep.acquire(timeout=_BACKLOG_PERIOD if self._queue else _IDLE_PERIOD)
         return None
 
     def _begin(self, following: _NextBag) -> bool:
@@ -243,8 +254,7 @@ class Recorder:
             following = self._discard()
             if following is not None or self._stop.is_set():
                 return following
-            if self._wake.wait(RESUME_PERIOD):
-                self._wake.clear()
+            if self._sleep.acquire(timeout=RESUME_PERIOD):
                 continue
             with suppress(OSError):
                 if self._resumes and self._room() >= _RESUME_ROOM + self._free_space // 10:

@@ -349,23 +349,46 @@ def test_a_disk_that_fails_otherwise_is_not_tried_again(tmp_path: Path, room: Ro
     recorder.close()
 
 
-def test_the_disk_is_never_asked_for_its_space_where_messages_are_recorded(tmp_path: Path, monkeypatch):
-    asked = []
+@pytest.fixture
+def asked(monkeypatch) -> list[str]:
+    """Names of the threads that asked the disk for its space, in order."""
+    found = []
 
     class Watched:
         @staticmethod
         def disk_usage(path: Path) -> Room:
             assert path.is_dir()
-            asked.append(threading.current_thread().name)
+            found.append(threading.current_thread().name)
             return Room(10**12)
 
-    recorder = Recorder(tmp_path / 'bag', free_space=1)
     monkeypatch.setattr(recorder_module, 'shutil', Watched)
+    return found
+
+
+def test_the_disk_is_never_asked_for_its_space_where_messages_are_recorded(tmp_path: Path, asked: list[str]):
+    recorder = Recorder(tmp_path / 'bag', free_space=1)
+    made = len(asked)
     for number in range(1000):
         record(recorder, number)
         recorder.flush_if_idle()
     recorder.close()
-    assert set(asked) == {'recorder'}
+    assert asked[:made].count('recorder') == made - 1  # one while it is made
+    assert set(asked[made:]) <= {'recorder'}
+    assert 'recorder' in asked
+
+
+@pytest.mark.parametrize(('size', 'period', 'looks'), [(100_000, 1e9, 20), (10, 0.0, 20), (10, 1e9, 1)])
+def test_the_disk_is_asked_by_bytes_written_and_by_time(tmp_path: Path, monkeypatch, asked, size, period, looks):
+    monkeypatch.setattr(recorder_module, '_LOOK_PERIOD', period)
+    recorder = Recorder(tmp_path / 'bag', free_space=1)
+    for number in range(20):
+        recorder.record('/t', CONFIGURATION_TYPE, number, encode_text(str(number)) + bytes(size))
+        recorder._wake()
+        wait_until(lambda: not recorder.waiting)
+        time.sleep(0.003)
+    recorder.close()
+    found = asked.count('recorder')
+    assert found == 1 if looks == 1 else found >= looks - 1
 
 
 def record_long(recorder: Recorder, size: int) -> list[Path]:
