@@ -1,10 +1,10 @@
 """Round trip through the live node beside that of bare echo nodes: ``python bench/live.py [--json]``.
 
-Four nodes, each a process and a graph of its own, are asked in turn, in many short rounds: an rclpy node that sends
-each message back, with the SingleThreadedExecutor and with the events executor, and the estimator without and with
-recording. The echo has one topic; the estimator three in and two out, all recorded. A round trip is from the publishing
-of a velocity to the arrival of the answer in this process. The bare nodes and who asks have Fast DDS as it comes, the
-estimator as this package sets it up.
+Nodes, each a process and a graph of its own, are asked in turn, in many short rounds: an rclpy node that sends each
+message back, with the SingleThreadedExecutor and with the events executor, and the estimator without and with
+recording, as Python and compiled. The echo has one topic; the estimator three in and two out, all recorded. A round
+trip is from the publishing of a velocity to the arrival of the answer in this process. The bare nodes and who asks have
+Fast DDS as it comes, the estimator as this package sets it up.
 
 Percentiles are those of a round, and of them the median over all rounds; so is the ratio to the bare echo, taken round
 by round: a slow moment of the machine is one bad round, not a wrong result. The maximum and what is missed are of all.
@@ -53,9 +53,10 @@ ROUND, SAMPLES = 0.5, 300  # [s], samples: a round of one case is no shorter
 WARM_UP = 20  # samples at the beginning of a round that are not counted: the node has slept while others were asked
 BARE, EVENTS = 'bare echo, SingleThreadedExecutor', 'bare echo, events executor'
 ALONE, RECORDING = 'estimator', 'estimator, recording'
-CASES = (BARE, EVENTS, ALONE, RECORDING)
+COMPILED, COMPILED_RECORDING = 'estimator, compiled', 'estimator, compiled, recording'
+CASES = (BARE, EVENTS, ALONE, RECORDING, COMPILED, COMPILED_RECORDING)
 _STAMP = struct.Struct('<4xiI')
-_PATIENCE = 30.0  # [s]
+_PATIENCE = 60.0  # [s] the first compiled node compiles
 _BUSY = 'import os; os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))\nwhile True: pass'
 
 
@@ -216,8 +217,10 @@ def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
             stack.callback(process.kill)
         else:
             values: dict[str, Any] = {'feedforward.use_measured_velocity': True, 'realtime_priority': realtime}
-            if case == RECORDING:
-                values |= {'record': True, 'record_directory': str(folder), 'record_name': 'bag'}
+            if case in (COMPILED, COMPILED_RECORDING):
+                values |= {'compiled': True}
+            if case in (RECORDING, COMPILED_RECORDING):
+                values |= {'record': True, 'record_directory': str(folder), 'record_name': case}
             process = stack.enter_context(node_process('friction_estimator', domain, values, log))
         for name in PROFILES:
             os.environ.pop(name, None)

@@ -54,7 +54,7 @@ from seal_friction_ros.offline.replay.replay import replay
 
 OWN = 'one actuator, own messages'
 WARM_UP = 0.5  # [s] of a round, not counted
-_PATIENCE = 30.0  # [s]
+_PATIENCE = 60.0  # [s] the first compiled node compiles
 NO_FORCE = FeedForward(0, 0.0, 0.0, 0)
 
 
@@ -63,13 +63,18 @@ class Case(NamedTuple):
 
     count: int  # of actuators; 0: one, with its own messages
     together: bool = False  # whether the answers are one message
+    compiled: bool = False  # whether the estimator is
     bare: bool = False  # whether it is a node that only takes and sends
 
     @property
     def name(self) -> str:
         """For the table."""
         kind = 'bare node with the messages of' if self.bare else 'machine of'
-        return f'{kind} {self.count}' + ', answers together' * self.together if self.count else OWN
+        return (
+            f'{kind} {self.count}' + ', answers together' * self.together + ', compiled' * self.compiled
+            if self.count
+            else OWN
+        )
 
 
 def mapping(case: Case) -> str:
@@ -213,7 +218,12 @@ def node(case: Case, folder: Path) -> Iterator[Asker]:
         RuntimeError: It does not answer.
     """
     domain = free_domain()
-    values: dict[str, Any] = {'record': True, 'record_directory': str(folder), 'record_name': case.name}
+    values: dict[str, Any] = {
+        'record': True,
+        'record_directory': str(folder),
+        'record_name': case.name,
+        'compiled': case.compiled,
+    }
     if case.count:
         path = folder / f'{case.name}.yaml'
         path.write_text(mapping(case))
@@ -250,7 +260,7 @@ def main() -> int:
     if arguments.bare:
         echo(arguments.bare)
         return 0
-    forms = ({}, {'together': True}, {'bare': True})
+    forms = ({}, {'together': True}, {'compiled': True}, {'together': True, 'compiled': True}, {'bare': True})
     cases = [Case(0), *(Case(n, **form) for n in arguments.actuators for form in forms)]
     found: dict[str, list[tuple[float, float, int]]] = {case.name: [] for case in cases}
     with tempfile.TemporaryDirectory() as name:

@@ -7,11 +7,12 @@ from statistics import median_high
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED
+from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.messages import INPUTS
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate, SealTemperature, Status
+from seal_friction_ros.core.estimation.pipeline import Turn
+from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate, Status
 from seal_friction_ros.core.estimation.seal_health import (
     SealHealth,
     Starts,
@@ -153,7 +154,6 @@ class EstimatorDiagnostics:
         self._latencies: list[int] = []
         self._lateness = Lateness()
         self._health, self._starts = SealHealth(), Starts()
-        self._adaptation = NOT_ADAPTED
         self._newest: dict[type, FrictionEstimate | FeedForward] = {}
         self._status = self._limited = 0  # bits of all answers since the newest were taken
         self.start_interval()
@@ -197,22 +197,20 @@ class EstimatorDiagnostics:
         self._estimate = self._newest[FrictionEstimate] = estimate
         self._status |= estimate.status
 
-    def on_adaptation(
-        self,
-        parameters: EstimatorParameters,
-        before: EstimatorState,
-        state: EstimatorState,
-        temperature: SealTemperature,
-    ) -> None:
+    def on_adaptation(self, parameters: EstimatorParameters, turn: Turn | None) -> None:
         """Follow what is learnt from the newest sample, whose estimate `on_estimate` has counted."""
-        self._adaptation = state.adaptation
         self._starts = with_sample(self._starts, self._estimate)
-        self._health = followed(self._health, parameters, before, state, temperature)
+        if turn is not None:
+            self._health = followed(self._health, parameters, *turn)
 
-    def health(self, parameters: EstimatorParameters) -> DiagnosticStatus:
+    def on_reset(self) -> None:
+        """Forget the reversals: the adaptation has."""
+        self._health = SealHealth()
+
+    def health(self, parameters: EstimatorParameters, adaptation: AdaptationState) -> DiagnosticStatus:
         """Indicators of the seals, WARN with what a person should know."""
         said = findings(parameters, self._health, self._estimate.status)
-        values = health_values(parameters, self._adaptation, self._health, self._starts)
+        values = health_values(parameters, adaptation, self._health, self._starts)
         return DiagnosticStatus(
             level=DiagnosticStatus.WARN if said else DiagnosticStatus.OK,
             message='; '.join(said) or 'no finding',
@@ -256,7 +254,7 @@ class EstimatorDiagnostics:
         refused: bool,
         graph: GraphFindings,
         parameters: EstimatorParameters | None = None,
-        swing: Swing = NO_SWING,
+        known: EstimatorState | None = None,
     ) -> DiagnosticStatus:
         """Status of the estimate in this interval.
 
@@ -265,8 +263,9 @@ class EstimatorDiagnostics:
             active: Whether the node estimates.
             refused: Whether the node rejects its inputs because of duplicate publishers.
             graph: State of the graph.
-            swing: Of the newest sample.
+            known: State of the estimator; None: it does not estimate.
         """
+        swing = NO_SWING if known is None else known.swing
         seconds = max(time.monotonic() - self._started, 1e-3)
         level, message = self._level(seconds, parameters, swing) if active else (DiagnosticStatus.OK, 'inactive')
         if refused:
@@ -274,8 +273,8 @@ class EstimatorDiagnostics:
         elif (graph.duplicates or graph.unheard) and level == DiagnosticStatus.OK:
             level = DiagnosticStatus.WARN
         values = self._input_values(seconds, graph) | self._output_values(seconds)
-        if active and parameters is not None:
-            values |= health_values(parameters, self._adaptation, self._health, self._starts)
+        if known is not None and parameters is not None:
+            values |= health_values(parameters, known.adaptation, self._health, self._starts)
         values['swing without force [um]'] = f'{swing.doubted * 1e6:.1f}'
         values |= {f'{name} best effort only, from': node for name, node in graph.best_effort.items()}
         return DiagnosticStatus(

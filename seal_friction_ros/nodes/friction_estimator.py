@@ -34,9 +34,8 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.node_options import (
     FRICTION_ESTIMATOR_PARAMETERS,
 )
-from seal_friction_ros.core.estimation.pipeline import init, is_tick_due, receive
+from seal_friction_ros.core.estimation.pipeline import init, is_tick_due
 from seal_friction_ros.core.estimation.records import WatchdogTick
-from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.nodes import qos
@@ -78,6 +77,7 @@ class FrictionEstimator(EstimatorNode):
             self.get_logger().warning(PLACEHOLDER_WARNING)
         self._statistics = EstimatorDiagnostics()
         answers = {type_name: type_name for type_name in OUTPUTS.values()}
+        self._take = self.estimator_in_use([configuration.parameters()])
         self._watch = GraphWatch(self, self._inputs, INPUTS, self._outputs, answers, self.subscribe)
         for topic, type_name in OUTPUTS.items():  # not of the life cycle, which costs time: only an active node answers
             self._outputs[type_name] = self.create_publisher(
@@ -107,7 +107,8 @@ class FrictionEstimator(EstimatorNode):
     def start(self) -> None:
         """Start to estimate from the initial state, and to record if ``record`` is set."""
         self._known = self._configuration.parameters()
-        self._state = init(self._known)._replace(refused=self.is_refused(self._watch.duplicate_publishers()))
+        refused = self.is_refused(self._watch.duplicate_publishers())
+        self._state = self._take.hold(self._known, init(self._known)._replace(refused=refused))
         self._statistics = EstimatorDiagnostics()
         self.begin()
 
@@ -150,8 +151,8 @@ class FrictionEstimator(EstimatorNode):
             return
         received = self._now()
         self._sent.clear()
-        before = self._state.estimator
-        self._state = receive(self._known, self._state, message, received, self._send)
+        before = self._state
+        self._state = self._take.receive(self._known, before, message, received, self._send)
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
@@ -163,8 +164,7 @@ class FrictionEstimator(EstimatorNode):
             self._record_answers(done - taken, received)
         if name == 'rod_velocity':
             if self._known.estimator.adapts:
-                state = self._state
-                self._statistics.on_adaptation(self._known.estimator, before, state.estimator, state.temperature)
+                self._statistics.on_adaptation(self._known.estimator, self._state.turn_since(before))
             self._recording.flush_if_idle()
         self.look_after_timers(done)
 
@@ -187,7 +187,7 @@ class FrictionEstimator(EstimatorNode):
     def _tick(self, received: int) -> None:
         tick = WatchdogTick(received + self._state.clock_offset, (received - self._state.feedforward.received) * 1e-9)
         self._sent.clear()
-        self._state = receive(self._known, self._state, tick, received, self._send)
+        self._state = self._take.receive(self._known, self._state, tick, received, self._send)
         self._recording.record(self._topics[TICK_TYPE], TICK_TYPE, received, encode(tick))
         self._record_answers()
 
@@ -230,11 +230,12 @@ class FrictionEstimator(EstimatorNode):
 
     def snapshot(self) -> str:
         """All that the next answer depends on, as text."""
-        return snapshot_text(Snapshot(self._configuration, self._state))
+        return snapshot_text(Snapshot(self._configuration, self._state.records))
 
     def reset_adaptation(self) -> None:
         """Forget what the adaptation has learnt."""
         self._state = self._state._replace(estimator=self._state.estimator._replace(adaptation=NOT_ADAPTED))
+        self._statistics.on_reset()
 
     # --- diagnostics ---
 
@@ -243,8 +244,8 @@ class FrictionEstimator(EstimatorNode):
         graph = self._watch.findings(self._statistics.silent_inputs, retry=self.active)
         self._refuse_inputs(graph.duplicates)
         adapting = self._known.estimator if self._adapts else None
-        swing = self._state.estimator.swing if self.active else NO_SWING
-        estimate = self._statistics.report(self.active, self.active and self._state.refused, graph, adapting, swing)
+        known = self._state.estimator if self.active else None
+        estimate = self._statistics.report(self.active, self.active and self._state.refused, graph, adapting, known)
         return {'estimate': estimate, 'recorder': self.report_graph(graph)}
 
     @property
@@ -253,7 +254,9 @@ class FrictionEstimator(EstimatorNode):
 
     def health(self) -> dict[str, DiagnosticStatus]:
         """Indicators of the seals while the adaptation learns."""
-        return {'seals': self._statistics.health(self._known.estimator)} if self._adapts else {}
+        if not self._adapts:
+            return {}
+        return {'seals': self._statistics.health(self._known.estimator, self._state.estimator.adaptation)}
 
     def newest_answers(self) -> list[NamedAnswer]:
         """The newest answers since the last call."""

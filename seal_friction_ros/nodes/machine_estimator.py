@@ -29,7 +29,6 @@ from seal_friction_ros.core.estimation.node_options import (
     MachineOptions,
 )
 from seal_friction_ros.core.estimation.records import WatchdogTick
-from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
@@ -90,6 +89,7 @@ class MachineEstimator(EstimatorNode):
         self._machine = self._made()
         if any(actuator.configuration.has_placeholder for actuator in self._machine.actuators):
             self.get_logger().warning(PLACEHOLDER_WARNING)
+        self._take = self.estimator_in_use([actuator.pipeline for actuator in self._machine.actuators])
         self._types = {topic: full_name(self._file.topics[topic]) for topic in self._machine.plans}
         self._new_statistics()
         answers = {('', MACHINE_TYPE): '~/friction'}
@@ -156,7 +156,11 @@ class MachineEstimator(EstimatorNode):
 
     def start(self) -> None:
         """Start to estimate from the initial state, and to record if ``record`` is set."""
-        self._state = _with(init(self._machine), refused=self.is_refused(self._watch.duplicate_publishers()))
+        first = _with(init(self._machine), refused=self.is_refused(self._watch.duplicate_publishers()))
+        pairs = zip(self._machine.actuators, first.actuators, strict=True)
+        self._state = MachineState(
+            tuple(k._replace(pipeline=self._take.hold(actuator.pipeline, k.pipeline)) for actuator, k in pairs)
+        )
         self._new_statistics()
         self._newest.clear()
         self.begin()
@@ -171,7 +175,7 @@ class MachineEstimator(EstimatorNode):
         received, before = self._now(), self._state
         self._sent.clear()
         try:
-            self._state = receive(self._machine, self._state, name, data, received, self._send)
+            self._state = receive(self._machine, self._state, name, data, received, self._send, self._take.receive)
         except ValueError as error:
             for listener in self._listeners[name]:
                 self._statistics[listener].on_malformed(name)
@@ -240,8 +244,8 @@ class MachineEstimator(EstimatorNode):
         for actuator, known, newest in states:
             parameters = actuator.pipeline.estimator
             if parameters.adapts and newest is not known:
-                last, state = known.pipeline.estimator, newest.pipeline.estimator
-                self._statistics[actuator.name].on_adaptation(parameters, last, state, newest.pipeline.temperature)
+                turn = newest.pipeline.turn_since(known.pipeline)
+                self._statistics[actuator.name].on_adaptation(parameters, turn)
 
     def on_watchdog(self) -> bool:
         """Renew each feed-forward that no velocity sample renews, so that it fades out."""
@@ -256,7 +260,7 @@ class MachineEstimator(EstimatorNode):
         made = self._state.actuators[number].pipeline.feedforward.received
         tick = WatchdogTick(received + self.clock_offset, (received - made) * 1e-9)
         self._sent.clear()
-        self._state = receive_tick(self._machine, self._state, number, tick, received, self._send)
+        self._state = receive_tick(self._machine, self._state, number, tick, received, self._send, self._take.receive)
         self._send_together()
         made = self._command(received)
         self._recording.record(self._ticks[number], TICK_TYPE, received, encode(tick))
@@ -327,6 +331,8 @@ class MachineEstimator(EstimatorNode):
             for known in self._state.actuators
         ]
         self._state = MachineState(tuple(states))
+        for statistics in self._statistics.values():
+            statistics.on_reset()
 
     # --- diagnostics ---
 
@@ -340,9 +346,8 @@ class MachineEstimator(EstimatorNode):
             name, active = actuator.name, self.active
             adapting = actuator.pipeline.estimator if active and actuator.pipeline.estimator.adapts else None
             known = self._state.actuators[number].pipeline if active else None
-            swing = known.estimator.swing if known else NO_SWING
             refused = known is not None and known.refused
-            status = self._statistics[name].report(active, refused, graph, adapting, swing)
+            status = self._statistics[name].report(active, refused, graph, adapting, known.estimator if known else None)
             said = self._unanswered(number) if active else []
             if said:
                 status.level = max(status.level, DiagnosticStatus.WARN)
@@ -359,11 +364,14 @@ class MachineEstimator(EstimatorNode):
 
     def health(self) -> dict[str, DiagnosticStatus]:
         """Indicators of the seals of each actuator whose adaptation learns."""
-        return {
-            f'{actuator.name} seals': self._statistics[actuator.name].health(actuator.pipeline.estimator)
-            for actuator in self._machine.actuators
-            if self.active and actuator.pipeline.estimator.adapts
-        }
+        found = {}
+        for actuator, known in zip(self._machine.actuators, self._state.actuators if self.active else (), strict=False):
+            if actuator.pipeline.estimator.adapts:
+                adaptation = known.pipeline.estimator.adaptation
+                found[f'{actuator.name} seals'] = self._statistics[actuator.name].health(
+                    actuator.pipeline.estimator, adaptation
+                )
+        return found
 
     def newest_answers(self) -> list[NamedAnswer]:
         """The newest answers of each actuator since the last call."""

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from seal_friction_ros.core.estimation.estimator import init
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.messages import INPUTS
 from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
 from seal_friction_ros.core.estimation.swings import NO_SWING
+from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, Lateness, MissingSamples
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
@@ -50,7 +52,8 @@ def test_a_velocity_that_hums_is_named():
     diagnostics, watched = EstimatorDiagnostics(), GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {})
     for i in range(100):
         diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(Status.MOTION_UNCERTAIN) if i < 50 else 0), 1000, 0)
-    report = diagnostics.report(True, False, watched, swing=NO_SWING._replace(doubted=64e-6))
+    known = init(default_configuration().parameters().estimator)._replace(swing=NO_SWING._replace(doubted=64e-6))
+    report = diagnostics.report(True, False, watched, known=known)
     assert report.message.endswith('swings by 64 um, the force sum does not show it: hum, or a wrong force sum')
     assert {value.key: value.value for value in report.values}['swing without force [um]'] == '64.0'
     assert 'swings' not in diagnostics.report(True, False, watched).message

@@ -330,8 +330,9 @@ def test_quality_of_service_can_be_overridden():
         assert g.estimator.get_parameter('qos_overrides./rod_velocity.subscription.depth').value == 7
 
 
-def test_a_recording_started_by_service_during_motion_replays_bit_for_bit(tmp_path: Path):
-    with graph({'record_directory': str(tmp_path)}) as g:
+@pytest.mark.parametrize('compiled', [False, True])
+def test_a_recording_started_by_service_during_motion_replays_bit_for_bit(tmp_path: Path, compiled: bool):
+    with graph({'record_directory': str(tmp_path), 'compiled': compiled}) as g:
         g.connect()
         for i in range(5):
             g.estimate(SECOND + i * 10**6, 0.0015 if i else 0.1, force=3.0)
@@ -346,8 +347,10 @@ def test_a_recording_started_by_service_during_motion_replays_bit_for_bit(tmp_pa
     assert replay(Path(started.message)).identical
 
 
-def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Path):
-    with graph({'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}) as g:
+@pytest.mark.parametrize('compiled', [False, True])
+def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Path, compiled: bool):
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    with graph({'compiled': compiled, **recording}) as g:
         g.connect()
         g.estimate(SECOND, 0.003)
         request = SetParametersAtomically.Request(
@@ -362,10 +365,10 @@ def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Pat
     assert replay(tmp_path / 'bag').identical
 
 
-def test_a_recording_holds_states_between_which_it_verifies_by_itself(tmp_path: Path):
-    with graph(
-        {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag', 'record_state_period': 0.5}
-    ) as g:
+@pytest.mark.parametrize('compiled', [False, True])
+def test_a_recording_holds_states_between_which_it_verifies_by_itself(tmp_path: Path, compiled: bool):
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag', 'record_state_period': 0.5}
+    with graph({'compiled': compiled, **recording}) as g:
         g.connect()
         bag, number = tmp_path / 'bag', 0
         recorded = g.estimator._recording.record
@@ -435,8 +438,9 @@ def test_the_node_declares_the_parameters_of_its_table_and_no_other():
         assert isinstance(g.estimator, FrictionEstimator)
 
 
-def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it():
-    with graph({'adaptation.mode': 'observe'}) as g:
+@pytest.mark.parametrize('compiled', [False, True])
+def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it(compiled: bool):
+    with graph({'adaptation.mode': 'observe', 'compiled': compiled}) as g:
         g.connect()
         g.estimate(SECOND, 0.005)
         assert g.call(Trigger, 'friction_estimator/reset_adaptation', Trigger.Request()).success
@@ -444,6 +448,22 @@ def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it():
         values = {item.key: item.value for item in g.estimator.diagnostics()['estimate'].values}
         assert values['adaptation mode'] == 'observe'
         assert values['adaptation scale std'] == 'not learnt'
+
+
+@pytest.mark.parametrize('compiled', [False, True])
+def test_the_ends_of_strokes_are_followed_and_a_reset_forgets_them(compiled: bool):
+    with graph({'adaptation.mode': 'observe', 'compiled': compiled, 'stamp_age_max': 0.0}) as g:
+        g.connect()
+        for i in range(400):  # a reversal a second, 5 cm/s
+            side = 1.0 if i // 100 % 2 else -1.0
+            g.estimate(SECOND + 10 * i * 10**6, side * 0.05, force=40.0 * side)
+        statistics = g.estimator._statistics
+        learnt = g.estimator._state.estimator.adaptation.learnt.reversals
+        assert learnt >= 1
+        assert statistics._health.learnt == learnt
+        assert len(statistics._health.reversals) == learnt
+        g.estimator.reset_adaptation()
+        assert statistics._health.learnt == 0
 
 
 def test_a_velocity_that_hums_on_a_rod_that_is_held_is_a_warning():

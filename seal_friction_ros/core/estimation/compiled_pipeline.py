@@ -60,7 +60,7 @@ Bytes = npt.NDArray[np.uint8]
 Integers = npt.NDArray[np.int64]
 
 MOST_MESSAGES = 1 << 16  # in one call: enough to be fast, and memory is bounded
-_LATEST = 1 << 61  # [ns] stamps up to here, as messages have them: differences fit into 64 bits
+LATEST = 1 << 61  # [ns] stamps up to here, as messages have them: differences fit into 64 bits
 
 
 class Kind(IntEnum):
@@ -193,7 +193,7 @@ def _fits(value: Any) -> bool:
     """Whether all whole numbers are small enough, so that differences do not leave 64 bits."""
     if isinstance(value, tuple):
         return all(map(_fits, value))
-    return isinstance(value, float) or value == NEVER or abs(value) <= _LATEST
+    return isinstance(value, float) or value == NEVER or abs(value) <= LATEST
 
 
 # -- compiled ---------------------------------------------------------------------------------------------------------
@@ -248,7 +248,7 @@ def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, receiv
         kind, offset, size = kinds[i], offsets[i], sizes[i]
         if not _FORCE <= kind <= _VELOCITY:
             continue
-        if not 0 <= received[i] <= _LATEST:
+        if not 0 <= received[i] <= LATEST:
             return i, 0
         if size < 16 or data[offset] != 0 or data[offset + 1] != 1:
             return i, 0
@@ -301,7 +301,9 @@ def _receive_all(
 @overload(send, jit_options=INNER)
 def _send(emit: Any, record: Any, frame_id: Any) -> Any:
     """`pipeline.send` in compiled code: the record goes into the outbox. The frame is the number of the message."""
-    del emit, frame_id  # overload compares the names with those of `send`
+    del frame_id  # overload compares the names with those of `send`
+    if getattr(emit, 'instance_class', None) is not _Outbox:
+        return None
     column, layout = _ANSWERS[record.instance_class]
     write = _writer(layout)
 

@@ -109,6 +109,19 @@ class RecordingOptions:
             raise ValueError(f'RecordingOptions.record_name = {self.record_name!r} is not a plain name of a folder')
 
 
+@dataclass(frozen=True)
+class SpeedOptions:
+    """Speed of the node, one ROS parameter per field."""
+
+    compiled: bool = parameter(
+        False,
+        unit='',
+        live=False,
+        description='Run the estimator compiled: the same answers with less processor time, see docs/performance.md. '
+        'Configuration then takes 2 s, some 20 s the first time, and the node needs 150 MB more. Needs numba.',
+    )
+
+
 FEEDFORWARD_PREFIX = 'feedforward.'
 """Start of the names of the feed-forward parameters."""
 
@@ -123,6 +136,7 @@ FRICTION_ESTIMATOR_PARAMETERS = (
     ParameterGroup(AdaptationSettings, ADAPTATION_PREFIX),
     ParameterGroup(InputOptions),
     ParameterGroup(RecordingOptions),
+    ParameterGroup(SpeedOptions),
 )
 """Every parameter that the node ``friction_estimator`` declares."""
 
@@ -141,6 +155,7 @@ MACHINE_ESTIMATOR_PARAMETERS = (
     ParameterGroup(MachineOptions),
     ParameterGroup(InputOptions),
     ParameterGroup(RecordingOptions),
+    ParameterGroup(SpeedOptions),
 )
 """Every parameter that the node ``machine_estimator`` declares; those of each actuator come from its mapping file."""
 

@@ -18,12 +18,11 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration
-from seal_friction_ros.core.estimation.feedforward import newest_force
+from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.messages import Input, Output
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
 from seal_friction_ros.core.estimation.records import (
@@ -59,6 +58,8 @@ _REFERENCE = tuple(_PLACE[f'reference_{name}'] for name in ('position', 'velocit
 
 Emit = Callable[[str, Output, bytes], object]
 """Takes an answer: name of the actuator, record, frame name."""
+Take = Callable[[PipelineParameters, Any, Input, int, pipeline.Emit], Any]
+"""`pipeline.receive`, or a function like it with states of its own."""
 
 
 class Wiring(NamedTuple):
@@ -256,7 +257,15 @@ def init(machine: Machine) -> MachineState:
 # -- running ----------------------------------------------------------------------------------------------------------
 
 
-def receive(machine: Machine, state: MachineState, topic: str, data: bytes, received: int, emit: Emit) -> MachineState:
+def receive(
+    machine: Machine,
+    state: MachineState,
+    topic: str,
+    data: bytes,
+    received: int,
+    emit: Emit,
+    take: Take = pipeline.receive,
+) -> MachineState:
     """Take one message.
 
     Args:
@@ -266,6 +275,7 @@ def receive(machine: Machine, state: MachineState, topic: str, data: bytes, rece
         data: The message, CDR.
         received: When it was received [ns], on the clock of `pipeline.receive`.
         emit: Called with each answer.
+        take: `pipeline.receive`, or its compiled form with states of its own.
 
     Returns:
         The next state.
@@ -281,19 +291,25 @@ def receive(machine: Machine, state: MachineState, topic: str, data: bytes, rece
         try:
             stamp = reading.stamp if reading.stamp is not None else received + known.pipeline.clock_offset
             memory, records = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
-            states[number] = _passed(actuator, known, memory, records, received, emit)
+            states[number] = _passed(actuator, known, memory, records, received, emit, take)
         except (ArithmeticError, ValueError) as error:
             states[number] = known._replace(force=0.0, fault=f'{topic}: {type(error).__name__}: {error}')
     return MachineState(tuple(states))
 
 
 def receive_tick(
-    machine: Machine, state: MachineState, number: int, tick: WatchdogTick, received: int, emit: Emit
+    machine: Machine,
+    state: MachineState,
+    number: int,
+    tick: WatchdogTick,
+    received: int,
+    emit: Emit,
+    take: Take = pipeline.receive,
 ) -> MachineState:
     """The watchdog acts on one actuator, see `due`."""
     states = list(state.actuators)
     known = states[number]
-    states[number] = _passed(machine.actuators[number], known, known.memory, [tick], received, emit)
+    states[number] = _passed(machine.actuators[number], known, known.memory, [tick], received, emit, take)
     return MachineState(tuple(states))
 
 
@@ -372,15 +388,22 @@ def _passed(
     records: list[Input],
     received: int,
     emit: Emit,
+    take: Take,
 ) -> ActuatorState:
     """State after some records have taken the path of their actuator."""
     if not records:
         return ActuatorState(state.pipeline, memory, state.force)
-    known, pass_on = state.pipeline, partial(emit, actuator.mapping.name)
+    known, name, force = state.pipeline, actuator.mapping.name, state.force
+
+    def pass_on(answer: Output, frame_id: bytes) -> None:
+        nonlocal force
+        emit(name, answer, frame_id)
+        if type(answer) is FeedForward:
+            force = answer.force
+
     for record in records:
-        known = pipeline.receive(actuator.pipeline, known, record, received, pass_on)
-    has_feedforward = known.feedforward is not state.pipeline.feedforward
-    return ActuatorState(known, memory, newest_force(known.feedforward) if has_feedforward else state.force)
+        known = take(actuator.pipeline, known, record, received, pass_on)
+    return ActuatorState(known, memory, force)
 
 
 def records_of(

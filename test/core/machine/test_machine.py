@@ -7,6 +7,8 @@ import pytest
 import yaml
 from harness.machines import BENCH, EXCAVATOR, made, message, message_class, parsed
 
+from seal_friction_ros.core.estimation.compiled_state import CompiledState
+from seal_friction_ros.core.estimation.compiled_state import receive as receive_in_place
 from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.records import (
     NEVER,
@@ -38,10 +40,10 @@ class Run:
     def __init__(self, machine):
         self.machine, self.state, self.answers = machine, m.init(machine), []
 
-    def take(self, topic, data, received):
+    def take(self, topic, data, received, take=m.pipeline.receive):
         self.answers = []
         self.state = m.receive(
-            self.machine, self.state, topic, data, received, lambda *answer: self.answers.append(answer)
+            self.machine, self.state, topic, data, received, lambda *answer: self.answers.append(answer), take
         )
 
     def estimates(self):
@@ -196,23 +198,48 @@ def test_what_a_message_lacks_is_said():
     assert [m.missing(machine, number, '/joint_states', data) for number in range(3)] == [[], [], [text]]
 
 
-def test_an_actuator_whose_arithmetic_fails_leaves_the_others_alone_and_commands_nothing(monkeypatch):
+def test_an_actuator_whose_arithmetic_fails_leaves_the_others_alone_and_commands_nothing():
     run, whole = excavator(), excavator()
-    real = m.pipeline.receive
 
     def fails(parameters, *others):
         if parameters is run.machine.actuators[0].pipeline:
             raise OverflowError('too large')
-        return real(parameters, *others)
+        return m.pipeline.receive(parameters, *others)
 
-    monkeypatch.setattr(m.pipeline, 'receive', fails)
     data = message('sensor_msgs/JointState', 700 * MS, name=['boom', 'arm', 'bucket'], velocity=[0.1, 0.0, -0.1])
-    run.take('/joint_states', data, 700 * MS)
-    monkeypatch.undo()
+    run.take('/joint_states', data, 700 * MS, fails)
     whole.take('/joint_states', data, 700 * MS)
     assert run.answers == [answer for answer in whole.answers if answer[0] != 'boom']
     assert run.state.actuators[0].force == 0.0
     assert 'too large' in run.state.actuators[0].fault
+
+
+def test_states_in_compiled_memory_give_the_same_answers_and_the_same_states():
+    plain, held = Run(made(EXCAVATOR)), Run(made(EXCAVATOR))
+    pairs = zip(held.machine.actuators, held.state.actuators, strict=True)
+    held.state = m.MachineState(
+        tuple(known._replace(pipeline=CompiledState(one.pipeline, known.pipeline)) for one, known in pairs)
+    )
+    names = ['boom', 'arm', 'bucket']
+    for i in range(1, 1000):
+        stamp, side = i * 2 * MS, 1.0 if i // 150 % 2 else -1.0
+        speeds = [0.1 * side, math.nan if i % 97 == 0 else 0.0, -0.05 * side]
+        for topic, data in (
+            ('/a', message('std_msgs/Float64MultiArray', data=[20.0 + side, 30.0, 40.0])),
+            ('/b', message('std_msgs/Float64MultiArray', data=[10.0, 10.0, 10.0])),
+            ('/set', message('sensor_msgs/JointState', stamp, name=names, velocity=speeds)),
+            ('/joint_states', message('sensor_msgs/JointState', stamp, name=names, velocity=speeds)),
+        ):
+            before = plain.state.actuators
+            plain.take(topic, data, stamp)
+            held.take(topic, data, stamp, receive_in_place)
+            assert held.answers == plain.answers
+            for known, one, other in zip(before, plain.state.actuators, held.state.actuators, strict=True):
+                assert other.pipeline.turn_since(None) == one.pipeline.turn_since(known.pipeline)
+                assert repr(other.pipeline.pressure) == repr(one.pipeline.pressure)
+    records = [known._replace(pipeline=known.pipeline.records) for known in held.state.actuators]
+    assert repr(records) == repr(list(plain.state.actuators))
+    assert plain.state.actuators[0].pipeline.estimator.adaptation.learnt.reversals > 1
 
 
 def test_bytes_that_are_no_message_are_refused_and_change_nothing():
