@@ -3,7 +3,8 @@
 One ``sensor_msgs/JointState`` with all velocities, two ``std_msgs/Float64MultiArray`` with all pressures and one
 ``JointState`` with all references at ``--rate``; two answers of each actuator and one array of commands out, all
 recorded. Beside it, in the same run and in turn, the estimator of one actuator with its own messages (four in, two
-out, recorded). Processor time is that of the whole process, its middleware and its recorder among it.
+out, recorded), and the machine compiled. Ratios are those of a round, and of them the median. Processor time is that
+of the whole process, its middleware and its recorder among it.
 
 The bare node takes and sends as many messages with rclpy; it decodes, computes and records nothing.
 """
@@ -246,6 +247,22 @@ def node(case: Case, folder: Path) -> Iterator[Asker]:
         yield asker
 
 
+class Round(NamedTuple):
+    """Result of one round."""
+
+    cost: float  # [us] per actuator and sample
+    of_own: float  # [-] of the cost of one actuator with its own messages in this round
+    of_plain: float  # [-] of the cost of the same machine without compiled code
+    load: float  # [-] of one core
+    missed: int
+
+
+def groups(count: int) -> list[list[Case]]:
+    """Machines of ``count`` actuators that are asked in turn: the nodes of a group run at the same time."""
+    pairs = [[Case(count, together, compiled) for compiled in (False, True)] for together in (False, True)]
+    return [*pairs, [Case(count, bare=True)]]
+
+
 def main() -> int:
     """Ask all of them in turn, and print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
@@ -260,29 +277,29 @@ def main() -> int:
     if arguments.bare:
         echo(arguments.bare)
         return 0
-    forms = ({}, {'together': True}, {'compiled': True}, {'together': True, 'compiled': True}, {'bare': True})
-    cases = [Case(0), *(Case(n, **form) for n in arguments.actuators for form in forms)]
-    found: dict[str, list[tuple[float, float, int]]] = {case.name: [] for case in cases}
+    found: dict[Case, list[Round]] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for case in cases[1:]:  # two at a time: a machine of two cores does not bear more
+        for group in (group for count in arguments.actuators for group in groups(count)):
             with ExitStack() as stack:
-                askers = {one.name: stack.enter_context(node(one, folder)) for one in (cases[0], case)}
+                askers = {one: stack.enter_context(node(one, folder)) for one in (Case(0), *group)}
                 for _ in range(arguments.rounds):
-                    for one, asker in askers.items():
-                        found[one].append(asker.round(arguments.rate, arguments.seconds))
+                    rounds = {one: asker.round(arguments.rate, arguments.seconds) for one, asker in askers.items()}
+                    for one, (cost, load, missed) in rounds.items():
+                        others = cost / rounds[Case(0)][0], cost / rounds[group[0]][0]
+                        found.setdefault(one, []).append(Round(cost, *others, load, missed))
             shutil.rmtree(folder / OWN)
-        identical = {case.name: replay(folder / case.name).identical for case in cases[1:] if not case.bare}
-    own = [cost for cost, _, _ in found[OWN]]
+        identical = {one: replay(folder / one.name).identical for one in found if one.count and not one.bare}
     figures = {
-        case: {
-            'per actuator and sample [us]': round(median(cost for cost, _, _ in rounds), 1),
-            'of one with own messages': round(median(cost for cost, _, _ in rounds) / median(own), 2),
-            'load of one core [%]': round(100 * median(load for _, load, _ in rounds)),
-            'missed': sum(missed for _, _, missed in rounds),
-            'replay identical': identical.get(case, ''),
+        one.name: {
+            'per actuator and sample [us]': round(median(r.cost for r in rounds), 1),
+            'of one with own messages': round(median(r.of_own for r in rounds), 2),
+            'of the same, not compiled': round(median(r.of_plain for r in rounds), 2) if one.compiled else '',
+            'load of one core [%]': round(100 * median(r.load for r in rounds)),
+            'missed': sum(r.missed for r in rounds),
+            'replay identical': identical.get(one, ''),
         }
-        for case, rounds in found.items()
+        for one, rounds in found.items()
     }
     if arguments.json:
         print(json.dumps(figures))

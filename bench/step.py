@@ -16,6 +16,7 @@ from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import rclpy
 from rclpy.context import Context
@@ -30,11 +31,13 @@ from seal_friction_msgs.msg import RodVelocity
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.processes import free_domain
 
+from seal_friction_ros.core.estimation import compiled_state
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, step
 from seal_friction_ros.core.estimation.estimator import init as init_estimator
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, Output, decode, encode
-from seal_friction_ros.core.estimation.pipeline import init, init_running, receive
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init, init_running, receive
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, ServoReference, Velocity
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.files import default_configuration
@@ -60,13 +63,32 @@ def sliding(parameters: EstimatorParameters) -> Callable[[], object]:
     return one
 
 
+def samples(receive_one: Callable[..., Any], parameters: PipelineParameters, state: Any) -> Callable[[], object]:
+    """Pressure, force and velocity of one moment of a rod that slides to and fro; the next call is the next moment."""
+    numbers = count(1)
+
+    def one() -> None:
+        """The next moment."""
+        nonlocal state
+        number = next(numbers)
+        stamp, side = number * 1_000_000, 1.0 if number // 1000 % 2 == 0 else -1.0
+        for message in (Pressure(stamp, 3e6, 1e6), Force(stamp, side * 20.0), Velocity(stamp, side * 0.1, b'rod')):
+            state = receive_one(parameters, state, message, stamp, drop)
+
+    return one
+
+
+def drop(_record: Output, _frame_id: bytes) -> None:
+    """Emit to nobody."""
+
+
 def stages() -> dict[str, Callable[[], object]]:
     """Each stage of the live path but the middleware's, as a function without arguments."""
     parameters = default_configuration().parameters()
+    measured = replace(
+        default_configuration(), feedforward=FeedForwardSettings(use_measured_velocity=True)
+    ).parameters()
     pressure, force, velocity = Pressure(1, 3e6, 1e6), Force(1, 20.0), Velocity(1, 0.1, b'rod')
-
-    def drop(record: Output, frame_id: bytes) -> None:
-        """Emit to nobody."""
 
     sample = RodSample(1, 0.1, pressure, force)
     alone = init(parameters)._replace(pressure=pressure, force=force)
@@ -89,6 +111,10 @@ def stages() -> dict[str, Callable[[], object]]:
         'estimator step, sliding, on elastic seals': sliding(elastic),
         'receive velocity': lambda: receive(parameters, alone, velocity, 1, drop),
         'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity, 1, drop),
+        'receive three messages, with feed-forward': samples(receive, measured, init(measured)),
+        'receive three messages, with feed-forward, compiled': samples(
+            compiled_state.receive, measured, compiled_state.CompiledState(measured, init(measured))
+        ),
         'encode estimate': lambda: encode(*estimate),
         'encode estimate and feed-forward': lambda: [encode(*estimate), encode(*feedforward)],
     }

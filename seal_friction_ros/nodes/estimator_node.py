@@ -16,7 +16,7 @@ from seal_friction_ros.compiled_code import keep_compiled_code
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, OUTPUTS, encode, encode_text, type_of
 from seal_friction_ros.core.estimation.node_options import InputOptions, RecordingOptions, SpeedOptions
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, receive
-from seal_friction_ros.core.foundation.compiled import has_compiler
+from seal_friction_ros.core.foundation.compiled import runs_as_python
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE, TopicMessage, encode_newest
@@ -140,16 +140,16 @@ class EstimatorNode(ManagedNode, ABC):
         """The estimator, compiled for these parameters if ``compiled`` is set.
 
         Raises:
-            ValueError: There is no compiler.
+            ValueError: There is no compiler, or it is told to do nothing.
         """
         if not self.settings(SpeedOptions).compiled:
             return EstimatorInUse(receive, lambda _parameters, state: state)
         keep_compiled_code()
-        if not has_compiler():
-            raise ValueError('compiled: true needs numba, which is not installed')
+        if runs_as_python():
+            raise ValueError('compiled: true needs numba, and NUMBA_DISABLE_JIT must not be set')
         from seal_friction_ros.core.estimation import compiled_state  # noqa: PLC0415  loads the compiler
 
-        self.get_logger().info('compiling; some 20 s the first time')
+        self.get_logger().info('compiling: some 15 s the first time')
         for one in parameters:
             compiled_state.compile_now(one)
         if gc.get_freeze_count():  # configured while the executor runs: see there

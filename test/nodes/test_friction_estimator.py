@@ -32,6 +32,7 @@ from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PA
 from seal_friction_ros.core.estimation.records import Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import default_configuration, load_parameter_file
+from seal_friction_ros.nodes import estimator_node
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.bags.topics import find_topics
@@ -423,6 +424,13 @@ def test_an_invalid_seal_file_prevents_the_start_and_the_log_names_the_field(tmp
         assert '1.7' in said[0]
         assert '0.99' in said[0]
         assert g.probe.count_publishers('friction_estimate') == 0
+
+
+def test_without_a_compiler_a_compiled_node_does_not_start_and_says_why(monkeypatch, capfd):
+    monkeypatch.setattr(estimator_node, 'runs_as_python', lambda: True)
+    with graph({'compiled': True}, autostart=False) as g:
+        assert not g.estimator.autostart()
+    assert [line for line in capfd.readouterr().err.splitlines() if 'numba' in line and 'ERROR' in line]
 
 
 @pytest.mark.parametrize(('seals', 'warnings'), [({}, 1), ({'seals': ['ms28775_114'], 'seal_chambers': ['a']}, 0)])

@@ -117,8 +117,8 @@ class SpeedOptions:
         False,
         unit='',
         live=False,
-        description='Run the estimator compiled: the same answers with less processor time, see docs/performance.md. '
-        'Configuration then takes 2 s, some 20 s the first time, and the node needs 150 MB more. Needs numba.',
+        description='Run the estimator compiled: the same answers with less processor time (docs/performance.md). The '
+        'first configuration after an update then takes some 15 s, and the node needs 130 MB more. Needs numba.',
     )
 
 

@@ -1,14 +1,15 @@
 """One source for Python and for compiled code: numeric functions on floats, named tuples and arrays.
 
 - ``@compiled``: the function always runs compiled (simulation, lubricated contact): twenty times faster.
-- ``@compilable``: the function runs as plain Python in the live node, which never loads the compiler, and compiled
-  where `compiled` code calls it (replay of long bags, servo plant): the same source, the same bytes.
+- ``@compilable``: the function runs as plain Python in the live node, which does not load the compiler, and compiled
+  where `compiled` code calls it (replay of long bags, servo plant, the live node with ``compiled: true``): the same
+  source, the same bytes.
 
 What a friction law needs beyond numbers is here too: `bound` binds the parameters of a law to its function, `evaluate`
 calls it, `unrolled` loops over records of different types, `chosen_by_type` is a table of functions by the type of a
 record, and `for_compiler` converts records for compiled code.
 
-numba and numpy are imported where they are used: numba takes half a second, and the live node does without.
+numba and numpy are imported where they are used: numba takes half a second, and the live node may do without.
 
 With ``NUMBA_DISABLE_JIT=1`` in the environment, or without numba, everything runs as plain Python and gives the same
 numbers.
@@ -157,7 +158,7 @@ def for_compiler(value: Any) -> Any:
     Tuples of numbers become arrays, a bound function becomes a record of its parameters, a dataclass a named tuple (of
     the fields that its ``COMPILED`` names, if it has one); records within records likewise.
     """
-    if _runs_as_python():
+    if runs_as_python():
         return value
     make_known()
     return _converted(value)
@@ -191,7 +192,7 @@ def keep(value: Any) -> Any:
 
     Compiled code gets the record as one pointer, so a call from Python costs the same however large the value is.
     """
-    return Kept(value) if _runs_as_python() else _maker_of_kept()(value)
+    return Kept(value) if runs_as_python() else _maker_of_kept()(value)
 
 
 @cache
@@ -261,7 +262,8 @@ def __getattr__(name: str) -> Any:
 
 
 @cache
-def _runs_as_python() -> bool:
+def runs_as_python() -> bool:
+    """Whether nothing is compiled: there is no compiler, or it is told to do nothing."""
     if not has_compiler():
         return True
     import numba
