@@ -1,7 +1,7 @@
 """Small bags for tests, made by the code under test's own writer."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +30,13 @@ STEP = 10_000_000  # [ns]
 TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}
 
 
-def write_inputs(path: Path, samples: int = 300, configuration: Configuration | None = None) -> Path:
-    """A rod that goes to and fro at changing pressure, with rests, and a few inputs that are missing or not finite."""
+def write_inputs(
+    path: Path, samples: int = 300, configuration: Configuration | None = None, frames: Sequence[bytes] = (b'rod',)
+) -> Path:
+    """A rod that goes to and fro at changing pressure, with rests, and a few inputs that are missing or not finite.
+
+    The frame names take turns.
+    """
     with b.BagWriter(path) as writer:
         if configuration is not None:
             data = encode_text(snapshot_text(first_snapshot(configuration)))
@@ -40,21 +45,24 @@ def write_inputs(path: Path, samples: int = 300, configuration: Configuration | 
             stamp = 1_000_000_000 + i * STEP
             velocity = max(abs(math.sin(i / 20)) - 0.3, 0.0) * math.copysign(0.05, math.sin(i / 20))
             inputs: list[Any] = []
+            frame = frames[i % len(frames)]
             if i % 50 != 7:
                 inputs.append(Pressure(stamp, 2e6 + 1e6 * math.sin(i / 70), math.nan if i % 61 == 5 else 5e5))
             inputs.append(Force(stamp, 60.0 * math.sin(i / 20 + 0.3)))
             if 100 <= i < 200:
-                inputs.append(ServoReference(stamp, 0.001 * i, velocity, 0.0, b'rod'))
-            inputs += [Position(stamp, 0.001 * i), Velocity(stamp, velocity, b'rod')]
+                inputs.append(ServoReference(stamp, 0.001 * i, velocity, 0.0, frame))
+            inputs += [Position(stamp, 0.001 * i), Velocity(stamp, velocity, frame)]
             for number, record in enumerate(inputs):  # received 1 us apart, so there is time between them for others
                 type_name = type_of(record)
-                writer.write(TOPICS[type_name], type_name, stamp + 1000 * number, encode(record, b'rod'))
+                writer.write(TOPICS[type_name], type_name, stamp + 1000 * number, encode(record, frame))
     return path
 
 
-def write_recorded(folder: Path, configuration: Configuration | None = None) -> Path:
+def write_recorded(
+    folder: Path, configuration: Configuration | None = None, frames: Sequence[bytes] = (b'rod',)
+) -> Path:
     """The same with the answers to it, as a live node records them: a replay without its mark."""
-    replay(write_inputs(folder / 'inputs', configuration=configuration), out=folder / 'replayed')
+    replay(write_inputs(folder / 'inputs', configuration=configuration, frames=frames), out=folder / 'replayed')
     return rewrite(folder / 'replayed', folder / 'recorded', lambda _, message: as_recorded(message))
 
 

@@ -65,11 +65,11 @@ class AnswerStream:
         self.recorded = self.differing = 0
         self.first = ''
         self._discarded = 0
-        self._size: int | None = None  # of the recorded messages, if their type has grown since
+        self._grown = 0  # [bytes] that the recorded messages have not, if their type has grown since
 
     def add_replayed(self, data: bytes) -> None:
         """Queue a replayed answer; the oldest one is discarded when the queue is longer than `LONGEST_QUEUE`."""
-        self.pending.append(data[: self._size])
+        self.pending.append(data[: len(data) - self._grown])
         if len(self.pending) > LONGEST_QUEUE:
             self.pending.popleft()
             self._discarded += 1
@@ -84,10 +84,10 @@ class AnswerStream:
         if self._discarded:
             self._count_difference(lambda: f'{name}: the ones before it were not recorded', self._discarded)
             self._discarded = 0
-        grown = GROWN.get(self.type_name)
-        if self._size is None and pending and grown is not None and len(data) == len(pending[0]) - grown:
-            self._size = len(data)
-            pending = self.pending = deque(answer[: self._size] for answer in pending)
+        grown = GROWN.get(self.type_name, 0)
+        if grown and not self._grown and pending and len(data) == len(pending[0]) - grown:
+            self._grown = grown
+            pending = self.pending = deque(answer[: len(answer) - grown] for answer in pending)
         while data in islice(pending, 1, None) and data != pending[0]:  # some were not recorded
             pending.popleft()
             self._count_difference(lambda: f'{name}: the ones before it were not recorded')

@@ -21,7 +21,13 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.compiled_pipeline import Kind, UnsuitedError
 from seal_friction_ros.core.estimation.configuration import Configuration
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, FORCE_TYPE, VELOCITY_TYPE
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    ESTIMATE_TYPE,
+    FORCE_TYPE,
+    GROWN,
+    VELOCITY_TYPE,
+)
 from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags.bag import (
     ESTIMATE_TOPIC,
@@ -102,6 +108,22 @@ def test_recorded_runs_verify_in_bulk_and_inputs_alone_do_not(recorded: Path, cl
     assert found.identical
     assert found.recorded_feedforwards > 1400
     assert not assert_same_verdict(folder / 'inputs').identical
+
+
+def test_frame_names_of_any_length_may_take_turns_also_in_a_bag_from_before_a_message_grew(tmp_path: Path):
+    """A driver that starts again may have another frame name."""
+    bag = write_recorded(tmp_path, default_configuration(), frames=(b'', b'rod', b'x' * 300))
+    found = assert_same_verdict(bag)
+    assert found.identical, found.first_difference
+    assert found.recorded_feedforwards >= 100
+    grown = GROWN[ESTIMATE_TYPE]
+    assert grown > 0
+
+    def older(_: int, message: BagMessage) -> BagMessage:
+        return message._replace(data=message.data[:-grown]) if message.type_name == ESTIMATE_TYPE else message
+
+    found = assert_same_verdict(rewrite(bag, tmp_path / 'older', older))
+    assert found.identical, found.first_difference
 
 
 PAIRS = [
