@@ -46,9 +46,19 @@ from rich.text import Text
 TREE = Path(__file__).resolve().parents[2]
 PACKAGE = 'seal_friction_ros'
 REQUIRED = 0.9  # [-] share of killed mutants
-COMPILER = ('core/estimation/compiled_pipeline.py', 'core/foundation/compiled.py')
-"""Modules whose tests run compiled: minutes for each mutant."""
-NEEDS_COMPILER = ('estimation/test_compiled_pipeline.py', 'foundation/test_compiled.py', 'servo/test_compiled.py')
+COMPILER = {
+    'core/estimation/compiled_pipeline.py': ('test_compiled_pipeline.py',),
+    'core/estimation/compiled_state.py': ('test_compiled_state.py', 'test_compiled_pipeline.py'),
+    'core/foundation/compiled.py': ('test_compiled.py',),
+}
+"""Modules whose tests run compiled, and these tests: minutes for each mutant."""
+NEEDS_COMPILER = (
+    'estimation/test_compiled_pipeline.py',
+    'estimation/test_compiled_state.py',
+    'foundation/test_compiled.py',
+    'machine/test_compiled_machine.py',
+    'servo/test_compiled.py',
+)
 """Tests that run only there."""
 TABLES = 'test/test_docs.py::test_tables_are_those_of_the_code'
 """Test for every room: the tables of parameters in docs."""
@@ -227,7 +237,7 @@ def tests_of(tree: Path, file: str) -> list[str]:
     module = Path(file).stem
     files = sorted((tree / 'test' / room_of(file)).glob('test_*.py'))
     if file in COMPILER:
-        files = [path for path in files if path.name == f'test_{module}.py']
+        files = [path for path in files if path.name in COMPILER[file]]
     else:
         files = [path for path in files if not path.as_posix().endswith(NEEDS_COMPILER)]
     files.sort(key=lambda path: (path.name != f'test_{module}.py', module not in path.read_text()))

@@ -7,8 +7,6 @@ import pytest
 import yaml
 from harness.machines import BENCH, EXCAVATOR, made, message, message_class, parsed
 
-from seal_friction_ros.core.estimation.compiled_state import CompiledState
-from seal_friction_ros.core.estimation.compiled_state import receive as receive_in_place
 from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.records import (
     NEVER,
@@ -212,34 +210,6 @@ def test_an_actuator_whose_arithmetic_fails_leaves_the_others_alone_and_commands
     assert run.answers == [answer for answer in whole.answers if answer[0] != 'boom']
     assert run.state.actuators[0].force == 0.0
     assert 'too large' in run.state.actuators[0].fault
-
-
-def test_states_in_compiled_memory_give_the_same_answers_and_the_same_states():
-    plain, held = Run(made(EXCAVATOR)), Run(made(EXCAVATOR))
-    pairs = zip(held.machine.actuators, held.state.actuators, strict=True)
-    held.state = m.MachineState(
-        tuple(known._replace(pipeline=CompiledState(one.pipeline, known.pipeline)) for one, known in pairs)
-    )
-    names = ['boom', 'arm', 'bucket']
-    for i in range(1, 1000):
-        stamp, side = i * 2 * MS, 1.0 if i // 150 % 2 else -1.0
-        speeds = [0.1 * side, math.nan if i % 97 == 0 else 0.0, -0.05 * side]
-        for topic, data in (
-            ('/a', message('std_msgs/Float64MultiArray', data=[20.0 + side, 30.0, 40.0])),
-            ('/b', message('std_msgs/Float64MultiArray', data=[10.0, 10.0, 10.0])),
-            ('/set', message('sensor_msgs/JointState', stamp, name=names, velocity=speeds)),
-            ('/joint_states', message('sensor_msgs/JointState', stamp, name=names, velocity=speeds)),
-        ):
-            before = plain.state.actuators
-            plain.take(topic, data, stamp)
-            held.take(topic, data, stamp, receive_in_place)
-            assert held.answers == plain.answers
-            for known, one, other in zip(before, plain.state.actuators, held.state.actuators, strict=True):
-                assert other.pipeline.turn_since(None) == one.pipeline.turn_since(known.pipeline)
-                assert repr(other.pipeline.pressure) == repr(one.pipeline.pressure)
-    records = [known._replace(pipeline=known.pipeline.records) for known in held.state.actuators]
-    assert repr(records) == repr(list(plain.state.actuators))
-    assert plain.state.actuators[0].pipeline.estimator.adaptation.learnt.reversals > 1
 
 
 def test_bytes_that_are_no_message_are_refused_and_change_nothing():
