@@ -209,12 +209,12 @@ def compile_now(parameters: PipelineParameters) -> None:
     CompiledState(parameters, state.records)
 
 
-def _answer(record: Any, stamp: int, row: Any) -> Any:
-    whole = _WHOLE[record]
+def _answer(kind: Any, stamp: int, row: Any) -> Any:
+    """Record of an answer from its row, its whole numbers as such."""
     numbers = row.tolist()
-    for place in whole:
+    for place in _WHOLE[kind]:
         numbers[place] = int(numbers[place])
-    return record(stamp, *numbers[: len(record._fields) - 1])
+    return kind(stamp, *numbers[: len(kind._fields) - 1])
 
 
 # -- compiled ---------------------------------------------------------------------------------------------------------

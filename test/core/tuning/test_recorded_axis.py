@@ -86,6 +86,8 @@ def test_given_mass_is_taken():
     law = fit_law(recording(), 5.0)
     assert (law.mass, law.mass_is_fitted) == (5.0, False)
     assert law.scale == pytest.approx(0.8, abs=1e-3)
+    noisy = recording(noise=2.0)
+    assert fit_law(noisy, 5.0).scale_std == pytest.approx(fit_law(noisy).scale_std, rel=0.1)  # its force is taken off
 
 
 def test_one_direction_cannot_tell_an_offset_so_none_is_taken_off():
