@@ -77,7 +77,7 @@ class FrictionEstimator(EstimatorNode):
             self.get_logger().warning(PLACEHOLDER_WARNING)
         self._statistics = EstimatorDiagnostics()
         answers = {type_name: type_name for type_name in OUTPUTS.values()}
-        self._take = self.estimator_in_use([configuration.parameters()])
+        self._estimator = self.estimator_in_use([configuration.parameters()])
         self._watch = GraphWatch(self, self._inputs, INPUTS, self._outputs, answers, self.subscribe)
         for topic, type_name in OUTPUTS.items():  # not of the life cycle, which costs time: only an active node answers
             self._outputs[type_name] = self.create_publisher(
@@ -108,7 +108,7 @@ class FrictionEstimator(EstimatorNode):
         """Start to estimate from the initial state, and to record if ``record`` is set."""
         self._known = self._configuration.parameters()
         refused = self.is_refused(self._watch.duplicate_publishers())
-        self._state = self._take.hold(self._known, init(self._known)._replace(refused=refused))
+        self._state = self._estimator.hold(self._known, init(self._known)._replace(refused=refused))
         self._statistics = EstimatorDiagnostics()
         self.begin()
 
@@ -152,7 +152,7 @@ class FrictionEstimator(EstimatorNode):
         received = self._now()
         self._sent.clear()
         before = self._state
-        self._state = self._take.receive(self._known, before, message, received, self._send)
+        self._state = self._estimator.receive(self._known, before, message, received, self._send)
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
@@ -187,7 +187,7 @@ class FrictionEstimator(EstimatorNode):
     def _tick(self, received: int) -> None:
         tick = WatchdogTick(received + self._state.clock_offset, (received - self._state.feedforward.received) * 1e-9)
         self._sent.clear()
-        self._state = self._take.receive(self._known, self._state, tick, received, self._send)
+        self._state = self._estimator.receive(self._known, self._state, tick, received, self._send)
         self._recording.record(self._topics[TICK_TYPE], TICK_TYPE, received, encode(tick))
         self._record_answers()
 

@@ -89,7 +89,7 @@ class MachineEstimator(EstimatorNode):
         self._machine = self._made()
         if any(actuator.configuration.has_placeholder for actuator in self._machine.actuators):
             self.get_logger().warning(PLACEHOLDER_WARNING)
-        self._take = self.estimator_in_use([actuator.pipeline for actuator in self._machine.actuators])
+        self._estimator = self.estimator_in_use([actuator.pipeline for actuator in self._machine.actuators])
         self._types = {topic: full_name(self._file.topics[topic]) for topic in self._machine.plans}
         self._new_statistics()
         answers = {('', MACHINE_TYPE): '~/friction'}
@@ -159,7 +159,7 @@ class MachineEstimator(EstimatorNode):
         first = _with(init(self._machine), refused=self.is_refused(self._watch.duplicate_publishers()))
         pairs = zip(self._machine.actuators, first.actuators, strict=True)
         self._state = MachineState(
-            tuple(k._replace(pipeline=self._take.hold(actuator.pipeline, k.pipeline)) for actuator, k in pairs)
+            tuple(k._replace(pipeline=self._estimator.hold(actuator.pipeline, k.pipeline)) for actuator, k in pairs)
         )
         self._new_statistics()
         self._newest.clear()
@@ -175,7 +175,7 @@ class MachineEstimator(EstimatorNode):
         received, before = self._now(), self._state
         self._sent.clear()
         try:
-            self._state = receive(self._machine, self._state, name, data, received, self._send, self._take.receive)
+            self._state = receive(self._machine, self._state, name, data, received, self._send, self._estimator.receive)
         except ValueError as error:
             for listener in self._listeners[name]:
                 self._statistics[listener].on_malformed(name)
@@ -260,7 +260,9 @@ class MachineEstimator(EstimatorNode):
         made = self._state.actuators[number].pipeline.feedforward.received
         tick = WatchdogTick(received + self.clock_offset, (received - made) * 1e-9)
         self._sent.clear()
-        self._state = receive_tick(self._machine, self._state, number, tick, received, self._send, self._take.receive)
+        self._state = receive_tick(
+            self._machine, self._state, number, tick, received, self._send, self._estimator.receive
+        )
         self._send_together()
         made = self._command(received)
         self._recording.record(self._ticks[number], TICK_TYPE, received, encode(tick))
