@@ -1,8 +1,9 @@
 """How long things take to start: ``python bench/start.py [--times 7] [--json]``.
 
 ``seal_friction --help`` and the completion of a command beside the bare interpreter, and the estimator from the start
-of its process to its first estimate, while inputs come at 1 kHz. Medians; the caches of the operating system are warm
-after the first round.
+of its process to its first estimate, while inputs come at 1 kHz, as Python and compiled. Medians; the caches of the
+operating system are warm after the first round. Once each: the compiled estimator where no compiled code is kept, and
+the memory of both.
 """
 
 import argparse
@@ -16,10 +17,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from statistics import median
 from types import MappingProxyType
+from typing import NamedTuple
 
 from live import ALONE, Asker
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.processes import free_domain, node_process
@@ -45,8 +48,15 @@ def run(command: list[str], environment: Mapping[str, str] = MappingProxyType({}
     return time.perf_counter() - start
 
 
-def first_estimate(compiled: bool = False) -> float:
-    """Time [s] from the start of the node's process to its first estimate.
+class Start(NamedTuple):
+    """From the start of the process of a node to its first estimate."""
+
+    seconds: float
+    memory: float  # [MB] resident then
+
+
+def first_estimate(*, compiled: bool = False) -> Start:
+    """Start the estimator while inputs come.
 
     Raises:
         RuntimeError: None comes.
@@ -54,13 +64,27 @@ def first_estimate(compiled: bool = False) -> float:
     domain = free_domain()
     with Asker(ALONE, domain, None) as asker, tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        with node_process('friction_estimator', domain, {'compiled': compiled}, Path(folder) / 'log'):
+        with node_process('friction_estimator', domain, {'compiled': compiled}, Path(folder) / 'log') as process:
             while not asker.round_trips:
                 if time.perf_counter() > start + PATIENCE:
                     raise RuntimeError('no estimate comes')
                 asker.ask()
                 time.sleep(0.001)
-            return time.perf_counter() - start
+            seconds = time.perf_counter() - start
+            status = Path(f'/proc/{process.pid}/status').read_text()
+    return Start(seconds, int(status.partition('VmRSS:')[2].split()[0]) / 1024.0)
+
+
+def compiled_anew() -> Start:
+    """`first_estimate` compiled, where no compiled code is kept yet."""
+    kept = {name: os.environ.pop(name, None) for name in ('NUMBA_CACHE_DIR', 'XDG_CACHE_HOME')}
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ['XDG_CACHE_HOME'] = folder
+        try:
+            return first_estimate(compiled=True)
+        finally:
+            del os.environ['XDG_CACHE_HOME']
+            os.environ |= {name: value for name, value in kept.items() if value is not None}
 
 
 def main() -> int:
@@ -74,8 +98,8 @@ def main() -> int:
         'bare interpreter': lambda: run(BARE),
         'seal_friction --help': lambda: run([*COMMAND, '--help']),
         'completion of a command': lambda: run(COMMAND, ASKED),
-        'estimator, to the first estimate': first_estimate,
-        'compiled estimator, to the first estimate': lambda: first_estimate(compiled=True),
+        'estimator, to the first estimate': lambda: first_estimate().seconds,
+        'compiled estimator, to the first estimate': lambda: first_estimate(compiled=True).seconds,
     }
     times: dict[str, list[float]] = {name: [] for name in measured}
     for number in range(arguments.times + 1):
@@ -83,13 +107,16 @@ def main() -> int:
             duration = measure()
             if number:  # the first round warms the caches
                 times[name].append(duration)
-    found = {name: round(median(durations), 3) for name, durations in times.items()}
+    found = {f'{name} [s]': round(median(durations), 3) for name, durations in times.items()}
+    found['compiled estimator, to the first estimate, nothing kept [s]'] = round(compiled_anew().seconds, 1)
+    found['estimator, memory [MB]'] = round(first_estimate().memory)
+    found['compiled estimator, memory [MB]'] = round(first_estimate(compiled=True).memory)
     if arguments.json:
-        print(json.dumps({f'{name} [s]': duration for name, duration in found.items()}))
+        print(json.dumps(found))
         return 0
-    table = Table('what', 'median', title='Start')
-    for name, duration in found.items():
-        table.add_row(name, f'{duration:.3f} s')
+    table = Table('what', 'figure', title='Start, medians of times')
+    for name, figure in found.items():
+        table.add_row(Text(name), f'{figure:g}')
     Console().print(table)
     return 0
 

@@ -396,6 +396,7 @@ def _passed(
     known, name, force = state.pipeline, actuator.mapping.name, state.force
 
     def pass_on(answer: Output, frame_id: bytes) -> None:
+        """Pass an answer on with the name of the actuator; keep its force."""
         nonlocal force
         emit(name, answer, frame_id)
         if type(answer) is FeedForward:
