@@ -1,4 +1,4 @@
-"""Round trip through the live node beside that of bare echo nodes: ``python bench/live.py [--json]``.
+"""Round trip through the live node beside that of bare echo nodes: ``python bench/live.py [--before TREE] [--json]``.
 
 Nodes, each a process and a graph of its own, are asked in turn, in many short rounds: an rclpy node that sends each
 message back, with the SingleThreadedExecutor and with the events executor, and the estimator without and with
@@ -8,6 +8,9 @@ Fast DDS as it comes, the estimator as this package sets it up.
 
 Percentiles are those of a round, and of them the median over all rounds; so is the ratio to the bare echo, taken round
 by round: a slow moment of the machine is one bad round, not a wrong result. The maximum and what is missed are of all.
+
+``--before TREE`` measures the estimator beside that of another checkout, which has its own ``.venv``, instead of bare
+nodes. Rounds are longer then, since the ratio is close to 1; it is given with its standard error.
 
 ``--busy 2 --realtime 50`` keeps both cores of a small machine busy and gives all processes real-time priority.
 """
@@ -21,7 +24,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,12 +52,45 @@ from seal_friction_ros.nodes.discovery import PROFILES
 from seal_friction_ros.nodes.executor import spin
 
 RATES = (100, 500, 1000)  # [Hz]
-ROUND, SAMPLES = 0.5, 300  # [s], samples: a round of one case is no shorter
-WARM_UP = 20  # samples at the beginning of a round that are not counted: the node has slept while others were asked
 BARE, EVENTS = 'bare echo, SingleThreadedExecutor', 'bare echo, events executor'
 ALONE, RECORDING = 'estimator', 'estimator, recording'
 COMPILED, COMPILED_RECORDING = 'estimator, compiled', 'estimator, compiled, recording'
-CASES = (BARE, EVENTS, ALONE, RECORDING, COMPILED, COMPILED_RECORDING)
+BEFORE, BEFORE_RECORDING = 'estimator before', 'estimator before, recording'
+CASES = {
+    BARE: '',
+    EVENTS: BARE,
+    ALONE: BARE,
+    RECORDING: BARE,
+    COMPILED: BARE,
+    COMPILED_RECORDING: BARE,
+}
+"""Each case, and the one that it is compared with."""
+CASES_BEFORE = {
+    BEFORE: '',
+    ALONE: BEFORE,
+    COMPILED: BEFORE,
+    BEFORE_RECORDING: '',
+    RECORDING: BEFORE_RECORDING,
+    COMPILED_RECORDING: BEFORE_RECORDING,
+}
+"""The same with another tree."""
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """Length of a round of one case."""
+
+    duration: float  # [s]
+    samples: int  # at least
+    warm_up: float  # [s] at its beginning that does not count: the node has slept while others were asked
+
+    def number(self, rate: int) -> int:
+        """Samples of a round at ``rate`` [Hz]."""
+        return max(round(self.duration * rate), self.samples)
+
+
+SHORT = Rounds(0.5, 300, 0.02)
+LONG = Rounds(4.0, 300, 1.5)  # the watchdog acts a hundred times a second in the first second after a pause
 _STAMP = struct.Struct('<4xiI')
 _PATIENCE = 60.0  # [s] the first compiled node compiles
 _BUSY = 'import os; os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))\nwhile True: pass'
@@ -178,16 +214,16 @@ class Figures:
         return {**found, 'missed': self.sent - sum(map(len, self.round_trips))}
 
 
-def ask(asker: Asker, rate: int, number: int, figures: Figures) -> None:
-    """Ask at a rate [Hz] so many times.
+def ask(asker: Asker, rate: int, rounds: Rounds, figures: Figures) -> None:
+    """Ask at a rate [Hz] for one round.
 
     Raises:
         RuntimeError: Nothing is answered.
     """
-    start = time.perf_counter_ns()
-    for index in range(WARM_UP + number):
+    start, number, warm_up = time.perf_counter_ns(), rounds.number(rate), max(round(rounds.warm_up * rate), 20)
+    for index in range(warm_up + number):
         time.sleep(max(start + index * 10**9 // rate - time.perf_counter_ns(), 0) * 1e-9)
-        if index == WARM_UP:
+        if index == warm_up:
             asker.sent.clear()
             asker.round_trips.clear()
             cpu, wakes = asker.cpu(), asker.wakes()
@@ -201,9 +237,24 @@ def ask(asker: Asker, rate: int, number: int, figures: Figures) -> None:
     figures.sent += number
 
 
+def of_tree(tree: Path) -> dict[str, Any]:
+    """How `node_process` runs the node of another tree, with the middleware as that tree sets it up."""
+    without = (part for name in PROFILES for part in ('-u', name))
+    return {
+        'prefix': ('env', *without, '-C', str(tree)),
+        'interpreter': str(tree.resolve() / '.venv' / 'bin' / 'python'),
+    }
+
+
 @contextmanager
-def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
+def node(case: str, folder: Path, realtime: int, before: Path | None = None) -> Iterator[Asker]:
     """The node under test in a process of its own, and who asks it.
+
+    Args:
+        case: One of `CASES` or `CASES_BEFORE`.
+        folder: Of logs and bags.
+        realtime: SCHED_FIFO priority; 0: none.
+        before: The other tree.
 
     Raises:
         RuntimeError: It does not answer.
@@ -219,9 +270,10 @@ def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
             values: dict[str, Any] = {'feedforward.use_measured_velocity': True, 'realtime_priority': realtime}
             if case in (COMPILED, COMPILED_RECORDING):
                 values |= {'compiled': True}
-            if case in (RECORDING, COMPILED_RECORDING):
+            if case in (RECORDING, COMPILED_RECORDING, BEFORE_RECORDING):
                 values |= {'record': True, 'record_directory': str(folder), 'record_name': case}
-            process = stack.enter_context(node_process('friction_estimator', domain, values, log))
+            tree = of_tree(before) if before is not None and case in (BEFORE, BEFORE_RECORDING) else {}
+            process = stack.enter_context(node_process('friction_estimator', domain, values, log, **tree))
         for name in PROFILES:
             os.environ.pop(name, None)
         asker = stack.enter_context(Asker(case, domain, process))
@@ -232,35 +284,47 @@ def node(case: str, folder: Path, realtime: int) -> Iterator[Asker]:
         yield asker
 
 
-def measure(seconds: float, realtime: int, rates: tuple[int, ...]) -> dict[str, dict[int, Figures]]:
+def measure(
+    cases: Collection[str], lengths: Rounds, seconds: float, realtime: int, rates: tuple[int, ...], before: Path | None
+) -> dict[str, dict[int, Figures]]:
     """Ask all of them in turn."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    found = {case: {rate: Figures() for rate in rates} for case in CASES}
+    found = {case: {rate: Figures() for rate in rates} for case in cases}
     with ExitStack() as stack, Progress(console=Console(stderr=True)) as progress:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        askers = [stack.enter_context(node(case, folder, realtime)) for case in CASES]
-        number = {rate: max(round(ROUND * rate), SAMPLES) for rate in rates}
-        rounds = {rate: max(round(seconds * rate / number[rate]), 1) for rate in rates}
+        askers = [stack.enter_context(node(case, folder, realtime, before)) for case in cases]
+        rounds = {rate: max(round(seconds * rate / lengths.number(rate)), 1) for rate in rates}
         task = progress.add_task('round trips', total=sum(rounds.values()) * len(askers))
         for rate in rates:
             for _ in range(rounds[rate]):
                 for asker in askers:
-                    ask(asker, rate, number[rate], found[asker.case][rate])
+                    ask(asker, rate, lengths, found[asker.case][rate])
                     progress.advance(task)
     return found
 
 
-def ratios(found: dict[str, dict[int, Figures]]) -> dict[str, dict[str, float]]:
-    """Of each case to the bare echo with the SingleThreadedExecutor, at each rate."""
+def ratios(
+    found: dict[str, dict[int, Figures]], compared: Mapping[str, str]
+) -> dict[str, dict[str, tuple[float, float]]]:
+    """Of each case to the one that it is compared with, at each rate: median of the rounds, and its standard error."""
     result = {}
-    for case in CASES[1:]:
+    for case, other in compared.items():
+        if not other:
+            continue
         for rate, figures in found[case].items():
-            bare = found[BARE][rate].of_rounds()
+            base = found[other][rate].of_rounds()
             result[f'{case}, {rate} Hz'] = {
-                name: round(median(own / other for own, other in zip(values, bare[name], strict=True)), 2)
+                name: _median_and_error([own / its for own, its in zip(values, base[name], strict=True)])
                 for name, values in figures.of_rounds().items()
             }
     return result
+
+
+def _median_and_error(values: list[float]) -> tuple[float, float]:
+    """The error from the median distance to the median, which a burst of the machine does not change."""
+    middle = median(values)
+    spread = 1.48 * median(abs(value - middle) for value in values)  # the standard deviation of a normal distribution
+    return round(middle, 2), round(1.25 * spread / len(values) ** 0.5, 2)  # 1.25: of a median, not of a mean
 
 
 def main() -> int:
@@ -270,6 +334,7 @@ def main() -> int:
     parser.add_argument('--rates', type=int, nargs='+', default=list(RATES), help='[Hz]')
     parser.add_argument('--realtime', type=int, default=0, help='SCHED_FIFO priority of all processes; 0: none')
     parser.add_argument('--busy', type=int, default=0, help='processes that compute without end beside them')
+    parser.add_argument('--before', type=Path, metavar='TREE', help='another checkout, with its own .venv')
     parser.add_argument('--echo', help=argparse.SUPPRESS)
     parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
@@ -278,34 +343,38 @@ def main() -> int:
     if arguments.echo:
         echo(arguments.echo)
         return 0
+    compared, lengths = (CASES_BEFORE, LONG) if arguments.before else (CASES, SHORT)
     sys.setswitchinterval(1e-4)
     busy = [subprocess.Popen([sys.executable, '-c', _BUSY]) for _ in range(arguments.busy)]
     try:
-        found = measure(arguments.seconds, arguments.realtime, tuple(arguments.rates))
+        found = measure(
+            compared, lengths, arguments.seconds, arguments.realtime, tuple(arguments.rates), arguments.before
+        )
     finally:
         for process in busy:
             process.kill()
     if arguments.json:
         figures = {case: {rate: f.summary() for rate, f in rates.items()} for case, rates in found.items()}
-        print(json.dumps({'figures': figures, 'ratios': ratios(found)}))
+        print(json.dumps({'figures': figures, 'ratios': ratios(found, compared)}))
         return 0
-    _print(found)
+    _print(found, compared)
     return 0
 
 
-def _print(found: dict[str, dict[int, Figures]]) -> None:
+def _print(found: dict[str, dict[int, Figures]], compared: Mapping[str, str]) -> None:
     console = Console()
-    names = list(next(iter(found[BARE].values())).summary())
+    names = list(next(iter(found[ALONE].values())).summary())
     table = Table(*map(escape, ('node', 'rate [Hz]', *names)), title='Round trip')
     for case, rates in found.items():
         for rate, figures in rates.items():
             table.add_row(case, str(rate), *(f'{value:g}' for value in figures.summary().values()))
     console.print(table)
-    compared = ratios(found)
-    table = Table('node', *next(iter(compared.values())), title=f'Ratio to the {BARE}')
-    for name, values in compared.items():
-        table.add_row(name, *(f'{value:g}' for value in values.values()))
-    console.print(table)
+    for other in dict.fromkeys(filter(None, compared.values())):
+        rows = ratios(found, {case: its for case, its in compared.items() if its == other})
+        table = Table('node', *next(iter(rows.values())), title=f'Ratio to the {other}: median of rounds ± its error')
+        for name, values in rows.items():
+            table.add_row(name, *(f'{middle:g} ± {error:g}' for middle, error in values.values()))
+        console.print(table)
 
 
 if __name__ == '__main__':

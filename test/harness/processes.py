@@ -62,6 +62,7 @@ def node_process(
     log: Path,
     parameter_file: Path | None = None,
     prefix: tuple[str, ...] = (),
+    interpreter: str = sys.executable,
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Run a node during a ``with`` block, then stop it by SIGINT and wait for its end.
 
@@ -72,11 +73,12 @@ def node_process(
         log: File to which stdout and stderr are appended.
         parameter_file: ROS parameter file; ``parameters`` override its values.
         prefix: Command that prepares the environment of the node, a mount for example, and then executes it.
+        interpreter: Python that runs the node.
 
     Yields:
         The process.
     """
-    command = [*prefix, sys.executable, '-m', f'seal_friction_ros.nodes.{module}', '--ros-args']
+    command = [*prefix, interpreter, '-m', f'seal_friction_ros.nodes.{module}', '--ros-args']
     if parameter_file is not None:
         command += ['--params-file', str(parameter_file)]
     for name, value in parameters.items():

@@ -1,13 +1,28 @@
-"""How many participants of one machine discover each other."""
+"""The settings of Fast DDS: how many participants of one machine discover each other, when lost messages come."""
 
+import signal
 import socket
+import subprocess
+import sys
+import time
 from contextlib import ExitStack
 
-from harness.processes import free_domain
+from harness.processes import free_domain, graph_environment
 from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
+SUBSCRIBER = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import Float64
+
+rclpy.init()
+node = Node('subscriber')
+node.create_subscription(Float64, 'topic', lambda message: print(message.data, flush=True), 100)
+rclpy.spin(node)
+"""
+MORE_THAN_FIT = 1000  # messages; the shared memory of Fast DDS holds 512 for a subscriber
 OTHERS = 90  # participants whose ports are taken: the next ones get numbers beyond
 
 
@@ -31,3 +46,30 @@ def test_a_hundred_participants_of_a_machine_discover_each_other():
         assert SpunNodes(contexts[1], receiver).spin_until(is_received)
         sender.destroy_node()
         receiver.destroy_node()
+
+
+def test_a_subscriber_that_was_stopped_hears_the_last_message_though_none_follows():
+    """By its own settings Fast DDS tells it after up to 3 s that it has missed something."""
+    domain, numbers = free_domain(), iter(range(10 * MORE_THAN_FIT))
+    with ExitStack() as stack:
+        context = stack.enter_context(ros_context(domain))
+        node = Node('publisher', context=context)
+        publisher = node.create_publisher(Float64, 'topic', 100)
+        command, environment = [sys.executable, '-c', SUBSCRIBER], graph_environment(domain)
+        process = stack.enter_context(subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True))
+        stack.callback(process.kill)
+        assert SpunNodes(context, node).spin_until(lambda: publisher.get_subscription_count() > 0)
+        delays = []
+        for _ in range(3):
+            process.send_signal(signal.SIGSTOP)
+            for _ in range(MORE_THAN_FIT):
+                last = float(next(numbers))
+                publisher.publish(Float64(data=last))
+            time.sleep(0.5)
+            process.send_signal(signal.SIGCONT)
+            began = time.monotonic()
+            while float(process.stdout.readline()) != last:
+                pass
+            delays.append(time.monotonic() - began)
+        node.destroy_node()
+    assert sorted(delays)[1] < 0.4
