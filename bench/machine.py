@@ -1,10 +1,10 @@
 """A machine of several actuators in one node, all recorded: ``python bench/machine.py [--actuators 3 12]``.
 
 One ``sensor_msgs/JointState`` with all velocities, two ``std_msgs/Float64MultiArray`` with all pressures and one
-``JointState`` with all references at ``--rate``; two answers of each actuator and one array of commands out, all
-recorded. Beside it, in the same run and in turn, the estimator of one actuator with its own messages (four in, two
-out, recorded), and the machine compiled. Ratios are those of a round, and of them the median. Processor time is that
-of the whole process, its middleware and its recorder among it.
+``JointState`` with all references at ``--rate``; two answers of each actuator out, all recorded. Beside it, in the same
+run and in turn, the estimator of one actuator with its own messages (four in, two out, recorded), the machine compiled,
+and the machine with an array of commands for a controller as well. Ratios are those of a round, and of them the median.
+Processor time is that of the whole process, its middleware and its recorder among it.
 
 The bare node takes and sends as many messages with rclpy; it decodes, computes and records nothing.
 """
@@ -65,17 +65,17 @@ class Case(NamedTuple):
     count: int  # of actuators; 0: one, with its own messages
     together: bool = False  # whether the answers are one message
     compiled: bool = False  # whether the estimator is
+    commands: bool = False  # whether it also publishes what a controller takes
     bare: bool = False  # whether it is a node that only takes and sends
 
     @property
     def name(self) -> str:
         """For the table."""
+        if not self.count:
+            return OWN
         kind = 'bare node with the messages of' if self.bare else 'machine of'
-        return (
-            f'{kind} {self.count}' + ', answers together' * self.together + ', compiled' * self.compiled
-            if self.count
-            else OWN
-        )
+        form = ', answers together' * self.together + ', and commands' * self.commands + ', compiled' * self.compiled
+        return f'{kind} {self.count}{form}'
 
 
 def mapping(case: Case) -> str:
@@ -95,10 +95,12 @@ def mapping(case: Case) -> str:
                 'pressure_a': {'topic': '/a', 'field': f'data[{i}]', 'unit': 'bar'},
                 'pressure_b': {'topic': '/b', 'field': f'data[{i}]', 'unit': 'bar'},
             },
-            'output': {'topic': '/effort', 'type': 'std_msgs/msg/Float64MultiArray', 'index': i},
         }
         for i in range(case.count)
     }
+    if case.commands:
+        for i, actuator in enumerate(actuators.values()):
+            actuator['output'] = {'topic': '/effort', 'type': 'std_msgs/msg/Float64MultiArray', 'index': i}
     joints, array = 'sensor_msgs/msg/JointState', 'std_msgs/msg/Float64MultiArray'
     topics = {'/joint_states': joints, '/set': joints, '/a': array, '/b': array}
     answers = 'together' if case.together else 'each'
@@ -118,8 +120,6 @@ def echo(count: int) -> None:
         for i in range(count)
         for kind, topic, record in answers
     ]
-    effort = serialize_message(Float64MultiArray(data=[0.0] * count))
-    sent.append((node.create_publisher(Float64MultiArray, '/effort', qos.STREAM), effort))
 
     def answer(_data: bytes) -> None:
         for publisher, data in sent:
@@ -260,7 +260,7 @@ class Round(NamedTuple):
 def groups(count: int) -> list[list[Case]]:
     """Machines of ``count`` actuators that are asked in turn: the nodes of a group run at the same time."""
     pairs = [[Case(count, together, compiled) for compiled in (False, True)] for together in (False, True)]
-    return [*pairs, [Case(count, bare=True)]]
+    return [*pairs, [Case(count, together=True, commands=True), Case(count, bare=True)]]
 
 
 def main() -> int:

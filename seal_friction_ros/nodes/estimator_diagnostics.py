@@ -140,11 +140,13 @@ class EstimatorDiagnostics:
 
     Args:
         inputs: Names of the inputs.
+        counted: Messages of each input, if the node counts them for several estimators; then their stamps do not tell
+            what is missing, and `on_input` is not called.
     """
 
-    def __init__(self, inputs: Collection[str] = INPUTS) -> None:
+    def __init__(self, inputs: Collection[str] = INPUTS, counted: Counter[str] | None = None) -> None:
         self._inputs = inputs
-        self._received: Counter[str] = Counter()
+        self._received: Counter[str] = Counter() if counted is None else counted
         self._malformed: Counter[str] = Counter()
         self._missing = {name: MissingSamples() for name in inputs}
         self._by_status: Counter[int] = Counter()
@@ -174,10 +176,6 @@ class EstimatorDiagnostics:
         """Count one message of an input with its stamp [ns]."""
         self._received[name] += 1
         self._missing[name].on_stamp(stamp)
-
-    def on_received(self, name: str) -> None:
-        """Count one message of an input whose stamps do not tell what is missing."""
-        self._received[name] += 1
 
     def on_malformed(self, name: str) -> None:
         """Count one message of an input that cannot be decoded."""

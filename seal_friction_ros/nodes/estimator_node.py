@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
@@ -70,6 +70,7 @@ class EstimatorNode(ManagedNode, ABC):
         self._logged_errors: dict[str, str] = {}
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[Any, Any] = {}
+        self._publish: dict[Any, Callable[[bytes], None]] = {}
         self._topics: dict[Any, str] = {}
         self._newest_inputs: dict[str, TopicMessage] = {}
         self.has_viewer = False  # by a live view
@@ -166,6 +167,7 @@ class EstimatorNode(ManagedNode, ABC):
             self.destroy_timer(timer)
         self._inputs.clear()
         self._outputs.clear()
+        self._publish.clear()
         self._timers.clear()
 
     def create_timers(self) -> None:
@@ -226,6 +228,23 @@ class EstimatorNode(ManagedNode, ABC):
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self._topics[name] = self._inputs[name].topic_name
+
+    def publish_answers(self, key: Any, topic: str, type_name: str) -> None:
+        """Create the publisher of an answer; ``_publish[key]`` sends the bytes of one.
+
+        Only an active node answers, so the publisher is none of the life cycle, and the bytes go past the checks of
+        `Publisher.publish`: both take time.
+        """
+        publisher = self._outputs[key] = self.create_publisher(
+            message_class(type_name),
+            topic,
+            qos.STREAM,
+            qos_overriding_options=qos.overridable(),
+            event_callbacks=PublisherEventCallbacks(
+                incompatible_qos=partial(self._watch.on_incompatible_subscriber, key)
+            ),
+        )
+        self._publish[key] = publisher.handle.publish_raw
 
     def _on_watchdog_timer(self) -> None:
         """Let the watchdog act; every `_TICK_PERIOD` while it has to or somebody looks on, else seldom.

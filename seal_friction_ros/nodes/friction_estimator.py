@@ -4,11 +4,9 @@ import sys
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.event_handler import PublisherEventCallbacks
 
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import (
@@ -79,16 +77,8 @@ class FrictionEstimator(EstimatorNode):
         answers = {type_name: type_name for type_name in OUTPUTS.values()}
         self._estimator = self.estimator_in_use([configuration.parameters()])
         self._watch = GraphWatch(self, self._inputs, INPUTS, self._outputs, answers, self.subscribe)
-        for topic, type_name in OUTPUTS.items():  # not of the life cycle, which costs time: only an active node answers
-            self._outputs[type_name] = self.create_publisher(
-                message_class(type_name),
-                topic,
-                qos.STREAM,
-                qos_overriding_options=qos.overridable(),
-                event_callbacks=PublisherEventCallbacks(
-                    incompatible_qos=partial(self._watch.on_incompatible_subscriber, type_name)
-                ),
-            )
+        for topic, type_name in OUTPUTS.items():
+            self.publish_answers(type_name, topic, type_name)
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
         )
@@ -207,7 +197,7 @@ class FrictionEstimator(EstimatorNode):
     def _send(self, answer: Output, frame_id: bytes) -> None:
         """Publish an answer at once; the rest waits until all answers are out."""
         type_name, data = type_of(answer), encode(answer, frame_id)
-        self._outputs[type_name].publish(data)
+        self._publish[type_name](data)
         self._sent.append((type_name, answer, data))
 
     # --- parameters ---

@@ -2,12 +2,11 @@
 
 import sys
 import time
+from collections import Counter
 from collections.abc import Collection, Mapping
-from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.event_handler import PublisherEventCallbacks
 
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration
@@ -102,9 +101,9 @@ class MachineEstimator(EstimatorNode):
         types = {key: key[1] for key in answers}
         self._watch = GraphWatch(self, self._inputs, self._types, self._outputs, types, self.subscribe)
         for key, topic in answers.items():
-            self._publish_on(key, topic, key[1])
+            self.publish_answers(key, topic, key[1])
         for topic, kind in {a.output.topic: a.output.type_name for a in self._file.actuators if a.output}.items():
-            self._publish_on(('', topic), topic, full_name(kind))
+            self.publish_answers(('', topic), topic, full_name(kind))
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
         )
@@ -113,16 +112,6 @@ class MachineEstimator(EstimatorNode):
         for topic in self._types:
             self.subscribe(topic, qos.STREAM)
         self.create_timers()
-
-    def _publish_on(self, key: tuple[str, str], topic: str, type_name: str) -> None:
-        incompatible = PublisherEventCallbacks(incompatible_qos=partial(self._watch.on_incompatible_subscriber, key))
-        self._outputs[key] = self.create_publisher(  # not of the life cycle: only an active node answers
-            message_class(type_name),
-            topic,
-            qos.STREAM,
-            qos_overriding_options=qos.overridable(),
-            event_callbacks=incompatible,
-        )
 
     def _made(self) -> Machine:
         """Machine with the present parameters."""
@@ -143,12 +132,9 @@ class MachineEstimator(EstimatorNode):
         for topic, plan in self._machine.plans.items():
             for number, _ in plan.taken:
                 listens[self._file.actuators[number].name].append(topic)
-        self._statistics = {name: EstimatorDiagnostics(topics) for name, topics in listens.items()}
+        self._counted: Counter[str] = Counter()  # messages of each topic
+        self._statistics = {name: EstimatorDiagnostics(topics, self._counted) for name, topics in listens.items()}
         self._lowest = [Lowest() for _ in self._file.actuators]
-        self._pressures_on: dict[str, list[int]] = {}
-        for number, actuator in enumerate(self._file.actuators):
-            for topic in {s.topic for name, s in actuator.signals().items() if name in ('pressure_a', 'pressure_b')}:
-                self._pressures_on.setdefault(topic, []).append(number)
         self._listeners = {
             topic: [self._file.actuators[number].name for number, _ in plan.taken]
             for topic, plan in self._machine.plans.items()
@@ -191,13 +177,10 @@ class MachineEstimator(EstimatorNode):
         self._newest[name] = data
         if self.has_viewer:
             self.keep_for_view(name, self._types[name], data)
-        for listener in self._listeners[name]:
-            self._statistics[listener].on_received(name)
-        for number in self._pressures_on.get(name, ()):
-            self._lowest[number] = self._lowest[number].after(self._state.actuators[number].pipeline.pressure)
+        self._counted[name] += 1
         if self._sent:
             self._record_answers(made, done - taken, received)
-            self._follow_adaptation(before)
+            self._follow(before)
             self._recording.flush_if_idle()
         self.look_after_timers(done)
 
@@ -206,7 +189,7 @@ class MachineEstimator(EstimatorNode):
         data = frame_id
         if not self._file.together:
             data = encode(answer, frame_id)
-            self._outputs[name, type_of(answer)].publish(data)
+            self._publish[name, type_of(answer)](data)
         self._sent.append(NamedAnswer(name, answer, data))
 
     def _send_together(self) -> None:
@@ -214,14 +197,14 @@ class MachineEstimator(EstimatorNode):
         self._together = b''
         if self._file.together and self._sent:
             self._together = encode_together(self._sent)
-            self._outputs['', MACHINE_TYPE].publish(self._together)
+            self._publish['', MACHINE_TYPE](self._together)
 
     def _command(self, received: int) -> list[Command]:
         """Publish what the controllers take after a message."""
         guided = FeedForward in [type(answer) for _, answer, _ in self._sent]
         made = due_commands(self._machine, self._state, guided, received)
         for command in made:
-            self._outputs['', command.topic].publish(command.data)
+            self._publish['', command.topic](command.data)
         return made
 
     def _record_answers(self, made: list[Command], latency: int = 0, received: int = 0) -> None:
@@ -239,11 +222,15 @@ class MachineEstimator(EstimatorNode):
         for command in made:
             self._recording.record(command.topic, full_name(command.type_name), self._now(), command.data)
 
-    def _follow_adaptation(self, before: MachineState) -> None:
+    def _follow(self, before: MachineState) -> None:
+        """Follow pressures and adaptation of the actuators that have answered."""
         states = zip(self._machine.actuators, before.actuators, self._state.actuators, strict=True)
-        for actuator, known, newest in states:
+        for number, (actuator, known, newest) in enumerate(states):
+            if newest is known:
+                continue
+            self._lowest[number] = self._lowest[number].after(newest.pipeline.pressure)
             parameters = actuator.pipeline.estimator
-            if parameters.adapts and newest is not known:
+            if parameters.adapts:
                 turn = newest.pipeline.turn_since(known.pipeline)
                 self._statistics[actuator.name].on_adaptation(parameters, turn)
 
