@@ -19,17 +19,26 @@ def test_every_node_answers_round_trips():
         assert 0.0 < figures['500']['p50 [us]'] <= figures['500']['p99 [us]']
     assert len(found['ratios']) == 5
     wakes = found['figures']['estimator']['500']['event thread woken per sample']
-    assert wakes < 3.0  # the effect of config/fastdds.xml; four to eight times without
+    assert wakes < 1.0  # the effect of config/fastdds.xml; four to eight times without
+
+
+@pytest.mark.long
+def test_round_trips_are_compared_with_those_of_another_tree():
+    found = run_json('bench/live.py', '--before', str(ROOT), '--seconds', '4', '--rates', '200')
+    assert len(found['figures']) == 6
+    assert len(found['ratios']) == 4  # two of them beside each of the tree before
+    assert all(0.3 < figures['CPU per sample'][0] < 3.0 for figures in found['ratios'].values())
 
 
 @pytest.mark.long
 def test_a_machine_is_timed_and_its_bags_replay_to_the_byte():
     found = run_json('bench/machine.py', '--actuators', '2', '--rounds', '1', '--seconds', '0.5', '--rate', '100')
     bare = 'bare node with the messages of 2'
-    forms = ['', ', compiled', ', answers together', ', answers together, compiled']
+    together = ', answers together'
+    forms = ['', ', compiled', together, f'{together}, compiled', f'{together}, and commands']
     assert list(found) == ['one actuator, own messages', *(f'machine of 2{form}' for form in forms), bare]
-    assert [figures['replay identical'] for figures in found.values()] == ['', *[True] * 4, '']
-    assert [figures['missed'] for figures in found.values()] == [0] * 6
+    assert [figures['replay identical'] for figures in found.values()] == ['', *[True] * 5, '']
+    assert [figures['missed'] for figures in found.values()] == [0] * 7
 
 
 @pytest.mark.long
