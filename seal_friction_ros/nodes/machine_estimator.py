@@ -102,7 +102,9 @@ class MachineEstimator(EstimatorNode):
         self._watch = GraphWatch(self, self._inputs, self._types, self._outputs, types, self.subscribe)
         for key, topic in answers.items():
             self.publish_answers(key, topic, key[1])
-        for topic, kind in {a.output.topic: a.output.type_name for a in self._file.actuators if a.output}.items():
+        outputs = {a.output.topic: a.output.type_name for a in self._file.actuators if a.output}
+        self._has_outputs = bool(outputs)
+        for topic, kind in outputs.items():
             self.publish_answers(('', topic), topic, full_name(kind))
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
@@ -201,6 +203,8 @@ class MachineEstimator(EstimatorNode):
 
     def _command(self, received: int) -> list[Command]:
         """Publish what the controllers take after a message."""
+        if not self._has_outputs:
+            return []
         guided = FeedForward in [type(answer) for _, answer, _ in self._sent]
         made = due_commands(self._machine, self._state, guided, received)
         for command in made:

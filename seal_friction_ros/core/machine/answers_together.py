@@ -36,23 +36,18 @@ class _Parts(NamedTuple):
 
 def encode_together(answers: Sequence[NamedAnswer]) -> bytes:
     """The answers to one message, at least one, in the order in which they were made."""
-    estimates = [answer for answer in answers if type(answer.record) is FrictionEstimate]
-    feedforwards = [answer for answer in answers if type(answer.record) is FeedForward]
-    parts = _Parts(
-        tuple([(answer.actuator, len(answer.frame_id)) for answer in estimates]),
-        tuple([(answer.actuator, len(answer.frame_id)) for answer in feedforwards]),
-    )
-    values: list[Any] = []
-    for answer in (*estimates, *feedforwards):
-        record = answer.record
+    parts: dict[type, list[tuple[str, int]]] = {FrictionEstimate: [], FeedForward: []}
+    values: dict[type, list[Any]] = {FrictionEstimate: [], FeedForward: []}
+    for actuator, record, frame_id in answers:
+        kind, length = type(record), len(frame_id)
         seconds, nanoseconds = divmod(record.stamp, SECOND)
-        values += (seconds, nanoseconds, len(answer.frame_id) + 1, answer.frame_id, *record[1:])
-    first = divmod((estimates or feedforwards)[0].record.stamp, SECOND)
-    layout, names, feedforward_names = _layout(parts)
-    middle = sum(4 + len(_CODES[FrictionEstimate]) for _ in estimates)
+        parts[kind].append((actuator, length))
+        values[kind] += (seconds, nanoseconds, length + 1, frame_id, *record[1:])
+    estimates, feedforwards = values.values()
+    layout, names, feedforward_names = _layout(_Parts(*map(tuple, parts.values())))
     return layout.pack(
-        _ENCAPSULATION, *first, 1, b'', *names, len(estimates), *values[:middle], *feedforward_names, len(feedforwards),
-        *values[middle:],
+        _ENCAPSULATION, *(estimates or feedforwards)[:2], 1, b'', *names, len(parts[FrictionEstimate]), *estimates,
+        *feedforward_names, len(parts[FeedForward]), *feedforwards,
     )  # fmt: skip
 
 
