@@ -66,6 +66,12 @@ def test_a_resonance_beyond_half_the_sampling_rate_is_refused():
         without_resonance(np.arange(100) / 100.0, np.zeros(100), 60.0, PAPER)
 
 
+def test_a_resonance_below_one_hertz_is_filtered():
+    time = np.arange(2000) / 10.0
+    wave = np.sin(2.0 * np.pi * 0.5 * time)
+    assert np.abs(without_resonance(time, wave, 0.5, PAPER)[500:-500]).max() < 0.02
+
+
 def test_moving_average_of_fifty_smooths_white_noise_by_the_root_of_fifty():
     noise = np.random.default_rng(2).normal(size=100_000)
     assert np.std(moving_average(noise, 50)) == pytest.approx(1.0 / np.sqrt(50.0), rel=0.05)
