@@ -339,8 +339,8 @@ def tried(cases: dict[str, Callable[[Axis], Any]], parameters: dict[str, Any], t
     found: dict[str, list[Any]] = {name: [] for name in cases}
     if cases:
         with axis(parameters) as place:
-            for name, case in track(cases.items(), console=Console(stderr=True)):
-                for _ in range(times):
+            for _ in track(range(times), console=Console(stderr=True)):
+                for name, case in cases.items():
                     place.restore()
                     found[name].append(case(place))
     return found
