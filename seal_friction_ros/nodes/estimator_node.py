@@ -229,8 +229,8 @@ class EstimatorNode(ManagedNode, ABC):
         )
         self._topics[name] = self._inputs[name].topic_name
 
-    def publish_answers(self, key: Any, topic: str, type_name: str) -> None:
-        """Create the publisher of an answer; ``_publish[key]`` sends the bytes of one.
+    def create_output(self, key: Any, topic: str, type_name: str) -> None:
+        """Create the publisher of an answer or a command; ``_publish[key]`` sends the bytes of one.
 
         Only an active node answers, so the publisher is none of the life cycle, and the bytes go past the checks of
         `Publisher.publish`: both take time.

@@ -78,7 +78,7 @@ class FrictionEstimator(EstimatorNode):
         self._estimator = self.estimator_in_use([configuration.parameters()])
         self._watch = GraphWatch(self, self._inputs, INPUTS, self._outputs, answers, self.subscribe)
         for topic, type_name in OUTPUTS.items():
-            self.publish_answers(type_name, topic, type_name)
+            self.create_output(type_name, topic, type_name)
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
         )

@@ -101,11 +101,11 @@ class MachineEstimator(EstimatorNode):
         types = {key: key[1] for key in answers}
         self._watch = GraphWatch(self, self._inputs, self._types, self._outputs, types, self.subscribe)
         for key, topic in answers.items():
-            self.publish_answers(key, topic, key[1])
+            self.create_output(key, topic, key[1])
         outputs = {a.output.topic: a.output.type_name for a in self._file.actuators if a.output}
         self._has_outputs = bool(outputs)
         for topic, kind in outputs.items():
-            self.publish_answers(('', topic), topic, full_name(kind))
+            self.create_output(('', topic), topic, full_name(kind))
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
         )

@@ -72,4 +72,4 @@ def test_a_subscriber_that_was_stopped_hears_the_last_message_though_none_follow
                 pass
             delays.append(time.monotonic() - began)
         node.destroy_node()
-    assert sorted(delays)[1] < 0.4
+    assert max(delays) < 1.0  # 0.1 s, and what a busy machine adds; with 3 s it is more in two of three tries
