@@ -398,7 +398,25 @@ SHORTEST_INTERVAL = 1e-3  # [s] our choice: over less, noise exceeds any rate, a
 def step(
     parameters: EstimatorParameters, state: EstimatorState, sample: RodSample
 ) -> tuple[EstimatorState, FrictionEstimate]:
-    """Estimate the friction of the seals at one rod-velocity sample.
+    """Estimate the friction of the seals at one rod-velocity sample, then learn from it: `estimate_at`, `learn_from`.
+
+    Args:
+        parameters: Settings and seals.
+        state: From `init` or the step before.
+        sample: Velocity sample with the newest pressure and force sum.
+
+    Returns:
+        The next state and the estimate, every number of which is finite.
+    """
+    state, estimate, seen, friction = estimate_at(parameters, state, sample)
+    return learn_from(parameters, state, estimate, seen, friction), estimate
+
+
+@compilable
+def estimate_at(
+    parameters: EstimatorParameters, state: EstimatorState, sample: RodSample
+) -> tuple[EstimatorState, FrictionEstimate, Observation, ActuatorFriction]:
+    """Estimate the friction of the seals at one rod-velocity sample by what was learnt before.
 
     A pressure or force sum that is not finite, out of range, or jumps is never used: the last usable one stays in use
     until it is stale, and the status says so. The state is UNKNOWN and the friction force 0 N with such a velocity,
@@ -415,7 +433,7 @@ def step(
         sample: Velocity sample with the newest pressure and force sum.
 
     Returns:
-        The next state and the estimate, every number of which is finite.
+        The next state, the estimate, every number of which is finite, and the rest of what `learn_from` takes.
 
     Source: thesis, chapter 7 (Figures 20 and 21); what is done with unusable inputs is our choice.
     """
@@ -427,13 +445,51 @@ def step(
         friction = friction_of_seals(parameters.seal_numbers, pressure.chamber_a, pressure.chamber_b, seen.velocity)
     if parameters.has_temperature_scale:
         seen, friction = _at_seal_temperature(parameters, seen, friction, sample.temperature)
-    if not parameters.adapts:
-        estimate = estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
-        state, estimate = _with_sheared_seals(
-            parameters.adaptation, parameters.followed_elasticity, state, seen, friction, estimate
-        )
-        return _with_swing(state, seen, last_stamp, estimate) if seen.velocity != 0.0 else (state, estimate)
-    return _adapted_step(parameters, state, seen, friction, last_stamp)
+    if parameters.adapts:
+        adapted, estimate = _estimate_with_learnt(parameters, state.adaptation, seen, friction)
+    else:
+        adapted, estimate = friction, estimate_of(parameters, seen, friction, 1.0, 0.0, 0.0, 0.0)
+    state, estimate = _with_sheared_seals(
+        parameters.adaptation, parameters.followed_elasticity, state, seen, adapted, estimate
+    )
+    if seen.velocity != 0.0:
+        state, estimate = _with_swing(state, seen, last_stamp, estimate)
+    return state, estimate, seen, friction
+
+
+@compilable
+def learn_from(
+    parameters: EstimatorParameters,
+    state: EstimatorState,
+    estimate: FrictionEstimate,
+    seen: Observation,
+    friction: ActuatorFriction,
+) -> EstimatorState:
+    """State after learning from a sample, if adaptation is on and the sample is due.
+
+    Args:
+        parameters: Settings and seals.
+        state: From `estimate_at`, like the other arguments.
+        estimate: Of this sample.
+        seen: The sample after the checks.
+        friction: By the seal files.
+    """
+    stamp, velocity, force_sum, _, _ = seen
+    if not parameters.adapts or not is_due(state.adaptation, stamp):
+        return state
+    status = estimate.status & ~_MODEL_DISAGREES
+    slide = Slide(
+        stamp,
+        velocity,
+        force_sum,
+        friction.coulomb_friction + friction.velocity_friction,
+        friction.coulomb_friction_std,
+        state.pressure.chamber_a,
+        state.pressure.chamber_b,
+        not status & ~_EXTRAPOLATED,
+        status == 0,
+    )
+    return _with_learnt(state, adapt(parameters.adaptation, state.adaptation, slide), state.shear, state.swing)
 
 
 @compilable
@@ -466,17 +522,12 @@ def _at_seal_temperature(
 
 
 @compilable
-def _adapted_step(
-    parameters: EstimatorParameters,
-    state: EstimatorState,
-    seen: Observation,
-    friction: ActuatorFriction,
-    last_stamp: int,
-) -> tuple[EstimatorState, FrictionEstimate]:
-    """Second half of a step with adaptation: estimate by what was learnt before, then learn from this sample."""
-    settings, uses_scale, known = parameters.adaptation, parameters.uses_scale, state.adaptation
+def _estimate_with_learnt(
+    parameters: EstimatorParameters, known: AdaptationState, seen: Observation, friction: ActuatorFriction
+) -> tuple[ActuatorFriction, FrictionEstimate]:
+    """Friction and estimate by what was learnt before this sample."""
+    settings, uses_scale, learnt = parameters.adaptation, parameters.uses_scale, known.learnt
     stamp, velocity, force_sum, status, input_age = seen
-    learnt = known.learnt
     adapted = with_scale(friction, learnt, stamp, uses_scale)
     if disagrees(settings, learnt, friction, uses_scale, velocity == 0.0):
         seen = Observation(stamp, velocity, force_sum, status | _MODEL_DISAGREES, input_age)
@@ -489,25 +540,7 @@ def _adapted_step(
         left = residual(settings, known, velocity, force_sum, law)
         if not uses_scale:
             left += (learnt.scale - 1.0) * law * (1.0 if velocity > 0.0 else -1.0)
-    estimate = estimate_of(parameters, seen, adapted, learnt.scale, scale_std, learnt.offset, left)
-    state, estimate = _with_sheared_seals(settings, parameters.followed_elasticity, state, seen, adapted, estimate)
-    if velocity != 0.0:
-        state, estimate = _with_swing(state, seen, last_stamp, estimate)
-    if not is_due(known, stamp):
-        return state, estimate
-    status = estimate.status & ~_MODEL_DISAGREES
-    slide = Slide(
-        stamp,
-        velocity,
-        force_sum,
-        law,
-        friction.coulomb_friction_std,
-        state.pressure.chamber_a,
-        state.pressure.chamber_b,
-        not status & ~_EXTRAPOLATED,
-        status == 0,
-    )
-    return _with_learnt(state, adapt(settings, known, slide), state.shear, state.swing), estimate
+    return adapted, estimate_of(parameters, seen, adapted, learnt.scale, scale_std, learnt.offset, left)
 
 
 @compilable

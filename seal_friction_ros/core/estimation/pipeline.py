@@ -4,8 +4,8 @@
 in order of receipt. The node passes a function that publishes, replay one that collects.
 
 A velocity sample makes an estimate with the newest pressure and force sum, and, once there has been a reference, a
-feed-forward. The estimate is emitted before the feed-forward is computed. While no velocity sample comes, the ticks
-of the watchdog make the feed-forward, so that it fades out.
+feed-forward. The estimate is emitted before anything is learnt from its sample, and before the feed-forward is
+computed. While no velocity sample comes, the ticks of the watchdog make the feed-forward, so that it fades out.
 
 ``received`` is the time of receipt, which a bag holds as log time. How old an input is for the feed-forward is
 counted on this clock, which never jumps; a message with the stamp of the one before is no new sample.
@@ -31,9 +31,10 @@ from seal_friction_ros.core.estimation.estimator import (
     NO_VELOCITY,
     EstimatorParameters,
     EstimatorState,
+    estimate_at,
+    learn_from,
     temperature_in_use,
 )
-from seal_friction_ros.core.estimation.estimator import step as estimator_step
 from seal_friction_ros.core.estimation.feedforward import (
     FADED_IN,
     FADED_OUT,
@@ -199,8 +200,9 @@ def receive_velocity(parameters: Any, state: PipelineState, velocity: Any, recei
     stamp, given, frame_id = velocity
     is_new = known.stamp != stamp
     sample = RodSample(stamp, given, pressure, force, refused, (received + offset - stamp) * 1e-9, temperature)
-    known, estimate = estimator_step(parameters.estimator, known, sample)
+    known, estimate, seen, friction_by_law = estimate_at(parameters.estimator, known, sample)
     send(emit, estimate, frame_id)
+    known = learn_from(parameters.estimator, known, estimate, seen, friction_by_law)
     if is_new and not estimate.status & NO_VELOCITY:
         receipt = ReceiptTimes(received, receipt.pressure, receipt.force, receipt.reference)
     friction = estimate.coulomb_friction if usable(parameters.feedforward, estimate) else -1.0

@@ -9,6 +9,7 @@ from harness.answers import NOTHING, receive_one
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from seal_friction_ros.core.estimation import adaptation, estimator
 from seal_friction_ros.core.estimation.adaptation import NOTHING_LEARNT, AdaptationSettings
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Limited
@@ -76,6 +77,21 @@ def run(messages, parameters=PARAMETERS, times=None):
         if answer is not NOTHING:
             answers.append(answer)
     return answers
+
+
+def test_nobody_waits_for_what_is_learnt_from_a_sample(monkeypatch):
+    """The estimate goes out before anything is learnt from its sample, which takes nearly as long as the estimate."""
+    order = []
+
+    def adapt(*arguments):
+        order.append('learnt')
+        return adaptation.adapt(*arguments)
+
+    monkeypatch.setattr(estimator, 'adapt', adapt)
+    state = init_running(PARAMETERS)
+    for message in (Pressure(MS, 3e6, 1e6), Force(MS, 20.0), ServoReference(MS, 0.0, 0.1, 0.0), Velocity(MS, 0.1, b'')):
+        state = receive(PARAMETERS, state, message, MS, lambda answer, _frame: order.append(type(answer).__name__))
+    assert order == ['FrictionEstimate', 'learnt', 'FeedForward']
 
 
 def run_state(messages, parameters=PARAMETERS):
