@@ -10,8 +10,7 @@ Percentiles are those of a round, and of them the median over all rounds; so is 
 by round: a slow moment of the machine is one bad round, not a wrong result. The maximum and what is missed are of all.
 
 ``--before TREE`` measures the estimator beside that of another checkout, which has its own ``.venv``, instead of bare
-nodes. The ratio is close to 1 then, and given with its standard error. Rounds are longer, and each has new nodes: two
-processes of the same node differ by some percent as long as they live.
+nodes. The ratio is close to 1 then: it is given with its standard error, and rounds are longer.
 
 ``--busy 2 --realtime 50`` keeps both cores of a small machine busy and gives all processes real-time priority.
 """
@@ -84,15 +83,14 @@ class Rounds:
     duration: float  # [s]
     samples: int  # at least
     warm_up: float  # [s] at its beginning that does not count: the node has slept while others were asked
-    new_nodes: bool  # whether each round has new nodes
 
     def number(self, rate: int) -> int:
         """Samples of a round at ``rate`` [Hz]."""
         return max(round(self.duration * rate), self.samples)
 
 
-SHORT = Rounds(0.5, 300, 0.02, False)
-LONG = Rounds(3.0, 300, 1.5, True)  # the watchdog acts a hundred times a second in the first second after a pause
+SHORT = Rounds(0.5, 300, 0.02)
+LONG = Rounds(1.0, 300, 1.2)  # the watchdog acts a hundred times a second in the first second after a pause
 _STAMP = struct.Struct('<4xiI')
 _PATIENCE = 60.0  # [s] the first compiled node compiles
 _BUSY = 'import os; os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))\nwhile True: pass'
@@ -292,18 +290,16 @@ def measure(
     """Ask all of them in turn, to and fro."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     found = {case: {rate: Figures() for rate in rates} for case in cases}
-    rounds = [rate for rate in rates for _ in range(max(round(seconds * rate / lengths.number(rate)), 1))]
-    starts = [[rate] for rate in rounds] if lengths.new_nodes else [rounds]
-    with Progress(console=Console(stderr=True)) as progress:
-        task = progress.add_task('round trips', total=len(rounds) * len(cases))
-        for number, start in enumerate(starts):
-            with ExitStack() as stack:
-                folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-                askers = [stack.enter_context(node(case, folder, realtime, before)) for case in cases]
-                for turn, rate in enumerate(start, number):
-                    for asker in askers[:: 1 if turn % 2 == 0 else -1]:
-                        ask(asker, rate, lengths, found[asker.case][rate])
-                        progress.advance(task)
+    with ExitStack() as stack, Progress(console=Console(stderr=True)) as progress:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        askers = [stack.enter_context(node(case, folder, realtime, before)) for case in cases]
+        rounds = {rate: max(round(seconds * rate / lengths.number(rate)), 1) for rate in rates}
+        task = progress.add_task('round trips', total=sum(rounds.values()) * len(askers))
+        for rate in rates:
+            for turn in range(rounds[rate]):
+                for asker in askers[:: 1 if turn % 2 == 0 else -1]:
+                    ask(asker, rate, lengths, found[asker.case][rate])
+                    progress.advance(task)
     return found
 
 
