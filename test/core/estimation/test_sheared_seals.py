@@ -39,6 +39,7 @@ from seal_friction_ros.core.estimation.sheared_seals import (
 from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
+from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.presliding import (
     NO_ELEMENTS,
     NOT_SHEARED,
@@ -124,6 +125,18 @@ def test_the_status_tells_where_the_seals_may_still_shear_and_the_state_is_that_
     assert (after.state, after.direction) == (FrictionState.SLIDING, -1)
     assert after.coulomb_friction_std > before.coulomb_friction_std
     assert not found[-1].status & Status.PRESLIDING
+
+
+def test_while_all_seals_slide_the_friction_follows_the_speed_over_the_memory_length():
+    remembers = dataclasses.replace(SOFT, memory_length=0.002)
+    slippery = parameters(remembers, velocity_terms=VelocityTerms(viscous_friction=500.0))
+    found = estimates(slippery, np.repeat([0.02, 0.05], 1000), np.zeros(2000))
+    slow, fast = 2.0 * 500.0 * 0.02, 2.0 * 500.0 * 0.05  # [N] of two seals
+    for i in (1, 20, 40, 1000):
+        way = 0.05 * i * 1e-3 - 0.5 * (0.05 - 0.02) * 1e-3  # [m] the velocity changes over the first sample
+        added = fast + (slow - fast) * math.exp(-way / 0.002)
+        assert found[999 + i].friction_force == pytest.approx(found[999 + i].coulomb_friction + added, rel=1e-4)
+        assert not found[999 + i].status & Status.PRESLIDING
 
 
 def test_stiff_seals_are_rigid_ones_after_a_micrometre():
