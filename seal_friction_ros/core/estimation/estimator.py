@@ -433,7 +433,7 @@ def estimate_at(
         sample: Velocity sample with the newest pressure and force sum.
 
     Returns:
-        The next state, the estimate, every number of which is finite, and the rest of what `learn_from` takes.
+        The state before it learns, the estimate, every number of which is finite, and what else `learn_from` takes.
 
     Source: thesis, chapter 7 (Figures 20 and 21); what is done with unusable inputs is our choice.
     """
