@@ -92,7 +92,9 @@ _DETERMINANT_HESSIAN = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1,
 def shear_response(rubber: Rubber, gradient: FloatArray) -> MaterialResponse:
     """Shear energy density with its derivatives, for a deformation gradient of shape (..., 5) with D > 0 and t > 0."""
     c10, c01 = mooney_rivlin_constants(rubber)
-    plane, hoop = gradient[..., :4], gradient[..., 4]
+    plane = gradient[..., :4]
+    # A copy: numpy 1.26 rounds powers of a view differently if their result happens to lie right behind it in memory.
+    hoop = np.ascontiguousarray(gradient[..., 4])
     squares = (plane**2).sum(axis=-1)
     cofactor = _cofactor(plane)
     area = 0.5 * (plane * cofactor).sum(axis=-1)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from seal_friction_msgs.msg import FrictionFeedForward
 
 from seal_friction_ros.core.estimation.feedforward import (
     FADED_IN,
@@ -365,11 +364,3 @@ def test_seals_without_friction_bear_nothing_and_those_of_an_unknown_friction_st
     held = FADED_IN._replace(elements=Elements(1.0, 1.0, 1.0, 1.0, 1.0, 1.0))
     assert first_elements((0.0, 0.01), state=held) == NO_ELEMENTS
     assert first_elements((NONE, 0.01), state=held) == held.elements
-
-
-def test_the_bits_in_the_message_definition_are_those_of_the_code():
-    assert {bit.name: bit.value for bit in Limited} == {
-        'SLEW': FrictionFeedForward.SLEW,
-        'CLAMP': FrictionFeedForward.CLAMP,
-        'FADE': FrictionFeedForward.FADE,
-    }

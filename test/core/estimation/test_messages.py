@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from seal_friction_msgs import msg as messages
 
 from seal_friction_ros.core.estimation import messages as wire
-from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.records import (
     Force,
     FrictionEstimate,
@@ -300,8 +300,8 @@ def test_a_text_that_is_none_is_refused(data):
 # --- the message definition ---
 
 
-def constants(kind: str) -> dict[str, int]:
-    text = (DEFINITIONS / 'FrictionEstimate.msg').read_text()
+def constants(kind: str, message: str = 'FrictionEstimate') -> dict[str, int]:
+    text = (DEFINITIONS / f'{message}.msg').read_text()
     return {name: int(value) for name, value in re.findall(rf'^{kind}\s+([A-Z_]+)\s*=\s*(\d+)', text, re.MULTILINE)}
 
 
@@ -311,6 +311,7 @@ def test_states_in_the_message_definition_are_those_of_the_code():
 
 def test_status_bits_in_the_message_definition_are_those_of_the_code():
     assert constants('uint32') == {bit.name: bit.value for bit in Status}
+    assert constants('uint32', 'FrictionFeedForward') == {bit.name: bit.value for bit in Limited}
 
 
 def test_status_bits_are_different_powers_of_two():
@@ -320,6 +321,8 @@ def test_status_bits_are_different_powers_of_two():
 def test_the_generated_message_has_the_constants_of_the_code():
     for member in (*FrictionState, *Status):
         assert getattr(messages.FrictionEstimate, member.name) == member.value
+    for bit in Limited:
+        assert getattr(messages.FrictionFeedForward, bit.name) == bit.value
 
 
 CODES = {'double': 'd', 'uint8': 'B', 'int8': 'b', 'uint32': 'I'}
