@@ -2,7 +2,7 @@
 
 Nodes, each a process and a graph of its own, are asked in turn, in many short rounds: an rclpy node that sends each
 message back, with the SingleThreadedExecutor and with the events executor, and the estimator without and with
-recording, as Python and compiled. The echo has one topic; the estimator three in and two out, all recorded. A round
+recording. The echo has one topic; the estimator three in and two out, all recorded. A round
 trip is from the publishing of a velocity to the arrival of the answer in this process. The bare nodes and who asks have
 Fast DDS as it comes, the estimator as this package sets it up.
 
@@ -54,24 +54,19 @@ from seal_friction_ros.nodes.executor import spin
 RATES = (100, 500, 1000)  # [Hz]
 BARE, EVENTS = 'bare echo, SingleThreadedExecutor', 'bare echo, events executor'
 ALONE, RECORDING = 'estimator', 'estimator, recording'
-COMPILED, COMPILED_RECORDING = 'estimator, compiled', 'estimator, compiled, recording'
 BEFORE, BEFORE_RECORDING = 'estimator before', 'estimator before, recording'
 CASES = {
     BARE: '',
     EVENTS: BARE,
     ALONE: BARE,
     RECORDING: BARE,
-    COMPILED: BARE,
-    COMPILED_RECORDING: BARE,
 }
 """Each case, and the one that it is compared with."""
 CASES_BEFORE = {
     BEFORE: '',
     ALONE: BEFORE,
-    COMPILED: BEFORE,
     BEFORE_RECORDING: '',
     RECORDING: BEFORE_RECORDING,
-    COMPILED_RECORDING: BEFORE_RECORDING,
 }
 """The same with another tree."""
 
@@ -92,7 +87,7 @@ class Rounds:
 SHORT = Rounds(0.5, 300, 0.02)
 LONG = Rounds(1.0, 300, 1.2)  # the watchdog acts a hundred times a second in the first second after a pause
 _STAMP = struct.Struct('<4xiI')
-_PATIENCE = 60.0  # [s] the first compiled node compiles
+_PATIENCE = 60.0  # [s] until the first answer
 _BUSY = 'import os; os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))\nwhile True: pass'
 
 
@@ -268,9 +263,7 @@ def node(case: str, folder: Path, realtime: int, before: Path | None = None) -> 
             stack.callback(process.kill)
         else:
             values: dict[str, Any] = {'feedforward.use_measured_velocity': True, 'realtime_priority': realtime}
-            if case in (COMPILED, COMPILED_RECORDING):
-                values |= {'compiled': True}
-            if case in (RECORDING, COMPILED_RECORDING, BEFORE_RECORDING):
+            if case in (RECORDING, BEFORE_RECORDING):
                 values |= {'record': True, 'record_directory': str(folder), 'record_name': case}
             tree = of_tree(before) if before is not None and case in (BEFORE, BEFORE_RECORDING) else {}
             process = stack.enter_context(node_process('friction_estimator', domain, values, log, **tree))

@@ -2,7 +2,7 @@
 
 One ``sensor_msgs/JointState`` with all velocities, two ``std_msgs/Float64MultiArray`` with all pressures and one
 ``JointState`` with all references at ``--rate``; two answers of each actuator out, all recorded. Beside it, in the same
-run and in turn, the estimator of one actuator with its own messages (four in, two out, recorded), the machine compiled,
+run and in turn, the estimator of one actuator with its own messages (four in, two out, recorded), the machine,
 and the machine with an array of commands for a controller as well. Ratios are those of a round, and of them the median.
 Processor time is that of the whole process, its middleware and its recorder among it.
 
@@ -55,7 +55,7 @@ from seal_friction_ros.offline.replay.replay import replay
 
 OWN = 'one actuator, own messages'
 WARM_UP = 0.5  # [s] of a round, not counted
-_PATIENCE = 60.0  # [s] the first compiled node compiles
+_PATIENCE = 60.0  # [s] until the first answer
 NO_FORCE = FeedForward(0, 0.0, 0.0, 0)
 
 
@@ -64,7 +64,6 @@ class Case(NamedTuple):
 
     count: int  # of actuators; 0: one, with its own messages
     together: bool = False  # whether the answers are one message
-    compiled: bool = False  # whether the estimator is
     commands: bool = False  # whether it also publishes what a controller takes
     bare: bool = False  # whether it is a node that only takes and sends
 
@@ -74,7 +73,7 @@ class Case(NamedTuple):
         if not self.count:
             return OWN
         kind = 'bare node with the messages of' if self.bare else 'machine of'
-        form = ', answers together' * self.together + ', and commands' * self.commands + ', compiled' * self.compiled
+        form = ', answers together' * self.together + ', and commands' * self.commands
         return f'{kind} {self.count}{form}'
 
 
@@ -223,7 +222,6 @@ def node(case: Case, folder: Path) -> Iterator[Asker]:
         'record': True,
         'record_directory': str(folder),
         'record_name': case.name,
-        'compiled': case.compiled,
     }
     if case.count:
         path = folder / f'{case.name}.yaml'
@@ -252,15 +250,16 @@ class Round(NamedTuple):
 
     cost: float  # [us] per actuator and sample
     of_own: float  # [-] of the cost of one actuator with its own messages in this round
-    of_plain: float  # [-] of the cost of the same machine without compiled code
     load: float  # [-] of one core
     missed: int
 
 
 def groups(count: int) -> list[list[Case]]:
     """Machines of ``count`` actuators that are asked in turn: the nodes of a group run at the same time."""
-    pairs = [[Case(count, together, compiled) for compiled in (False, True)] for together in (False, True)]
-    return [*pairs, [Case(count, together=True, commands=True), Case(count, bare=True)]]
+    return [
+        [Case(count), Case(count, together=True)],
+        [Case(count, together=True, commands=True), Case(count, bare=True)],
+    ]
 
 
 def main() -> int:
@@ -286,15 +285,13 @@ def main() -> int:
                 for _ in range(arguments.rounds):
                     rounds = {one: asker.round(arguments.rate, arguments.seconds) for one, asker in askers.items()}
                     for one, (cost, load, missed) in rounds.items():
-                        others = cost / rounds[Case(0)][0], cost / rounds[group[0]][0]
-                        found.setdefault(one, []).append(Round(cost, *others, load, missed))
+                        found.setdefault(one, []).append(Round(cost, cost / rounds[Case(0)][0], load, missed))
             shutil.rmtree(folder / OWN)
         identical = {one: replay(folder / one.name).identical for one in found if one.count and not one.bare}
     figures = {
         one.name: {
             'per actuator and sample [us]': round(median(r.cost for r in rounds), 1),
             'of one with own messages': round(median(r.of_own for r in rounds), 2),
-            'of the same, not compiled': round(median(r.of_plain for r in rounds), 2) if one.compiled else '',
             'load of one core [%]': round(100 * median(r.load for r in rounds)),
             'missed': sum(r.missed for r in rounds),
             'replay identical': identical.get(one, ''),

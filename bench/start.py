@@ -1,7 +1,7 @@
 """How long things take to start: ``python bench/start.py [--times 7] [--json]``.
 
 ``seal_friction --help`` and the completion of a command beside the bare interpreter, and the estimator from the start
-of its process to its first estimate, while inputs come at 1 kHz, as Python and compiled. Medians; the caches of the
+of its process to its first estimate, while inputs come at 1 kHz. Medians; the caches of the
 operating system are warm after the first round. Once each: the compiled estimator where no compiled code is kept, and
 the memory of both.
 """
@@ -55,7 +55,7 @@ class Start(NamedTuple):
     memory: float  # [MB] resident then
 
 
-def first_estimate(*, compiled: bool = False) -> Start:
+def first_estimate() -> Start:
     """Start the estimator while inputs come.
 
     Raises:
@@ -64,7 +64,7 @@ def first_estimate(*, compiled: bool = False) -> Start:
     domain = free_domain()
     with Asker(ALONE, domain, None) as asker, tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        with node_process('friction_estimator', domain, {'compiled': compiled}, Path(folder) / 'log') as process:
+        with node_process('friction_estimator', domain, {}, Path(folder) / 'log') as process:
             while not asker.round_trips:
                 if time.perf_counter() > start + PATIENCE:
                     raise RuntimeError('no estimate comes')
@@ -73,18 +73,6 @@ def first_estimate(*, compiled: bool = False) -> Start:
             seconds = time.perf_counter() - start
             status = Path(f'/proc/{process.pid}/status').read_text()
     return Start(seconds, int(status.partition('VmRSS:')[2].split()[0]) / 1024.0)
-
-
-def compiled_anew() -> Start:
-    """`first_estimate` compiled, where no compiled code is kept yet."""
-    kept = {name: os.environ.pop(name, None) for name in ('NUMBA_CACHE_DIR', 'XDG_CACHE_HOME')}
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ['XDG_CACHE_HOME'] = folder
-        try:
-            return first_estimate(compiled=True)
-        finally:
-            del os.environ['XDG_CACHE_HOME']
-            os.environ |= {name: value for name, value in kept.items() if value is not None}
 
 
 def main() -> int:
@@ -99,7 +87,6 @@ def main() -> int:
         'seal_friction --help': lambda: run([*COMMAND, '--help']),
         'completion of a command': lambda: run(COMMAND, ASKED),
         'estimator, to the first estimate': lambda: first_estimate().seconds,
-        'compiled estimator, to the first estimate': lambda: first_estimate(compiled=True).seconds,
     }
     times: dict[str, list[float]] = {name: [] for name in measured}
     for number in range(arguments.times + 1):
@@ -108,9 +95,7 @@ def main() -> int:
             if number:  # the first round warms the caches
                 times[name].append(duration)
     found = {f'{name} [s]': round(median(durations), 3) for name, durations in times.items()}
-    found['compiled estimator, to the first estimate, nothing kept [s]'] = round(compiled_anew().seconds, 1)
     found['estimator, memory [MB]'] = round(first_estimate().memory)
-    found['compiled estimator, memory [MB]'] = round(first_estimate(compiled=True).memory)
     if arguments.json:
         print(json.dumps(found))
         return 0

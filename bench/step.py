@@ -31,7 +31,6 @@ from seal_friction_msgs.msg import RodVelocity
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.processes import free_domain
 
-from seal_friction_ros.core.estimation import compiled_state
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, step
 from seal_friction_ros.core.estimation.estimator import init as init_estimator
@@ -112,9 +111,6 @@ def stages() -> dict[str, Callable[[], object]]:
         'receive velocity': lambda: receive(parameters, alone, velocity, 1, drop),
         'receive velocity, with feed-forward': lambda: receive(parameters, guided, velocity, 1, drop),
         'receive three messages, with feed-forward': samples(receive, measured, init(measured)),
-        'receive three messages, with feed-forward, compiled': samples(
-            compiled_state.receive, measured, compiled_state.CompiledState(measured, init(measured))
-        ),
         'encode estimate': lambda: encode(*estimate),
         'encode estimate and feed-forward': lambda: [encode(*estimate), encode(*feedforward)],
     }

@@ -1,22 +1,18 @@
 """What the estimator of one actuator and that of a machine share: clock of receipt, recording, watch of the graph."""
 
-import gc
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.compiled_code import keep_compiled_code
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, OUTPUTS, encode, encode_text, type_of
-from seal_friction_ros.core.estimation.node_options import InputOptions, RecordingOptions, SpeedOptions
-from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, receive
-from seal_friction_ros.core.foundation.compiled import runs_as_python
+from seal_friction_ros.core.estimation.node_options import InputOptions, RecordingOptions
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE, TopicMessage, encode_newest
@@ -41,14 +37,6 @@ LAST_FORCES = (
 )
 _HEALTH, _MONITOR = 'health', 'monitor'  # keys of their publishers
 _TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
-
-
-class EstimatorInUse(NamedTuple):
-    """`pipeline` as it is, or compiled."""
-
-    receive: Callable[..., Any]
-    hold: Callable[[PipelineParameters, PipelineState], Any]
-    """makes the state of records that ``receive`` takes"""
 
 
 class EstimatorNode(ManagedNode, ABC):
@@ -136,26 +124,6 @@ class EstimatorNode(ManagedNode, ABC):
         """The newest answers of each actuator since the last call, see `EstimatorDiagnostics.take_newest`."""
 
     # --- lifecycle ---
-
-    def estimator_in_use(self, parameters: Collection[PipelineParameters]) -> 'EstimatorInUse':
-        """The estimator, compiled for these parameters if ``compiled`` is set.
-
-        Raises:
-            ValueError: There is no compiler, or it is told to do nothing.
-        """
-        if not self.settings(SpeedOptions).compiled:
-            return EstimatorInUse(receive, lambda _parameters, state: state)
-        keep_compiled_code()
-        if runs_as_python():
-            raise ValueError('compiled: true needs numba, and NUMBA_DISABLE_JIT must not be set')
-        from seal_friction_ros.core.estimation import compiled_state  # noqa: PLC0415  loads the compiler
-
-        self.get_logger().info('compiling: some 15 s the first time')
-        for one in parameters:
-            compiled_state.compile_now(one)
-        if gc.get_freeze_count():  # configured while the executor runs: see there
-            gc.freeze()
-        return EstimatorInUse(compiled_state.receive, compiled_state.CompiledState)
 
     def release(self) -> None:
         """Destroy publishers, subscriptions and timers."""

@@ -32,7 +32,7 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.node_options import (
     FRICTION_ESTIMATOR_PARAMETERS,
 )
-from seal_friction_ros.core.estimation.pipeline import init, is_tick_due
+from seal_friction_ros.core.estimation.pipeline import init, is_tick_due, receive
 from seal_friction_ros.core.estimation.records import WatchdogTick
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.files import load_configuration
@@ -75,7 +75,6 @@ class FrictionEstimator(EstimatorNode):
             self.get_logger().warning(PLACEHOLDER_WARNING)
         self._statistics = EstimatorDiagnostics()
         answers = {type_name: type_name for type_name in OUTPUTS.values()}
-        self._estimator = self.estimator_in_use([configuration.parameters()])
         self._watch = GraphWatch(self, self._inputs, INPUTS, self._outputs, answers, self.subscribe)
         for topic, type_name in OUTPUTS.items():
             self.create_output(type_name, topic, type_name)
@@ -98,7 +97,7 @@ class FrictionEstimator(EstimatorNode):
         """Start to estimate from the initial state, and to record if ``record`` is set."""
         self._known = self._configuration.parameters()
         refused = self.is_refused(self._watch.duplicate_publishers())
-        self._state = self._estimator.hold(self._known, init(self._known)._replace(refused=refused))
+        self._state = init(self._known)._replace(refused=refused)
         self._statistics = EstimatorDiagnostics()
         self.begin()
 
@@ -142,7 +141,7 @@ class FrictionEstimator(EstimatorNode):
         received = self._now()
         self._sent.clear()
         before = self._state
-        self._state = self._estimator.receive(self._known, before, message, received, self._send)
+        self._state = receive(self._known, before, message, received, self._send)
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
@@ -177,7 +176,7 @@ class FrictionEstimator(EstimatorNode):
     def _tick(self, received: int) -> None:
         tick = WatchdogTick(received + self._state.clock_offset, (received - self._state.feedforward.received) * 1e-9)
         self._sent.clear()
-        self._state = self._estimator.receive(self._known, self._state, tick, received, self._send)
+        self._state = receive(self._known, self._state, tick, received, self._send)
         self._recording.record(self._topics[TICK_TYPE], TICK_TYPE, received, encode(tick))
         self._record_answers()
 
@@ -220,7 +219,7 @@ class FrictionEstimator(EstimatorNode):
 
     def snapshot(self) -> str:
         """All that the next answer depends on, as text."""
-        return snapshot_text(Snapshot(self._configuration, self._state.records))
+        return snapshot_text(Snapshot(self._configuration, self._state))
 
     def reset_adaptation(self) -> None:
         """Forget what the adaptation has learnt."""

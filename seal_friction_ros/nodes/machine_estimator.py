@@ -88,7 +88,6 @@ class MachineEstimator(EstimatorNode):
         self._machine = self._made()
         if any(actuator.configuration.has_placeholder for actuator in self._machine.actuators):
             self.get_logger().warning(PLACEHOLDER_WARNING)
-        self._estimator = self.estimator_in_use([actuator.pipeline for actuator in self._machine.actuators])
         self._types = {topic: full_name(self._file.topics[topic]) for topic in self._machine.plans}
         self._new_statistics()
         answers = {('', MACHINE_TYPE): '~/friction'}
@@ -144,11 +143,7 @@ class MachineEstimator(EstimatorNode):
 
     def start(self) -> None:
         """Start to estimate from the initial state, and to record if ``record`` is set."""
-        first = _with(init(self._machine), refused=self.is_refused(self._watch.duplicate_publishers()))
-        pairs = zip(self._machine.actuators, first.actuators, strict=True)
-        self._state = MachineState(
-            tuple(k._replace(pipeline=self._estimator.hold(actuator.pipeline, k.pipeline)) for actuator, k in pairs)
-        )
+        self._state = _with(init(self._machine), refused=self.is_refused(self._watch.duplicate_publishers()))
         self._new_statistics()
         self._newest.clear()
         self.begin()
@@ -163,7 +158,7 @@ class MachineEstimator(EstimatorNode):
         received, before = self._now(), self._state
         self._sent.clear()
         try:
-            self._state = receive(self._machine, self._state, name, data, received, self._send, self._estimator.receive)
+            self._state = receive(self._machine, self._state, name, data, received, self._send)
         except ValueError as error:
             for listener in self._listeners[name]:
                 self._statistics[listener].on_malformed(name)
@@ -251,9 +246,7 @@ class MachineEstimator(EstimatorNode):
         made = self._state.actuators[number].pipeline.feedforward.received
         tick = WatchdogTick(received + self.clock_offset, (received - made) * 1e-9)
         self._sent.clear()
-        self._state = receive_tick(
-            self._machine, self._state, number, tick, received, self._send, self._estimator.receive
-        )
+        self._state = receive_tick(self._machine, self._state, number, tick, received, self._send)
         self._send_together()
         made = self._command(received)
         self._recording.record(self._ticks[number], TICK_TYPE, received, encode(tick))

@@ -32,7 +32,6 @@ from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PA
 from seal_friction_ros.core.estimation.records import Velocity
 from seal_friction_ros.core.friction.actuator import actuator_friction
 from seal_friction_ros.files import default_configuration, load_parameter_file
-from seal_friction_ros.nodes import estimator_node
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.bags.topics import find_topics
@@ -331,9 +330,8 @@ def test_quality_of_service_can_be_overridden():
         assert g.estimator.get_parameter('qos_overrides./rod_velocity.subscription.depth').value == 7
 
 
-@pytest.mark.parametrize('compiled', [False, True])
-def test_a_recording_started_by_service_during_motion_replays_bit_for_bit(tmp_path: Path, compiled: bool):
-    with graph({'record_directory': str(tmp_path), 'compiled': compiled}) as g:
+def test_a_recording_started_by_service_during_motion_replays_bit_for_bit(tmp_path: Path):
+    with graph({'record_directory': str(tmp_path)}) as g:
         g.connect()
         for i in range(5):
             g.estimate(SECOND + i * 10**6, 0.0015 if i else 0.1, force=3.0)
@@ -348,10 +346,9 @@ def test_a_recording_started_by_service_during_motion_replays_bit_for_bit(tmp_pa
     assert replay(Path(started.message)).identical
 
 
-@pytest.mark.parametrize('compiled', [False, True])
-def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Path, compiled: bool):
+def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Path):
     recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
-    with graph({'compiled': compiled, **recording}) as g:
+    with graph(recording) as g:
         g.connect()
         g.estimate(SECOND, 0.003)
         request = SetParametersAtomically.Request(
@@ -366,10 +363,9 @@ def test_a_parameter_change_during_a_recording_replays_bit_for_bit(tmp_path: Pat
     assert replay(tmp_path / 'bag').identical
 
 
-@pytest.mark.parametrize('compiled', [False, True])
-def test_a_recording_holds_states_between_which_it_verifies_by_itself(tmp_path: Path, compiled: bool):
+def test_a_recording_holds_states_between_which_it_verifies_by_itself(tmp_path: Path):
     recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag', 'record_state_period': 0.5}
-    with graph({'compiled': compiled, **recording}) as g:
+    with graph(recording) as g:
         g.connect()
         bag, number = tmp_path / 'bag', 0
         recorded = g.estimator._recording.record
@@ -426,13 +422,6 @@ def test_an_invalid_seal_file_prevents_the_start_and_the_log_names_the_field(tmp
         assert g.probe.count_publishers('friction_estimate') == 0
 
 
-def test_without_a_compiler_a_compiled_node_does_not_start_and_says_why(monkeypatch, capfd):
-    monkeypatch.setattr(estimator_node, 'runs_as_python', lambda: True)
-    with graph({'compiled': True}, autostart=False) as g:
-        assert not g.estimator.autostart()
-    assert [line for line in capfd.readouterr().err.splitlines() if 'numba' in line and 'ERROR' in line]
-
-
 @pytest.mark.parametrize(('seals', 'warnings'), [({}, 1), ({'seals': ['ms28775_114'], 'seal_chambers': ['a']}, 0)])
 def test_placeholder_seals_are_a_warning_in_the_log(seals: dict[str, object], warnings: int, capfd):
     with graph(seals):
@@ -446,9 +435,8 @@ def test_the_node_declares_the_parameters_of_its_table_and_no_other():
         assert isinstance(g.estimator, FrictionEstimator)
 
 
-@pytest.mark.parametrize('compiled', [False, True])
-def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it(compiled: bool):
-    with graph({'adaptation.mode': 'observe', 'compiled': compiled}) as g:
+def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it():
+    with graph({'adaptation.mode': 'observe'}) as g:
         g.connect()
         g.estimate(SECOND, 0.005)
         assert g.call(Trigger, 'friction_estimator/reset_adaptation', Trigger.Request()).success
@@ -458,9 +446,8 @@ def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it(compiled: bool)
         assert values['adaptation scale std'] == 'not learnt'
 
 
-@pytest.mark.parametrize('compiled', [False, True])
-def test_the_ends_of_strokes_are_followed_and_a_reset_forgets_them(compiled: bool):
-    with graph({'adaptation.mode': 'observe', 'compiled': compiled, 'stamp_age_max': 0.0}) as g:
+def test_the_ends_of_strokes_are_followed_and_a_reset_forgets_them():
+    with graph({'adaptation.mode': 'observe', 'stamp_age_max': 0.0}) as g:
         g.connect()
         for i in range(400):  # a reversal a second, 5 cm/s
             side = 1.0 if i // 100 % 2 else -1.0

@@ -108,12 +108,9 @@ def move_until(nodes: SpunNodes, drivers: Drivers, condition: Callable[[list[flo
     raise AssertionError(drivers.commands[-1])
 
 
-@pytest.mark.parametrize('compiled', [False, True])
 @pytest.mark.parametrize('answers', ['each', 'together'])
-def test_three_actuators_from_one_joint_state_give_estimates_and_one_command_and_replay_to_the_byte(
-    tmp_path, answers, compiled
-):
-    recording = {'compiled': compiled, 'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+def test_three_actuators_from_one_joint_state_give_estimates_and_one_command_and_replay_to_the_byte(tmp_path, answers):
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     with machine(tmp_path, f'answers: {answers}\n{EXCAVATOR}', **recording) as (nodes, node, drivers):
         heard(nodes, node, drivers)
         move_until(nodes, drivers, lambda force: force[0] > 0.0 > force[1] and force[2] > 0.0)
@@ -153,9 +150,8 @@ def test_malformed_bytes_are_counted_and_the_estimate_goes_on(tmp_path):
         assert nodes.spin_until(lambda: 'malformed' in drivers.status('boom').message)
 
 
-@pytest.mark.parametrize('compiled', [False, True])
-def test_the_forces_fall_to_0_when_the_node_stops(tmp_path, compiled):
-    with machine(tmp_path, compiled=compiled) as (nodes, node, drivers):
+def test_the_forces_fall_to_0_when_the_node_stops(tmp_path):
+    with machine(tmp_path) as (nodes, node, drivers):
         heard(nodes, node, drivers)
         move_until(nodes, drivers, lambda force: force[0] > 1.0)
         node.finish()

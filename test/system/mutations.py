@@ -48,15 +48,12 @@ PACKAGE = 'seal_friction_ros'
 REQUIRED = 0.9  # [-] share of killed mutants
 COMPILER = {
     'core/estimation/compiled_pipeline.py': ('test_compiled_pipeline.py',),
-    'core/estimation/compiled_state.py': ('test_compiled_state.py', 'test_compiled_pipeline.py'),
     'core/foundation/compiled.py': ('test_compiled.py',),
 }
 """Modules whose tests run compiled, and these tests: minutes for each mutant."""
 NEEDS_COMPILER = (
     'estimation/test_compiled_pipeline.py',
-    'estimation/test_compiled_state.py',
     'foundation/test_compiled.py',
-    'machine/test_compiled_machine.py',
     'servo/test_compiled.py',
 )
 """Tests that run only there."""

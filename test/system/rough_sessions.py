@@ -2,7 +2,7 @@
 
 A node in a process of its own records while it gets numbers of any size, NaN, bytes that are no message, stamps that
 leap and repeat, frame names of any length, missing joints, other settings, resets of the adaptation, and deactivation
-and activation. One actuator and three, answers each and together, as Python and compiled. Required: the node lives and
+and activation. One actuator and three, answers each and together. Required: the node lives and
 writes no traceback, every force it sends is finite, and every bag replays to the byte.
 """
 
@@ -53,7 +53,6 @@ class Case(NamedTuple):
     """Which node, and how it runs."""
 
     answers: str  # 'one': friction_estimator; 'each', 'together': machine_estimator
-    compiled: bool
 
     @property
     def module(self) -> str:
@@ -61,7 +60,7 @@ class Case(NamedTuple):
         return 'friction_estimator' if self.answers == 'one' else 'machine_estimator'
 
 
-CASES = tuple(Case(answers, compiled) for answers in ('one', 'each', 'together') for compiled in (False, True))
+CASES = tuple(Case(answers) for answers in ('one', 'each', 'together'))
 
 
 class Outcome(NamedTuple):
@@ -169,7 +168,7 @@ def session(case: Case, seed: int, moments: int, folder: Path) -> Outcome:
         RuntimeError: The node does not answer.
     """
     chance, domain, log = random.Random(seed), free_domain(), folder / 'log'  # noqa: S311
-    values: dict[str, Any] = {'compiled': case.compiled, 'record': True, 'record_directory': str(folder)}
+    values: dict[str, Any] = {'record': True, 'record_directory': str(folder)}
     made: Callable[[random.Random, int, float], Messages] = of_one
     if case.answers == 'one':
         values |= {'stamp_age_max': 0.0, 'record_state_period': 0.5}
@@ -217,7 +216,7 @@ def main() -> int:
     found: dict[str, Outcome] = {}
     for number, case in enumerate(CASES * arguments.seeds):
         with tempfile.TemporaryDirectory() as folder:
-            name = f'{case.answers}{", compiled" * case.compiled}, seed {number}'
+            name = f'{case.answers}, seed {number}'
             found[name] = session(case, number, arguments.moments, Path(folder))
     if arguments.json:
         print(json.dumps({name: outcome._asdict() for name, outcome in found.items()}))

@@ -1,4 +1,4 @@
-"""Time to 0 N: ``python test/system/time_to_zero.py [--times 20] [--only TEXT] [--compiled] [--json]``.
+"""Time to 0 N: ``python test/system/time_to_zero.py [--times 20] [--only TEXT] [--json]``.
 
 Stops, freezes, leaps and kills each input and the reference of a live node, and deactivates, interrupts and terminates
 the node. The node runs with its default parameters, each publisher in a process of its own, and this process receives
@@ -354,13 +354,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--times', type=int, default=20, help='tries of each case')
     parser.add_argument('--only', default='', help='only cases with this text in their name')
-    parser.add_argument('--compiled', action='store_true', help='the node with compiled: true')
     parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
-    more = {'compiled': arguments.compiled}
     timed, reversals = ({n: c for n, c in cases.items() if arguments.only in n} for cases in (TIMED, REVERSALS))
-    times = tried(timed, more, arguments.times)
-    beyond = tried(reversals, {'feedforward.slew_limit': SLOW_SLEW, **more}, arguments.times)
+    times = tried(timed, {}, arguments.times)
+    beyond = tried(reversals, {'feedforward.slew_limit': SLOW_SLEW}, arguments.times)
     acting = {name: [one.acting for one in found] for name, found in times.items()} | beyond
     received = {name: [one.received for one in found] for name, found in times.items()} | beyond
     if arguments.json:

@@ -109,19 +109,6 @@ class RecordingOptions:
             raise ValueError(f'RecordingOptions.record_name = {self.record_name!r} is not a plain name of a folder')
 
 
-@dataclass(frozen=True)
-class SpeedOptions:
-    """Speed of the node, one ROS parameter per field."""
-
-    compiled: bool = parameter(
-        False,
-        unit='',
-        live=False,
-        description='Run the estimator compiled: the same answers with less processor time (docs/performance.md). The '
-        'first configuration after an update then takes some 15 s, and the node needs 130 MB more. Needs numba.',
-    )
-
-
 FEEDFORWARD_PREFIX = 'feedforward.'
 """Start of the names of the feed-forward parameters."""
 
@@ -136,7 +123,6 @@ FRICTION_ESTIMATOR_PARAMETERS = (
     ParameterGroup(AdaptationSettings, ADAPTATION_PREFIX),
     ParameterGroup(InputOptions),
     ParameterGroup(RecordingOptions),
-    ParameterGroup(SpeedOptions),
 )
 """Every parameter that the node ``friction_estimator`` declares."""
 
@@ -155,7 +141,6 @@ MACHINE_ESTIMATOR_PARAMETERS = (
     ParameterGroup(MachineOptions),
     ParameterGroup(InputOptions),
     ParameterGroup(RecordingOptions),
-    ParameterGroup(SpeedOptions),
 )
 """Every parameter that the node ``machine_estimator`` declares; those of each actuator come from its mapping file."""
 

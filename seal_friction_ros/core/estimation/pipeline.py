@@ -127,22 +127,12 @@ class PipelineState(NamedTuple):
     clock_offset: int = 0  # [ns] what the clock of the stamps shows after the clock of receipt
     temperature: SealTemperature = NO_TEMPERATURE
 
-    @property
-    def records(self) -> 'PipelineState':
-        """The state as records, which it is; see `compiled_state.CompiledState`."""
-        return self
-
     def turn_since(self, before: 'PipelineState') -> Turn | None:
         """The end of a stroke between the state before a message and this one, if the adaptation learns from it."""
-        return turn_between(before, self)
-
-
-def turn_between(before: PipelineState, after: PipelineState) -> Turn | None:
-    """The end of a stroke between two states: the adaptation has another direction, or one more reversal."""
-    last, learnt = before.estimator.adaptation.learnt, after.estimator.adaptation.learnt
-    if learnt.direction == last.direction and learnt.reversals == last.reversals:
-        return None
-    return Turn(before.estimator, after.estimator, after.temperature)
+        last, learnt = before.estimator.adaptation.learnt, self.estimator.adaptation.learnt
+        if learnt.direction == last.direction and learnt.reversals == last.reversals:
+            return None
+        return Turn(before.estimator, self.estimator, self.temperature)
 
 
 def init(parameters: PipelineParameters) -> PipelineState:

@@ -2,7 +2,7 @@
 
 - ``@compiled``: the function always runs compiled (simulation, lubricated contact): twenty times faster.
 - ``@compilable``: the function runs as plain Python in the live node, which does not load the compiler, and compiled
-  where `compiled` code calls it (replay of long bags, servo plant, the live node with ``compiled: true``): the same
+  where `compiled` code calls it (replay of long bags, servo plant): the same
   source, the same bytes.
 
 What a friction law needs beyond numbers is here too: `bound` binds the parameters of a law to its function, `evaluate`

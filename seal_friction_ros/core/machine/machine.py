@@ -58,8 +58,6 @@ _REFERENCE = tuple(_PLACE[f'reference_{name}'] for name in ('position', 'velocit
 
 Emit = Callable[[str, Output, bytes], object]
 """Takes an answer: name of the actuator, record, frame name."""
-Take = Callable[[PipelineParameters, Any, Input, int, pipeline.Emit], Any]
-"""`pipeline.receive`, or a function like it with states of its own."""
 
 
 class Wiring(NamedTuple):
@@ -264,7 +262,6 @@ def receive(
     data: bytes,
     received: int,
     emit: Emit,
-    take: Take = pipeline.receive,
 ) -> MachineState:
     """Take one message.
 
@@ -275,7 +272,6 @@ def receive(
         data: The message, CDR.
         received: When it was received [ns], on the clock of `pipeline.receive`.
         emit: Called with each answer.
-        take: `pipeline.receive`, or its compiled form with states of its own.
 
     Returns:
         The next state.
@@ -291,7 +287,7 @@ def receive(
         try:
             stamp = reading.stamp if reading.stamp is not None else received + known.pipeline.clock_offset
             memory, records = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
-            states[number] = _passed(actuator, known, memory, records, received, emit, take)
+            states[number] = _passed(actuator, known, memory, records, received, emit)
         except (ArithmeticError, ValueError) as error:
             states[number] = known._replace(force=0.0, fault=f'{topic}: {type(error).__name__}: {error}')
     return MachineState(tuple(states))
@@ -304,12 +300,11 @@ def receive_tick(
     tick: WatchdogTick,
     received: int,
     emit: Emit,
-    take: Take = pipeline.receive,
 ) -> MachineState:
     """The watchdog acts on one actuator, see `due`."""
     states = list(state.actuators)
     known = states[number]
-    states[number] = _passed(machine.actuators[number], known, known.memory, [tick], received, emit, take)
+    states[number] = _passed(machine.actuators[number], known, known.memory, [tick], received, emit)
     return MachineState(tuple(states))
 
 
@@ -388,7 +383,6 @@ def _passed(
     records: list[Input],
     received: int,
     emit: Emit,
-    take: Take,
 ) -> ActuatorState:
     """State after some records have taken the path of their actuator."""
     if not records:
@@ -403,7 +397,7 @@ def _passed(
             force = answer.force
 
     for record in records:
-        known = take(actuator.pipeline, known, record, received, pass_on)
+        known = pipeline.receive(actuator.pipeline, known, record, received, pass_on)
     return ActuatorState(known, memory, force)
 
 

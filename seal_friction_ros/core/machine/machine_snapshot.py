@@ -34,7 +34,7 @@ def machine_text(document: Mapping[str, Any], machine: Machine, state: MachineSt
     """
     actuators = {}
     for actuator, known in zip(machine.actuators, state.actuators, strict=True):
-        snapshot = json.loads(snapshot_text(Snapshot(actuator.configuration, known.pipeline.records)))
+        snapshot = json.loads(snapshot_text(Snapshot(actuator.configuration, known.pipeline)))
         memory = memory_document(known.memory)
         actuators[actuator.name] = {'snapshot': snapshot, 'memory': memory, 'force': known.force.hex()}
     return json.dumps({'machine': document, 'actuators': actuators}, allow_nan=False)

@@ -1,4 +1,4 @@
-"""Compiled code, of many messages at once or message by message, gives the bytes and the state of plain Python."""
+"""Compiled code, of many messages at once, gives the bytes and the state of plain Python."""
 
 import dataclasses
 import json
@@ -18,8 +18,6 @@ from hypothesis import strategies as st
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.compiled_pipeline import Kind, Messages, UnsuitedError, receive_all
-from seal_friction_ros.core.estimation.compiled_state import CompiledState
-from seal_friction_ros.core.estimation.compiled_state import receive as receive_in_place
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters
 from seal_friction_ros.core.estimation.feedforward import FADED_IN
 from seal_friction_ros.core.estimation.messages import (
@@ -187,24 +185,8 @@ def all_at_once(parameters: PipelineParameters, state: PipelineState, pieces, ti
     return state, [(found.data[a : a + b].tobytes(), found.data[c : c + d].tobytes()) for a, b, c, d in places]
 
 
-def in_compiled_memory(parameters: PipelineParameters, state: PipelineState, pieces, times, looks=()):
-    """As `one_by_one`; the state is read before the pieces ``looks``, as snapshots and diagnostics read it."""
-    held, answers = CompiledState(parameters, state), []
-    for i, ((kind, data), received) in enumerate(zip(pieces, times, strict=True)):
-        given_back: dict[str, bytes] = {}
-        if i in looks:
-            expected, _ = one_by_one(parameters, state, pieces[:i], times[:i])
-            assert repr(held.records) == repr(expected)
-        if kind in TYPES:
-            message = decode(TYPES[kind], data)
-            held = receive_in_place(parameters, held, message, received, partial(_collect, given_back))
-            assert repr(held.pressure) == repr(message if kind == Kind.PRESSURE else held.pressure)
-        answers.append((given_back.get(ESTIMATE_TYPE, b''), given_back.get(FEEDFORWARD_TYPE, b'')))
-    return held.records, answers
-
-
 def assert_same(parameters: PipelineParameters, state: PipelineState, pieces: Sequence[tuple[Kind, bytes]], cuts=()):
-    times, first_state = receipts(pieces), state
+    times = receipts(pieces)
     expected_state, expected = one_by_one(parameters, state, pieces, times)
     answers = []
     for first, end in pairwise([0, *sorted(cuts), len(pieces)]):
@@ -212,9 +194,6 @@ def assert_same(parameters: PipelineParameters, state: PipelineState, pieces: Se
         answers += some
     assert answers == expected
     assert repr(state) == repr(expected_state)  # NaN is not equal to itself
-    found, answers = in_compiled_memory(parameters, first_state, pieces, times, cuts)
-    assert answers == expected
-    assert repr(found) == repr(expected_state)
 
 
 odd = st.sampled_from([math.nan, math.inf, -math.inf, -0.0, 0.0, 1e300, 5e-324])

@@ -30,12 +30,12 @@ def test_the_feed_forward_has_a_prefix_and_seals_are_fixed():
     names = [name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.names()]
     assert f'{FEEDFORWARD_PREFIX}scale' in names
     fixed = {name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.fixed()}
-    assert fixed == {'autostart', 'realtime_priority', 'seals', 'seal_chambers', 'record', 'compiled'}
+    assert fixed == {'autostart', 'realtime_priority', 'seals', 'seal_chambers', 'record'}
 
 
 def test_the_mapping_file_of_a_machine_is_fixed_and_what_can_be_recorded_is_not():
     fixed = {name for group in MACHINE_ESTIMATOR_PARAMETERS for name in group.fixed()}
-    assert fixed == {'autostart', 'realtime_priority', 'machine', 'record', 'compiled'}
+    assert fixed == {'autostart', 'realtime_priority', 'machine', 'record'}
 
 
 def test_what_replaces_a_removed_parameter_is_one():
