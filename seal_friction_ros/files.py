@@ -1,7 +1,7 @@
 """Reads YAML for nodes and commands: seal files and ROS parameter files."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -282,12 +282,13 @@ def machine_configurations(file: MachineFile, where: str) -> dict[str, Configura
     return configurations
 
 
-def unknown_parameters(node: str, names: Iterable[str]) -> str:
+def unknown_parameters(node: str, names: Iterable[str], declared: Collection[str] = ()) -> str:
     """One line that says which parameters a node lacks, with the node that has them or the most similar name.
 
     Args:
         node: ``friction_estimator`` or ``servo_simulator``.
         names: Parameters that the node does not have.
+        declared: Those that it has, if they depend on others.
     """
     from seal_friction_ros.core.servo.simulator_options import (  # noqa: PLC0415  loads scipy, which the node does not
         SERVO_SIMULATOR_PARAMETERS,
@@ -300,7 +301,7 @@ def unknown_parameters(node: str, names: Iterable[str]) -> str:
     }
     owners = {name: other for other, groups in tables.items() for group in groups for name in group.names()}
     names = sorted(names)
-    similar = similar_names(names, [name for group in tables[node] for name in group.names()])
+    similar = similar_names(names, declared or [name for group in tables[node] for name in group.names()])
     hints = {name: f' (did you mean {other}?)' for name, other in similar.items()}
     hints |= {name: f' (a parameter of {owners[name]})' for name in names if name in owners}
     hints |= {name: f' (replaced by {REMOVED_PARAMETERS[name]})' for name in names if name in REMOVED_PARAMETERS}

@@ -3,16 +3,15 @@
 import time
 from collections import Counter, deque
 from collections.abc import Collection
-from statistics import median_high
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.messages import INPUTS
+from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS
 from seal_friction_ros.core.estimation.pipeline import Turn
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate, Status
+from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate, Status
 from seal_friction_ros.core.estimation.seal_health import (
     SealHealth,
     Starts,
@@ -49,8 +48,9 @@ _FEEDFORWARDS = {f'feed-forwards {bit.name}': int(bit) for bit in Limited}
 _FEEDFORWARD_SHARES = {f'feed-forward {bit.name} share': int(bit) for bit in Limited}
 _MOST_REVERSALS = 50  # [1/s] of the force; faster motion is not compensated, so this is chatter
 _LARGEST_DELAY = 1_000_000_000  # [ns] a stamp further back than this means that its clock was set
-_LARGEST_LATENESS = 50_000_000  # [ns] of a velocity: controllers are to refuse what is older (docs/interfaces.md)
-_LATENESS_MEMORY = 60  # intervals that tell what is usual
+_LARGEST_LATENESS = 50_000_000  # [ns] of an input: controllers are to refuse what is older (docs/interfaces.md)
+_LARGEST_QUEUE = 10_000_000_000  # [ns] nothing waits so long: the clocks differ
+_STANDS_STILL = 'simulated time stands still: nothing new on /clock'
 
 
 class MissingSamples:
@@ -101,40 +101,6 @@ class MissingSamples:
         return round(step / self._period) - 1 if step > 1.5 * self._period else 0
 
 
-class Lateness:
-    """How much later than usual velocities came, from receipt minus stamp (our choice).
-
-    Usual is the median of the quickest velocity of each interval of the last minute: so it does not matter whether the
-    clocks agree, and wrong stamps for a moment are not taken for it. A node that is too slow takes messages that have
-    waited in the middleware, up to the length of its queue: their estimates are right for their stamps, and late.
-    """
-
-    def __init__(self) -> None:
-        self._quickest: deque[int] = deque(maxlen=_LATENESS_MEMORY)  # of each interval before
-        self._ages: list[int] = []
-
-    def on_velocity(self, age: int) -> None:
-        """Add receipt minus stamp [ns] of a velocity."""
-        self._ages.append(age)
-
-    def start_interval(self) -> None:
-        """Start a new interval."""
-        if self._ages:
-            self._quickest.append(min(self._ages))
-        self._ages = []
-
-    @property
-    def largest(self) -> int:
-        """The latest of this interval [ns], >= 0; 0 if a clock was set meanwhile."""
-        if not self._ages:
-            return 0
-        late = max(max(self._ages) - median_high([*self._quickest, min(self._ages)]), 0)
-        if late <= _LARGEST_DELAY:
-            return late
-        self._quickest.clear()
-        return 0
-
-
 class EstimatorDiagnostics:
     """Counts since activation, and rates, ages and latencies of the present interval.
 
@@ -154,8 +120,8 @@ class EstimatorDiagnostics:
         self._feedforward_force = self._feedforward_sign = 0.0
         self._estimate = NO_ESTIMATE
         self._latencies: list[int] = []
-        self._lateness = Lateness()
         self._health, self._starts = SealHealth(), Starts()
+        self._clock = NEVER  # [ns] newest simulated time
         self._newest: dict[type, FrictionEstimate | FeedForward] = {}
         self._status = self._limited = 0  # bits of all answers since the newest were taken
         self.start_interval()
@@ -170,28 +136,33 @@ class EstimatorDiagnostics:
         self._limits_before = self._feedforwards_by_limit.copy()
         self._reversals, self._travel = 0, 0.0
         self._latencies = []
-        self._lateness.start_interval()
+        self._lateness: dict[str, int] = {}  # [ns] the largest of each input in this interval
+        self._clock_moved = False
 
-    def on_input(self, name: str, stamp: int) -> None:
-        """Count one message of an input with its stamp [ns]."""
+    def on_input(self, name: str, stamp: int, lateness: int = 0) -> None:
+        """Count one message of an input with its stamp [ns], ``lateness`` [ns] after it was sent."""
         self._received[name] += 1
         self._missing[name].on_stamp(stamp)
+        self.on_lateness(name, lateness)
+
+    def on_lateness(self, name: str, lateness: int) -> None:
+        """Note how long after its sending a message of an input came [ns]; negative if the clocks differ."""
+        if abs(lateness) > abs(self._lateness.get(name, 0)):
+            self._lateness[name] = lateness
+
+    def on_clock(self, stamp: int) -> None:
+        """Note simulated time [ns]."""
+        if stamp != self._clock:
+            self._clock, self._clock_moved = stamp, True
 
     def on_malformed(self, name: str) -> None:
         """Count one message of an input that cannot be decoded."""
         self._malformed[name] += 1
 
-    def on_estimate(self, estimate: FrictionEstimate, latency: int, received: int) -> None:
-        """Count one estimate.
-
-        Args:
-            estimate: With the stamp of its velocity.
-            latency: [ns] since its velocity was taken.
-            received: When the velocity was taken [ns], on the clock of the stamps.
-        """
+    def on_estimate(self, estimate: FrictionEstimate, latency: int) -> None:
+        """Count one estimate, made ``latency`` [ns] after its velocity was taken."""
         self._by_status[estimate.status] += 1
         self._latencies.append(latency)
-        self._lateness.on_velocity(received - estimate.stamp)
         self._estimate = self._newest[FrictionEstimate] = estimate
         self._status |= estimate.status
 
@@ -266,6 +237,8 @@ class EstimatorDiagnostics:
         swing = NO_SWING if known is None else known.swing
         seconds = max(time.monotonic() - self._started, 1e-3)
         level, message = self._level(seconds, parameters, swing) if active else (DiagnosticStatus.OK, 'inactive')
+        if active and CLOCK_TOPIC in self._inputs and not self._clock_moved and seconds > _SHORTEST_SILENCE:
+            level, message = DiagnosticStatus.ERROR, f'{_STANDS_STILL}; {message}'
         if refused:
             level = DiagnosticStatus.ERROR
         elif (graph.duplicates or graph.unheard) and level == DiagnosticStatus.OK:
@@ -293,9 +266,7 @@ class EstimatorDiagnostics:
         said: list[str] = []
         if parameters is not None:
             said = findings(parameters, self._health, status)
-        if self._lateness.largest > _LARGEST_LATENESS:
-            late = self._lateness.largest * 1e-6
-            said.append(f'rod_velocity comes up to {late:.0f} ms late: this node is too slow, or its machine too busy')
+        said += self._late()
         if status:
             return DiagnosticStatus.WARN, '; '.join([str(Status(status).name), *said])
         if self._malformed != self._malformed_before:
@@ -311,6 +282,19 @@ class EstimatorDiagnostics:
             way = f'rod_velocity swings by {swing.doubted * 1e6:.0f} um'
             said.append(f'{way}, the force sum does not show it: hum, or a wrong force sum')
         return (DiagnosticStatus.WARN, '; '.join(said)) if said else (DiagnosticStatus.OK, 'estimating')
+
+    def _late(self) -> list[str]:
+        """Which inputs come late."""
+        said = []
+        for name, lateness in self._lateness.items():
+            if not -_LARGEST_LATENESS < lateness < _LARGEST_QUEUE:
+                said.append(
+                    f'the clock of the publisher of {name} differs by {-lateness * 1e-9:.3f} s: no feed-forward'
+                )
+            elif lateness > _LARGEST_LATENESS:
+                late = f'{name} comes up to {lateness * 1e-6:.0f} ms late'
+                said.append(f'{late}: this node is too slow, its machine too busy, or the clock of the publisher wrong')
+        return said
 
     def _feedforward_findings(self, seconds: float) -> list[str]:
         """What limits the feed-forward more than a motion does by itself."""
@@ -333,6 +317,7 @@ class EstimatorDiagnostics:
             values[f'{name} received'] = str(self._received[name])
             values[f'{name} malformed'] = str(self._malformed[name])
             values[f'{name} missing'] = str(self._missing[name].count)
+            values[f'{name} late [ms]'] = f'{self._lateness.get(name, 0) * 1e-6:.1f}'
         return values
 
     def _output_values(self, seconds: float) -> dict[str, str]:
@@ -349,7 +334,6 @@ class EstimatorDiagnostics:
             'feed-forward travel [N/s]': f'{self._travel / seconds:.0f}',
             'feed-forward [N]': f'{self._feedforward_force:.3f}',
             'input age [s]': f'{self._estimate.input_age:.4f}',
-            'velocity late [ms]': f'{self._lateness.largest * 1e-6:.1f}',
             **latency_values(self._latencies),
         }
 

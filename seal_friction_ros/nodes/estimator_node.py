@@ -4,6 +4,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
+from operator import itemgetter
 from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -11,7 +12,17 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, OUTPUTS, encode, encode_text, type_of
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.messages import (
+    CLOCK_TOPIC,
+    CLOCK_TYPE,
+    CONFIGURATION_TYPE,
+    OUTPUTS,
+    encode,
+    encode_text,
+    type_of,
+)
 from seal_friction_ros.core.estimation.node_options import InputOptions, RecordingOptions
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
@@ -21,6 +32,7 @@ from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
 from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
+from seal_friction_ros.nodes.subscription import with_source_time
 from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
 
 _WATCH_PERIOD = 45_000_000  # [ns] of the graph and the clocks: every other call of the watchdog, even of an early one
@@ -31,12 +43,19 @@ _STARVED = round(_TICK_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog
 _HEALTH_PERIOD = 60.0  # [s]
 _INPUT_PERIOD = 0.5  # [s]
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
+_BACKLOG = 5_000_000  # [ns] late by more, others may wait behind a message: the node takes them all in one go
+_MOST_WAITING = 10_000  # [messages] that it takes in one go
 STOP_PERIOD = 0.005  # [s] between two forces while the node stops
 LAST_FORCES = (
     10  # number of forces of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
 )
 _HEALTH, _MONITOR = 'health', 'monitor'  # keys of their publishers
 _TOPIC_OF = {type_name: topic for topic, type_name in OUTPUTS.items()}
+
+
+def _lateness(source: int) -> int:
+    """Time [ns] since a message was sent at ``source`` [ns of the system clock]; 0 if the middleware does not tell."""
+    return time.time_ns() - source if source else 0
 
 
 class EstimatorNode(ManagedNode, ABC):
@@ -95,8 +114,8 @@ class EstimatorNode(ManagedNode, ABC):
         """Message type of an input."""
 
     @abstractmethod
-    def on_input(self, name: str, data: bytes) -> None:
-        """Take one message of an input."""
+    def on_input(self, name: str, data: bytes, lateness: int) -> None:
+        """Take one message of an input, ``lateness`` [ns] after it was sent."""
 
     @property
     @abstractmethod
@@ -106,6 +125,10 @@ class EstimatorNode(ManagedNode, ABC):
     @abstractmethod
     def received(self) -> Mapping[str, int]:
         """Messages of each input since activation."""
+
+    @abstractmethod
+    def has_placeholder(self, prefix: str) -> bool:
+        """Whether the parameters with a prefix are of an actuator with a placeholder seal, while configured."""
 
     @abstractmethod
     def on_watchdog(self) -> bool:
@@ -162,8 +185,6 @@ class EstimatorNode(ManagedNode, ABC):
         self._logged_errors.clear()
         self._watchdog_called = time.perf_counter_ns()
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
-        self._received = 0
-        self._now = self._receipt_clock()
         self._input_watch = InputWatch(self.needed_inputs, time.monotonic(), self._watch.publishers_text)
         if self.settings(RecordingOptions).record:
             self._start_recording()
@@ -188,7 +209,7 @@ class EstimatorNode(ManagedNode, ABC):
         self._inputs[name] = self.create_subscription(
             message_class(self.input_type(name)),
             name,
-            partial(self.on_input, name),
+            with_source_time(partial(self._on_message, name)),
             profile,
             raw=True,
             qos_overriding_options=overriding,
@@ -196,6 +217,40 @@ class EstimatorNode(ManagedNode, ABC):
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self._topics[name] = self._inputs[name].topic_name
+
+    def input_types(self, types: Mapping[str, str]) -> dict[str, str]:
+        """Message type of each input; simulated time is one with ``use_sim_time``."""
+        return {**types, CLOCK_TOPIC: CLOCK_TYPE} if self.get_parameter('use_sim_time').value else dict(types)
+
+    def _on_message(self, name: str, data: bytes, source: int) -> None:
+        """Take a message that was sent at ``source`` [ns, system clock], and those that wait behind a late one."""
+        lateness = _lateness(source)
+        self.on_input(name, data, lateness)
+        if lateness > _BACKLOG:
+            self._take_backlog()
+
+    def _take_backlog(self) -> None:
+        """Take all messages that wait in the middleware, in order of their receipt there.
+
+        An executor takes messages one by one, with a pass through itself for each: a node that is behind would stay
+        behind.
+        """
+        waiting = [message for name in list(self._inputs) for message in self._waiting(name)]
+        for _, name, data, source in sorted(waiting, key=itemgetter(0)):
+            self.on_input(name, data, _lateness(source))
+
+    def _waiting(self, name: str) -> list[tuple[int, str, bytes, int]]:
+        """Messages that wait in the middleware: time of receipt there [ns], input, bytes, time of sending [ns]."""
+        found: list[tuple[int, str, bytes, int]] = []
+        subscription = self._inputs[name]
+        with subscription.handle:
+            while len(found) < _MOST_WAITING:
+                taken = subscription.handle.take_message(subscription.msg_type, True)
+                if taken is None:
+                    break
+                data, info = taken
+                found.append((info['received_timestamp'], name, data, info['source_timestamp']))
+        return found
 
     def create_output(self, key: Any, topic: str, type_name: str) -> None:
         """Create the publisher of an answer or a command; ``_publish[key]`` sends the bytes of one.
@@ -257,6 +312,18 @@ class EstimatorNode(ManagedNode, ABC):
         if newest:
             self._outputs[_MONITOR].publish(encode_newest(newest))
 
+    # --- parameters ---
+
+    def check_change(self, changed: Mapping[ParameterGroup, Any]) -> None:
+        """Reject a force from placeholder seals.
+
+        Raises:
+            ValueError: The change is invalid.
+        """
+        for group, record in changed.items():
+            if isinstance(record, FeedForwardSettings) and record.scale > 0.0 and self.has_placeholder(group.prefix):
+                raise ValueError(f'{group.prefix}scale = {record.scale}: {PLACEHOLDER_WARNING}')
+
     # --- clock and graph ---
 
     def _look_at_graph(self) -> None:
@@ -273,7 +340,7 @@ class EstimatorNode(ManagedNode, ABC):
             self.get_logger().info(f'recording to {following}')
         if self.active and self.RECORDS_STATES and self._recording.is_state_due(time.monotonic()):
             self._recording.record(self._state_topic, STATE_TYPE, self._now(), encode_text(self.snapshot()))
-        if self.active and self._now == self._steady_time:
+        if self.active and CLOCK_TOPIC not in self._inputs:
             offset = time.time_ns() - self._now()
             if abs(offset - self.clock_offset) > _LARGEST_CLOCK_STEP:
                 self._follow_clock(offset)
@@ -294,19 +361,8 @@ class EstimatorNode(ManagedNode, ABC):
         self.set_clock_offset(offset)
         self.publish_configuration()
 
-    def _receipt_clock(self) -> Callable[[], int]:
-        return self._simulated_time if self.get_parameter('use_sim_time').value else self._steady_time
-
-    def _simulated_time(self) -> int:
-        """Time of receipt [ns] with ``use_sim_time``: it increases at every call, as the log time of a bag does."""
-        shown = self.get_clock().now().nanoseconds
-        if shown - self.clock_offset < self._received - _LARGEST_CLOCK_STEP:
-            self._follow_clock(shown - self._received)
-        self._received = max(shown - self.clock_offset, self._received + 1)
-        return self._received
-
-    def _steady_time(self) -> int:
-        """Time of receipt [ns]: the clock as it was at activation, which no setting of the clock changes."""
+    def _now(self) -> int:
+        """Time of receipt [ns]: the clock as it was at activation. It goes on whatever clocks and simulated time do."""
         return time.monotonic_ns() + self._receipt_offset
 
     # --- recording ---

@@ -19,6 +19,7 @@ from seal_friction_ros.core.estimation.configuration import (
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, newest_force
 from seal_friction_ros.core.estimation.messages import (
+    CLOCK_TOPIC,
     CONFIGURATION_TYPE,
     DECODERS,
     ESTIMATE_TYPE,
@@ -48,6 +49,7 @@ NEEDED_INPUTS = (
     'cylinder_pressure',
     'force_sum',
     'rod_velocity',
+    CLOCK_TOPIC,
 )  # the others are for the feed-forward, or only recorded
 
 
@@ -70,19 +72,20 @@ class FrictionEstimator(EstimatorNode):
     def make(self) -> None:
         """Read the seal files; create publishers and subscriptions."""
         settings = map(self.settings, (EstimatorSettings, FeedForwardSettings, AdaptationSettings))
-        configuration = load_configuration(self.settings(SealSelection), *settings)
+        configuration = load_configuration(self.settings(SealSelection), *settings).without_placeholder_force()
         if configuration.has_placeholder:
             self.get_logger().warning(PLACEHOLDER_WARNING)
-        self._statistics = EstimatorDiagnostics()
+        self._types = self.input_types(INPUTS)
+        self._statistics = EstimatorDiagnostics(self._types)
         answers = {type_name: type_name for type_name in OUTPUTS.values()}
-        self._watch = GraphWatch(self, self._inputs, INPUTS, self._outputs, answers, self.subscribe)
+        self._watch = GraphWatch(self, self._inputs, self._types, self._outputs, answers, self.subscribe)
         for topic, type_name in OUTPUTS.items():
             self.create_output(type_name, topic, type_name)
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
             message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
         )
         self._topics = {type_name: publisher.topic_name for type_name, publisher in self._outputs.items()}
-        for name in INPUTS:
+        for name in self._types:
             self.subscribe(name, qos.STREAM)
         self._topics[TICK_TYPE] = self.resolve_topic_name('~/watchdog_tick')
         self.create_timers()
@@ -98,17 +101,19 @@ class FrictionEstimator(EstimatorNode):
         self._known = self._configuration.parameters()
         refused = self.is_refused(self._watch.duplicate_publishers())
         self._state = init(self._known)._replace(refused=refused)
-        self._statistics = EstimatorDiagnostics()
+        if CLOCK_TOPIC in self._types:
+            self._state = self._state._replace(clock=0)  # stands still until it comes
+        self._statistics = EstimatorDiagnostics(self._types)
         self.begin()
 
     def input_type(self, name: str) -> str:
         """Message type of an input."""
-        return INPUTS[name]
+        return self._types[name]
 
     @property
     def needed_inputs(self) -> Collection[str]:
         """Inputs without which there is no good estimate."""
-        return NEEDED_INPUTS
+        return [name for name in self._types if name in NEEDED_INPUTS]
 
     def received(self) -> Mapping[str, int]:
         """Messages of each input since activation."""
@@ -125,12 +130,12 @@ class FrictionEstimator(EstimatorNode):
 
     # --- the live path ---
 
-    def on_input(self, name: str, data: bytes) -> None:
-        """Take one message of an input."""
+    def on_input(self, name: str, data: bytes, lateness: int) -> None:
+        """Take one message of an input, ``lateness`` [ns] after it was sent."""
         taken = time.perf_counter_ns()
         if not self.active:
             return
-        type_name = INPUTS[name]
+        type_name = self._types[name]
         try:
             message = DECODERS[type_name](data)
         except ValueError as error:
@@ -139,30 +144,33 @@ class FrictionEstimator(EstimatorNode):
             self.look_after_timers(taken)
             return
         received = self._now()
+        sent = received - lateness
         self._sent.clear()
         before = self._state
-        self._state = receive(self._known, before, message, received, self._send)
+        self._state = receive(self._known, before, message, received, self._send, sent)
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
-        self._recording.record(self._topics[name], type_name, received, data)
+        self._recording.record(self._topics[name], type_name, received, data, sent)
         if self.has_viewer:
             self.keep_for_view(self._topics[name], type_name, data)
-        self._statistics.on_input(name, message.stamp)
+        self._statistics.on_input(name, message.stamp, lateness)
+        if name == CLOCK_TOPIC:
+            self._statistics.on_clock(message.stamp)
         if self._sent:
-            self._record_answers(done - taken, received)
+            self._record_answers(done - taken)
         if name == 'rod_velocity':
             if self._known.estimator.adapts:
                 self._statistics.on_adaptation(self._known.estimator, self._state.turn_since(before))
             self._recording.flush_if_idle()
         self.look_after_timers(done)
 
-    def _record_answers(self, latency: int = 0, received: int = 0) -> None:
-        """Record and count what was sent, ``latency`` [ns] after its input was taken at ``received`` [ns]."""
+    def _record_answers(self, latency: int = 0) -> None:
+        """Record and count what was sent, ``latency`` [ns] after its input was taken."""
         for answer_type, answer, answer_data in self._sent:
             self._recording.record(self._topics[answer_type], answer_type, self._now(), answer_data)
             if answer_type == ESTIMATE_TYPE:
-                self._statistics.on_estimate(answer, latency, received + self._state.clock_offset)
+                self._statistics.on_estimate(answer, latency)
             else:
                 self._statistics.on_feedforward(answer)
 
@@ -181,15 +189,15 @@ class FrictionEstimator(EstimatorNode):
         self._record_answers()
 
     def fade_out(self) -> None:
-        """Fade the force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""
+        """Fade the force to 0 N within ``fade_time``, whatever comes."""
         if newest_force(self._state.feedforward) == 0.0:
             return
         self._state = self._state._replace(refused=True)
         self.publish_configuration()  # a replay fades from here on
-        began, start, left = time.monotonic(), self._now(), LAST_FORCES
+        left = LAST_FORCES
         while left:
             time.sleep(STOP_PERIOD)
-            self._tick(start + int((time.monotonic() - began) * 1e9))
+            self._tick(self._now())
             self.publish_newest()
             left -= self._state.feedforward.fade == 0.0
 
@@ -201,6 +209,11 @@ class FrictionEstimator(EstimatorNode):
 
     # --- parameters ---
 
+    def has_placeholder(self, prefix: str) -> bool:
+        """Whether a seal is the placeholder."""
+        del prefix  # of the only actuator
+        return self._configuration is not None and self._configuration.has_placeholder
+
     def on_change(self) -> None:
         """Apply changed settings, between two samples."""
         self._refuse_inputs(self._watch.duplicate_publishers())
@@ -209,7 +222,7 @@ class FrictionEstimator(EstimatorNode):
             settings=self.settings(EstimatorSettings),
             feedforward=self.settings(FeedForwardSettings),
             adaptation=self.settings(AdaptationSettings),
-        )
+        ).without_placeholder_force()
         if changed == self._configuration:
             return
         self._configuration = changed

@@ -13,11 +13,13 @@ from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING,
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
+    CLOCK_TOPIC,
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
     OUTPUTS,
     TICK_TYPE,
     Output,
+    decode_clock,
     encode,
     type_of,
 )
@@ -39,6 +41,7 @@ from seal_friction_ros.core.machine.machine import (
     make_machine,
     missing,
     receive,
+    receive_clock,
     receive_tick,
 )
 from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile
@@ -88,7 +91,7 @@ class MachineEstimator(EstimatorNode):
         self._machine = self._made()
         if any(actuator.configuration.has_placeholder for actuator in self._machine.actuators):
             self.get_logger().warning(PLACEHOLDER_WARNING)
-        self._types = {topic: full_name(self._file.topics[topic]) for topic in self._machine.plans}
+        self._types = self.input_types({topic: full_name(self._file.topics[topic]) for topic in self._machine.plans})
         self._new_statistics()
         answers = {('', MACHINE_TYPE): '~/friction'}
         if not self._file.together:
@@ -121,9 +124,8 @@ class MachineEstimator(EstimatorNode):
 
     def _configuration(self, actuator: Actuator) -> Configuration:
         try:
-            return load_configuration(
-                actuator.selection, *(self.settings(group.record_type, group.prefix) for group in _groups(actuator))
-            )
+            settings = (self.settings(group.record_type, group.prefix) for group in _groups(actuator))
+            return load_configuration(actuator.selection, *settings).without_placeholder_force()
         except ValueError as error:
             raise ValueError(f'{actuator.name}: {error}') from None
 
@@ -133,6 +135,9 @@ class MachineEstimator(EstimatorNode):
         for topic, plan in self._machine.plans.items():
             for number, _ in plan.taken:
                 listens[self._file.actuators[number].name].append(topic)
+        if CLOCK_TOPIC in self._types:
+            for topics in listens.values():
+                topics.append(CLOCK_TOPIC)
         self._counted: Counter[str] = Counter()  # messages of each topic
         self._statistics = {name: EstimatorDiagnostics(topics, self._counted) for name, topics in listens.items()}
         self._lowest = [Lowest() for _ in self._file.actuators]
@@ -140,25 +145,32 @@ class MachineEstimator(EstimatorNode):
             topic: [self._file.actuators[number].name for number, _ in plan.taken]
             for topic, plan in self._machine.plans.items()
         }
+        self._listeners[CLOCK_TOPIC] = list(listens)
 
     def start(self) -> None:
         """Start to estimate from the initial state, and to record if ``record`` is set."""
         self._state = _with(init(self._machine), refused=self.is_refused(self._watch.duplicate_publishers()))
+        if CLOCK_TOPIC in self._types:
+            self._state = _with(self._state, clock=0)  # stands still until it comes
         self._new_statistics()
         self._newest.clear()
         self.begin()
 
     # --- the live path ---
 
-    def on_input(self, name: str, data: bytes) -> None:
-        """Take one message of a topic."""
+    def on_input(self, name: str, data: bytes, lateness: int) -> None:
+        """Take one message of a topic, ``lateness`` [ns] after it was sent."""
         taken = time.perf_counter_ns()
         if not self.active:
             return
         received, before = self._now(), self._state
+        sent = received - lateness
         self._sent.clear()
         try:
-            self._state = receive(self._machine, self._state, name, data, received, self._send)
+            if name == CLOCK_TOPIC:
+                self._state = receive_clock(self._machine, before, decode_clock(data), received, sent)
+            else:
+                self._state = receive(self._machine, before, name, data, received, self._send, sent)
         except ValueError as error:
             for listener in self._listeners[name]:
                 self._statistics[listener].on_malformed(name)
@@ -170,13 +182,18 @@ class MachineEstimator(EstimatorNode):
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
-        self._recording.record(name, self._types[name], received, data)  # by its name in the mapping file
-        self._newest[name] = data
+        self._recording.record(name, self._types[name], received, data, sent)  # by its name in the mapping file
+        if name != CLOCK_TOPIC:
+            self._newest[name] = data
         if self.has_viewer:
             self.keep_for_view(name, self._types[name], data)
         self._counted[name] += 1
+        for listener in self._listeners[name]:
+            self._statistics[listener].on_lateness(name, lateness)
+            if name == CLOCK_TOPIC:
+                self._statistics[listener].on_clock(self._state.actuators[0].pipeline.clock)
         if self._sent:
-            self._record_answers(made, done - taken, received)
+            self._record_answers(made, done - taken)
             self._follow(before)
             self._recording.flush_if_idle()
         self.look_after_timers(done)
@@ -206,14 +223,14 @@ class MachineEstimator(EstimatorNode):
             self._publish['', command.topic](command.data)
         return made
 
-    def _record_answers(self, made: list[Command], latency: int = 0, received: int = 0) -> None:
-        """Record and count what was sent, ``latency`` [ns] after its input was taken at ``received`` [ns]."""
+    def _record_answers(self, made: list[Command], latency: int = 0) -> None:
+        """Record and count what was sent, ``latency`` [ns] after its input was taken."""
         for name, answer, data in self._sent:
             kind, statistics = type_of(answer), self._statistics[name]
             if not self._together:
                 self._recording.record(self._topics[name, kind], kind, self._now(), data)
             if kind == ESTIMATE_TYPE:
-                statistics.on_estimate(answer, latency, received + self.clock_offset)
+                statistics.on_estimate(answer, latency)
             else:
                 statistics.on_feedforward(answer)
         if self._together:
@@ -253,17 +270,17 @@ class MachineEstimator(EstimatorNode):
         self._record_answers(made)
 
     def fade_out(self) -> None:
-        """Fade every force to 0 N within ``fade_time``, whatever comes, also if simulated time stands still."""
+        """Fade every force to 0 N within ``fade_time``, whatever comes."""
         acting = [number for number, known in enumerate(self._state.actuators) if known.force != 0.0]
         if not acting:
             return
         self._state = _with(self._state, refused=True)
         self.publish_configuration()  # a replay fades from here on
-        began, start, left = time.monotonic(), self._now(), LAST_FORCES
+        left = LAST_FORCES
         while left:
             time.sleep(STOP_PERIOD)
             for number in acting:
-                self._tick(number, start + int((time.monotonic() - began) * 1e9))
+                self._tick(number, self._now())
             self.publish_newest()
             left -= all(known.pipeline.feedforward.fade == 0.0 for known in self._at(acting))
 
@@ -271,6 +288,11 @@ class MachineEstimator(EstimatorNode):
         return [self._state.actuators[number] for number in numbers]
 
     # --- parameters and state ---
+
+    def has_placeholder(self, prefix: str) -> bool:
+        """Whether a seal of the actuator whose parameters begin with a prefix is the placeholder."""
+        found = [one.configuration for one in self._machine.actuators if prefix.startswith(f'{one.name}.')]
+        return any(configuration.has_placeholder for configuration in found)
 
     def input_type(self, name: str) -> str:
         """Message type of a topic."""

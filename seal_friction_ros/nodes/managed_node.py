@@ -1,8 +1,10 @@
 """Base class of the nodes: lifecycle, parameters from dataclasses, diagnostics once a second."""
 
 import inspect
+import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, TypeVar
 
@@ -23,6 +25,7 @@ Record = TypeVar('Record')
 
 _DIAGNOSTICS_PERIOD = 1.0  # [s]
 OVERDUE = 50_000_000  # [ns] by which a timer may be late
+_SIMILAR = 0.8  # [-] of `difflib`; our choice
 
 
 def message_class(type_name: str) -> Any:
@@ -36,6 +39,17 @@ def message_class(type_name: str) -> Any:
         return getattr(import_module(f'{package}.msg'), name)
     except (ImportError, AttributeError):
         raise ValueError(f'{type_name} is not installed: install the package {package}') from None
+
+
+def _may_limit_force(unknown: str, declared: Collection[str]) -> bool:
+    """Whether who gave an unknown parameter may have meant one of the feed-forward: its off switch, for example.
+
+    Names of a machine begin with the name of an actuator.
+    """
+    parts, letters = unknown.split('.'), re.sub('[^a-z]', '', unknown.lower())
+    wanted = [name for name in declared if FEEDFORWARD_PREFIX in name]
+    is_similar = bool(get_close_matches(unknown, wanted, n=1, cutoff=_SIMILAR))
+    return 'feedforward' in letters or parts[-1] == 'scale' or is_similar
 
 
 class _SteadyTimer:
@@ -99,10 +113,11 @@ class ManagedNode(LifecycleNode):
         # rclpy ignores overrides of undeclared parameters silently.
         given = getattr(self, '_parameter_overrides', {})
         unknown = [n for n in given if not n.startswith('qos_overrides') and not self.has_parameter(n)]
-        if any(n.startswith(FEEDFORWARD_PREFIX) for n in unknown):
-            raise ValueError(unknown_parameters(name, unknown))
+        declared = [n for group in self._groups for n in group.names()]
+        if any(_may_limit_force(n, declared) for n in unknown):
+            raise ValueError(unknown_parameters(name, unknown, declared))
         if unknown:
-            self.get_logger().warning(f'ignored: {unknown_parameters(name, unknown)}')
+            self.get_logger().warning(f'ignored: {unknown_parameters(name, unknown, declared)}')
         floats = {name for group in self._groups for name in numbers(group)}
         self.add_pre_set_parameters_callback(lambda changes: [with_declared_type(p, floats) for p in changes])
         self.add_on_set_parameters_callback(self._on_set_parameters)
@@ -137,11 +152,11 @@ class ManagedNode(LifecycleNode):
     def end_interval(self) -> None:
         """Start a new counting interval; called once a second after the diagnostics."""
 
-    def check_change(self, changed: dict[type, Any]) -> None:
+    def check_change(self, changed: Mapping[ParameterGroup, Any]) -> None:
         """Reject changed records that contradict other parameters.
 
         Args:
-            changed: Record of each group with a changed parameter, by its type.
+            changed: Record of each group with a changed parameter.
 
         Raises:
             ValueError: The change is invalid.
@@ -166,7 +181,7 @@ class ManagedNode(LifecycleNode):
     def _on_set_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         """Accept or reject a set of changes as a whole."""
         values = {p.name: p.value for p in parameters}
-        made: dict[type, Any] = {}
+        made: dict[ParameterGroup, Any] = {}
         for group in self._groups:
             names = {name: field for name, field in group.names().items() if name in values}
             fixed = sorted(names.keys() & group.fixed())
@@ -177,7 +192,7 @@ class ManagedNode(LifecycleNode):
                 continue
             try:
                 changed = {field: values[name] for name, field in names.items()}
-                made[group.record_type] = self.settings(group.record_type, group.prefix, **changed)
+                made[group] = self.settings(group.record_type, group.prefix, **changed)
             except (ValueError, TypeError) as error:
                 return SetParametersResult(successful=False, reason=str(error))
         try:

@@ -70,10 +70,10 @@ class Recording:
             self._next_state = now + self._state_period
         return is_due
 
-    def record(self, topic: str, type_name: str, log_time: int, data: bytes) -> None:
+    def record(self, topic: str, type_name: str, log_time: int, data: bytes, publish_time: int | None = None) -> None:
         """Record one message, if a bag is being recorded."""
         if self._recorder is not None:
-            self._recorder.record(topic, type_name, log_time, data)
+            self._recorder.record(topic, type_name, log_time, data, publish_time)
 
     def flush_if_idle(self) -> None:
         """Let the recorder write now, right after an answer."""

@@ -5,6 +5,7 @@ import sys
 import threading
 import time
 from collections import Counter, deque
+from collections.abc import Mapping
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -16,6 +17,7 @@ from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE, INPUTS, REFERENCE_TYPE, decode, encode
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.foundation.compiled import has_compiler
+from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.friction.force_sum_correction import NO_CORRECTION, measured_force_sum, one_correction
 from seal_friction_ros.core.servo.controller import Limited
 from seal_friction_ros.core.servo.cylinder import pressure_force
@@ -163,17 +165,18 @@ class ServoSimulator(ManagedNode):
 
     # --- parameters ---
 
-    def check_change(self, changed: dict[type, Any]) -> None:
+    def check_change(self, changed: Mapping[ParameterGroup, Any]) -> None:
         """Reject an unstable or unphysical plant, and a wave that needs other topics than the present one.
 
         Raises:
             ValueError: The change is invalid.
         """
+        records = {group.record_type: record for group, record in changed.items()}
         if not self.configured:
-            if changed.keys() & {SimulatorSettings, SealSelection, *PLANT.values()}:
-                self._servo_parameters(changed)
+            if records.keys() & {SimulatorSettings, SealSelection, *PLANT.values()}:
+                self._servo_parameters(records)
             return
-        waves = {changed.get(SimulatorSettings, self._settings).wave, self._settings.wave}
+        waves = {records.get(SimulatorSettings, self._settings).wave, self._settings.wave}
         if len(waves) > 1 and not waves <= WAVES.keys():
             raise ValueError('wave: to and from topic and pull_test only while the node is unconfigured')
 

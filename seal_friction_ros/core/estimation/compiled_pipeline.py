@@ -36,6 +36,7 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.pipeline import (
     PipelineParameters,
     PipelineState,
+    acting_since,
     receive_force,
     receive_pressure,
     receive_reference,
@@ -115,11 +116,17 @@ class Messages(NamedTuple):
     offsets: Integers  # where each begins in ``data``, shape (n,)
     sizes: Integers  # [bytes] shape (n,)
     received: Integers  # [ns] log time of each, shape (n,)
+    sent: Integers  # [ns] publish time of each, shape (n,)
 
     def taken(self, first: int, end: int) -> 'Messages':
         """The messages from number ``first`` to before number ``end``."""
         part = slice(first, end)
-        return Messages(self.data, self.kinds[part], self.offsets[part], self.sizes[part], self.received[part])
+        return self.in_order(part)
+
+    def in_order(self, order: slice | Integers) -> 'Messages':
+        """Some of the messages, or all in another order."""
+        data, kinds, *columns = self
+        return Messages(data, kinds[order], *(column[order] for column in columns))
 
     def message(self, number: int) -> bytes:
         """Bytes of one message."""
@@ -182,7 +189,9 @@ def receive_all(
         messages.data,
         messages.offsets,
     )
-    state, wrong = _receive_all(for_compiler(parameters), state, messages.kinds, messages.received, outbox)
+    state, wrong = _receive_all(
+        for_compiler(parameters), state, messages.kinds, messages.received, messages.sent, outbox
+    )
     if wrong >= 0:
         raise UnsuitedError(f'an answer to message {wrong} is not finite')
     (estimates, feedforwards), (estimate_sizes, feedforward_sizes) = places
@@ -237,7 +246,9 @@ def _stamp(data: Bytes, offset: int) -> int:
 
 
 @compiled
-def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, received: Integers) -> tuple[int, int]:
+def _check(
+    data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, received: Integers, sent: Integers
+) -> tuple[int, int]:
     """Check inputs as `messages.decode` does.
 
     Returns:
@@ -248,7 +259,7 @@ def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, receiv
         kind, offset, size = kinds[i], offsets[i], sizes[i]
         if not _FORCE <= kind <= _VELOCITY:
             continue
-        if not 0 <= received[i] <= LATEST:
+        if not (0 <= received[i] <= LATEST and 0 <= sent[i] <= LATEST):
             return i, 0
         if size < 16 or data[offset] != 0 or data[offset + 1] != 1:
             return i, 0
@@ -268,7 +279,7 @@ def _check(data: Bytes, kinds: Bytes, offsets: Integers, sizes: Integers, receiv
 
 @compiled
 def _receive_all(
-    parameters: Any, state: PipelineState, kinds: Bytes, receipts: Integers, outbox: Any
+    parameters: Any, state: PipelineState, kinds: Bytes, receipts: Integers, sent: Integers, outbox: Any
 ) -> tuple[PipelineState, int]:
     """The pass; the number of the first message whose answer is not finite, or -1."""
     data, message_offsets, cursor = outbox.data, outbox.message_offsets, outbox.cursor
@@ -277,22 +288,23 @@ def _receive_all(
         if not _FORCE <= kind <= _VELOCITY:
             continue
         offset, received = message_offsets[i], receipts[i]
+        since = acting_since(parameters.feedforward, received, sent[i])
         body = offset + 4 + _head_size(_integer(data, offset + 12, 4))
         stamp = _stamp(data, offset)
         first, second, third = _numbers(data, body, _NUMBERS[kind])
         if kind == _VELOCITY:
-            state = receive_velocity(parameters, state, Velocity(stamp, first, i), received, outbox)
+            state = receive_velocity(parameters, state, Velocity(stamp, first, i), received, since, outbox)
         elif kind == _PRESSURE:
-            state = receive_pressure(parameters, state, Pressure(stamp, first, second), received, outbox)
+            state = receive_pressure(parameters, state, Pressure(stamp, first, second), received, since, outbox)
         elif kind == _FORCE:
-            state = receive_force(parameters, state, Force(stamp, first), received, outbox)
+            state = receive_force(parameters, state, Force(stamp, first), received, since, outbox)
         elif kind == _TEMPERATURE:
-            state = receive_temperature(parameters, state, Temperature(stamp, first, second), received, outbox)
+            state = receive_temperature(parameters, state, Temperature(stamp, first, second), received, since, outbox)
         elif kind == _TICK:
-            state = receive_tick(parameters, state, WatchdogTick(stamp, first, i), received, outbox)
+            state = receive_tick(parameters, state, WatchdogTick(stamp, first, i), received, since, outbox)
         else:
             wanted = ServoReference(stamp, first, second, third, i)
-            state = receive_reference(parameters, state, wanted, received, outbox)
+            state = receive_reference(parameters, state, wanted, received, since, outbox)
         if cursor[0] < 0:
             return state, i
     return state, -1

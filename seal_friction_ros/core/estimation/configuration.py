@@ -14,8 +14,8 @@ from typing import Any, NamedTuple, get_type_hints
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorParameters, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FADED_OUT, FeedForwardSettings
-from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
-from seal_friction_ros.core.estimation.records import NO_TEMPERATURE, Force, Pressure
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, ReceiptTimes, init
+from seal_friction_ros.core.estimation.records import NEVER, NO_TEMPERATURE, Force, Pressure
 from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED
 from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
@@ -25,8 +25,8 @@ from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of
 PLACEHOLDER = 'placeholder'
 """Seal file of the default configuration."""
 PLACEHOLDER_WARNING = (
-    'the seals are the placeholder of the default configuration, not those of your machine: name their seal files in '
-    'the parameter seals'
+    'the seals are the placeholder of the default configuration, not those of your machine, so they make no force: '
+    'name their seal files in the parameter seals'
 )
 MOUNTING = ('mounting',)
 """Value of `SealSelection.seal_chambers`: the chambers are those in ``seals``, or else of the seal files."""
@@ -149,6 +149,20 @@ class Configuration:
         """Whether a seal is the placeholder of the default configuration."""
         return PLACEHOLDER in self.selection.seals
 
+    def without_placeholder_force(self) -> 'Configuration':
+        """The same, but without feed-forward if a seal is the placeholder."""
+        if not self.has_placeholder:
+            return self
+        return dataclasses.replace(self, feedforward=dataclasses.replace(self.feedforward, scale=0.0))
+
+    @property
+    def tells_sending(self) -> bool:
+        """Whether a bag with this configuration has as publish time when a message was sent, on the clock of receipt.
+
+        Older bags have another time there.
+        """
+        return self.feedforward.lateness_max > 0.0
+
     def parameters(self) -> PipelineParameters:
         """Parameters of estimate and feed-forward.
 
@@ -167,6 +181,7 @@ ALGORITHM_VERSION = 2
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
 _WITHOUT = {'use_presliding': False}  # settings that older bags have not: without effect
+_WITHOUT_LATENESS = {'lateness_max': 0.0}  # likewise of the feed-forward; the publish times of older bags tell nothing
 _NOT_YET = {'stamp_age_max': 0.0}  # settings that version 1 had not: without effect
 
 
@@ -226,7 +241,7 @@ def parse_snapshot(text: str) -> Snapshot:
             selection,
             tuple(document['seal_documents']),
             _settings(EstimatorSettings, _WITHOUT | document['settings'], version, 'configuration: settings'),
-            _settings(FeedForwardSettings, document['feedforward'], version, 'configuration: feedforward'),
+            _feedforward(document['feedforward'], version, 'configuration: feedforward'),
             from_mapping(AdaptationSettings, document.get('adaptation', {'mode': 'off'}), 'configuration: adaptation'),
         )
         state = _state(configuration, document['state'], version)
@@ -244,7 +259,13 @@ def _recorded(document: Any, version: int) -> Recorded | None:
     if document is None:
         return None
     acted, where = document['feedforward'], 'configuration: recorded.feedforward'
-    return Recorded(None if acted is None else _settings(FeedForwardSettings, acted, version, where))
+    return Recorded(None if acted is None else _feedforward(acted, version, where))
+
+
+def _feedforward(document: Any, version: int, where: str) -> FeedForwardSettings:
+    """Settings of the feed-forward of a snapshot."""
+    made: FeedForwardSettings = _settings(FeedForwardSettings, _WITHOUT_LATENESS | document, version, where)
+    return made
 
 
 def _settings(record_type: Any, document: Any, version: int, where: str) -> Any:
@@ -272,13 +293,14 @@ def _state(configuration: Configuration, document: Any, version: int) -> Pipelin
         return init(configuration.parameters())._replace(
             pressure=pressure, force=force, refused=bool(document['refused'])
         )
-    # Older bags are without adaptation, temperature, sheared seals, a field of these, swings and elements of the
-    # feed-forward.
+    # Older bags are without adaptation, temperature, sheared seals, a field of these, swings, elements of the
+    # feed-forward and simulated time.
     later = {'adaptation': _encoded_record(NOT_ADAPTED), 'swing': _encoded_record(NO_SWING)}
     estimator = later | document['estimator']
     estimator['shear'] = _encoded_record(NOT_FOLLOWED) | estimator.get('shear', {})
     guided = _encoded_record(FADED_OUT) | document['feedforward']
-    document = {'temperature': _encoded_record(NO_TEMPERATURE)} | document
+    document = {'temperature': _encoded_record(NO_TEMPERATURE), 'clock': NEVER} | document
+    document['receipt'] = _encoded_record(ReceiptTimes()) | document['receipt']
     state: PipelineState = _parsed(PipelineState, document | {'estimator': estimator, 'feedforward': guided})
     computed = state.estimator, state.feedforward, state.friction, state.reference, state.temperature
     if not all(map(_is_finite, computed)):

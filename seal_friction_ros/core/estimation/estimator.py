@@ -371,6 +371,7 @@ _FORCE_LEAP = int(Status.FORCE_LEAP)
 _VELOCITY_LEAP = int(Status.VELOCITY_LEAP)
 _INPUT_REFUSED = int(Status.INPUT_REFUSED)
 _STAMP_AGE = int(Status.STAMP_AGE)
+_LATE_INPUT = int(Status.LATE_INPUT)
 _MOTION_UNCERTAIN = int(Status.MOTION_UNCERTAIN)
 _FASTER_THAN_IDENTIFIED = int(Status.FASTER_THAN_IDENTIFIED)
 _SLOWER_THAN_IDENTIFIED = int(Status.SLOWER_THAN_IDENTIFIED)
@@ -636,7 +637,7 @@ def assess_inputs(
     pressure in use.
     """
     # One unpacking takes a quarter of the time of an attribute each.
-    stamp, given, newest_pressure, newest_force, refused, stamp_age, _ = sample
+    stamp, given, newest_pressure, newest_force, refused, stamp_age, _, is_late = sample
     last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, _, _, _ = state
     settings = parameters.settings
     status = _INPUT_REFUSED if refused else 0
@@ -644,6 +645,8 @@ def assess_inputs(
         status |= _STAMP_NOT_INCREASING
     if abs(stamp_age) > settings.stamp_age_max > 0.0:
         status |= _STAMP_AGE
+    if is_late:
+        status |= _LATE_INPUT
 
     pressure, leapt_pressure, fault = _usable_pressure(settings, newest_pressure, pressure, leapt_pressure)
     status |= fault

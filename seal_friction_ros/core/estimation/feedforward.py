@@ -63,6 +63,7 @@ class Limited(IntFlag):
 
 
 _SLEW, _CLAMP, _FADE = int(Limited.SLEW), int(Limited.CLAMP), int(Limited.FADE)
+_STAMP_AGE = int(Status.STAMP_AGE)
 
 UNUSABLE = int(
     Status.PRESSURE_MISSING
@@ -84,7 +85,7 @@ class FeedForwardSettings:
     """
 
     scale: float = parameter(
-        0.9, unit='1', lower=0.0, upper=2.0, description='s, share of the friction that is compensated; 0: no force.'
+        0.0, unit='1', lower=0.0, upper=2.0, description='s, share of the friction that is compensated; 0: no force.'
     )
     smoothing_velocity: float = parameter(
         0.001, unit='m/s', lower=1e-6, upper=1.0, description='w, speed at which 76 % of the force is there.'
@@ -121,6 +122,14 @@ class FeedForwardSettings:
     )
     reference_timeout: float = parameter(
         0.03, unit='s', lower=1e-3, upper=1.0, description='Longest time since the reference was received; likewise.'
+    )
+    lateness_max: float = parameter(
+        0.03,
+        unit='s',
+        lower=0.0,
+        upper=10.0,
+        description='Longest time from the sending of an input to its use; a later one, or one whose stamp is further '
+        'from its receipt than stamp_age_max, makes no force. 0: not checked.',
     )
     fade_time: float = parameter(
         0.2, unit='s', lower=1e-3, upper=1.0, description='Time in which the force fades out, and back in.'
@@ -168,7 +177,7 @@ def usable(settings: FeedForwardSettings, estimate: FrictionEstimate) -> bool:
 
     The state of the rod counts only with ``use_measured_velocity``; else the direction comes from the reference.
     """
-    if estimate.status & UNUSABLE:
+    if estimate.status & UNUSABLE or (settings.lateness_max > 0.0 and estimate.status & _STAMP_AGE):
         return False
     return not settings.use_measured_velocity or estimate.state != UNKNOWN
 

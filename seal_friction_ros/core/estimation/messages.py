@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.records import (
+    Clock,
     Force,
     FrictionEstimate,
     Position,
@@ -36,6 +37,10 @@ FEEDFORWARD_TYPE = f'{PACKAGE}/msg/FrictionFeedForward'
 TICK_TYPE = f'{PACKAGE}/msg/WatchdogTick'
 CONFIGURATION_TYPE = f'{PACKAGE}/msg/EstimatorConfiguration'
 TEMPERATURE_TYPE = 'sensor_msgs/msg/Temperature'
+CLOCK_TYPE = 'rosgraph_msgs/msg/Clock'
+
+CLOCK_TOPIC = '/clock'
+"""Simulated time, an input of nodes with ``use_sim_time``."""
 
 INPUTS: dict[str, str] = {
     'cylinder_pressure': PRESSURE_TYPE,
@@ -50,7 +55,7 @@ INPUTS: dict[str, str] = {
 OUTPUTS: dict[str, str] = {'friction_estimate': ESTIMATE_TYPE, 'friction_feedforward': FEEDFORWARD_TYPE}
 """Topic that the estimator publishes -> message type."""
 
-Input = Pressure | Force | ServoReference | Position | Temperature | Velocity | WatchdogTick
+Input = Pressure | Force | ServoReference | Position | Temperature | Velocity | Clock | WatchdogTick
 """A message that the estimator takes."""
 Output = FrictionEstimate | FeedForward
 """A message that the estimator makes."""
@@ -124,6 +129,7 @@ LONGEST_FRAME = 1024  # [bytes] our choice; a longer frame name is not valid
 SECOND = 1_000_000_000  # [ns]
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little endian, no options
 _LITTLE_ENDIAN = b'\x00\x01'  # begin of the encapsulation
+_CLOCK = struct.Struct('<4xiI')
 _SHORTEST = 16  # [bytes] encapsulation, stamp and length of the frame name
 
 
@@ -239,9 +245,24 @@ def decode_text(data: bytes) -> str:
     return data[8 : 8 + length - 1].decode()
 
 
+def decode_clock(data: bytes) -> Clock:
+    """Simulated time from the bytes of a rosgraph_msgs/Clock.
+
+    Raises:
+        ValueError: The bytes are not such a message.
+    """
+    if not _CLOCK.size <= len(data) <= _CLOCK.size + 3 or data[:2] != _LITTLE_ENDIAN:
+        raise ValueError(f'{len(data)} bytes are not a time in little-endian CDR')
+    seconds, nanoseconds = _CLOCK.unpack_from(data)
+    if nanoseconds >= SECOND:
+        raise ValueError(f'time with {nanoseconds} ns is not valid')
+    return Clock(seconds * SECOND + nanoseconds)
+
+
 DECODERS: dict[str, Callable[[bytes], Any]] = {
     **{layout.message_type: _decoder(layout) for layout in LAYOUTS},
     CONFIGURATION_TYPE: decode_text,
+    CLOCK_TYPE: decode_clock,
 }
 """Message type -> its decoder: bytes to record. Raises ValueError for bytes that are not such a message."""
 

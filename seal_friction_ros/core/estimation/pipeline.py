@@ -7,9 +7,14 @@ A velocity sample makes an estimate with the newest pressure and force sum, and,
 feed-forward. The estimate is emitted before anything is learnt from its sample, and before the feed-forward is
 computed. While no velocity sample comes, the ticks of the watchdog make the feed-forward, so that it fades out.
 
-``received`` is the time of receipt, which a bag holds as log time. How old an input is for the feed-forward is
-counted on this clock, which never jumps; a message with the stamp of the one before is no new sample.
-`PipelineState.clock_offset` leads from it to the clock of the stamps.
+``received`` is the time of receipt, which a bag holds as log time, on a clock that never jumps nor stands still, also
+with simulated time. `PipelineState.clock_offset` leads from it to the clock of the stamps. ``sent`` is when the
+publisher sent the message, on the same clock; a bag holds it as publish time. How old an input is for the feed-forward
+is counted from there, so that neither a backlog nor a stopped process makes it younger. An input that comes later than
+``lateness_max`` does not count at all, nor does a message with the stamp of the one before. While only late velocities
+come, the feed-forward is made as often as ticks make it, and fades.
+
+With simulated time, `Clock` is an input like the others: while it stands still, the feed-forward fades.
 
 Inputs with several publishers are refused, since nobody knows which publisher is right: they still make estimates, so
 that everybody sees it, but the estimates are marked and the feed-forward fades out.
@@ -30,6 +35,7 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
 from seal_friction_ros.core.estimation.estimator import (
     NO_VELOCITY,
     EstimatorParameters,
+    EstimatorSettings,
     EstimatorState,
     estimate_at,
     learn_from,
@@ -38,7 +44,6 @@ from seal_friction_ros.core.estimation.estimator import (
 from seal_friction_ros.core.estimation.feedforward import (
     FADED_IN,
     FADED_OUT,
-    FASTEST,
     FeedForwardSettings,
     FeedForwardState,
     elastic_step,
@@ -53,6 +58,7 @@ from seal_friction_ros.core.estimation.records import (
     NO_FORCE,
     NO_PRESSURE,
     NO_TEMPERATURE,
+    Clock,
     Force,
     Position,
     Pressure,
@@ -70,7 +76,6 @@ from seal_friction_ros.core.friction.actuator import friction_of_seals
 from seal_friction_ros.core.friction.temperature import COLDEST, HOTTEST, scale_at
 
 ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
-LARGEST_ACCELERATION = 1e6  # [m/s^2] no rod accelerates faster
 ZERO_CELSIUS = ZEROS['degC']  # [K]
 TICK_INTERVAL = 9_000_000  # [ns] the watchdog acts if no feed-forward was made for this time
 
@@ -97,12 +102,13 @@ NO_REFERENCE = Reference(NOT_CONDITIONED, 0.0, 0.0)
 
 
 class ReceiptTimes(NamedTuple):
-    """When the last new sample of each input was received [ns]; `NEVER` before the first."""
+    """When the last new sample of each input was sent that was in time [ns]; `NEVER` before the first."""
 
     velocity: int = NEVER
     pressure: int = NEVER
     force: int = NEVER
     reference: int = NEVER
+    clock: int = NEVER  # simulated time
 
 
 class Turn(NamedTuple):
@@ -126,6 +132,7 @@ class PipelineState(NamedTuple):
     refused: bool = False  # whether no input may act: one has several publishers, or the node is stopping
     clock_offset: int = 0  # [ns] what the clock of the stamps shows after the clock of receipt
     temperature: SealTemperature = NO_TEMPERATURE
+    clock: int = NEVER  # [ns] newest simulated time
 
     def turn_since(self, before: 'PipelineState') -> Turn | None:
         """The end of a stroke between the state before a message and this one, if the adaptation learns from it."""
@@ -149,7 +156,12 @@ def init_running(parameters: PipelineParameters) -> PipelineState:
 
 
 def receive(
-    parameters: PipelineParameters, state: PipelineState, message: Input, received: int, emit: Emit
+    parameters: PipelineParameters,
+    state: PipelineState,
+    message: Input,
+    received: int,
+    emit: Emit,
+    sent: int | None = None,
 ) -> PipelineState:
     """Take one message.
 
@@ -159,15 +171,17 @@ def receive(
         message: As `messages.decode` makes it; its values may be anything.
         received: When it was received [ns].
         emit: Called with each estimate and feed-forward that the message makes; every number in them is finite.
+        sent: When its publisher sent it [ns], on the clock of ``received``; None: just then.
 
     Returns:
         The next state.
     """
-    return _RECEIVERS[type(message)](parameters, state, message, received, emit)
+    since = acting_since(parameters.feedforward, received, received if sent is None else sent)
+    return _RECEIVERS[type(message)](parameters, state, message, received, since, emit)
 
 
 def answered(
-    parameters: PipelineParameters, state: PipelineState, message: Input, received: int
+    parameters: PipelineParameters, state: PipelineState, message: Input, received: int, sent: int | None = None
 ) -> tuple[PipelineState, list[tuple[str, bytes]]]:
     """`receive` with the answers collected: message type and bytes of each, in the order they are emitted."""
     answers: list[tuple[str, bytes]] = []
@@ -175,7 +189,7 @@ def answered(
     def collect(record: Output, frame_id: bytes) -> None:
         answers.append((type_of(record), encode(record, frame_id)))
 
-    return receive(parameters, state, message, received, collect), answers
+    return receive(parameters, state, message, received, collect, sent), answers
 
 
 def send(emit: Any, record: Any, frame_id: Any) -> None:
@@ -184,63 +198,112 @@ def send(emit: Any, record: Any, frame_id: Any) -> None:
 
 
 @compilable
-def receive_velocity(parameters: Any, state: PipelineState, velocity: Any, received: int, emit: Any) -> PipelineState:
+def acting_since(settings: FeedForwardSettings, received: int, sent: int) -> int:
+    """Time from which the age of an input counts [ns]; `NEVER` if it came too late to act.
+
+    A message that was sent after its receipt came from another clock, so nobody knows how old it is.
+    """
+    if settings.lateness_max == 0.0:
+        return received
+    if abs(received - sent) * 1e-9 > settings.lateness_max:
+        return NEVER
+    return sent if sent < received else received
+
+
+@compilable
+def receive_velocity(
+    parameters: Any, state: PipelineState, velocity: Any, received: int, since: int, emit: Any
+) -> PipelineState:
     """An estimate, and with a reference a feed-forward."""
-    known, guided, _, pressure, force, reference, receipt, refused, offset, temperature = state
+    known, guided, _, pressure, force, reference, receipt, refused, offset, temperature, clock = state
     stamp, given, frame_id = velocity
     is_new = known.stamp != stamp
-    sample = RodSample(stamp, given, pressure, force, refused, (received + offset - stamp) * 1e-9, temperature)
+    stands_still = clock != NEVER and not _is_younger(receipt.clock, received, parameters.feedforward.estimate_timeout)
+    is_late = since == NEVER or stands_still
+    age = (received + offset - stamp) * 1e-9
+    sample = RodSample(stamp, given, pressure, force, refused, age, temperature, is_late)
     known, estimate, seen, friction_by_law = estimate_at(parameters.estimator, known, sample)
     send(emit, estimate, frame_id)
     known = learn_from(parameters.estimator, known, estimate, seen, friction_by_law)
-    if is_new and not estimate.status & NO_VELOCITY:
-        receipt = ReceiptTimes(received, receipt.pressure, receipt.force, receipt.reference)
+    if is_new and since != NEVER and not estimate.status & NO_VELOCITY:
+        receipt = ReceiptTimes(since, receipt.pressure, receipt.force, receipt.reference, receipt.clock)
     friction = estimate.coulomb_friction if usable(parameters.feedforward, estimate) else -1.0
-    state = PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature)
+    state = PipelineState(
+        known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
+    )
     if receipt.reference == NEVER and not parameters.feedforward.use_measured_velocity:
+        return state
+    if since == NEVER and guided.received != NEVER and received - guided.received < TICK_INTERVAL:
         return state
     return _feed_forward(parameters, state, stamp, received, frame_id, emit)
 
 
 @compilable
 def receive_pressure(
-    _parameters: Any, state: PipelineState, newest: Pressure, received: int, _emit: Any
+    _parameters: Any, state: PipelineState, newest: Pressure, _received: int, since: int, _emit: Any
 ) -> PipelineState:
     """Keep the pressure for the next velocity sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
-    if newest.stamp != pressure.stamp:
-        receipt = ReceiptTimes(receipt.velocity, received, receipt.force, receipt.reference)
-    return PipelineState(known, guided, friction, newest, force, reference, receipt, refused, offset, temperature)
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
+    if newest.stamp != pressure.stamp and since != NEVER:
+        receipt = ReceiptTimes(receipt.velocity, since, receipt.force, receipt.reference, receipt.clock)
+    return PipelineState(
+        known, guided, friction, newest, force, reference, receipt, refused, offset, temperature, clock
+    )
 
 
 @compilable
-def receive_force(parameters: Any, state: PipelineState, newest: Force, received: int, _emit: Any) -> PipelineState:
+def receive_force(
+    parameters: Any, state: PipelineState, newest: Force, _received: int, since: int, _emit: Any
+) -> PipelineState:
     """Keep the force sum for the next velocity sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
-    if newest.stamp != force.stamp and abs(newest.force) <= parameters.estimator.settings.force_max:
-        receipt = ReceiptTimes(receipt.velocity, receipt.pressure, received, receipt.reference)
-    return PipelineState(known, guided, friction, pressure, newest, reference, receipt, refused, offset, temperature)
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
+    in_range = abs(newest.force) <= parameters.estimator.settings.force_max
+    if newest.stamp != force.stamp and since != NEVER and in_range:
+        receipt = ReceiptTimes(receipt.velocity, receipt.pressure, since, receipt.reference, receipt.clock)
+    return PipelineState(
+        known, guided, friction, pressure, newest, reference, receipt, refused, offset, temperature, clock
+    )
 
 
 @compilable
-def receive_reference(_parameters: Any, state: PipelineState, wanted: Any, received: int, _emit: Any) -> PipelineState:
-    """Condition the reference and keep it for the next velocity sample; one that is not finite is no new sample."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
-    if wanted.stamp != reference.velocity.stamp and math.isfinite(wanted.velocity):
+def receive_reference(
+    parameters: Any, state: PipelineState, wanted: Any, _received: int, since: int, _emit: Any
+) -> PipelineState:
+    """Condition the reference and keep it for the next velocity sample; one that is not possible is no new sample."""
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
+    if wanted.stamp != reference.velocity.stamp and is_possible(parameters.estimator.settings, wanted):
         reference = condition_reference(reference, wanted)
-        receipt = ReceiptTimes(receipt.velocity, receipt.pressure, receipt.force, received)
-    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature)
+        if since != NEVER:
+            receipt = ReceiptTimes(receipt.velocity, receipt.pressure, receipt.force, since, receipt.clock)
+    return PipelineState(
+        known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
+    )
+
+
+@compilable
+def is_possible(settings: EstimatorSettings, wanted: Any) -> bool:
+    """Whether a rod can follow a reference, by its velocity and acceleration; a NaN acceleration is not known."""
+    is_slow = abs(wanted.velocity) <= settings.velocity_max
+    return is_slow and not abs(wanted.acceleration) > settings.acceleration_max
+
+
+def receive_clock(state: PipelineState, newest: Clock, received: int, since: int) -> PipelineState:
+    """Follow simulated time; one that stands still gets old."""
+    receipt = state.receipt
+    if newest.stamp != state.clock and since != NEVER:
+        receipt = receipt._replace(clock=since)
+    return state._replace(clock=newest.stamp, clock_offset=newest.stamp - received, receipt=receipt)
 
 
 @compilable
 def receive_temperature(
-    parameters: Any, state: PipelineState, newest: Temperature, _received: int, _emit: Any
+    parameters: Any, state: PipelineState, newest: Temperature, _received: int, _since: int, _emit: Any
 ) -> PipelineState:
     """Keep the median of three temperatures for the next velocity sample; one that no rubber seal has is no sample.
 
     After a pause longer than the timeout the three begin anew: the older ones say nothing of now.
     """
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
     kelvin = newest.temperature + ZERO_CELSIUS
     if COLDEST <= kelvin <= HOTTEST and newest.stamp != temperature.newest_stamp:
         stamp, used, last_stamp, last, before = temperature
@@ -250,29 +313,34 @@ def receive_temperature(
             lower, higher = (last, before) if last < before else (before, last)
             stamp, used = newest.stamp, between(lower, kelvin, higher)
         temperature = SealTemperature(stamp, used, newest.stamp, kelvin, last)
-    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature)
+    return PipelineState(
+        known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
+    )
 
 
 @compilable
-def receive_tick(parameters: Any, state: PipelineState, tick: Any, received: int, emit: Any) -> PipelineState:
+def receive_tick(
+    parameters: Any, state: PipelineState, tick: Any, received: int, _since: int, emit: Any
+) -> PipelineState:
     """A feed-forward without a velocity sample, which fades once an input is too old."""
     return _feed_forward(parameters, state, tick.stamp, received, tick.frame_id, emit)
 
 
 def receive_position(
-    _parameters: Any, state: PipelineState, _position: Position, _received: int, _emit: Any
+    _parameters: Any, state: PipelineState, _position: Position, _received: int, _since: int, _emit: Any
 ) -> PipelineState:
     """Nothing depends on the position; it is recorded to show how the servo tracks."""
     return state
 
 
-_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, Any], PipelineState]] = {
+_RECEIVERS: dict[type, Callable[[Any, PipelineState, Any, int, int, Any], PipelineState]] = {
     Velocity: receive_velocity,
     Pressure: receive_pressure,
     Force: receive_force,
     ServoReference: receive_reference,
     Position: receive_position,
     Temperature: receive_temperature,
+    Clock: lambda _parameters, state, clock, received, since, _emit: receive_clock(state, clock, received, since),
     WatchdogTick: receive_tick,
 }
 
@@ -296,10 +364,8 @@ def condition_reference(reference: Reference, wanted: Any) -> Reference:
     rounded velocity alternates, that of a clean one does not.
     """
     last_velocity, smoothed, last = reference
-    velocity = condition_velocity(last_velocity, wanted.stamp, between(-FASTEST, wanted.velocity, FASTEST), 0.0)
-    given = 0.0
-    if math.isfinite(wanted.acceleration):
-        given = between(-LARGEST_ACCELERATION, wanted.acceleration, LARGEST_ACCELERATION)
+    velocity = condition_velocity(last_velocity, wanted.stamp, wanted.velocity, 0.0)
+    given = 0.0 if math.isnan(wanted.acceleration) else wanted.acceleration
     agreed = 0.0
     if given * last > 0.0:
         agreed = given if abs(given) < abs(last) else last
@@ -316,7 +382,7 @@ def _feed_forward(
     parameters: Any, state: PipelineState, stamp: int, received: int, frame_id: Any, emit: Any
 ) -> PipelineState:
     """Make and emit the feed-forward of this moment."""
-    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature = state
+    known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
     settings = parameters.feedforward
     present, acceleration = _reference_motion(settings, known, reference, receipt, received)
     velocity = led = present
@@ -339,7 +405,9 @@ def _feed_forward(
     elasticity = parameters.estimator.elasticity
     guided, compensation = elastic_step(settings, elasticity, guided, stamp, received, ground, velocity, present, led)
     send(emit, compensation, frame_id)
-    return PipelineState(known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature)
+    return PipelineState(
+        known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
+    )
 
 
 @compilable
@@ -364,8 +432,10 @@ def _reference_motion(
 @compilable
 def _is_fresh(receipt: ReceiptTimes, received: int, timeout: float) -> bool:
     """Whether every input of the estimator that ever came has come within ``timeout`` [s]."""
-    velocity, pressure, force, _ = receipt
+    velocity, pressure, force, _, clock = receipt
     if force != NEVER and not _is_younger(force, received, timeout):
+        return False
+    if clock != NEVER and not _is_younger(clock, received, timeout):
         return False
     return _is_younger(velocity, received, timeout) and _is_younger(pressure, received, timeout)
 

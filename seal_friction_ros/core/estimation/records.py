@@ -42,6 +42,7 @@ class Status(IntFlag):
     TEMPERATURE_MISSING = 8388608
     OUTSIDE_IDENTIFIED_TEMPERATURE = 16777216
     PRESLIDING = 33554432
+    LATE_INPUT = 67108864
 
 
 EXTRAPOLATED = (
@@ -117,6 +118,12 @@ class ServoReference(NamedTuple):
     frame_id: Any = b''  # bytes; in compiled code the number of the message
 
 
+class Clock(NamedTuple):
+    """One message of simulated time (``/clock``)."""
+
+    stamp: int  # [ns] simulated time
+
+
 class WatchdogTick(NamedTuple):
     """The watchdog of the node acts: there is a force, and no velocity sample has renewed it."""
 
@@ -135,6 +142,7 @@ class RodSample(NamedTuple):
     refused: bool = False  # whether an input has several publishers, so that none may act
     stamp_age: float = 0.0  # [s] time of receipt after the stamp; negative for a stamp in the future
     temperature: SealTemperature = NO_TEMPERATURE
+    is_late: bool = False  # whether it came too late to act, or simulated time stands still
 
 
 class FrictionEstimate(NamedTuple):

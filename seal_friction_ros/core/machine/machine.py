@@ -27,6 +27,7 @@ from seal_friction_ros.core.estimation.messages import Input, Output
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
 from seal_friction_ros.core.estimation.records import (
     NEVER,
+    Clock,
     Force,
     Position,
     Pressure,
@@ -262,6 +263,7 @@ def receive(
     data: bytes,
     received: int,
     emit: Emit,
+    sent: int | None = None,
 ) -> MachineState:
     """Take one message.
 
@@ -272,6 +274,7 @@ def receive(
         data: The message, CDR.
         received: When it was received [ns], on the clock of `pipeline.receive`.
         emit: Called with each answer.
+        sent: When its publisher sent it [ns], as `pipeline.receive`.
 
     Returns:
         The next state.
@@ -285,9 +288,9 @@ def receive(
     for number, taken in plan.taken:
         actuator, known = machine.actuators[number], states[number]
         try:
-            stamp = reading.stamp if reading.stamp is not None else received + known.pipeline.clock_offset
+            stamp = reading.stamp if reading.stamp is not None else _stamp(actuator, known, received, sent)
             memory, records = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
-            states[number] = _passed(actuator, known, memory, records, received, emit)
+            states[number] = _passed(actuator, known, memory, records, received, emit, sent)
         except (ArithmeticError, ValueError) as error:
             states[number] = known._replace(force=0.0, fault=f'{topic}: {type(error).__name__}: {error}')
     return MachineState(tuple(states))
@@ -306,6 +309,21 @@ def receive_tick(
     known = states[number]
     states[number] = _passed(machine.actuators[number], known, known.memory, [tick], received, emit)
     return MachineState(tuple(states))
+
+
+def receive_clock(machine: Machine, state: MachineState, clock: Clock, received: int, sent: int) -> MachineState:
+    """Every actuator follows simulated time."""
+    states = []
+    for actuator, known in zip(machine.actuators, state.actuators, strict=True):
+        since = pipeline.acting_since(actuator.pipeline.feedforward, received, sent)
+        states.append(known._replace(pipeline=pipeline.receive_clock(known.pipeline, clock, received, since)))
+    return MachineState(tuple(states))
+
+
+def _stamp(actuator: MachineActuator, known: ActuatorState, received: int, sent: int | None) -> int:
+    """Stamp [ns] of a message that has none: when it was sent, if it came in time."""
+    since = NEVER if sent is None else pipeline.acting_since(actuator.pipeline.feedforward, received, sent)
+    return (received if since == NEVER else since) + known.pipeline.clock_offset
 
 
 def due(state: MachineState, now: int) -> list[int]:
@@ -383,6 +401,7 @@ def _passed(
     records: list[Input],
     received: int,
     emit: Emit,
+    sent: int | None = None,
 ) -> ActuatorState:
     """State after some records have taken the path of their actuator."""
     if not records:
@@ -397,7 +416,7 @@ def _passed(
             force = answer.force
 
     for record in records:
-        known = pipeline.receive(actuator.pipeline, known, record, received, pass_on)
+        known = pipeline.receive(actuator.pipeline, known, record, received, pass_on, sent)
     return ActuatorState(known, memory, force)
 
 

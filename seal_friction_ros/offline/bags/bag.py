@@ -61,6 +61,7 @@ class BagMessage(NamedTuple):
     type_name: str
     log_time: int  # [ns]
     data: bytes
+    publish_time: int | None = None  # [ns] on any clock; None: not known
 
 
 def timed_name(name: str) -> str:
@@ -187,8 +188,8 @@ class BagWriter:
         type_name: str,
         log_time: int,
         data: bytes,
-        description: Description | None = None,
         publish_time: int | None = None,
+        description: Description | None = None,
     ) -> int:
         """Append one serialised message.
 
@@ -197,8 +198,8 @@ class BagWriter:
             type_name: Its type.
             log_time: [ns]
             data: CDR.
-            description: Of the topic; optional if the type is installed.
             publish_time: [ns] on any clock; default: the recorded log time.
+            description: Of the topic; optional if the type is installed.
 
         Returns:
             The recorded log time [ns]: the one given, or 1 ns after the last one if that is later.
@@ -424,7 +425,7 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
                 yield BagMessage(*message)
 
 
-_Messages = Callable[[Path], Iterator[tuple[str, str, int, bytes]]]
+_Messages = Callable[[Path], Iterator[tuple[str, str, int, bytes, int | None]]]
 _Topics = Callable[[Path], Iterable[tuple[str, str, int]]]
 
 
@@ -433,7 +434,7 @@ class Storage(NamedTuple):
 
     files: tuple[Path, ...]
     read: _Messages
-    """topic, message type, log time [ns] and bytes of each message, in order of log time"""
+    """topic, message type, log time [ns], bytes and publish time [ns] of each message, in order of log time"""
     list_topics: _Topics
     """name, message type and number of messages of each topic; a name may come several times"""
 
@@ -529,15 +530,15 @@ def storage(path: Path) -> Storage:
         return Storage(tuple(_inside(path, name) for name in names), messages, topics)
 
 
-def _unpacked_messages(read: _Messages, file: Path) -> Iterator[tuple[str, str, int, bytes]]:
-    for topic, type_name, log_time, data in read(file):
-        yield topic, type_name, log_time, mcap_reader.unpack_zstd(data, mcap_reader.LARGEST_CHUNK)
+def _unpacked_messages(read: _Messages, file: Path) -> Iterator[tuple[str, str, int, bytes, int | None]]:
+    for topic, type_name, log_time, data, publish_time in read(file):
+        yield topic, type_name, log_time, mcap_reader.unpack_zstd(data, mcap_reader.LARGEST_CHUNK), publish_time
 
 
 def _of_packed_files(messages: _Messages, topics: _Topics) -> tuple[_Messages, _Topics]:
     """Readers of files that are compressed as a whole, each unpacked to a temporary file while it is read."""
 
-    def packed_messages(file: Path) -> Iterator[tuple[str, str, int, bytes]]:
+    def packed_messages(file: Path) -> Iterator[tuple[str, str, int, bytes, int | None]]:
         with mcap_reader.unpacked_file(file) as unpacked:
             yield from messages(unpacked)
 

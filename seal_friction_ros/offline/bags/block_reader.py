@@ -122,12 +122,13 @@ def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messa
         sizes = np.array([len(message.data) for message in block], np.int64)
         data = np.frombuffer(b''.join(message.data for message in block), np.uint8)
         times = np.array([message.log_time for message in block], np.int64)
-        yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, times)
+        sent = [message.log_time if message.publish_time is None else message.publish_time for message in block]
+        yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, times, np.array(sent, np.int64))
 
 
 def _room_for(data: bytes, count: int) -> Messages:
     """Space for ``count`` messages in ``data``."""
-    columns: Integers = np.empty((3, count), np.int64)
+    columns: Integers = np.empty((4, count), np.int64)
     return Messages(np.frombuffer(data, np.uint8), np.empty(count, np.uint8), *columns)
 
 
@@ -186,8 +187,7 @@ def _sorted(messages: Messages) -> Messages:
     if (times[:-1] <= times[1:]).all():
         return messages
     order = np.argsort(times, kind='stable')
-    data, kinds, offsets, sizes, _ = messages
-    return Messages(data, kinds[order], offsets[order], sizes[order], times[order])
+    return messages.in_order(order)
 
 
 def _copied(messages: Messages, first: int) -> Messages:
@@ -198,7 +198,8 @@ def _copied(messages: Messages, first: int) -> Messages:
     data = b''.join(messages.message(number) for number in range(first, count))
     sizes = messages.sizes[first:]
     offsets = np.cumsum(sizes) - sizes
-    return Messages(np.frombuffer(data, np.uint8), messages.kinds[first:], offsets, sizes, messages.received[first:])
+    left = messages.taken(first, count)
+    return left._replace(data=np.frombuffer(data, np.uint8), offsets=offsets)
 
 
 class _Channels:
@@ -242,6 +243,7 @@ def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: Me
         messages = _room_for(data, most)
         messages.kinds[:count], messages.offsets[:count] = kept.kinds, kept.offsets
         messages.sizes[:count], messages.received[:count] = kept.sizes, kept.received
+        messages.sent[:count] = kept.sent
         for block, end in ends:
             count = _index(messages, count, start, end, block, channels)
             start = end
@@ -281,6 +283,7 @@ def _walk(
     offsets: Integers,
     sizes: Integers,
     times: Integers,
+    sent: Integers,
     count: int,
     start: int,
     end: int,
@@ -310,6 +313,7 @@ def _walk(
             if kind == _UNKNOWN or not first <= time <= last:
                 return start, count, -1
             kinds[count], offsets[count], sizes[count], times[count] = kind, start + 31, length - 22, time
+            sent[count] = _whole_number(data, start + 23)
             count += 1
         start += 9 + length
     return start, count, 0

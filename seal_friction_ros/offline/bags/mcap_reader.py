@@ -280,15 +280,17 @@ def _check_name(kind: str, name: str) -> None:
         raise ValueError(f'{name[:40]!r} is not a valid name of a {kind}')
 
 
-def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
-    """Topic, message type, log time [ns] and bytes of each message of a finished file, in order of log time.
+def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes, int]]:
+    """Topic, message type, log time [ns], bytes and publish time [ns] of each message of a finished file.
+
+    In order of log time.
 
     Raises:
         ValueError: The file is not finished, or a block cannot be read.
     """
     with path.open('rb') as file:
-        for channel, log_time, _, data in messages(file, scan_finished(file)):
-            yield channel.topic, channel.type_name, log_time, data
+        for channel, log_time, publish_time, data in messages(file, scan_finished(file)):
+            yield channel.topic, channel.type_name, log_time, data, publish_time
 
 
 def file_topics(path: Path) -> Iterator[tuple[str, str, int]]:

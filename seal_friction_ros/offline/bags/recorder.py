@@ -89,7 +89,7 @@ class Recorder:
         self._resumes = False
         self._queue_length = queue_length
         # Plain tuples: the garbage collector untracks them.
-        self._queue: deque[tuple[str, str, int, bytes, int] | _NextBag] = deque()
+        self._queue: deque[tuple[str, str, int, bytes, int | None] | _NextBag] = deque()
         self._make = partial(
             BagWriter,
             split_size=split_size,
@@ -107,13 +107,13 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
         self._thread.start()
 
-    def record(self, topic: str, type_name: str, log_time: int, data: bytes) -> None:
-        """Queue one serialised message with the present wall time, or drop and count it; never blocks."""
+    def record(self, topic: str, type_name: str, log_time: int, data: bytes, publish_time: int | None = None) -> None:
+        """Queue one serialised message, or drop and count it; never blocks."""
         self._offered += 1
         if self._failed == self._newest or len(self._queue) >= self._queue_length:
             self._refused += 1
         else:
-            self._queue.append((topic, type_name, log_time, data, time.time_ns()))
+            self._queue.append((topic, type_name, log_time, data, publish_time))
 
     def flush_if_idle(self) -> None:
         """Write the queue now if it is long enough; the estimator calls this right after an answer.
@@ -200,9 +200,8 @@ class Recorder:
                 item = self._queue.popleft()
                 if isinstance(item, _NextBag):
                     return item
-                topic, type_name, log_time, data, wall_time = item
-                self._writer.write(topic, type_name, log_time, data, publish_time=wall_time)
-                unlooked += len(data)
+                self._writer.write(*item)
+                unlooked += len(item[3])
             if time.monotonic() - flushed >= FLUSH_PERIOD - _IDLE_PERIOD:  # the next look would be too late
                 self._writer.flush()
                 flushed = time.monotonic()

@@ -103,7 +103,7 @@ def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
                 key = topic, type_name
                 if key not in descriptions:
                     descriptions[key] = _described(channel)
-                found.last_ns = writer.write(topic, type_name, log_time, data, descriptions[key], publish_time)
+                found.last_ns = writer.write(topic, type_name, log_time, data, publish_time, descriptions[key])
                 found.first_ns = found.last_ns if found.first_ns < 0 else found.first_ns
                 found.messages += 1
                 found.topics[topic] = found.topics.get(topic, 0) + 1

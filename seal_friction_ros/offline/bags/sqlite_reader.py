@@ -27,8 +27,8 @@ def file_topics(path: Path) -> list[tuple[str, str, int]]:
         return [(name, type_name, counts.get(number, 0)) for number, name, type_name in _names(database)]
 
 
-def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
-    """Topic, message type, log time [ns] and bytes of each message, in order of log time.
+def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes, None]]:
+    """Topic, message type, log time [ns] and bytes of each message, in order of log time; no publish time.
 
     Raises:
         ValueError: The file is not such a database.
@@ -39,7 +39,7 @@ def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes]]:
         for number, log_time, data in database.execute(_MESSAGES):
             if number not in names or not isinstance(log_time, int) or not isinstance(data, bytes):
                 raise ValueError(f'a message of topic {number!r} at {log_time!r} is invalid')
-            yield *names[number], log_time, data
+            yield *names[number], log_time, data, None
 
 
 def file_definitions(path: Path) -> list[tuple[str, str, str]]:

@@ -37,6 +37,13 @@ class Topics(NamedTuple):
     configuration: str
     tick: str
     temperature: str
+    clock: str
+
+    @property
+    def inputs(self) -> set[str]:
+        """Topics that the estimator takes."""
+        used = self.pressure, self.velocity, self.force, self.reference, self.tick, self.temperature, self.clock
+        return set(used) - {''}
 
     @property
     def answers(self) -> dict[str, str]:
@@ -60,6 +67,7 @@ TYPES = Topics(
     configuration=messages.CONFIGURATION_TYPE,
     tick=messages.TICK_TYPE,
     temperature=messages.TEMPERATURE_TYPE,
+    clock=messages.CLOCK_TYPE,
 )
 """Message type of each topic."""
 
@@ -80,7 +88,8 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
     known = bag_topics(bag) if known is None else known
     topics = {topic: info for topic, info in known.items() if topic.startswith(below) and not topic.endswith(RECORDED)}
     for wanted in TYPES:
-        found = sorted(topic for topic, info in topics.items() if info.type_name == wanted and info.message_count)
+        place = known if wanted == TYPES.clock else topics  # simulated time is one for all
+        found = sorted(topic for topic, info in place.items() if info.type_name == wanted and info.message_count)
         if len(found) > 1 and wanted == TYPES.temperature:  # a standard type: others may be of a motor or a battery
             found = [topic for topic in found if topic.endswith(TEMPERATURE_TOPIC)]
         if len(found) > 1:

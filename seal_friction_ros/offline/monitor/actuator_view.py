@@ -111,6 +111,7 @@ STATUS_WORDS = {
     Status.TEMPERATURE_MISSING: 'no valid temperature of the seals',
     Status.OUTSIDE_IDENTIFIED_TEMPERATURE: 'outside the identified temperatures: extrapolated',
     Status.PRESLIDING: 'the seals may still shear: the friction follows their elasticity',
+    Status.LATE_INPUT: 'the velocity comes late, or simulated time stands still',
 }
 """Bit of the status -> what it means for a person who looks on; FrictionEstimate.msg has the definition."""
 

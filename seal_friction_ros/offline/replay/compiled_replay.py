@@ -88,6 +88,7 @@ class Run:
     ) -> None:
         self.configuration, self._has_override = configuration, has_override
         self._parameters = configuration.parameters()
+        self._tells_sending = state is not None and configuration.tells_sending
         self.state = init(self._parameters) if state is None else state
 
     def compared(
@@ -134,8 +135,11 @@ class Run:
                 messages = block.taken(first, end)
                 if messages.kinds[0] == Kind.CONFIGURATION:
                     configuration, self.state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))[:2]
+                    self._tells_sending = configuration.tells_sending
                     if not self._has_override:
                         self.configuration, self._parameters = configuration, configuration.parameters()
+                if not self._tells_sending:
+                    messages = messages._replace(sent=messages.received)
                 self.state, answers = receive_all(self._parameters, self.state, messages)
                 yield messages, answers
 
@@ -146,7 +150,7 @@ def compile_now(configurations: Iterable[Configuration] = ()) -> None:
     Args:
         configurations: What the bags are replayed with; each kind of law is compiled once. None: the default one.
     """
-    none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((3, 0), np.int64))
+    none = Messages(np.frombuffer(bytes(1), np.uint8), np.zeros(0, np.uint8), *np.zeros((4, 0), np.int64))
     for configuration in list(configurations) or [default_configuration()]:
         parameters = configuration.parameters()
         _, answers = receive_all(parameters, init(parameters), none)
@@ -184,18 +188,20 @@ def _first_configuration(bag: Path, namespace: str) -> Configuration:
 def kinds_of_topics(topics: Topics) -> KindOf:
     """Function that gives the kind of message on a topic.
 
-    It raises `UnsuitedError` for a topic with messages of two types.
+    It raises `UnsuitedError` for a topic with messages of two types, and for simulated time.
     """
     known = {
         topic: (type_name, Kind[name.upper()])
         for name, topic, type_name in zip(Topics._fields, topics, TYPES, strict=True)
-        if topic and name != 'position'
+        if topic and name not in ('position', 'clock')
     }
 
     def kind_of(topic: str, type_name: str) -> Kind:
         """Kind of the messages on a topic."""
         other = Kind.OTHER_ESTIMATE if type_name == ESTIMATE_TYPE else Kind.OTHER
         wanted, kind = known.get(topic, (type_name, other))
+        if topic == topics.clock:
+            raise UnsuitedError(f'{topic}: simulated time')
         if type_name != wanted:
             raise UnsuitedError(f'{topic} has messages of {wanted} and of {type_name}')
         return kind

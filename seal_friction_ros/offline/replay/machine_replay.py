@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.messages import (
+    CLOCK_TYPE,
     CONFIGURATION_TYPE,
     DECODERS,
     ESTIMATE_TYPE,
@@ -18,7 +19,7 @@ from seal_friction_ros.core.estimation.messages import (
     type_of,
 )
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
-from seal_friction_ros.core.machine.machine import Machine, MachineState, receive, receive_tick
+from seal_friction_ros.core.machine.machine import Machine, MachineState, receive, receive_clock, receive_tick
 from seal_friction_ros.core.machine.machine_snapshot import is_machine_text, machine_of_text, parse_machine_text
 from seal_friction_ros.core.machine.message_fields import full_name
 from seal_friction_ros.core.machine.outputs import due_commands
@@ -107,6 +108,11 @@ class _Replayed:
         found = [topic for topic, info in self._known.items() if info.type_name == kind and topic.endswith(end)]
         return found[0] if found else end
 
+    def _sent(self, message: BagMessage) -> int:
+        """When a message was sent [ns]: at its receipt where the bag does not tell."""
+        is_told = self._machine is not None and self._machine.actuators[0].configuration.tells_sending
+        return message.log_time if message.publish_time is None or not is_told else message.publish_time
+
     def _answers(self, message: BagMessage) -> list[Answer]:
         machine, state = self._machine, self._state
         if machine is None or state is None:
@@ -118,9 +124,14 @@ class _Replayed:
 
         if message.topic in machine.plans:
             try:
-                state = receive(machine, state, message.topic, message.data, message.log_time, collect)
+                state = receive(
+                    machine, state, message.topic, message.data, message.log_time, collect, self._sent(message)
+                )
             except ValueError:
                 return []  # as the node: it counts the message as malformed
+        elif message.type_name == CLOCK_TYPE:
+            clock = DECODERS[CLOCK_TYPE](message.data)
+            state = receive_clock(machine, state, clock, message.log_time, self._sent(message))
         elif message.topic in self._number:
             tick = DECODERS[TICK_TYPE](message.data)
             state = receive_tick(machine, state, self._number[message.topic], tick, message.log_time, collect)

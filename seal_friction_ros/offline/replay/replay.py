@@ -84,7 +84,7 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
     configuration = override or default_configuration()
     parameters = configuration.parameters()
     state = init(parameters)
-    inputs = {topics.pressure, topics.velocity, topics.force, topics.reference, topics.tick, topics.temperature} - {''}
+    inputs, tells_sending = topics.inputs, False
     if not topics.configuration:
         data = encode_text(snapshot_text(first_snapshot(configuration)._replace(recorded=Recorded(None))))
         yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, data), ())
@@ -99,14 +99,14 @@ def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuratio
             due = message.log_time + round(STATE_PERIOD * 1e9)
         newest = message.log_time
         answers: list[tuple[str, bytes]] = []
-        used = message
+        used = message if tells_sending else message._replace(publish_time=message.log_time)
         try:
             if message.topic in inputs:
                 record = DECODERS[message.type_name](message.data)
-                state, answers = answered(parameters, state, record, message.log_time)
+                state, answers = answered(parameters, state, record, message.log_time, used.publish_time)
             elif message.topic == topics.configuration:
                 snapshot = parse_snapshot(DECODERS[CONFIGURATION_TYPE](message.data))
-                state = snapshot.state
+                state, tells_sending = snapshot.state, snapshot.configuration.tells_sending
                 recorded = snapshot.recorded or Recorded(snapshot.configuration.feedforward)
                 if override:
                     snapshot = Snapshot(override, state)

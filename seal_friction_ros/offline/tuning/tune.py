@@ -4,7 +4,6 @@ The file holds every parameter of the feed-forward and nothing else. It does not
 axis gives the same bytes.
 """
 
-import math
 import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -16,10 +15,10 @@ import yaml
 
 from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX
-from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, Reference, condition_reference
+from seal_friction_ros.core.estimation.pipeline import NO_REFERENCE, Reference, condition_reference, is_possible
 from seal_friction_ros.core.estimation.records import (
     NO_PRESSURE,
     Force,
@@ -368,7 +367,7 @@ def read_recording(
                 continue
             sample = messages.DECODERS[message.type_name](message.data)
             held[type(sample)] = sample
-            conditioned = _with_reference(conditioned, sample)
+            conditioned = _with_reference(estimator.settings, conditioned, sample)
             reference = held.get(ServoReference)
             if not isinstance(sample, Velocity) or reference is None:
                 continue
@@ -394,9 +393,9 @@ def _force_sum(estimator: EstimatorParameters, force: Force, pressure: Pressure)
     return float(corrected_force_sum(correction, force.force, pressure.chamber_a, pressure.chamber_b))
 
 
-def _with_reference(conditioned: Reference, sample: Any) -> Reference:
+def _with_reference(settings: EstimatorSettings, conditioned: Reference, sample: Any) -> Reference:
     """What the node keeps of the references, after one more sample of any kind."""
-    is_new = isinstance(sample, ServoReference) and math.isfinite(sample.velocity)
+    is_new = isinstance(sample, ServoReference) and is_possible(settings, sample)
     return condition_reference(conditioned, sample) if is_new else conditioned
 
 

@@ -1,0 +1,23 @@
+"""Callback of a subscription that needs to know when a message was sent."""
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+_TWO = inspect.Signature([inspect.Parameter(name, inspect.Parameter.POSITIONAL_ONLY) for name in ('message', 'info')])
+
+
+def with_source_time(callback: Callable[[Any, int], None]) -> Callable[..., None]:
+    """Callback for rclpy that calls ``callback`` with a message and when it was sent [ns of the sender's system clock].
+
+    rclpy gives the information about a message to a callback of two arguments; its events executor gives both as one
+    tuple.
+    """
+
+    def call(*taken: Any) -> None:
+        """What rclpy calls."""
+        message, info = taken[0] if len(taken) == 1 else taken
+        callback(message, info['source_timestamp'])
+
+    call.__signature__ = _TWO  # type: ignore[attr-defined]
+    return call
