@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
@@ -23,7 +24,7 @@ from seal_friction_ros.core.estimation.messages import (
     encode_text,
     type_of,
 )
-from seal_friction_ros.core.estimation.node_options import InputOptions, RecordingOptions
+from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX, InputOptions, RecordingOptions
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
 from seal_friction_ros.core.machine.answers_together import NamedAnswer
 from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE, TopicMessage, encode_newest
@@ -41,6 +42,7 @@ _TICK_PERIOD = 0.01  # [s] while ticks keep a force up; more than `pipeline.TICK
 _TICKING = 1_000_000_000  # [ns] after the last tick: inputs slower than the ticks need them again and again
 _STARVED = round(_TICK_PERIOD * 1e9) + OVERDUE  # [ns] without the watchdog
 _HEALTH_PERIOD = 60.0  # [s]
+_CHANGE_PERIOD = 100_000_000  # [ns] between two applications of changed parameters, which take half a millisecond
 _INPUT_PERIOD = 0.5  # [s]
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
 _BACKLOG = 5_000_000  # [ns] late by more, others may wait behind a message: the node takes them all in one go
@@ -83,6 +85,8 @@ class EstimatorNode(ManagedNode, ABC):
         self.has_viewer = False  # by a live view
         self._watchdog_called = self._ticked = self._watched = 0  # [ns] of `time.perf_counter_ns`
         self._is_ticking = False
+        self._is_change_due, self._applied = False, 0  # [ns] of `time.perf_counter_ns`
+        self._sets = self._applications = 0  # of parameters since the last report
         self._timers: list[Any] = []
         super().__init__(name, groups, **kwargs)
         self._recording = Recording(self.get_fully_qualified_name())
@@ -125,6 +129,10 @@ class EstimatorNode(ManagedNode, ABC):
     @abstractmethod
     def received(self) -> Mapping[str, int]:
         """Messages of each input since activation."""
+
+    @abstractmethod
+    def apply_change(self) -> None:
+        """Apply the present parameters."""
 
     @abstractmethod
     def has_placeholder(self, prefix: str) -> bool:
@@ -278,6 +286,7 @@ class EstimatorNode(ManagedNode, ABC):
         if self.on_watchdog():
             self._ticked = now
         self.publish_newest()
+        self._apply_due_change()
         is_ticking = self.has_viewer or now - self._ticked < _TICKING
         if is_ticking != self._is_ticking:
             self._is_ticking = is_ticking
@@ -313,6 +322,29 @@ class EstimatorNode(ManagedNode, ABC):
             self._outputs[_MONITOR].publish(encode_newest(newest))
 
     # --- parameters ---
+
+    def on_change(self, changed: Collection[Parameter]) -> None:
+        """Apply changed settings between two samples, at most every `_CHANGE_PERIOD`; a force that is off, at once."""
+        self._sets += 1
+        self._is_change_due = True
+        is_off = any(one.name.endswith(f'{FEEDFORWARD_PREFIX}scale') and one.value == 0.0 for one in changed)
+        self._apply_due_change(is_urgent=is_off or not self.active)
+
+    def _apply_due_change(self, *, is_urgent: bool = False) -> None:
+        now = time.perf_counter_ns()
+        if self._is_change_due and (is_urgent or now - self._applied >= _CHANGE_PERIOD):
+            self._is_change_due, self._applied = False, now
+            self._applications += 1
+            self.apply_change()
+
+    def report_sets(self) -> dict[str, DiagnosticStatus]:
+        """A warning if parameters are set more often than they are applied."""
+        sets, applied = self._sets, self._applications
+        self._sets = self._applications = 0
+        if sets <= applied + 1:
+            return {}
+        message = f'parameters were set {sets} times since the last report and applied {applied} times'
+        return {'parameters': DiagnosticStatus(level=DiagnosticStatus.WARN, message=message)}
 
     def check_change(self, changed: Mapping[ParameterGroup, Any]) -> None:
         """Reject a force from placeholder seals.

@@ -214,8 +214,8 @@ class FrictionEstimator(EstimatorNode):
         del prefix  # of the only actuator
         return self._configuration is not None and self._configuration.has_placeholder
 
-    def on_change(self) -> None:
-        """Apply changed settings, between two samples."""
+    def apply_change(self) -> None:
+        """Apply the present parameters."""
         self._refuse_inputs(self._watch.duplicate_publishers())
         changed = replace(
             self._configuration,
@@ -227,7 +227,7 @@ class FrictionEstimator(EstimatorNode):
             return
         self._configuration = changed
         if self.active:
-            self._known = changed.parameters()
+            self._known = changed.parameters(self._known.estimator.seals)
             self.publish_configuration()
 
     def snapshot(self) -> str:
@@ -248,7 +248,7 @@ class FrictionEstimator(EstimatorNode):
         adapting = self._known.estimator if self._adapts else None
         known = self._state.estimator if self.active else None
         estimate = self._statistics.report(self.active, self.active and self._state.refused, graph, adapting, known)
-        return {'estimate': estimate, 'recorder': self.report_graph(graph)}
+        return {'estimate': estimate, 'recorder': self.report_graph(graph), **self.report_sets()}
 
     @property
     def _adapts(self) -> bool:

@@ -4,6 +4,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -35,6 +36,7 @@ from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedA
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import (
     Machine,
+    MachineActuator,
     MachineState,
     due,
     init,
@@ -124,10 +126,27 @@ class MachineEstimator(EstimatorNode):
 
     def _configuration(self, actuator: Actuator) -> Configuration:
         try:
-            settings = (self.settings(group.record_type, group.prefix) for group in _groups(actuator))
-            return load_configuration(actuator.selection, *settings).without_placeholder_force()
+            return load_configuration(actuator.selection, *self._settings(actuator)).without_placeholder_force()
         except ValueError as error:
             raise ValueError(f'{actuator.name}: {error}') from None
+
+    def _changed(self, actuator: MachineActuator) -> MachineActuator:
+        """Actuator with the present parameters; itself if they are as they were."""
+        settings, feedforward, adaptation = self._settings(actuator.mapping)
+        configuration = replace(
+            actuator.configuration, settings=settings, feedforward=feedforward, adaptation=adaptation
+        ).without_placeholder_force()
+        if configuration == actuator.configuration:
+            return actuator
+        return replace(
+            actuator,
+            configuration=configuration,
+            pipeline=configuration.parameters(actuator.pipeline.estimator.seals),
+        )
+
+    def _settings(self, actuator: Actuator) -> list[Any]:
+        """Present settings of estimator, feed-forward and adaptation of an actuator."""
+        return [self.settings(group.record_type, group.prefix) for group in _groups(actuator)]
 
     def _new_statistics(self) -> None:
         """Count anew."""
@@ -316,13 +335,13 @@ class MachineEstimator(EstimatorNode):
         """Use another offset [ns] from now on."""
         self._state = _with(self._state, clock_offset=offset)
 
-    def on_change(self) -> None:
-        """Apply changed settings, between two messages."""
+    def apply_change(self) -> None:
+        """Apply the present parameters."""
         self._refuse_inputs(self._watch.duplicate_publishers())
-        changed = self._made()
-        if [a.configuration for a in changed.actuators] == [a.configuration for a in self._machine.actuators]:
+        changed = tuple(map(self._changed, self._machine.actuators))
+        if all(new is old for new, old in zip(changed, self._machine.actuators, strict=True)):
             return
-        self._machine = changed
+        self._machine = replace(self._machine, actuators=changed)
         if self.active:
             self.publish_configuration()
 
@@ -361,7 +380,7 @@ class MachineEstimator(EstimatorNode):
                 status.level = max(status.level, DiagnosticStatus.WARN)
                 status.message = '; '.join([*said, status.message])
             parts[name] = status
-        return {**parts, 'recorder': self.report_graph(graph)}
+        return {**parts, 'recorder': self.report_graph(graph), **self.report_sets()}
 
     def _unanswered(self, number: int) -> list[str]:
         """What is wrong with the messages of an actuator: not taken, without its numbers, gauge or absolute."""

@@ -162,7 +162,7 @@ class ManagedNode(LifecycleNode):
             ValueError: The change is invalid.
         """
 
-    def on_change(self) -> None:
+    def on_change(self, changed: Collection[Parameter]) -> None:
         """Apply changed parameters; called while the node is configured."""
 
     # --- parameters ---
@@ -202,9 +202,8 @@ class ManagedNode(LifecycleNode):
         return SetParametersResult(successful=True)
 
     def _on_parameters_set(self, parameters: list[Parameter]) -> None:
-        del parameters
         if self.configured:
-            self.on_change()
+            self.on_change(parameters)
 
     # --- lifecycle ---
 

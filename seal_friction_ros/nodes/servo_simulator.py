@@ -5,11 +5,12 @@ import sys
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from seal_friction_ros.core.estimation.configuration import SealSelection
@@ -180,8 +181,9 @@ class ServoSimulator(ManagedNode):
         if len(waves) > 1 and not waves <= WAVES.keys():
             raise ValueError('wave: to and from topic and pull_test only while the node is unconfigured')
 
-    def on_change(self) -> None:
+    def on_change(self, changed: Collection[Parameter]) -> None:
         """Apply changed settings; a changed wave starts from its beginning."""
+        del changed
         settings = self.settings(SimulatorSettings)
         if self.active and settings.wave != self._settings.wave:
             self._wave_start = self._index

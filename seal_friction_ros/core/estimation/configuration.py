@@ -19,6 +19,7 @@ from seal_friction_ros.core.estimation.records import NEVER, NO_TEMPERATURE, For
 from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED
 from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
+from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.mounting import CHAMBERS_TEXT, check_chambers
 from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of
 
@@ -163,13 +164,16 @@ class Configuration:
         """
         return self.feedforward.lateness_max > 0.0
 
-    def parameters(self) -> PipelineParameters:
+    def parameters(self, mounted_seals: tuple[MountedSeal, ...] | None = None) -> PipelineParameters:
         """Parameters of estimate and feed-forward.
+
+        Args:
+            mounted_seals: The seals, if they are made already, which takes a millisecond.
 
         Raises:
             ValueError: A seal document is not valid.
         """
-        seals = mount_seals(self.seal_documents, self.selection.seal_chambers)
+        seals = mounted_seals or mount_seals(self.seal_documents, self.selection.seal_chambers)
         return PipelineParameters(EstimatorParameters(self.settings, seals, self.adaptation), self.feedforward)
 
 
@@ -210,16 +214,16 @@ def snapshot_text(snapshot: Snapshot) -> str:
     configuration, state, version, recorded = snapshot
     document = {
         'version': version,
-        'selection': dataclasses.asdict(configuration.selection),
+        'selection': vars(configuration.selection),
         'seal_documents': configuration.seal_documents,
-        'settings': dataclasses.asdict(configuration.settings),
-        'feedforward': dataclasses.asdict(configuration.feedforward),
-        'adaptation': dataclasses.asdict(configuration.adaptation),
+        'settings': vars(configuration.settings),
+        'feedforward': vars(configuration.feedforward),
+        'adaptation': vars(configuration.adaptation),
         'state': _encoded_record(state),
     }
     if recorded is not None:
         acted = recorded.feedforward
-        document['recorded'] = {'feedforward': dataclasses.asdict(acted) if acted is not None else None}
+        document['recorded'] = {'feedforward': vars(acted) if acted is not None else None}
     return json.dumps(document, sort_keys=True, allow_nan=False)
 
 
