@@ -1,13 +1,18 @@
 """Time to 0 N: ``python test/system/time_to_zero.py [--times 20] [--only TEXT] [--json]``.
 
-Stops, freezes, leaps and kills each input and the reference of a live node, and deactivates, interrupts and terminates
-the node. The node runs with its default parameters, each publisher in a process of its own, and this process receives
-the feed-forward. The time counts from the last usable input, taken by its publisher just before it publishes, or from
-just before the request or signal, until 0 N is received for good; at most `LONGEST`. Run it at real-time priority on a
-busy machine: ``chrt -f 50``.
+Stops, freezes, leaps and kills each input, the reference and simulated time of a live node, reverses the reference
+meanwhile, asks for what no rod can do, holds the node up (SIGSTOP, a share of the processor) while the machine goes on
+or stops, deactivates, interrupts and terminates it, and starts it wrongly. The node runs with real seals, a scale of
+0.9 and else its default parameters, each publisher in a process of its own, and this process receives the feed-forward.
+The time counts from the last usable input, taken by its publisher just before it publishes, or from just before the
+request or signal, until 0 N is received for good; at most `LONGEST`. Run it at real-time priority on a busy machine:
+``chrt -f 50``.
 
 The middleware may deliver late what the node has sent in time (docs/degradation.md). So the time is also that of a
 controller which takes no message older than `OLDEST`, as docs/controllers.md asks.
+
+Time counts from SIGCONT where a node was stopped: until then nobody can act. A force against the wanted velocity, a
+node that starts where it must not, and a force from placeholder seals count as infinite.
 
 Alternating stamps stay usable. There the requirement is that a reversal is not faster than the slew limit.
 """
@@ -23,11 +28,14 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from http.client import HTTPConnection
 from pathlib import Path
 from typing import IO, Any, NamedTuple
+from urllib.parse import urlsplit
 
 import rclpy
 from rclpy.node import Node
@@ -37,6 +45,7 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from fault_rows import MS, good
+from harness.monitor_process import monitor
 from harness.processes import free_domain, graph_environment, node_process
 from harness.spin_nodes import TIMEOUT, SpunNodes, ros_context
 from lifecycle_msgs.msg import Transition
@@ -44,13 +53,30 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy.context import Context
 
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
-from seal_friction_ros.core.estimation.messages import DECODERS, FEEDFORWARD_TYPE, INPUTS, encode
+from seal_friction_ros.core.estimation.messages import (
+    CLOCK_TOPIC,
+    CLOCK_TYPE,
+    CONFIGURATION_TYPE,
+    DECODERS,
+    FEEDFORWARD_TYPE,
+    INPUTS,
+    encode,
+    encode_text,
+)
+from seal_friction_ros.core.estimation.records import Clock, ServoReference
 from seal_friction_ros.files import share_directory
 from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.discovery import PROFILES, set_up_discovery
 from seal_friction_ros.nodes.managed_node import message_class
 
 TOPICS = ('rod_velocity', 'cylinder_pressure', 'force_sum', 'servo_reference')
+NODE = {'seals': ['ms28775_114', 'ms28775_114'], 'feedforward.scale': 0.9}
+"""Parameters of the node in all cases"""
+STOPS = (0.2, 1.0, 5.0)  # [s] for which a node is stopped
+SHARE = (0.002, 0.018)  # [s] for which a node with a tenth of the processor runs and is stopped
+BOMB = '[' * 100_000
+"""Text of a configuration that a parser without bounds does not survive"""
+ABSURD = 1e300  # [-] reference that no rod can follow over the usual one
 PERIOD = 4 * MS  # [ns] between two messages of each publisher
 LONGEST = FeedForwardSettings().fade_time + 0.05  # [s]
 QUIET = 0.3  # [s] 0 N for good
@@ -58,7 +84,9 @@ LONGEST_WAIT = 5.0  # [s] for it
 OLDEST = 50 * MS  # [ns] message that a controller takes
 SLOW_SLEW = 500.0  # [N/s] where stamps alternate
 JITTER = 0.01  # [s] of the receipt
-SHORT_LEASE = '<sec>2</sec>'  # until a killed publisher is gone from the graph, here
+NEVER_ZERO = float('inf')  # [s]
+REVERSAL_TICKS = 10  # feed-forwards until one has heard of a reversal
+LEASE, SHORT_LEASE = '<sec>20</sec>', '<sec>2</sec>'  # until a killed publisher is gone from the graph, and here
 ANNOUNCED = '<sec>0</sec><nanosec>500000000</nanosec>'  # between two announcements, which have to be within the lease
 
 
@@ -66,7 +94,7 @@ ANNOUNCED = '<sec>0</sec><nanosec>500000000</nanosec>'  # between two announceme
 
 
 def send(topic: str, shared: Path) -> None:
-    """Publish one topic as told by the newest line of stdin: run, stop, freeze, alternate, leap or reverse.
+    """Publish one topic as told by the newest line of stdin: run, stop, freeze, alternate, leap, absurd or reverse.
 
     Args:
         topic: Its name.
@@ -74,9 +102,12 @@ def send(topic: str, shared: Path) -> None:
     """
     set_up_discovery()
     rclpy.init()
-    publisher = Node(f'{topic}_driver').create_publisher(message_class(INPUTS[topic]), topic, qos.STREAM)
+    is_clock = topic == CLOCK_TOPIC
+    kind = CLOCK_TYPE if is_clock else INPUTS[topic]
+    made = Clock if is_clock else lambda time_ns: good(time_ns)[topic][0]
+    publisher = Node(f'{topic.strip("/")}_driver').create_publisher(message_class(kind), topic, qos.STREAM)
     with shared.open('r+b') as file, mmap.mmap(file.fileno(), 8) as last_usable:
-        command, sign, last, number = 'run', 1.0, good(time.time_ns())[topic][0], 0
+        command, sign, last, number = 'run', 1.0, made(time.time_ns()), 0
         due = time.monotonic_ns()
         while True:
             due += PERIOD
@@ -96,20 +127,29 @@ def send(topic: str, shared: Path) -> None:
             if command != 'freeze':
                 number += 1
                 ahead = {'alternate': 5 * MS * (number % 2), 'leap': 20 * MS}.get(command, 0)
-                last = good(time.time_ns() + ahead)[topic][0]
-                if topic == 'servo_reference':
-                    last = last._replace(velocity=sign * last.velocity)
-                last_usable[:] = struct.pack('q', time.monotonic_ns())
-            publisher.publish(encode(last))
+                last = directed(made(time.time_ns() + ahead), ABSURD if command == 'absurd' else sign)
+                if command != 'absurd':
+                    last_usable[:] = struct.pack('q', time.monotonic_ns())
+            publisher.publish(clock_bytes(last) if is_clock else encode(last))
             if command == 'leap':
                 command = 'stop'
+
+
+def directed(record: Any, factor: float) -> Any:
+    """A reference with its velocity times ``factor``; another record as it is."""
+    return record._replace(velocity=factor * record.velocity) if isinstance(record, ServoReference) else record
+
+
+def clock_bytes(clock: Clock) -> bytes:
+    """Bytes of simulated time."""
+    return struct.pack('<4siI', b'\x00\x01\x00\x00', *divmod(clock.stamp, 10**9))
 
 
 class Sender:
     """Handle of a publisher process."""
 
     def __init__(self, topic: str, environment: dict[str, str], folder: Path) -> None:
-        self._shared = folder / topic
+        self._shared = folder / topic.strip('/')
         self._shared.write_bytes(bytes(8))
         command = [sys.executable, __file__, '--send', topic, str(self._shared)]
         self.process = subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, text=True)
@@ -152,16 +192,18 @@ class Received(NamedTuple):
 class Axis(SpunNodes):
     """Node and publishers in processes of their own, and the measurement in this one."""
 
-    def __init__(self, context: Context, folder: Path, domain: int, parameters: dict[str, Any]) -> None:
-        self._listener = Node('listener', context=context)
-        super().__init__(context, self._listener)
-        self._folder, self._domain, self._parameters = folder, domain, parameters
+    def __init__(
+        self, context: Context, folder: Path, domain: int, parameters: dict[str, Any], topics: tuple[str, ...]
+    ) -> None:
+        self.listener = Node('listener', context=context)
+        super().__init__(context, self.listener)
+        self.folder, self.domain, self._parameters = folder, domain, {**NODE, **parameters}
         self._environment = graph_environment(domain)
         self.received: list[Received] = []
         kind = message_class(FEEDFORWARD_TYPE)
-        self._listener.create_subscription(kind, 'friction_feedforward', self._on_feedforward, 1000, raw=True)
-        self._change = self._listener.create_client(ChangeState, 'friction_estimator/change_state')
-        self.senders = {topic: self._sender(topic) for topic in TOPICS}
+        self.listener.create_subscription(kind, 'friction_feedforward', self._on_feedforward, 1000, raw=True)
+        self._change = self.listener.create_client(ChangeState, 'friction_estimator/change_state')
+        self.senders = {topic: self._sender(topic) for topic in topics}
         self._stack = ExitStack()
         self.node = self._start_node()
 
@@ -171,18 +213,23 @@ class Axis(SpunNodes):
         self.received.append(Received(received, answer.force, answer.limited, answer.stamp - since))
 
     def _sender(self, topic: str) -> Sender:
-        return Sender(topic, self._environment, self._folder)
+        return Sender(topic, self._environment, self.folder)
 
     def _start_node(self) -> subprocess.Popen[bytes]:
-        log = self._folder / 'log'
-        return self._stack.enter_context(node_process('friction_estimator', self._domain, self._parameters, log))
+        log = self.folder / 'log'
+        return self._stack.enter_context(node_process('friction_estimator', self.domain, self._parameters, log))
+
+    def kill_node(self) -> None:
+        """Kill the node; `restore` starts another one."""
+        self.node.kill()
+        self.node.wait()
 
     def close(self) -> None:
         """End all processes."""
         for sender in self.senders.values():
             sender.kill()
         self._stack.close()
-        self._listener.destroy_node()
+        self.listener.destroy_node()
 
     def restore(self) -> None:
         """All publishers run, the force is there.
@@ -190,6 +237,7 @@ class Axis(SpunNodes):
         Raises:
             RuntimeError: It does not come.
         """
+        self.node.send_signal(signal.SIGCONT)
         if self.node.poll() is not None:
             self._stack.close()
             self.node = self._start_node()
@@ -205,7 +253,7 @@ class Axis(SpunNodes):
             return len(newest) == 20 and all(one.force > 0.0 and not one.limited for one in newest)
 
         if not self.spin_until(is_steady):
-            raise RuntimeError(f'no force: {self.received[-1:]}; {(self._folder / "log").read_text()[-2000:]}')
+            raise RuntimeError(f'no force: {self.received[-1:]}; {(self.folder / "log").read_text()[-2000:]}')
         self.spin(random.uniform(0.0, 0.05))  # noqa: S311
 
     def time_to_zero(self, since: Callable[[], int]) -> TimeToZero:
@@ -221,7 +269,7 @@ class Axis(SpunNodes):
             return zero() < len(self.received) and time.monotonic_ns() - last > QUIET * 1e9
 
         if not self.spin_until(is_quiet, LONGEST_WAIT):
-            return TimeToZero(float('inf'), float('inf'))
+            return TimeToZero(NEVER_ZERO, NEVER_ZERO)
         taken = [one for one in self.received if one.time - one.stamp <= OLDEST]
         forces = [i for i, one in enumerate(taken) if one.force != 0.0]
         end = start
@@ -238,16 +286,18 @@ class Axis(SpunNodes):
 
 
 @contextmanager
-def axis(parameters: dict[str, Any] | None = None) -> Iterator[Axis]:
-    """Node and publishers, on a ROS domain of their own; a killed publisher leaves the graph after `SHORT_LEASE`."""
+def axis(
+    parameters: dict[str, Any] | None = None, topics: tuple[str, ...] = TOPICS, lease: str = SHORT_LEASE
+) -> Iterator[Axis]:
+    """Node and publishers, on a ROS domain of their own; a killed publisher leaves the graph after the lease."""
     domain = free_domain()
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder, profile = Path(name), share_directory('seal_friction_ros', __file__) / 'config' / 'fastdds.xml'
-        text = profile.read_text().replace('<sec>2</sec>', ANNOUNCED).replace('<sec>20</sec>', SHORT_LEASE)
+        text = profile.read_text().replace('<sec>2</sec>', ANNOUNCED).replace(LEASE, lease)
         (folder / 'fastdds.xml').write_text(text)
         os.environ[PROFILES[0]] = str(folder / 'fastdds.xml')
         stack.callback(os.environ.pop, PROFILES[0])
-        made = Axis(stack.enter_context(ros_context(domain)), folder, domain, parameters or {})
+        made = Axis(stack.enter_context(ros_context(domain)), folder, domain, parameters or {}, topics)
         stack.callback(made.close)
         yield made
 
@@ -285,7 +335,7 @@ def signalled(number: signal.Signals) -> Callable[[Axis], TimeToZero]:
         place.node.send_signal(number)
         found = place.time_to_zero(lambda: start)
         code = place.node.wait(TIMEOUT)
-        return found if code == 0 else TimeToZero(float('inf'), float('inf'))
+        return found if code == 0 else TimeToZero(NEVER_ZERO, NEVER_ZERO)
 
     return attempt
 
@@ -297,6 +347,124 @@ def deactivated(place: Axis) -> TimeToZero:
     found = place.time_to_zero(lambda: start)
     place.change_state(Transition.TRANSITION_ACTIVATE)
     return found
+
+
+def together(command: str, *topics: str) -> Callable[[Axis], TimeToZero]:
+    """Some publishers do the same at the same time."""
+
+    def attempt(place: Axis) -> TimeToZero:
+        for topic in topics or place.senders:
+            place.senders[topic].tell(command)
+        return place.time_to_zero(lambda: min(place.senders[topic].last_usable() for topic in topics or place.senders))
+
+    return attempt
+
+
+def clock_stops_before_a_reversal(place: Axis) -> TimeToZero:
+    """Simulated time stops, then the wanted velocity reverses: the force never acts against it."""
+    clock, reference = place.senders[CLOCK_TOPIC], place.senders['servo_reference']
+    clock.tell('stop')
+    place.spin(0.05)
+    before = len(place.received)
+    reference.tell('reverse')
+    found = place.time_to_zero(clock.last_usable)
+    reference.tell('reverse')
+    opposed = [one for one in place.received[before + REVERSAL_TICKS :] if one.force > 0.0]
+    return TimeToZero(NEVER_ZERO, NEVER_ZERO) if opposed else found
+
+
+def stopped(seconds: float, *, goes_on: bool) -> Callable[[Axis], TimeToZero]:
+    """The node is stopped for a while, the machine goes on or is switched off meanwhile."""
+
+    def attempt(place: Axis) -> TimeToZero:
+        place.node.send_signal(signal.SIGSTOP)
+        place.spin(seconds / 2.0)
+        if not goes_on:
+            for sender in place.senders.values():
+                sender.tell('stop')
+        place.spin(seconds / 2.0)
+        place.received.clear()
+        start = time.monotonic_ns()
+        place.node.send_signal(signal.SIGCONT)
+        if not goes_on:
+            return place.time_to_zero(lambda: start)
+        place.spin_until(lambda: any(one.force == 0.0 for one in place.received), LONGEST_WAIT)
+        zeros = [one.time for one in place.received if one.force == 0.0]
+        found = (zeros[0] - start) * 1e-9 if zeros else NEVER_ZERO
+        return TimeToZero(found, found)
+
+    return attempt
+
+
+@contextmanager
+def slowed(process: subprocess.Popen[bytes]) -> Iterator[None]:
+    """The node gets `SHARE` of the processor."""
+    ended = threading.Event()
+
+    def hold_up() -> None:
+        """Stop it and let it go on, until the end."""
+        while not ended.is_set():
+            process.send_signal(signal.SIGSTOP)
+            time.sleep(SHARE[1])
+            process.send_signal(signal.SIGCONT)
+            time.sleep(SHARE[0])
+
+    thread = threading.Thread(target=hold_up)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def backlog(place: Axis) -> TimeToZero:
+    """All inputs stop while a node with a tenth of the processor is behind."""
+    with slowed(place.node):
+        place.spin(1.0)
+        return together('stop')(place)
+
+
+def switch_off(url: str) -> None:
+    """Press OFF in the live view at ``url``."""
+    parts = urlsplit(url)
+    connection = HTTPConnection(parts.netloc, timeout=LONGEST_WAIT)
+    connection.request('POST', f'/off?{parts.query}', b'{}', {'Content-Type': 'application/json'})
+    connection.getresponse().read()
+
+
+def bombed(place: Axis) -> TimeToZero:
+    """OFF in the live view after a configuration that is made to break parsers."""
+    publisher = place.listener.create_publisher(message_class(CONFIGURATION_TYPE), '/x/configuration', qos.LATCHED)
+    with monitor(place.domain) as (_, url):
+        publisher.publish(encode_text(BOMB))
+        place.spin(1.0)
+        start = time.monotonic_ns()
+        thread = threading.Thread(target=switch_off, args=(url,))
+        thread.start()
+        found = place.time_to_zero(lambda: start)
+        thread.join()
+    place.listener.destroy_publisher(publisher)
+    place.kill_node()
+    return found
+
+
+def started(values: dict[str, Any], *, runs: bool) -> Callable[[Axis], TimeToZero]:
+    """A node that is started with these parameters makes no force; it runs, or ends with one line."""
+
+    def attempt(place: Axis) -> TimeToZero:
+        place.kill_node()
+        place.received.clear()
+        log = place.folder / 'wrong'
+        with node_process('friction_estimator', place.domain, {**NODE, **values}, log) as process:
+            place.spin_until(lambda: process.poll() is not None or len(place.received) > 100, LONGEST_WAIT)
+            has_force = any(one.force != 0.0 for one in place.received)
+            is_right = not has_force and (
+                process.poll() is None and len(place.received) > 100 if runs else process.poll() == 2
+            )
+        return TimeToZero(0.0, 0.0) if is_right else TimeToZero(NEVER_ZERO, NEVER_ZERO)
+
+    return attempt
 
 
 def alternating_reversal(topic: str) -> Callable[[Axis], float]:
@@ -325,20 +493,44 @@ TIMED: dict[str, Callable[[Axis], TimeToZero]] = {
     **{f'{topic} repeats its last message': told(topic, 'freeze') for topic in TOPICS},
     **{f'{topic} leaps 20 ms ahead, then stops': told(topic, 'leap') for topic in TOPICS},
     **{f'publisher of {topic} killed': killed(topic) for topic in TOPICS},
+    'servo_reference asks for 1e300 m/s': told('servo_reference', 'absurd'),
+    'all inputs stop while the node has a tenth of the processor': backlog,
+    'OFF in the live view after a configuration bomb': bombed,
+    'mistyped feedforward.scale': started({'feedfoward.scale': 0.0}, runs=False),
+    'placeholder seals': started({'seals': ['placeholder', 'placeholder']}, runs=True),
     'deactivate': deactivated,
     'SIGINT': signalled(signal.SIGINT),
     'SIGTERM': signalled(signal.SIGTERM),
 }
 """Case -> time to 0 N."""
+HELD_UP: dict[str, Callable[[Axis], TimeToZero]] = {
+    f'node stopped for {seconds:g} s, the machine {word}': stopped(seconds, goes_on=goes_on)
+    for seconds in STOPS
+    for goes_on, word in ((True, 'goes on'), (False, 'is switched off'))
+}
+"""The same with the leases of config/fastdds.xml, so that others do not take the stopped node for dead."""
+SIMULATED: dict[str, Callable[[Axis], TimeToZero]] = {
+    '/clock stops': told(CLOCK_TOPIC, 'stop'),
+    '/clock repeats its last message': told(CLOCK_TOPIC, 'freeze'),
+    '/clock stops, then the reference reverses': clock_stops_before_a_reversal,
+    '/clock and all inputs stop': together('stop'),
+}
+"""The same with simulated time."""
 REVERSALS = {f'stamps of {topic} alternate by 5 ms': alternating_reversal(topic) for topic in TOPICS}
 """Case -> time of a reversal beyond the one that the slew limit asks for [s]."""
 
 
-def tried(cases: dict[str, Callable[[Axis], Any]], parameters: dict[str, Any], times: int) -> dict[str, list[Any]]:
+def tried(
+    cases: dict[str, Callable[[Axis], Any]],
+    times: int,
+    parameters: dict[str, Any] | None = None,
+    topics: tuple[str, ...] = TOPICS,
+    lease: str = SHORT_LEASE,
+) -> dict[str, list[Any]]:
     """Results of each case."""
     found: dict[str, list[Any]] = {name: [] for name in cases}
     if cases:
-        with axis(parameters) as place:
+        with axis(parameters, topics, lease) as place:
             for _ in track(range(times), console=Console(stderr=True)):
                 for name, case in cases.items():
                     place.restore()
@@ -356,9 +548,13 @@ def main() -> int:
     parser.add_argument('--only', default='', help='only cases with this text in their name')
     parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
-    timed, reversals = ({n: c for n, c in cases.items() if arguments.only in n} for cases in (TIMED, REVERSALS))
-    times = tried(timed, {}, arguments.times)
-    beyond = tried(reversals, {'feedforward.slew_limit': SLOW_SLEW}, arguments.times)
+    timed, held_up, simulated, reversals = (
+        {name: case for name, case in cases.items() if arguments.only in name}
+        for cases in (TIMED, HELD_UP, SIMULATED, REVERSALS)
+    )
+    times = tried(timed, arguments.times) | tried(held_up, arguments.times, lease=LEASE)
+    times |= tried(simulated, arguments.times, {'use_sim_time': True}, (*TOPICS, CLOCK_TOPIC))
+    beyond = tried(reversals, arguments.times, {'feedforward.slew_limit': SLOW_SLEW})
     acting = {name: [one.acting for one in found] for name, found in times.items()} | beyond
     received = {name: [one.received for one in found] for name, found in times.items()} | beyond
     if arguments.json:
