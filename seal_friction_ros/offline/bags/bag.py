@@ -11,11 +11,10 @@ import os
 import re
 import shutil
 import sqlite3
-import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
-from functools import cache, partial
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from types import TracebackType
@@ -26,7 +25,8 @@ import yaml
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, PACKAGE
 from seal_friction_ros.files import parse_yaml, read_yaml, share_directory
 from seal_friction_ros.offline.bags import mcap_reader, sqlite_reader
-from seal_friction_ros.offline.bags.mcap_writer import FILE_MODE, Description, McapOutput, Span
+from seal_friction_ros.offline.bags.mcap_reader import Channel
+from seal_friction_ros.offline.bags.mcap_writer import FILE_MODE, Contents, Description, McapOutput
 
 PRESSURE_TOPIC = '/cylinder_pressure'
 VELOCITY_TOPIC = '/rod_velocity'
@@ -50,18 +50,11 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 
 
+BagMessage = mcap_reader.BagMessage
+
+
 class BagError(ValueError):
     """A bag that cannot be read or written; one line that says which and why."""
-
-
-class BagMessage(NamedTuple):
-    """One serialised message of a bag."""
-
-    topic: str
-    type_name: str
-    log_time: int  # [ns]
-    data: bytes
-    publish_time: int | None = None  # [ns] on any clock; None: not known
 
 
 def timed_name(name: str) -> str:
@@ -158,13 +151,13 @@ class BagWriter:
         for type_name in DECODERS:
             describe(type_name)  # raises here and not at the first message
         self._split_size, self._split_time = split_size, round(split_duration * 1e9)
+        self._is_split = bool(self._split_size or self._split_time)
         self._descriptions: dict[tuple[str, str], Description] = {}
         self._listed = 0
         self._last_time = -1
         self._custom_data = dict(custom_data or {})
-        self._finished: list[tuple[str, Span]] = []
+        self._finished: list[tuple[str, Contents]] = []
         self._finished_size = 0
-        self._finished_counts: dict[tuple[str, str], int] = {}
         try:
             path.mkdir(_FOLDER_MODE, parents=True)
         except FileExistsError:
@@ -207,14 +200,15 @@ class BagWriter:
         Raises:
             OSError: Writing failed.
         """
-        known = self._descriptions.get((topic, type_name))
-        if known is None:
-            known = self._descriptions[topic, type_name] = description or describe(type_name)
-        log_time = max(log_time, self._last_time + 1)
-        if self._is_full(log_time, len(data)):
+        key = (topic, type_name)
+        if key not in self._descriptions:
+            self._descriptions[key] = description or describe(type_name)
+        if log_time <= self._last_time:
+            log_time = self._last_time + 1
+        if self._is_split and self._is_full(log_time, len(data)):
             self._split()
         self._last_time = log_time
-        self._output.write(topic, known, log_time, data, publish_time)
+        self._output.write(key, self._descriptions[key], log_time, data, publish_time)
         return log_time
 
     def flush(self) -> None:
@@ -230,7 +224,7 @@ class BagWriter:
     @property
     def message_count(self) -> int:
         """Number of messages written so far."""
-        return sum(span.messages for _, span in self._finished) + self._output.span.messages
+        return sum(contents.messages for _, contents in self._files())
 
     @property
     def size(self) -> int:
@@ -299,41 +293,38 @@ class BagWriter:
         shutil.rmtree(self.path, ignore_errors=True)
 
     def _is_full(self, log_time: int, size: int) -> bool:
-        span = self._output.span
         too_large = self._split_size and self._output.size + size > self._split_size
-        too_long = self._split_time and log_time - span.first_time > self._split_time
-        return bool(span.messages and (too_large or too_long))
+        too_long = self._split_time and log_time - self._output.first_time > self._split_time
+        return bool(self._output.counts and (too_large or too_long))
 
     def _file(self, number: int) -> McapOutput:
         return McapOutput(self.path / f'{self.path.name}_{number}.mcap')
+
+    def _files(self) -> list[tuple[str, Contents]]:
+        return [*self._finished, (self._output.path.name, self._output.contents)]
 
     def _split(self) -> None:
         finished = self._output
         finished.finish(_yaml_text(self._information()))
         following = self._file(len(self._finished) + 1)
         finished.close()
-        self._finished.append((finished.path.name, finished.span))
+        self._finished.append((finished.path.name, finished.contents))
         self._finished_size += finished.size
-        self._finished_counts = self._counts(finished)
         self._output = following
         self._write_metadata()
 
-    def _counts(self, newest: McapOutput) -> dict[tuple[str, str], int]:
-        counts = dict(self._finished_counts)
-        for key, count in newest.counts.items():
-            counts[key] = counts.get(key, 0) + count
-        return counts
-
     def _information(self) -> dict[str, Any]:
-        newest = (self._output.path.name, self._output.span)
-        files = [*self._finished, newest] if newest[1].messages or not self._finished else self._finished
-        spans = [span for _, span in files]
-        counts = self._counts(self._output)
+        files = [file for file in self._files() if file[1].messages] or self._files()[:1]
+        spans = [contents for _, contents in files]
+        counts: dict[tuple[str, str], int] = {}
+        for _, contents in files:
+            for key, count in contents.counts.items():
+                counts[key] = counts.get(key, 0) + count
         return {
             'version': 9,
             'storage_identifier': 'mcap',
             'relative_file_paths': [name for name, _ in files],
-            **_span_information(Span(spans[0].first_time, spans[-1].last_time, sum(span.messages for span in spans))),
+            **_span_information(spans[0].first_time, spans[-1].last_time, self.message_count),
             'topics_with_message_count': [
                 {'topic_metadata': _topic_metadata(topic, description), 'message_count': counts[topic, type_name]}
                 for (topic, type_name), description in self._descriptions.items()
@@ -341,7 +332,9 @@ class BagWriter:
             ],
             'compression_format': '',
             'compression_mode': '',
-            'files': [{'path': name, **_span_information(span)} for name, span in files],
+            'files': [
+                {'path': name, **_span_information(*contents[1:3], contents.messages)} for name, contents in files
+            ],
             'custom_data': self._custom_data or None,
             'ros_distro': os.environ.get('ROS_DISTRO', 'unknown'),
         }
@@ -359,11 +352,11 @@ class BagWriter:
         self._listed = len(self._descriptions)
 
 
-def _span_information(span: Span) -> dict[str, Any]:
+def _span_information(first_time: int, last_time: int, messages: int) -> dict[str, Any]:
     return {
-        'duration': {'nanoseconds': span.last_time - span.first_time},
-        'starting_time': {'nanoseconds_since_epoch': span.first_time},
-        'message_count': span.messages,
+        'duration': {'nanoseconds': last_time - first_time},
+        'starting_time': {'nanoseconds_since_epoch': first_time},
+        'message_count': messages,
     }
 
 
@@ -420,35 +413,36 @@ def read_messages(path: Path) -> Iterator[BagMessage]:
     """
     with _as_bag_errors(path):
         found = storage(path)
-        for file in found.files:
-            for message in found.read(file):
-                yield BagMessage(*message)
-
-
-_Messages = Callable[[Path], Iterator[tuple[str, str, int, bytes, int | None]]]
-_Topics = Callable[[Path], Iterable[tuple[str, str, int]]]
+        for message in found.read('file_messages'):
+            if found.packed == 'message':
+                yield message._replace(data=mcap_reader.unpack_zstd(message.data))
+            else:
+                yield message
 
 
 class Storage(NamedTuple):
-    """Files of a bag, and the functions that read one of them."""
+    """Files of a bag and how to read them."""
 
     files: tuple[Path, ...]
-    read: _Messages
-    """topic, message type, log time [ns], bytes and publish time [ns] of each message, in order of log time"""
-    list_topics: _Topics
-    """name, message type and number of messages of each topic; a name may come several times"""
+    reader: Any
+    """`mcap_reader` or `sqlite_reader`: `file_messages` and `file_channels` of a file"""
+    packed: str
+    """what is compressed by zstd: ``none``, each ``message`` or each ``file``"""
 
     @property
     def is_plain_mcap(self) -> bool:
         """Whether the files are MCAP with messages that are not packed."""
-        return self.read is mcap_reader.file_messages
+        return self.reader is mcap_reader and self.packed == 'none'
+
+    def read(self, function: str) -> Iterator[Any]:
+        """What a function of the reader gives for one file after the other."""
+        for file in self.files:
+            with mcap_reader.unpacked_file(file) if self.packed == 'file' else nullcontext(file) as plain:
+                yield from getattr(self.reader, function)(plain)
 
 
-_READERS = {
-    'mcap': (mcap_reader.file_messages, mcap_reader.file_topics),
-    'sqlite3': (sqlite_reader.file_messages, sqlite_reader.file_topics),
-}
-"""Storage identifier of rosbag2 -> functions of `Storage`."""
+_READERS = {'mcap': mcap_reader, 'sqlite3': sqlite_reader}
+"""Storage identifier of rosbag2 -> its reader."""
 
 
 class TopicInfo(NamedTuple):
@@ -458,6 +452,16 @@ class TopicInfo(NamedTuple):
     message_count: int
 
 
+def bag_channels(path: Path) -> Iterator[tuple[Channel, int]]:
+    """Channels of a bag and their numbers of messages, from its index if it has one; one may come often.
+
+    Raises:
+        BagError: There is no bag, or it is damaged.
+    """
+    with _as_bag_errors(path):
+        yield from storage(path).read('file_channels')
+
+
 def bag_topics(path: Path) -> dict[str, TopicInfo]:
     """Topics of a bag with their type and number of messages, from its index if it has one.
 
@@ -465,14 +469,11 @@ def bag_topics(path: Path) -> dict[str, TopicInfo]:
         BagError: There is no bag, or it is damaged.
     """
     found: dict[str, TopicInfo] = {}
-    with _as_bag_errors(path):
-        stored = storage(path)
-        for file in stored.files:
-            for topic, type_name, count in stored.list_topics(file):
-                before = found.get(topic)
-                if before is not None and before.type_name != type_name:
-                    raise ValueError(f'{topic} has messages of {before.type_name} and of {type_name}')
-                found[topic] = TopicInfo(type_name, count + (before.message_count if before else 0))
+    for (topic, _, (type_name, *_)), count in bag_channels(path):
+        before = found.get(topic, TopicInfo(type_name, 0))
+        if before.type_name != type_name:
+            raise BagError(f'{path}: {topic} has messages of {before.type_name} and of {type_name}')
+        found[topic] = TopicInfo(type_name, count + before.message_count)
     return found
 
 
@@ -483,7 +484,7 @@ def _as_bag_errors(path: Path) -> Iterator[None]:
         yield
     except BagError:
         raise
-    except (OSError, ValueError, struct.error, sqlite3.Error) as error:
+    except (OSError, *mcap_reader.ERRORS, sqlite3.Error) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise BagError(f'{path}: not a readable bag: {reason}') from None
 
@@ -499,12 +500,9 @@ def storage(path: Path) -> Storage:
             if not path.is_file():
                 raise ValueError('no such file' if not path.exists() else 'neither a file nor a folder')
             packed = path.suffix == '.zstd'
-            functions = _READERS[
-                'sqlite3' if path.with_suffix('' if packed else path.suffix).suffix == '.db3' else 'mcap'
-            ]
-            return Storage((path,), *(_of_packed_files(*functions) if packed else functions))
-        metadata = path / 'metadata.yaml'
-        if not metadata.is_file():
+            is_sqlite = (path.with_suffix('') if packed else path).suffix == '.db3'
+            return Storage((path,), _READERS['sqlite3' if is_sqlite else 'mcap'], 'file' if packed else 'none')
+        if not (path / 'metadata.yaml').is_file():
             raise BagError(f'{path}: not a rosbag2 bag: no metadata.yaml in it')
         document = read_yaml(_inside(path, 'metadata.yaml'), LARGEST_METADATA)
         information = document.get('rosbag2_bagfile_information') if isinstance(document, Mapping) else None
@@ -520,33 +518,7 @@ def storage(path: Path) -> Storage:
             raise ValueError(
                 f'metadata.yaml: compression_mode = {mode!r} by {form!r} is none of message or file by zstd'
             )
-        messages: _Messages
-        topics: _Topics
-        messages, topics = _READERS[kind]
-        if mode == 'message':
-            messages = partial(_unpacked_messages, messages)
-        if mode == 'file':
-            messages, topics = _of_packed_files(messages, topics)
-        return Storage(tuple(_inside(path, name) for name in names), messages, topics)
-
-
-def _unpacked_messages(read: _Messages, file: Path) -> Iterator[tuple[str, str, int, bytes, int | None]]:
-    for topic, type_name, log_time, data, publish_time in read(file):
-        yield topic, type_name, log_time, mcap_reader.unpack_zstd(data, mcap_reader.LARGEST_CHUNK), publish_time
-
-
-def _of_packed_files(messages: _Messages, topics: _Topics) -> tuple[_Messages, _Topics]:
-    """Readers of files that are compressed as a whole, each unpacked to a temporary file while it is read."""
-
-    def packed_messages(file: Path) -> Iterator[tuple[str, str, int, bytes, int | None]]:
-        with mcap_reader.unpacked_file(file) as unpacked:
-            yield from messages(unpacked)
-
-    def packed_topics(file: Path) -> Iterable[tuple[str, str, int]]:
-        with mcap_reader.unpacked_file(file) as unpacked:
-            yield from topics(unpacked)
-
-    return packed_messages, packed_topics
+        return Storage(tuple(_inside(path, name) for name in names), _READERS[kind], mode)
 
 
 def _inside(folder: Path, name: str) -> Path:

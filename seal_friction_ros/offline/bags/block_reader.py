@@ -1,33 +1,24 @@
-"""Bulk reading of a bag: blocks of messages in file order, with the position of each message.
+"""Bulk reading of a bag: `mcap_reader` with a compiled search for the messages in each block.
 
-The checks and the order of messages are those of `mcap_reader`. Unusual bags (damage, a topic described twice, chunks
-that overlap by much) are refused with `UnsuitedError`; the general reader reads them or reports the fault.
+The library makes an object of each message, which takes a hundred times as long.
 """
 
-import heapq
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+from mcap.opcode import Opcode
 
-from seal_friction_ros.core.estimation.compiled_pipeline import (
-    MOST_MESSAGES,
-    Bytes,
-    Integers,
-    Kind,
-    Messages,
-    UnsuitedError,
-)
+from seal_friction_ros.core.estimation.compiled_pipeline import MOST_MESSAGES, Bytes, Integers, Kind, Messages
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.offline.bags import mcap_reader
-from seal_friction_ros.offline.bags.bag import BagMessage, read_messages, storage
-from seal_friction_ros.offline.bags.mcap_reader import Block, Layout
-from seal_friction_ros.offline.bags.mcap_records import Opcode
+from seal_friction_ros.offline.bags.bag import read_messages, storage
+from seal_friction_ros.offline.bags.mcap_reader import HEAD, LAST_TIME, MESSAGE_HEAD, BagMessage, Block, Layout, Names
 
 KindOf = Callable[[str, str], Kind]
 """Topic and message type -> kind of its messages."""
@@ -41,41 +32,55 @@ class Stretch(NamedTuple):
     last_file: int
     end: int  # [ns] in the last file
 
-    def in_file(self, number: int) -> tuple[int, int] | None:
-        """First log time [ns] in a file and that which is not in it any more; None if nothing of the file is."""
+    def in_file(self, number: int) -> tuple[int, int]:
+        """First log time [ns] in a file and that which is not in it any more."""
         if not self.file <= number <= self.last_file:
-            return None
-        return self.first if number == self.file else 0, self.end if number == self.last_file else _LAST_TIME + 1
+            return 0, 0
+        return self.first if number == self.file else 0, self.end if number == self.last_file else LAST_TIME + 1
 
 
+_WHOLE = Stretch(0, 0, 1 << 30, 0)
 _AT_ONCE = 1 << 21  # [bytes] read at a time: about 20 000 messages
-_UNKNOWN = 255  # instead of a `Kind`: channel without description
-_SMALLEST = 31  # [bytes] of the record of an empty message
-_MESSAGE, _SCHEMA, _CHANNEL = int(Opcode.MESSAGE), int(Opcode.SCHEMA), int(Opcode.CHANNEL)
-_LAST_TIME = mcap_reader.LAST_TIME
+_SCHEMA, _CHANNEL, _MESSAGE = int(Opcode.SCHEMA), int(Opcode.CHANNEL), int(Opcode.MESSAGE)
 
 
-def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch | None = None) -> Iterator[Messages]:
+def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch = _WHOLE) -> Iterator[Messages]:
     """Messages of a bag, or of a part of it, in the order of `bag.read_messages`, at most `MOST_MESSAGES` at a time.
 
     Of a part only the chunks with such messages are read.
 
     Raises:
-        UnsuitedError: The bag is unusual.
         BagError: It cannot be read.
+        ValueError: Likewise (or another error in `mcap_reader.ERRORS`).
     """
     files = storage(path)
     if not files.is_plain_mcap:
         yield from _gathered(read_messages(path), kind_of)
         return
     for number, file_path in enumerate(files.files):
-        span = (0, _LAST_TIME + 1) if stretch is None else stretch.in_file(number)
-        if span is None:
+        begin, end = stretch.in_file(number)
+        if begin == end:
             continue
         with file_path.open('rb') as file:
-            for messages in _of_file(file, _layout(file), kind_of, span):
-                for first in range(0, len(messages.kinds), MOST_MESSAGES):
-                    yield messages.taken(first, first + MOST_MESSAGES)
+            layout = _layout(file)
+            blocks = [block for block in layout.blocks if _may_hold(block, begin, end)]
+            for messages in _of_blocks(file, blocks, Names(layout.channels), kind_of):
+                first, last = (int(place) for place in np.searchsorted(messages.received, (begin, end)))
+                for start in range(first, last, MOST_MESSAGES):
+                    yield messages.taken(start, min(start + MOST_MESSAGES, last))
+
+
+def _may_hold(block: Block, begin: int, end: int) -> bool:
+    """Whether there may be messages between two log times [ns] in a block; a block without messages has channels."""
+    return block.first > block.last or (block.first < end and block.last >= begin)
+
+
+def _of_blocks(file: BinaryIO, blocks: list[Block], names: Names, kind_of: KindOf) -> Iterator[Messages]:
+    kinds: Bytes = np.zeros(1 << 16, np.uint8)  # by channel
+    for data, rows in mcap_reader.in_order(file, blocks, names, _located, _AT_ONCE):
+        for number, channel in names.channels.items():
+            kinds[number] = kind_of(channel.topic, channel.description.type_name)
+        yield Messages(np.frombuffer(data, np.uint8), kinds[rows[0]], *rows[1:])
 
 
 def times_of(path: Path, topic: str) -> list[tuple[int, int]]:
@@ -91,8 +96,7 @@ def times_of(path: Path, topic: str) -> list[tuple[int, int]]:
     times: list[tuple[int, int]] = []
     for number, file_path in enumerate(files.files if files.is_plain_mcap else ()):
         with file_path.open('rb') as file:
-            channels = _layout(file).channels
-            wanted = [key for key, channel in channels.items() if channel.topic == topic]
+            wanted = [key for key, channel in _layout(file).channels.items() if channel.topic == topic]
             times += [(number, time) for time in mcap_reader.indexed_times(file, wanted)] if wanted else []
     return times
 
@@ -111,7 +115,7 @@ def _kept_layout(name: str, *_changes: int) -> Layout:
 
 def compile_now() -> None:
     """Compile in this process, so that worker processes inherit the compiled code."""
-    _walk(*_room_for(bytes(1), 0), 0, 0, 0, 0, 0, np.zeros(1, np.uint8))
+    _located(bytes(HEAD), Block(0, HEAD, 0, 0, HEAD, is_chunk=False), Names())
 
 
 def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
@@ -126,145 +130,22 @@ def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messa
         yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, times, np.array(sent, np.int64))
 
 
-def _room_for(data: bytes, count: int) -> Messages:
-    """Space for ``count`` messages in ``data``."""
-    columns: Integers = np.empty((4, count), np.int64)
-    return Messages(np.frombuffer(data, np.uint8), np.empty(count, np.uint8), *columns)
-
-
-_NONE = _room_for(b'', 0)
-
-
-def _of_file(file: BinaryIO, layout: Layout, kind_of: KindOf, span: tuple[int, int]) -> Iterator[Messages]:
-    """Messages in order of log time; equal times in the order of the file.
-
-    Those before ``span`` [ns] and from its end on are not among them.
-    """
-    if span != (0, _LAST_TIME + 1):
-        inside = tuple(block for block in layout.blocks if block.first < span[1] and block.last >= span[0])
-        for messages in _of_file(file, layout._replace(blocks=inside), kind_of, (0, _LAST_TIME + 1)):
-            first, end = np.searchsorted(messages.received, span)
-            yield messages.taken(int(first), int(end))
-        return
-    channels = _Channels(layout, kind_of)
-    blocks = sorted(layout.blocks, key=lambda block: block.first) if layout.channels else layout.blocks
-    earliest = mcap_reader.earliest_times(blocks)
-    _check_overlap(blocks, earliest)
-    kept = _NONE
-    begin = size = 0
-    for end, block in enumerate(blocks, start=1):
-        size += block.unpacked_size
-        if size < _AT_ONCE and end < len(blocks):
-            continue
-        messages = _sorted(_read(file, blocks[begin:end], channels, kept))
-        begin, size = end, 0
-        sure = len(messages.received)
-        if end < len(blocks):
-            sure = int(np.searchsorted(messages.received, min(earliest[end], _LAST_TIME), side='right'))
-        yield messages.taken(0, sure)
-        kept = _copied(messages, sure)
-
-
-def _check_overlap(blocks: Sequence[Block], earliest: Sequence[int]) -> None:
-    """Refuse chunks that overlap in time by so much that `mcap_reader` may refuse them.
-
-    Raises:
-        UnsuitedError: They overlap by too much.
-    """
-    open_blocks: list[tuple[int, int]] = []  # end in time [ns] and size
-    at_once = 0
-    for block, begin in zip(blocks, earliest, strict=True):
-        while open_blocks and open_blocks[0][0] < begin:
-            at_once -= heapq.heappop(open_blocks)[1]
-        heapq.heappush(open_blocks, (block.last, block.unpacked_size))
-        at_once += block.unpacked_size
-        if at_once > mcap_reader.MOST_AT_ONCE:
-            raise UnsuitedError('chunks overlap by much')
-
-
-def _sorted(messages: Messages) -> Messages:
-    times = messages.received
-    if (times[:-1] <= times[1:]).all():
-        return messages
-    order = np.argsort(times, kind='stable')
-    return messages.in_order(order)
-
-
-def _copied(messages: Messages, first: int) -> Messages:
-    """Messages from number ``first`` on: they wait, since a following chunk begins before them."""
-    count = len(messages.received)
-    if first == count:
-        return _NONE
-    data = b''.join(messages.message(number) for number in range(first, count))
-    sizes = messages.sizes[first:]
-    offsets = np.cumsum(sizes) - sizes
-    left = messages.taken(first, count)
-    return left._replace(data=np.frombuffer(data, np.uint8), offsets=offsets)
-
-
-class _Channels:
-    """Kinds of messages by channel, as a table for compiled code."""
-
-    def __init__(self, layout: Layout, kind_of: KindOf) -> None:
-        self._names = mcap_reader.Names(layout.channels)
-        self._kind_of = kind_of
-        self._known = dict(layout.channels)
-        self.kinds: Bytes = np.full(1 << 16, _UNKNOWN, np.uint8)
-        for number, channel in layout.channels.items():
-            self.kinds[number] = kind_of(channel.topic, channel.type_name)
-
-    def learn(self, opcode: int, data: bytes) -> None:
-        """Add the record of a schema or a channel."""
-        self._names.learn(opcode, data)
-        for number, channel in self._names.channels.items():
-            if self._known.setdefault(number, channel) != channel:
-                raise UnsuitedError(f'{channel.topic} is described twice')
-            self.kinds[number] = self._kind_of(channel.topic, channel.type_name)
-
-
-def _read(file: BinaryIO, blocks: Iterable[Block], channels: _Channels, kept: Messages) -> Messages:
-    """The kept messages, then those of the blocks.
-
-    Raises:
-        UnsuitedError: A block cannot be read.
-    """
-    parts, ends = [kept.data.tobytes()], []
-    size = len(parts[0])
-    try:
-        for block in blocks:
-            parts.append(mcap_reader.unpacked(file, block))
-            size += len(parts[-1])
-            ends.append((block, size))
-        data = b''.join(parts)
-        start = len(parts[0])
-        del parts
-        count = len(kept.received)
-        most = count + (size - start) // _SMALLEST
-        messages = _room_for(data, most)
-        messages.kinds[:count], messages.offsets[:count] = kept.kinds, kept.offsets
-        messages.sizes[:count], messages.received[:count] = kept.sizes, kept.received
-        messages.sent[:count] = kept.sent
-        for block, end in ends:
-            count = _index(messages, count, start, end, block, channels)
-            start = end
-    except mcap_reader.ERRORS as error:
-        raise UnsuitedError(str(error)) from None
-    return messages.taken(0, count)
-
-
-def _index(messages: Messages, count: int, start: int, end: int, block: Block, channels: _Channels) -> int:
-    """Index the messages of a block; return the number of all messages so far."""
-    data = messages.data
-    first, last = min(block.first, _LAST_TIME + 1), min(block.last, _LAST_TIME)
-    while start < end:
-        start, count, opcode = _walk(*messages, count, start, end, first, last, channels.kinds)
+def _located(data: bytes, block: Block, names: Names) -> Integers:
+    """`mcap_reader.located`, compiled."""
+    rows: Integers = np.empty((5, len(data) // MESSAGE_HEAD), np.int64)
+    first, last = min(block.first, LAST_TIME + 1), min(block.last, LAST_TIME)
+    offset = count = 0
+    while offset < len(data):
+        known = np.zeros(1 << 16, np.uint8)
+        known[list(names.channels)] = 1
+        offset, count, opcode = _walk(np.frombuffer(data, np.uint8), rows, count, offset, first, last, known)
         if opcode < 0:
-            raise UnsuitedError(f'a record at byte {start}')
-        if opcode in (_SCHEMA, _CHANNEL):
-            following = start + 9 + int.from_bytes(data[start + 1 : start + 9].tobytes(), 'little')
-            channels.learn(opcode, data[start + 9 : following].tobytes())
-            start = following
-    return count
+            raise ValueError(f'the record {offset} bytes after its beginning is invalid')
+        if opcode:
+            end = offset + HEAD + int.from_bytes(data[offset + 1 : offset + HEAD], 'little')
+            names.learn(BytesIO(data[offset:end]), end - offset)
+            offset = end
+    return rows[:, :count]
 
 
 @compiled
@@ -278,42 +159,26 @@ def _whole_number(data: Bytes, offset: int) -> int:
 
 @compiled
 def _walk(
-    data: Bytes,
-    kinds: Bytes,
-    offsets: Integers,
-    sizes: Integers,
-    times: Integers,
-    sent: Integers,
-    count: int,
-    start: int,
-    end: int,
-    first: int,
-    last: int,
-    kind_of_channel: npt.NDArray[np.uint8],
+    data: Bytes, rows: Integers, count: int, offset: int, first: int, last: int, known: Bytes
 ) -> tuple[int, int, int]:
-    """Index records of a block up to its end, or up to the next schema or channel.
+    """Locate messages from an offset on, up to the end, the next schema, the next channel or an invalid record.
 
     Returns:
-        Offset reached, number of all messages, and opcode of the record there: 0 at the end of the block, -1 for an
-        invalid record.
+        Offset reached, number of messages, and opcode of the record there: 0 at the end, -1 if it is invalid.
     """
-    while start < end:
-        if end - start < 9:
-            return start, count, -1
-        opcode, length = data[start], _whole_number(data, start + 1)
-        if length < 0 or length > end - start - 9:
-            return start, count, -1
+    while offset + HEAD <= len(data):
+        opcode, end = data[offset], offset + HEAD + _whole_number(data, offset + 1)
+        if not offset + HEAD <= end <= len(data):
+            break
         if _SCHEMA <= opcode <= _CHANNEL:
-            return start, count, opcode
+            return offset, count, opcode
         if opcode == _MESSAGE:
-            if length < 22:
-                return start, count, -1
-            kind = kind_of_channel[data[start + 9] | np.int64(data[start + 10]) << 8]
-            time = _whole_number(data, start + 15)
-            if kind == _UNKNOWN or not first <= time <= last:
-                return start, count, -1
-            kinds[count], offsets[count], sizes[count], times[count] = kind, start + 31, length - 22, time
-            sent[count] = _whole_number(data, start + 23)
+            begin = offset + MESSAGE_HEAD
+            channel = data[offset + 9] | np.int64(data[offset + 10]) << 8
+            if begin > end or not known[channel] or not first <= _whole_number(data, offset + 15) <= last:
+                break
+            rows[0, count], rows[1, count], rows[2, count] = channel, begin, end - begin
+            rows[3, count], rows[4, count] = _whole_number(data, offset + 15), _whole_number(data, offset + 23)
             count += 1
-        start += 9 + length
-    return start, count, 0
+        offset = end
+    return offset, count, 0 if offset == len(data) else -1

@@ -1,12 +1,10 @@
 """Definitions of the message types in a bag: from the bag itself, else from the installed packages."""
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 from seal_friction_ros.core.machine.message_fields import Definition, parse_definition, short_name
-from seal_friction_ros.offline.bags import mcap_reader, sqlite_reader
-from seal_friction_ros.offline.bags.bag import BagError, message_definition, storage
+from seal_friction_ros.offline.bags.bag import BagError, bag_channels, message_definition
 
 ROS2MSG = 'ros2msg'
 
@@ -25,12 +23,10 @@ def read_definitions(bag: Path, types: Iterable[str]) -> dict[str, Definition]:
     """
     wanted = dict.fromkeys(short_name(name) for name in types)
     texts: dict[str, str] = {}
-    for file in storage(bag).files:
-        with _plain(file) as plain:
-            reader = sqlite_reader if plain.suffix == '.db3' or '.db3' in file.suffixes else mcap_reader
-            for name, encoding, text in reader.file_definitions(plain):
-                if encoding == ROS2MSG and text:
-                    texts.setdefault(short_name(name), text)
+    for channel, _ in bag_channels(bag):
+        type_name, encoding, definition, _ = channel.description
+        if encoding == ROS2MSG and definition:
+            texts.setdefault(short_name(type_name), definition.decode(errors='replace'))
         if wanted.keys() <= texts.keys():
             break
     found = {}
@@ -44,13 +40,3 @@ def read_definitions(bag: Path, types: Iterable[str]) -> dict[str, Definition]:
         except ValueError as error:
             raise BagError(f'{bag}: definition of {name}: {error}') from None
     return found
-
-
-@contextmanager
-def _plain(file: Path) -> Iterator[Path]:
-    """The file, or what is packed in it."""
-    if file.suffix != '.zstd':
-        yield file
-        return
-    with mcap_reader.unpacked_file(file) as unpacked:
-        yield unpacked

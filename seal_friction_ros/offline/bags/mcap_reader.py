@@ -1,12 +1,14 @@
-"""Reader of one untrusted MCAP file: memory is bounded whatever sizes the file claims, and damage is located.
+"""Reader of one untrusted MCAP file: the records of the ``mcap`` library, read within bounds.
 
-The libraries trust the sizes in a file (a chunk of 1 TB, a kilobyte that unpacks to gigabytes), so this module walks
-over the records itself.
+Ours is what the library does not do:
+
+- It reads and unpacks as much as a file claims. Here the heads of the records (opcode and length) are checked first.
+- It copies each message into an object, and sorts a file without an index in memory. Here messages stay in the bytes of
+  their block, where `block_reader` decodes them in bulk, and only those wait that a later block may precede.
 
 Layout: https://mcap.dev/spec.
 """
 
-import heapq
 import os
 import shutil
 import struct
@@ -14,51 +16,58 @@ import zlib
 from array import array
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
+from itertools import accumulate
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import BinaryIO, NamedTuple
+from typing import IO, Any, BinaryIO, NamedTuple, cast
 
-from seal_friction_ros.offline.bags import mcap_records
-from seal_friction_ros.offline.bags.mcap_records import MAGIC, TOO_SHORT, Opcode
+import numpy as np
+import numpy.typing as npt
+from mcap import records
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.stream_reader import StreamReader
+from mcap.writer import MCAP0_MAGIC as MAGIC
+
+from seal_friction_ros.offline.bags.mcap_writer import Description
 from seal_friction_ros.packages import needed
 
 FREE_SPACE = 1 << 30  # [bytes] that stay free on the disk where a file is unpacked (our choice)
 _UNPACKED_AT_ONCE = 1 << 22  # [bytes]
 LARGEST_CHUNK = 1 << 25  # [bytes] packed or unpacked, and of any other record; rosbag2 writes chunks of 0.8 MB
-MOST_AT_ONCE = 2 * LARGEST_CHUNK  # [bytes] of chunks that overlap in time
 _MOST_BLOCKS = 500_000  # 30 GB in chunks of `mcap_writer`
 _BLOCK_SIZE = 1 << 20  # [bytes] read at a time of messages outside of chunks
 _LONGEST_NAME = 1024  # characters of a topic or a type; ROS has 255
 LAST_TIME = 1 << 62  # [ns] in the year 2116
-NO_TIME = (1 << 64) - 1  # [ns] first log time of a block without messages
+_NO_TIME = (1 << 64) - 1  # [ns] first log time of a block without messages
 
-RECORD = struct.Struct('<BQ')  # opcode, length
-_CHUNK = struct.Struct('<QQQII')  # first and last log time, unpacked size, checksum, length of the compression's name
+_RECORD = struct.Struct('<BQ')  # opcode, length
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log time, publish time
-_SIZE = struct.Struct('<Q')
-_INDEX = struct.Struct('<HI')  # channel, size of what follows: the entries
-_INDEX_ENTRY = struct.Struct('<QQ')  # log time, offset in the chunk
-ERRORS = (ValueError, struct.error)
+_CHUNK = struct.Struct('<BQQQQ')  # opcode, length, first and last log time, unpacked size
+HEAD, MESSAGE_HEAD = _RECORD.size, _MESSAGE.size  # [bytes]
+_TOO_SHORT = 'a record is shorter than what it claims to hold'
+ERRORS = (ValueError, struct.error, McapError)
+
+Integers = npt.NDArray[np.int64]
 
 
 class Channel(NamedTuple):
-    """Description of a topic in the file."""
+    """Description of a topic in a file."""
+
+    topic: str
+    encoding: str  # of its messages; ``cdr`` for ROS 2
+    description: Description
+
+
+class BagMessage(NamedTuple):
+    """One serialised message of a bag."""
 
     topic: str
     type_name: str
-    encoding: str  # of its messages; ``cdr`` for ROS 2
-    definition_encoding: str
-    definition: bytes
-    metadata: dict[str, str]
-
-
-class Message(NamedTuple):
-    """One serialised message."""
-
-    channel: Channel
     log_time: int  # [ns]
-    publish_time: int  # [ns]
     data: bytes
+    publish_time: int | None = None  # [ns] on any clock; None: not known
 
 
 class Block(NamedTuple):
@@ -68,10 +77,8 @@ class Block(NamedTuple):
     size: int  # [bytes] as stored
     first: int  # smallest log time in it [ns]
     last: int  # largest log time in it [ns]
-    unpacked_size: int  # [bytes]
-    checksum: int = 0  # CRC-32 of the unpacked data; 0 if unknown
-    compression: str = ''
-    fault: str = ''  # reason why it cannot be read; empty if none is known
+    unpacked_size: int  # [bytes] as the file claims
+    is_chunk: bool
 
 
 class Layout(NamedTuple):
@@ -84,16 +91,135 @@ class Layout(NamedTuple):
     sound_size: int  # [bytes] of complete records
 
 
+# -- records ----------------------------------------------------------------------------------------------------------
+
+
+class _Record:
+    """One record of a stream. A field that claims more than the record holds is an error; the library takes less."""
+
+    def __init__(self, stream: BinaryIO, size: int) -> None:
+        self._stream, self._left = stream, size
+
+    def read(self, size: int) -> bytes:
+        """Exactly so many bytes."""
+        self._left -= size
+        data = self._stream.read(size) if self._left >= 0 else b''
+        if len(data) != size:
+            raise ValueError(_TOO_SHORT)
+        return data
+
+
+def _parsed(stream: BinaryIO, size: int) -> Any:
+    """The record that begins here and has so many bytes, as the library gives it; a chunk as it is packed."""
+    if size > LARGEST_CHUNK:
+        raise ValueError(_too_large(size))
+    record = cast(IO[bytes], _Record(stream, size))
+    return next(StreamReader(record, skip_magic=True, emit_chunks=True, record_size_limit=LARGEST_CHUNK).records)
+
+
+def _too_large(size: int) -> str:
+    return f'{size} bytes, at most {LARGEST_CHUNK >> 20} MiB are allowed: write the file again with smaller chunks'
+
+
+def _reason(error: Exception) -> str:
+    return _TOO_SHORT if isinstance(error, struct.error) else str(error)
+
+
+class Names:
+    """Channels by number."""
+
+    def __init__(self, channels: dict[int, Channel] | None = None) -> None:
+        self._schemas = {0: records.Schema(id=0, name='', encoding='', data=b'')}
+        self._size = 0
+        self.channels = dict(channels or {})
+
+    def learn(self, stream: BinaryIO, size: int) -> None:
+        """Add the record of a schema or a channel that begins here and has so many bytes.
+
+        Raises:
+            ValueError: It is invalid, a name in it is too long or not printable, or its number is that of another one.
+        """
+        record = _parsed(stream, size)
+        if isinstance(record, records.Schema):
+            self._add(self._schemas, record.id, record.name, record, size)
+            return
+        schema = self._schemas.get(record.schema_id)
+        if schema is None:
+            raise ValueError(f'{record.topic[:40]!r} has a type without description in the file')
+        description = Description(schema.name, schema.encoding, schema.data, record.metadata)
+        found = Channel(record.topic, record.message_encoding, description)
+        self._add(self.channels, record.id, record.topic, found, size)
+
+    def _add(self, known: dict[int, Any], number: int, name: str, found: Any, size: int) -> None:
+        if not name.isprintable() or len(name) > _LONGEST_NAME:
+            raise ValueError(f'{name[:40]!r} is not a valid name of a {type(found).__name__.lower()}')
+        self._size += 0 if number in known else size
+        if self._size > LARGEST_CHUNK:
+            raise ValueError(f'descriptions of types and topics: {_too_large(self._size)}')
+        if known.setdefault(number, found) != found:
+            raise ValueError(f'{name} has the number of another one, {number}')
+
+
+# -- layout -----------------------------------------------------------------------------------------------------------
+
+
+def _heads(file: BinaryIO) -> Iterator[tuple[int, int, int, bytes]]:
+    """Offset, opcode, size and first bytes of each record, up to the end of a finished file.
+
+    Raises:
+        ValueError: It is unfinished or not an MCAP file.
+    """
+    file_size = os.fstat(file.fileno()).st_size
+    file.seek(0)
+    if file.read(len(MAGIC)) != MAGIC:
+        raise ValueError('it does not begin like an MCAP file')
+    offset, opcode = len(MAGIC), 0
+    while opcode != Opcode.FOOTER:
+        file.seek(offset)
+        head = file.read(_CHUNK.size)
+        opcode, size = (head[0], HEAD + int.from_bytes(head[1:HEAD], 'little')) if head else (0, HEAD)
+        if offset + size > file_size:
+            raise ValueError(f'it was not finished, or truncated: no complete record at byte {offset}')
+        yield offset, opcode, size, head
+        offset += size
+    file.seek(offset)
+    if file.read(len(MAGIC) + 1) != MAGIC:
+        raise ValueError(f'no end of an MCAP file at byte {offset}')
+
+
 def scan(file: BinaryIO) -> Layout:
-    """Walk over the records of a file without reading their contents; in a damaged file, up to the damage."""
-    walk = _Walk(file)
-    damage = ''
+    """Walk over the records of a file without reading the messages; in a damaged file, up to the damage."""
+    names, blocks, counts = Names(), list[Block](), dict[int, int]()
+    damage, sound_size, in_data = '', 0, True
     try:
-        walk.to_the_end()
+        for offset, opcode, size, head in _heads(file):
+            file.seek(offset)
+            if opcode == Opcode.CHUNK:
+                first, last, unpacked_size = _CHUNK.unpack_from(head)[2:]
+                blocks.append(Block(offset, size, first, last, unpacked_size, is_chunk=True))
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE) and in_data:
+                _add_bare(blocks, offset, size, _MESSAGE.unpack_from(head)[4] if opcode == Opcode.MESSAGE else None)
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                names.learn(file, size)
+            elif opcode == Opcode.STATISTICS:
+                counts = _parsed(file, size).channel_message_counts
+            in_data = in_data and opcode != Opcode.DATA_END
+            sound_size = offset + size
+            if len(blocks) > _MOST_BLOCKS:
+                raise ValueError(f'more than {_MOST_BLOCKS} chunks: split the file')
     except ERRORS as error:
-        damage = TOO_SHORT if isinstance(error, struct.error) else str(error)
-    walk.finish_bare()
-    return Layout(tuple(walk.blocks), walk.names.channels, walk.counts, damage, walk.position)
+        damage = _reason(error)
+    return Layout(tuple(blocks), names.channels, counts, damage, sound_size)
+
+
+def _add_bare(blocks: list[Block], offset: int, size: int, time: int | None) -> None:
+    """Add a record outside of chunks, to the block that ends where it begins if there is one."""
+    block = blocks.pop() if blocks else None
+    if block is None or block.is_chunk or block.offset + block.size != offset or block.size > _BLOCK_SIZE:
+        blocks += [block] if block else []
+        block = Block(offset, 0, _NO_TIME, 0, 0, is_chunk=False)
+    times = (block.first, block.last) if time is None else (min(block.first, time), max(block.last, time))
+    blocks.append(Block(block.offset, block.size + size, *times, block.size + size, is_chunk=False))
 
 
 def scan_finished(file: BinaryIO) -> Layout:
@@ -114,187 +240,161 @@ def indexed_times(file: BinaryIO, channels: Collection[int]) -> list[int]:
     Nothing of the messages is read, so the index is believed. Without an index there are none.
     """
     times: list[int] = []
-    position, opcode = len(MAGIC), 0
-    while opcode != Opcode.DATA_END:
-        file.seek(position)
-        head = file.read(RECORD.size + _INDEX.size)
-        if len(head) < RECORD.size:
-            break
-        opcode, length = RECORD.unpack_from(head)
-        position += RECORD.size + length
-        if opcode == Opcode.MESSAGE_INDEX and len(head) == RECORD.size + _INDEX.size:
-            channel, size = _INDEX.unpack_from(head, RECORD.size)
-            if channel in channels and size == length - _INDEX.size <= LARGEST_CHUNK:
-                times += [time for time, _ in _INDEX_ENTRY.iter_unpack(file.read(size - size % _INDEX_ENTRY.size))]
+    for offset, opcode, size, head in _heads(file):
+        if opcode == Opcode.MESSAGE_INDEX and int.from_bytes(head[HEAD : HEAD + 2], 'little') in channels:
+            file.seek(offset)
+            times += [time for time, _ in _parsed(file, size).records]
     return sorted(times)
 
 
-class _Walk:
-    """State of `scan`."""
+# -- messages ---------------------------------------------------------------------------------------------------------
 
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self._size = os.fstat(file.fileno()).st_size
-        self._bare: Block | None = None
-        self._in_summary = False
-        self.blocks: list[Block] = []
-        self.names = Names()
-        self.counts: dict[int, int] = {}
-        self.position = 0
 
-    def to_the_end(self) -> None:
-        """Walk until the end of a finished file.
+class Located(NamedTuple):
+    """Messages in the bytes of their blocks, n of them."""
 
-        Raises:
-            ValueError: It is unfinished or not an MCAP file; `position` is that of the fault.
-        """
-        if self._read(0, len(MAGIC)) != MAGIC:
-            raise ValueError('it does not begin like an MCAP file')
-        self.position, opcode = len(MAGIC), 0
-        while opcode != Opcode.FOOTER:
-            head = self._read(self.position, RECORD.size)
-            opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, self._size)
-            end = self.position + RECORD.size + length
-            if end > self._size:
-                raise ValueError(f'it was not finished, or truncated: no complete record at byte {self.position}')
-            self._take(opcode, length)
-            self.position = end
-        if self._read(self.position, len(MAGIC) + 1) != MAGIC:
-            raise ValueError(f'no end of an MCAP file at byte {self.position}')
+    data: bytes
+    rows: Integers
+    """channel, offset in ``data`` [bytes], size [bytes], log time [ns], publish time [ns]; shape (5, n). A publish time
+    from 2^63 on is negative."""
 
-    def finish_bare(self) -> None:
-        """Complete the block of records outside of chunks."""
-        if self._bare is not None:
-            size = self._bare.unpacked_size
-            fault = _too_large(size) if size > LARGEST_CHUNK else ''
-            self.blocks.append(self._bare._replace(size=size, fault=fault))
-            self._bare = None
 
-    def _take(self, opcode: int, length: int) -> None:
-        content = self.position + RECORD.size
-        if opcode in OF_MESSAGES and not self._in_summary:
-            self._extend_bare(opcode, length)
-            return
-        self.finish_bare()
-        if opcode == Opcode.CHUNK:
-            self._chunk(content, length)
-        elif opcode == Opcode.DATA_END:
-            self._in_summary = True
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            self.names.learn(opcode, self._whole(content, length))
-        elif opcode == Opcode.STATISTICS:
-            self.counts = mcap_records.parse_message_counts(self._whole(content, length))
-        if len(self.blocks) > _MOST_BLOCKS:
-            raise ValueError(f'more than {_MOST_BLOCKS} chunks: split the file')
+Locate = Callable[[bytes, Block, Names], Integers]
+"""`located`, or the same compiled."""
 
-    def _extend_bare(self, opcode: int, length: int) -> None:
-        if self._bare is None or self._bare.unpacked_size > _BLOCK_SIZE:
-            self.finish_bare()
-            self._bare = Block(self.position, 0, NO_TIME, 0, 0)
-        bare = self._bare
-        time_range = (bare.first, bare.last)
+
+def located(data: bytes, block: Block, names: Names) -> Integers:
+    """Rows of `Located` of the messages of a block. The channels described in it become known to ``names``.
+
+    Raises:
+        ValueError: A record is invalid (or another error in `ERRORS`).
+    """
+    found = array('Q')
+    first, last, size, offset = block.first, min(block.last, LAST_TIME), len(data), 0
+    while offset < size:
+        opcode, length = _RECORD.unpack_from(data, offset)
+        end = offset + HEAD + length
+        if end > size:
+            raise ValueError(f'a record of {length} bytes reaches beyond its end')
         if opcode == Opcode.MESSAGE:
-            head = self._read(self.position, _MESSAGE.size)
-            time = _MESSAGE.unpack(head)[4]
-            time_range = (min(bare.first, time), max(bare.last, time))
-        size = bare.unpacked_size + RECORD.size + length
-        self._bare = bare._replace(first=time_range[0], last=time_range[1], unpacked_size=size)
-
-    def _chunk(self, offset: int, length: int) -> None:
-        head = self._read(offset, min(length, _CHUNK.size + 16 + _SIZE.size))
-        first, last, unpacked_size, checksum, name_length = _CHUNK.unpack_from(head)
-        start = _CHUNK.size + name_length
-        if start + _SIZE.size > len(head):
-            self.blocks.append(Block(offset, length, first, last, 0, fault='its compression has no sensible name'))
-            return
-        compression = head[_CHUNK.size : start].decode('ascii', 'replace')
-        (size,) = _SIZE.unpack_from(head, start)
-        start += _SIZE.size
-        fault = ''
-        if size != length - start:
-            fault = f'it claims {size} bytes in a record of {length}'
-        elif compression not in _UNPACKERS:
-            fault = f'compressed by {compression!r}, not by zstd or lz4'
-        elif max(size, unpacked_size) > LARGEST_CHUNK:
-            fault = _too_large(max(size, unpacked_size))
-        if unpacked_size or fault:
-            self.blocks.append(
-                Block(offset + start, length - start, first, last, unpacked_size, checksum, compression, fault)
-            )
-
-    def _whole(self, offset: int, length: int) -> bytes:
-        if length > LARGEST_CHUNK:
-            raise ValueError(f'record at byte {offset}: {_too_large(length)}')
-        return self._read(offset, length)
-
-    def _read(self, offset: int, size: int) -> bytes:
-        self._file.seek(offset)
-        return self._file.read(size)
+            _, _, channel, _, time, sent = _MESSAGE.unpack_from(data, offset)
+            begin = offset + MESSAGE_HEAD
+            if begin > end or channel not in names.channels or not first <= time <= last:
+                raise ValueError(f'a message of {length} bytes on channel {channel} at {time} ns is invalid')
+            found.extend((channel, begin, end - begin, time, sent))
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            names.learn(BytesIO(data[offset:end]), end - offset)
+        offset = end
+    return np.frombuffer(found, np.int64).reshape(-1, 5).T
 
 
-OF_MESSAGES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+OnFault = Callable[[Block, str], None]
+"""Called with each unreadable block and the reason."""
 
 
-def _too_large(size: int) -> str:
-    return f'{size} bytes, at most {LARGEST_CHUNK >> 20} MiB are allowed: write the file again with smaller chunks'
+def messages(
+    file: BinaryIO, layout: Layout, on_fault: OnFault | None = None
+) -> Iterator[tuple[Channel, int, int, bytes]]:
+    """Channel, log time [ns], publish time [ns] and bytes of each message, in the order of `in_order`.
+
+    Args:
+        file: The file.
+        layout: From `scan`.
+        on_fault: If None, an unreadable block is an error.
+
+    Raises:
+        ValueError: A block cannot be read, or too many overlap in time.
+    """
+    names = Names(layout.channels)
+    for data, rows in in_order(file, layout.blocks, names, on_fault=on_fault):
+        for channel, offset, size, time, sent in rows.view(np.uint64).T.tolist():
+            yield names.channels[channel], time, sent, data[offset : offset + size]
 
 
-class Names:
-    """Schemas and channels by number."""
+def in_order(
+    file: BinaryIO,
+    blocks: Sequence[Block],
+    names: Names,
+    locate: Locate = located,
+    at_once: int = 1,
+    on_fault: OnFault | None = None,
+) -> Iterator[Located]:
+    """Messages of blocks in order of log time; equal times in the order of the file.
 
-    def __init__(self, channels: dict[int, Channel] | None = None) -> None:
-        self._schemas = {0: mcap_records.Schema(0, '', '', b'')}
-        self._sizes: dict[tuple[int, int], int] = {}
-        self._size = 0
-        self.channels = dict(channels or {})
+    Args:
+        file: The file.
+        blocks: From its `Layout`.
+        names: Its channels.
+        locate: Finds the messages of a block.
+        at_once: Least size of the blocks that are read together [bytes].
+        on_fault: As of `messages`.
 
-    def learn(self, opcode: int, data: bytes) -> None:
-        """Add the record of a schema or a channel.
-
-        Raises:
-            ValueError: It is invalid, or a name in it is too long or not printable.
-        """
-        if opcode == Opcode.SCHEMA:
-            schema = mcap_records.parse_schema(data)
-            _check_name('type', schema.name)
-            self._count(opcode, schema.number, len(data))
-            self._schemas[schema.number] = schema
-            return
-        number, of_schema, topic, encoding, metadata = mcap_records.parse_channel(data)
-        _check_name('topic', topic)
-        self._count(opcode, number, len(data))
-        known = self._schemas.get(of_schema)
-        if known is None:
-            raise ValueError(f'{topic} has a type without description in the file')
-        self.channels[number] = Channel(topic, known.name, encoding, known.encoding, known.data, dict(metadata))
-
-    def _count(self, opcode: int, number: int, size: int) -> None:
-        self._size += size - self._sizes.get((opcode, number), 0)
-        self._sizes[opcode, number] = size
-        if self._size > LARGEST_CHUNK:
-            raise ValueError(f'descriptions of types and topics: {_too_large(self._size)}')
+    Raises:
+        ValueError: As `messages`.
+    """
+    if names.channels:  # else blocks stay in file order: channels are described before their messages
+        blocks = sorted(blocks, key=lambda block: block.first)
+    following = list(accumulate([LAST_TIME, *(block.first for block in reversed(blocks))], min))[-2::-1]
+    waiting = _joined([])
+    begin = size = 0
+    for end, (block, until) in enumerate(zip(blocks, following, strict=True), start=1):
+        size += block.unpacked_size
+        if size < max(at_once, len(waiting.data)) and end < len(blocks):
+            continue
+        data, rows = _joined([waiting, *_read(file, blocks[begin:end], names, locate, on_fault)])
+        begin, size = end, 0
+        if (rows[3, :-1] > rows[3, 1:]).any():
+            rows = rows[:, np.argsort(rows[3], kind='stable')]
+        ready = int(np.searchsorted(rows[3], until, side='right'))
+        yield Located(data, rows[:, :ready])
+        waiting = _alone(data, rows[:, ready:])
+        if len(waiting.data) > LARGEST_CHUNK:
+            raise ValueError(f'more than {LARGEST_CHUNK >> 20} MiB of messages overlap in time: sort the file first')
 
 
-def _check_name(kind: str, name: str) -> None:
-    if not name.isprintable() or len(name) > _LONGEST_NAME:
-        raise ValueError(f'{name[:40]!r} is not a valid name of a {kind}')
+def _read(
+    file: BinaryIO, blocks: Sequence[Block], names: Names, locate: Locate, on_fault: OnFault | None
+) -> Iterator[Located]:
+    """Messages of each block."""
+    for block in blocks:
+        try:
+            data = _unpacked(file, block)
+            yield Located(data, locate(data, block, names))
+        except ERRORS as error:
+            if on_fault is None:
+                raise ValueError(f'chunk at byte {block.offset}: {_reason(error)}') from None
+            on_fault(block, _reason(error))
 
 
-def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes, int]]:
-    """Topic, message type, log time [ns], bytes and publish time [ns] of each message of a finished file.
+def _alone(data: bytes, rows: Integers) -> Located:
+    """The same messages without the bytes between them."""
+    parts = [data[offset : offset + size] for _, offset, size, _, _ in rows.T.tolist()]
+    return Located(b''.join(parts), np.array([rows[0], np.cumsum(rows[2]) - rows[2], *rows[2:]]))
 
-    In order of log time.
+
+def _joined(parts: Sequence[Located]) -> Located:
+    """Messages of all parts."""
+    starts = accumulate((len(part.data) for part in parts), initial=0)
+    rows = [np.add(part.rows, [[0], [start], [0], [0], [0]]) for part, start in zip(parts, starts, strict=False)]
+    return Located(b''.join(part.data for part in parts), np.concatenate([np.empty((5, 0), np.int64), *rows], axis=1))
+
+
+# -- the file of a bag ------------------------------------------------------------------------------------------------
+
+
+def file_messages(path: Path) -> Iterator[BagMessage]:
+    """Messages of a finished file, in order of log time.
 
     Raises:
         ValueError: The file is not finished, or a block cannot be read.
     """
     with path.open('rb') as file:
         for channel, log_time, publish_time, data in messages(file, scan_finished(file)):
-            yield channel.topic, channel.type_name, log_time, data, publish_time
+            yield BagMessage(channel.topic, channel.description.type_name, log_time, data, publish_time)
 
 
-def file_topics(path: Path) -> Iterator[tuple[str, str, int]]:
-    """Name, message type and number of messages of each topic, from the index of the file if it has one.
+def file_channels(path: Path) -> Iterator[tuple[Channel, int]]:
+    """Channels of a finished file and their numbers of messages, from its index if it has one; one may come often.
 
     Raises:
         ValueError: As `file_messages`.
@@ -302,168 +402,57 @@ def file_topics(path: Path) -> Iterator[tuple[str, str, int]]:
     with path.open('rb') as file:
         layout = scan_finished(file)
         if layout.channels and layout.counts:
-            for number, channel in layout.channels.items():
-                yield channel.topic, channel.type_name, layout.counts.get(number, 0)
+            yield from ((channel, layout.counts.get(number, 0)) for number, channel in layout.channels.items())
         else:
-            for message in messages(file, layout):
-                yield message.channel.topic, message.channel.type_name, 1
+            yield from ((channel, 1) for channel, *_ in messages(file, layout))
 
 
-def file_definitions(path: Path) -> Iterator[tuple[str, str, str]]:
-    """Message type, encoding and text of each definition of a finished file; a type may come several times.
-
-    Raises:
-        ValueError: As `file_messages`.
-    """
-    with path.open('rb') as file:
-        layout = scan_finished(file)
-        channels = layout.channels.values() if layout.channels else (m.channel for m in messages(file, layout))
-        seen = set()
-        for channel in channels:
-            if channel.type_name not in seen:
-                seen.add(channel.type_name)
-                yield channel.type_name, channel.definition_encoding, channel.definition.decode(errors='replace')
+# -- compression ------------------------------------------------------------------------------------------------------
 
 
-def messages(file: BinaryIO, layout: Layout, on_fault: Callable[[Block, str], None] | None = None) -> Iterator[Message]:
-    """Messages of a file in order of log time; equal times in the order of the file.
-
-    Args:
-        file: The file.
-        layout: From `scan`.
-        on_fault: Called with each unreadable block and the reason; if None, such a block is an error.
-
-    Raises:
-        ValueError: A block cannot be read, or too many overlap in time.
-    """
-    names = Names(layout.channels)
-    blocks: Sequence[Block] = layout.blocks
-    if names.channels:  # else blocks stay in file order: channels are described before their messages
-        blocks = sorted(blocks, key=lambda block: block.first)
-    earliest = earliest_times(blocks)
-    heap: list[tuple[int, int, int, _Contents, Iterator[int]]] = []
-    at_once = upcoming = 0
-    while heap or upcoming < len(blocks):
-        if upcoming < len(blocks) and (not heap or earliest[upcoming] <= heap[0][0]):
-            contents = _contents(file, blocks[upcoming], names, on_fault)
-            numbers = iter(contents.by_time())
-            number = next(numbers, None)
-            if number is not None:
-                heapq.heappush(heap, (contents.times[number], upcoming, number, contents, numbers))
-                at_once += len(contents.data)
-            if at_once > MOST_AT_ONCE:
-                raise ValueError(f'chunks of more than {MOST_AT_ONCE >> 20} MiB overlap in time: sort it first')
-            upcoming += 1
-            continue
-        _, place, number, contents, numbers = heap[0]
-        yield contents.message(number, names.channels)
-        following = next(numbers, None)
-        if following is None:
-            heapq.heappop(heap)
-            at_once -= len(contents.data)
-        else:
-            heapq.heapreplace(heap, (contents.times[following], place, following, contents, numbers))
-
-
-def earliest_times(blocks: Sequence[Block]) -> 'array[int]':
-    """Smallest log time [ns] in each block and all following ones."""
-    earliest = array('Q', [block.first for block in blocks])
-    for place in reversed(range(len(earliest) - 1)):
-        earliest[place] = min(earliest[place], earliest[place + 1])
-    return earliest
-
-
-class _Contents(NamedTuple):
-    """Data of a block, and positions of its messages."""
-
-    data: bytes
-    times: 'array[int]'  # log time of each message [ns]
-    offsets: 'array[int]'
-
-    def by_time(self) -> Sequence[int]:
-        """Numbers of the messages in order of log time."""
-        numbers, times = range(len(self.times)), self.times
-        if all(times[number - 1] <= times[number] for number in numbers[1:]):
-            return numbers
-        return sorted(numbers, key=times.__getitem__)
-
-    def message(self, number: int, channels: dict[int, Channel]) -> Message:
-        """One message."""
-        offset = self.offsets[number]
-        _, length, channel, _, log_time, publish_time = _MESSAGE.unpack_from(self.data, offset)
-        data = self.data[offset + _MESSAGE.size : offset + RECORD.size + length]
-        return Message(channels[channel], log_time, publish_time, data)
-
-
-_NOTHING = _Contents(b'', array('Q'), array('Q'))
-
-
-def _contents(file: BinaryIO, block: Block, names: Names, on_fault: Callable[[Block, str], None] | None) -> _Contents:
-    try:
-        return _indexed(unpacked(file, block), block, names)
-    except ERRORS as error:
-        reason = TOO_SHORT if isinstance(error, struct.error) else str(error)
-        if on_fault is None:
-            raise ValueError(f'chunk at byte {block.offset}: {reason}') from None
-        on_fault(block, reason)
-        return _NOTHING
-
-
-def unpacked(file: BinaryIO, block: Block) -> bytes:
-    """Records of a block, of the claimed size and checksum.
-
-    Raises:
-        ValueError: It cannot be read (or another error in `ERRORS`).
-    """
-    if block.fault:
-        raise ValueError(block.fault)
+def _unpacked(file: BinaryIO, block: Block) -> bytes:
+    """Records of a block, of the claimed size and checksum."""
+    if block.unpacked_size > LARGEST_CHUNK:
+        raise ValueError(_too_large(block.unpacked_size))
     file.seek(block.offset)
-    data = _UNPACKERS[block.compression](file.read(block.size), block.unpacked_size)
+    if not block.is_chunk:
+        return file.read(block.size)
+    chunk = _parsed(file, block.size)
+    if chunk.compression not in _UNPACKERS:
+        raise ValueError(f'compressed by {chunk.compression[:20]!r}, not by zstd or lz4')
+    data = _UNPACKERS[chunk.compression](chunk.data)
     if len(data) != block.unpacked_size:
         raise ValueError(f'it does not unpack to the claimed {block.unpacked_size} bytes')
-    if block.checksum and zlib.crc32(data) != block.checksum:
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError('its checksum is wrong')
     return data
 
 
-def _indexed(data: bytes, block: Block, names: Names) -> _Contents:
-    times, offsets = array('Q'), array('Q')
-    offset = 0
-    while offset < len(data):
-        opcode, length = RECORD.unpack_from(data, offset)
-        end = offset + RECORD.size + length
-        if end > len(data):
-            raise ValueError(f'a record of {length} bytes reaches beyond its end')
-        if opcode == Opcode.MESSAGE:
-            _, length, channel, _, log_time, _ = _MESSAGE.unpack_from(data, offset)
-            if length < _MESSAGE.size - RECORD.size or channel not in names.channels:
-                raise ValueError(f'a message of {length} bytes on channel {channel} is invalid')
-            if not block.first <= log_time <= block.last or log_time > LAST_TIME:
-                raise ValueError(f'a message at {log_time} ns is outside its claimed range of times')
-            times.append(log_time)
-            offsets.append(offset)
-        elif opcode in OF_MESSAGES:
-            names.learn(opcode, data[offset + RECORD.size : end])
-        offset = end
-    return _Contents(data, times, offsets)
-
-
-def unpack_zstd(data: bytes, size: int) -> bytes:
-    """Unpack at most ``size + 1`` bytes.
+def unpack_zstd(data: bytes) -> bytes:
+    """Unpack one zstd frame. The package allocates what the frame claims, so the claim is checked first.
 
     Raises:
-        ValueError: The data are no zstd frame, its window is above `LARGEST_CHUNK`, or the package is not installed.
+        ValueError: It is no such frame, it claims or has more than `LARGEST_CHUNK`, or the package is not installed.
     """
     zstandard = needed('zstandard')
-    parts, wanted = [], size + 1
     try:
-        with zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(data) as reader:
-            while wanted > 0 and (part := reader.read(wanted)):
-                parts.append(part)
-                wanted -= len(part)
+        if (size := zstandard.frame_content_size(data)) > LARGEST_CHUNK:
+            raise ValueError(_too_large(size))
+        unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK)
+        return cast(bytes, unpacker.decompress(data, max_output_size=LARGEST_CHUNK))
     except zstandard.ZstdError as error:
         raise ValueError(str(error)) from None
-    return b''.join(parts)
+
+
+def _unpack_lz4(data: bytes) -> bytes:
+    try:
+        unpacker = needed('lz4.frame').LZ4FrameDecompressor()
+        return cast(bytes, unpacker.decompress(data, max_length=LARGEST_CHUNK + 1))
+    except RuntimeError as error:
+        raise ValueError(str(error)) from None
+
+
+_UNPACKERS: dict[str, Callable[[bytes], bytes]] = {'': bytes, 'zstd': unpack_zstd, 'lz4': _unpack_lz4}
 
 
 @contextmanager
@@ -486,18 +475,3 @@ def unpacked_file(path: Path) -> Iterator[Path]:
             raise ValueError(str(error)) from None
         file.flush()
         yield Path(file.name)
-
-
-def _unpack_lz4(data: bytes, size: int) -> bytes:
-    try:
-        unpacked: bytes = needed('lz4.frame').LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-    except RuntimeError as error:
-        raise ValueError(str(error)) from None
-    return unpacked
-
-
-_UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {
-    '': lambda data, size: data[: size + 1],
-    'zstd': unpack_zstd,
-    'lz4': _unpack_lz4,
-}

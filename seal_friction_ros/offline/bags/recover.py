@@ -97,13 +97,13 @@ def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
                 found.lost_bytes += path.stat().st_size - layout.sound_size
                 found.damage.append(f'{path.name}: {layout.damage}')
             for channel, log_time, publish_time, data in mcap_reader.messages(file, layout, on_fault):
-                topic, type_name, encoding = channel[:3]
+                topic, encoding, description = channel
                 if encoding != 'cdr':
                     raise BagError(f'{path}: {topic} is encoded as {encoding[:40]!r}, not as CDR')
-                key = topic, type_name
-                if key not in descriptions:
-                    descriptions[key] = _described(channel)
-                found.last_ns = writer.write(topic, type_name, log_time, data, publish_time, descriptions[key])
+                if (topic, description.type_name) not in descriptions:
+                    descriptions[topic, description.type_name] = _described(channel)
+                known = descriptions[topic, description.type_name]
+                found.last_ns = writer.write(topic, known.type_name, log_time, data, publish_time, known)
                 found.first_ns = found.last_ns if found.first_ns < 0 else found.first_ns
                 found.messages += 1
                 found.topics[topic] = found.topics.get(topic, 0) + 1
@@ -115,7 +115,8 @@ def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
 
 def _described(channel: Channel) -> Description:
     """Description in the damaged bag, without a QoS that is not in the format of rosbag2."""
-    text = channel.metadata.get(_QOS, '')
+    metadata = channel.description.metadata
+    text = metadata.get(_QOS, '')
     try:
         profiles = parse_yaml(text.encode(), channel.topic)
     except ValueError:
@@ -123,5 +124,4 @@ def _described(channel: Channel) -> Description:
     known = isinstance(profiles, list) and all(
         isinstance(p, Mapping) and isinstance(p.get('history'), str) for p in profiles
     )
-    metadata = {_QOS: text if known else '[]', _HASH: channel.metadata.get(_HASH, '')}
-    return Description(channel.type_name, channel.definition_encoding, channel.definition, metadata)
+    return channel.description._replace(metadata={_QOS: text if known else '[]', _HASH: metadata.get(_HASH, '')})

@@ -1,22 +1,28 @@
-"""Reader of one untrusted SQLite file of a rosbag2 bag: plain tables only, no views, no journal files."""
+"""Reader of one untrusted SQLite file of a rosbag2 bag: plain tables only, no views, no journal files.
+
+Ours, since ``rosbags`` computes whatever columns a database has, reads values of any size, and leaves the order of
+equal times open.
+"""
 
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from seal_friction_ros.offline.bags.mcap_reader import LARGEST_CHUNK
+from seal_friction_ros.offline.bags.mcap_reader import LARGEST_CHUNK, BagMessage, Channel
+from seal_friction_ros.offline.bags.mcap_writer import Description
 
 _TOPICS = 'SELECT id, name, type FROM topics'
 _COUNTS = 'SELECT topic_id, count(*) FROM messages GROUP BY topic_id'
 _MESSAGES = 'SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id'
 _DEFINITIONS = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
+_HAS_DEFINITIONS = "SELECT count(*) FROM sqlite_schema WHERE name = 'message_definitions'"
 _MOST_DEFINITIONS = 10_000
 _LONGEST_NAME = 1024  # characters of a topic or a type
 
 
-def file_topics(path: Path) -> list[tuple[str, str, int]]:
-    """Name, message type and number of messages of each topic.
+def file_channels(path: Path) -> list[tuple[Channel, int]]:
+    """Channels and their numbers of messages. A file of Humble and before has no definitions.
 
     Raises:
         ValueError: The file is not such a database.
@@ -24,11 +30,21 @@ def file_topics(path: Path) -> list[tuple[str, str, int]]:
     """
     with _opened(path) as database:
         counts = {number: int(count) for number, count in database.execute(_COUNTS)}
-        return [(name, type_name, counts.get(number, 0)) for number, name, type_name in _names(database)]
+        definitions = {}
+        if database.execute(_HAS_DEFINITIONS).fetchone() != (0,):
+            _check_plain(database, 'message_definitions')
+            rows = database.execute(_DEFINITIONS).fetchmany(_MOST_DEFINITIONS)
+            definitions = {row[0]: row[1:] for row in rows if all(isinstance(text, str) for text in row)}
+        found = []
+        for number, name, type_name in _names(database):
+            encoding, text = definitions.get(type_name, ('', ''))
+            channel = Channel(name, 'cdr', Description(type_name, encoding, text.encode(), {}))
+            found.append((channel, counts.get(number, 0)))
+        return found
 
 
-def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes, None]]:
-    """Topic, message type, log time [ns] and bytes of each message, in order of log time; no publish time.
+def file_messages(path: Path) -> Iterator[BagMessage]:
+    """Messages in order of log time; no publish times.
 
     Raises:
         ValueError: The file is not such a database.
@@ -39,22 +55,7 @@ def file_messages(path: Path) -> Iterator[tuple[str, str, int, bytes, None]]:
         for number, log_time, data in database.execute(_MESSAGES):
             if number not in names or not isinstance(log_time, int) or not isinstance(data, bytes):
                 raise ValueError(f'a message of topic {number!r} at {log_time!r} is invalid')
-            yield *names[number], log_time, data, None
-
-
-def file_definitions(path: Path) -> list[tuple[str, str, str]]:
-    """Message type, encoding and text of each definition; empty for a file of Humble and before.
-
-    Raises:
-        ValueError: The file is not such a database.
-        sqlite3.Error: It is damaged.
-    """
-    with _opened(path) as database:
-        if database.execute("SELECT count(*) FROM sqlite_schema WHERE name = 'message_definitions'").fetchone() == (0,):
-            return []
-        _check_plain(database, 'message_definitions')
-        rows = database.execute(_DEFINITIONS).fetchmany(_MOST_DEFINITIONS)
-        return [row for row in rows if all(isinstance(text, str) for text in row)]
+            yield BagMessage(*names[number], log_time, data)
 
 
 @contextmanager
