@@ -40,6 +40,8 @@ setup(
         f'{NAME}.offline.monitor': ['page/*'],
     },
     python_requires='>=3.11',
+    # What no distribution packages; the rest comes by package.xml, or by requirements/run.txt.
+    install_requires=['mcap>=1.5.0', 'rosbags>=0.11.9'],
     zip_safe=False,
     # Commands on a Dask cluster, and tables for it; the versions of requirements/dev.txt.
     extras_require={

@@ -1,12 +1,14 @@
-"""Packages that only some commands need. Without one of them they end with one line that says how to install it.
+"""Packages that a machine may lack: a command or node that needs one ends with one line that says how to install it.
 
-Core, bags and the live node need numpy and PyYAML alone; the first command that a machine lacks a package for says so.
+Core and the computation of the live node need numpy and PyYAML alone, bags mcap, the others only some commands.
 """
 
 from importlib import import_module
 from typing import Any
 
 OPTIONAL = {
+    'mcap': '',
+    'rosbags': '',
     'scipy': 'python3-scipy',
     'numba': 'python3-numba',
     'matplotlib': 'python3-matplotlib',

@@ -70,10 +70,10 @@ def test_mutations_of_the_corpus_crash_no_reader(cases):
     ('name', 'reason'),
     [
         ('claims_1_tb_record', 'truncated'),
-        ('claims_1_tb_chunk', 'claims 1099511627776 bytes'),
+        ('claims_1_tb_chunk', 'at most 32 MiB'),
         ('claims_1_tb_unpacked', 'at most 32 MiB'),
         ('zstd_bomb', 'at most 32 MiB'),
-        ('zstd_bomb_that_lies', 'does not unpack to the claimed 1000 bytes'),
+        ('zstd_bomb_that_lies', 'at most 32 MiB'),
         ('statistics_claim_much', 'shorter than what it claims'),
         ('name_of_4_gb', 'shorter than what it claims'),
         ('message_in_message', None),
@@ -169,7 +169,7 @@ def test_a_pipe_or_a_device_is_no_bag_and_is_not_waited_for(tmp_path: Path):
 def test_a_name_that_would_act_on_a_terminal_is_refused(tmp_path: Path):
     with BagWriter(tmp_path / 'bag') as writer:
         writer.write('/a\x1b[2J', 'std_msgs/msg/String', 1, b'')
-    assert 'not a valid name of a topic' in complaint(read_messages, tmp_path / 'bag')
+    assert 'not a valid name of a channel' in complaint(read_messages, tmp_path / 'bag')
 
 
 # --- SQLite ---

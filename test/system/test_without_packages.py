@@ -16,7 +16,6 @@ from seal_friction_ros.offline.bags.bag import bag_topics
 from seal_friction_ros.packages import OPTIONAL, how_to_install
 
 WITHOUT = [sys.executable, str(ROOT / 'test' / 'harness' / 'without.py')]
-NOT_OF_A_DISTRIBUTION = ('mcap', 'rosbags')
 COMMAND = 'seal_friction_ros.offline.commands.main'
 PULL_TEST = 'bags/pull_test'
 
@@ -29,10 +28,10 @@ def command(packages: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-EVERYTHING = ','.join((*OPTIONAL, *NOT_OF_A_DISTRIBUTION))
+EVERYTHING = ','.join(name for name in OPTIONAL if name != 'mcap')
 
 
-def test_replay_compare_and_info_need_numpy_and_yaml_alone(tmp_path: Path):
+def test_replay_compare_and_info_need_numpy_yaml_and_mcap_alone(tmp_path: Path):
     out = str(tmp_path / 'replayed')
     for arguments in (
         ('info', PULL_TEST),
@@ -49,6 +48,8 @@ def test_replay_compare_and_info_need_numpy_and_yaml_alone(tmp_path: Path):
 @pytest.mark.parametrize(
     ('package', 'arguments'),
     [
+        ('mcap', ['info', PULL_TEST]),
+        ('mcap', ['replay', PULL_TEST, '--verify']),
         ('numba', ['tune', '--out', '{}.yaml']),
         ('numba', ['servo', '--out', '{}.html']),
         ('numba', ['ehl', 'run', 'inner_seal']),
@@ -93,9 +94,9 @@ def test_a_shell_that_completes_without_argcomplete_is_told_so():
 
 
 def test_both_nodes_run_and_record_without_any_of_them(tmp_path: Path):
-    """The estimator with numpy and PyYAML alone; the simulator needs scipy, too, and no compiler."""
+    """The estimator with numpy, PyYAML and mcap alone; the simulator needs scipy, too, and no compiler."""
     recording = ['-p', 'record:=true', '-p', f'record_directory:={tmp_path}', '-p', 'record_name:=bag']
-    without_scipy = ','.join(name for name in (*OPTIONAL, *NOT_OF_A_DISTRIBUTION) if name != 'scipy')
+    without_scipy = ','.join(name for name in OPTIONAL if name not in ('mcap', 'scipy'))
     environment = graph_environment(free_domain())
     processes = [
         subprocess.Popen(
@@ -123,10 +124,14 @@ def test_both_nodes_run_and_record_without_any_of_them(tmp_path: Path):
     assert json.loads(result.stdout)['identical'], result.stderr
 
 
-def test_the_simulator_without_scipy_says_so():
+@pytest.mark.parametrize(
+    ('node', 'package', 'how'),
+    [('servo_simulator', 'scipy', 'apt-get install python3-scipy'), ('friction_estimator', 'mcap', 'pip install mcap')],
+)
+def test_a_node_that_lacks_a_package_says_so(node: str, package: str, how: str):
     environment = graph_environment(free_domain())
-    run = [*WITHOUT, 'scipy', '--', 'seal_friction_ros.nodes.entry_points:servo_simulator']
+    run = [*WITHOUT, package, '--', f'seal_friction_ros.nodes.entry_points:{node}']
     result = subprocess.run(run, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
     assert result.returncode == 2
     assert result.stderr.strip().count('\n') == 0
-    assert 'servo_simulator: scipy is not installed: apt-get install python3-scipy' in result.stderr
+    assert f'{node}: {package} is not installed: {how}' in result.stderr

@@ -44,7 +44,7 @@ _AT_ONCE = 1 << 21  # [bytes] read at a time: about 20 000 messages
 _SCHEMA, _CHANNEL, _MESSAGE = int(Opcode.SCHEMA), int(Opcode.CHANNEL), int(Opcode.MESSAGE)
 
 
-def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch = _WHOLE) -> Iterator[Messages]:
+def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch | None = None) -> Iterator[Messages]:
     """Messages of a bag, or of a part of it, in the order of `bag.read_messages`, at most `MOST_MESSAGES` at a time.
 
     Of a part only the chunks with such messages are read.
@@ -58,7 +58,7 @@ def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch = _WHOLE) -> Iter
         yield from _gathered(read_messages(path), kind_of)
         return
     for number, file_path in enumerate(files.files):
-        begin, end = stretch.in_file(number)
+        begin, end = (stretch or _WHOLE).in_file(number)
         if begin == end:
             continue
         with file_path.open('rb') as file:

@@ -86,7 +86,7 @@ class Layout(NamedTuple):
 
     blocks: tuple[Block, ...]
     channels: dict[int, Channel]  # those repeated at the end of the file
-    counts: dict[int, int]  # messages of each channel, by the statistics of the file; empty if it has none
+    counts: dict[int, int] | None  # messages of each channel, by the statistics of the file if it has some
     damage: str  # fault of the file from `sound_size` on; empty if it is finished
     sound_size: int  # [bytes] of complete records
 
@@ -189,7 +189,7 @@ def _heads(file: BinaryIO) -> Iterator[tuple[int, int, int, bytes]]:
 
 def scan(file: BinaryIO) -> Layout:
     """Walk over the records of a file without reading the messages; in a damaged file, up to the damage."""
-    names, blocks, counts = Names(), list[Block](), dict[int, int]()
+    names, blocks, counts = Names(), list[Block](), None
     damage, sound_size, in_data = '', 0, True
     try:
         for offset, opcode, size, head in _heads(file):
@@ -401,8 +401,9 @@ def file_channels(path: Path) -> Iterator[tuple[Channel, int]]:
     """
     with path.open('rb') as file:
         layout = scan_finished(file)
-        if layout.channels and layout.counts:
-            yield from ((channel, layout.counts.get(number, 0)) for number, channel in layout.channels.items())
+        counts = layout.counts
+        if layout.channels and counts is not None:
+            yield from ((channel, counts.get(number, 0)) for number, channel in layout.channels.items())
         else:
             yield from ((channel, 1) for channel, *_ in messages(file, layout))
 
