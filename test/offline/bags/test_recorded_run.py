@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import yaml
-from harness.example_bags import STEP, default_configuration, rewrite, write_inputs, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import STEP, rewrite, write_inputs, write_recorded
 
 from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,
@@ -24,7 +25,7 @@ from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory):
-    return write_recorded(tmp_path_factory.mktemp('bag'), default_configuration())
+    return write_recorded(tmp_path_factory.mktemp('bag'), compensating())
 
 
 def test_each_estimate_has_the_inputs_that_were_held_with_it(recorded):

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 import zstandard
-from harness.example_bags import default_configuration, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import write_recorded
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
@@ -22,7 +23,7 @@ FORMATS = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory) -> Path:
-    return write_recorded(tmp_path_factory.mktemp('recorded'), default_configuration())
+    return write_recorded(tmp_path_factory.mktemp('recorded'), compensating())
 
 
 def in_the_format(recorded: Path, out: Path, form: str, mode: str) -> Path:

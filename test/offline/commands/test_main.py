@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from harness.example_bags import default_configuration, write_inputs
+from harness.compensation import compensating
+from harness.example_bags import write_inputs
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.messages import encode_text
@@ -76,7 +77,7 @@ def test_unusable_bags_are_exit_code_2_one_line_and_nothing_written(command: str
             if kind == 'other':
                 writer.write('/chatter', 'std_msgs/msg/String', 1, encode_text('hello'))
     elif kind == 'truncated':
-        write_inputs(bag, 50, default_configuration())
+        write_inputs(bag, 50, compensating())
         file = next(bag.glob('*.mcap'))
         file.write_bytes(file.read_bytes()[:-300])
     out = [] if command == 'info' else ['--out', str(tmp_path / ('out.html' if command == 'report' else 'out'))]

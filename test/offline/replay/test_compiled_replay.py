@@ -10,7 +10,8 @@ import pytest
 import yaml
 import zstandard
 from harness.closed_loop_bags import write_closed_loop
-from harness.example_bags import default_configuration, rewrite, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import rewrite, write_recorded
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -21,6 +22,7 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.compiled_pipeline import Kind, UnsuitedError
 from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
@@ -88,7 +90,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope='module')
 def recorded(folder: Path) -> Path:
-    return write_recorded(folder, default_configuration(stick_velocity=2e-3, slip_velocity=5e-3))
+    return write_recorded(folder, compensating(EstimatorSettings(stick_velocity=2e-3, slip_velocity=5e-3)))
 
 
 @pytest.fixture(scope='module')
@@ -112,7 +114,7 @@ def test_recorded_runs_verify_in_bulk_and_inputs_alone_do_not(recorded: Path, cl
 
 def test_frame_names_of_any_length_may_take_turns_also_in_a_bag_from_before_a_message_grew(tmp_path: Path):
     """A driver that starts again may have another frame name."""
-    bag = write_recorded(tmp_path, default_configuration(), frames=(b'', b'rod', b'x' * 300))
+    bag = write_recorded(tmp_path, compensating(), frames=(b'', b'rod', b'x' * 300))
     found = assert_same_verdict(bag)
     assert found.identical, found.first_difference
     assert found.recorded_feedforwards >= 100
@@ -144,7 +146,7 @@ def test_every_seal_is_in_a_pair():
     'pair', [*PAIRS[:2], *(pytest.param(pair, marks=pytest.mark.long) for pair in PAIRS[2:])], ids=map('-'.join, PAIRS)
 )
 def test_every_seal_gives_the_same_bytes(pair: tuple[str, str], closed_loop: Path, tmp_path: Path):
-    known = default_configuration()
+    known = compensating()
     selection = dataclasses.replace(known.selection, seals=pair)
     override = load_configuration(selection, known.settings, known.feedforward)
     assert assert_same_verdict(closed_loop, override).differing
@@ -153,7 +155,7 @@ def test_every_seal_gives_the_same_bytes(pair: tuple[str, str], closed_loop: Pat
 
 
 def test_velocity_terms_are_the_same_to_the_byte_in_estimate_and_feed_forward(closed_loop: Path, tmp_path: Path):
-    known = default_configuration()
+    known = compensating()
     terms = {'viscous_friction': 80.0, 'stribeck_friction': 6.0, 'stribeck_velocity': 0.004, 'asymmetry': 0.1}
     documents = tuple({**document, 'velocity_terms': terms} for document in known.seal_documents)
     override = dataclasses.replace(known, seal_documents=documents)
