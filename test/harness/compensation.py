@@ -13,6 +13,8 @@ SCALE = 0.9
 COMPENSATING = FeedForwardSettings(scale=SCALE)
 REAL_SEALS = ('ms28775_114', 'ms28775_114')
 """Seals with the law of the placeholder: a live node makes no force from placeholder seals."""
+LIVE: dict[str, Any] = {'seals': list(REAL_SEALS), 'feedforward.scale': SCALE}
+"""Parameters of a live node with a force."""
 
 
 def compensating(settings: EstimatorSettings | None = None, **changes: Any) -> Configuration:
