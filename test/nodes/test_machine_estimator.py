@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
+from harness.compensation import SCALE
 from harness.machines import BENCH, EXCAVATOR
 from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.node import Node
@@ -144,10 +145,12 @@ def test_malformed_bytes_are_counted_and_the_estimate_goes_on(tmp_path):
     with machine(tmp_path) as (nodes, node, drivers):
         heard(nodes, node, drivers)
         move(nodes, drivers, 2)
-        node.on_input('/joint_states', b'\x00\x01\x00\x00garbage')
+        node.on_input('/joint_states', b'\x00\x01\x00\x00garbage', 0)
         move(nodes, drivers, 2)
         node.publish_diagnostics()
-        assert nodes.spin_until(lambda: 'malformed' in drivers.status('boom').message)
+        assert nodes.spin_until(lambda: drivers.diagnostics)
+        values = {value.key: value.value for value in drivers.status('boom').values}
+        assert values['/joint_states malformed'] == '1'
 
 
 def test_the_forces_fall_to_0_when_the_node_stops(tmp_path):
@@ -213,6 +216,7 @@ def sensor_bench(tmp_path: Path, text: str) -> Iterator[tuple[SpunNodes, Any, Se
 WITH_REFERENCE = BENCH.replace(
     'pressure_b: /p_b}', "pressure_b: /p_b, reference_velocity: '/set velocity[axis]'}"
 ).replace('topics: {', 'topics: {/set: sensor_msgs/msg/JointState, ')
+WITH_REFERENCE += f'    parameters: {{feedforward: {{scale: {SCALE}}}}}\n'
 
 
 def test_drivers_with_the_qos_of_sensors_give_good_estimates_without_any_qos_parameter(tmp_path):
