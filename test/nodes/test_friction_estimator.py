@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
-from harness.live_graph import graph
+from harness.live_graph import DEFAULTS, graph
 from harness.processes import STOP_TIMEOUT
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -294,7 +294,7 @@ def test_an_unknown_parameter_is_logged_with_a_suggestion(capfd):
 
 @pytest.mark.parametrize('nested', [False, True])
 def test_every_parameter_of_the_node_is_accepted_in_a_parameter_file(nested: bool, tmp_path: Path):
-    with graph({'stamp_age_max': EstimatorSettings().stamp_age_max}) as g:
+    with graph(DEFAULTS) as g:
         names = g.estimator.list_parameters([], 0).names
         values = {name: g.estimator.get_parameter(name).value for name in names}
     assert {'realtime_priority', 'refuse_second_publisher', 'use_sim_time', 'feedforward.lead_time'} <= values.keys()
