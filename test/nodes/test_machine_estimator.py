@@ -1,5 +1,7 @@
 """A machine with standard messages only: three actuators in one node, live, recorded and replayed."""
 
+import re
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,8 +21,10 @@ from seal_friction_msgs.msg import FrictionEstimate, FrictionFeedForward, Machin
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.nodes.machine_estimator import MachineEstimator
+from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.replay.replay import replay
 
 NAMES = ('boom', 'arm', 'bucket')
@@ -162,6 +166,46 @@ def test_the_forces_fall_to_0_when_the_node_stops(tmp_path):
         node.finish()
         assert nodes.spin_until(lambda: drivers.commands[-1] == [0.0, 0.0, 0.0])
         assert drivers.commands[-1] == [0.0, 0.0, 0.0]
+
+
+def test_what_waited_while_the_node_was_held_up_makes_no_force_and_replays_to_the_byte(tmp_path):
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    with machine(tmp_path, **recording) as (nodes, node, drivers):
+        heard(nodes, node, drivers)
+        move_until(nodes, drivers, lambda force: force[0] > 10.0)
+        drivers.commands.clear()
+        end = time.monotonic() + 0.3
+        while time.monotonic() < end:  # the executor takes nothing meanwhile
+            drivers.send((0.05, -0.03, 0.02))
+            time.sleep(PERIOD)
+        assert nodes.spin_until(lambda: len(drivers.commands) >= 3)  # the watchdog answers for one after the other
+        assert [0.0, 0.0, 0.0] in drivers.commands[:3]
+        move_until(nodes, drivers, lambda force: force[0] > 10.0)
+        node.finish()
+    result = replay(tmp_path / 'bag')
+    assert result.identical, result.first_difference
+    late = [message.log_time - message.publish_time for message in read_messages(tmp_path / 'bag')]
+    assert max(late) > 0.2e9
+
+
+@pytest.mark.parametrize('name', ['bom.feedforward.scale', 'boom.feedfoward.scale', 'feedforward.scale', 'boom.scale'])
+def test_a_mistyped_off_switch_ends_the_start(tmp_path, name):
+    """A force of 32 N came from a machine whose operator believed it off."""
+    with pytest.raises(ValueError, match=f'no parameter {re.escape(name)}') as error, machine(tmp_path, **{name: 0.0}):
+        pass
+    assert '\n' not in str(error.value)
+
+
+def test_placeholder_seals_make_no_force_and_a_scale_is_rejected_with_the_reason(tmp_path):
+    text = EXCAVATOR.replace('seals: [ms28775_114@a, ms28775_114@b]', 'seals: [placeholder@a, placeholder@b]', 1)
+    with machine(tmp_path, text) as (nodes, node, drivers):
+        heard(nodes, node, drivers)
+        move_until(nodes, drivers, lambda force: force[1] < -5.0)  # the others have their seals
+        assert {force[0] for force in drivers.commands} == {0.0}
+        (result,) = node.set_parameters([Parameter('boom.feedforward.scale', value=0.5)])
+        assert not result.successful
+        assert PLACEHOLDER_WARNING in result.reason
+        assert node.set_parameters([Parameter('arm.feedforward.scale', value=0.5)])[0].successful
 
 
 class SensorDrivers(Node):
