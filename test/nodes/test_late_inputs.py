@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from harness.compensation import LIVE
 from harness.live_graph import DEFAULTS, Graph, graph, stamped
 from rosgraph_msgs.msg import Clock
@@ -120,12 +121,20 @@ def test_before_simulated_time_comes_there_is_no_force():
         assert g.spin_until(lambda: rod.move(SPEED) > PUSH)
 
 
-def test_a_publisher_whose_clock_differs_makes_no_force_and_is_named():
-    with moving_rod() as rod:
+@pytest.mark.parametrize(('ahead', 'named'), [(1, '1.0'), (-1_900_000_000, '-1900000000.')])
+def test_a_publisher_whose_clock_differs_makes_no_force_and_is_named(ahead: int, named: str, tmp_path: Path):
+    """By a second, and by the 60 years of a board that knows no time of day."""
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    with moving_rod(**recording) as rod:
         g, take = rod.g, rod.g.estimator.on_input
-        g.estimator.on_input = lambda name, data, late: take(name, data, late - 10**9 * (name == 'cylinder_pressure'))
+        shift = {'cylinder_pressure': ahead * 10**9}
+        g.estimator.on_input = lambda name, data, late: take(name, data, late - shift.get(name, 0))
         assert g.spin_until(lambda: rod.move(SPEED) == 0.0)
-        words = 'the clock of the publisher of cylinder_pressure differs by 1.0'
+        words = f'the clock of the publisher of cylinder_pressure differs by {named}'
         assert g.spin_until(lambda: rod.move(SPEED) == 0.0 and words in g.probe.values('estimate').get('message', ''))
         g.estimator.on_input = take
         assert g.spin_until(lambda: rod.move(SPEED) > PUSH)
+        g.estimator.finish()
+        assert g.estimator.diagnostics()['recorder'].level == DiagnosticStatus.OK
+    result = replay(tmp_path / 'bag')
+    assert result.identical, result.first_difference
