@@ -166,6 +166,19 @@ def test_one_late_input_among_inputs_in_time_is_enough(kind: type):
         assert (max(map(abs, forces)) < NONE_LEFT) is not stays
 
 
+@pytest.mark.parametrize('late', [60, 400])
+def test_a_reference_that_turns_back_late_is_never_pushed_against(late: int):
+    """It makes no force, but it is the newest that is known of what is wanted."""
+    messages = moments(600, 640) + moments(640, 1400, -0.05)
+    references = [
+        one._replace(sent=one.sent - late * MS) if isinstance(one.message, ServoReference) else one for one in messages
+    ]
+    player = started().play(references)
+    assert all(made.force >= 0.0 for made in player.made if made.moment < 640 * MS)
+    assert all(made.force <= 0.0 for made in player.made if made.moment >= 640 * MS)
+    assert max(map(abs, player.forces(598 * MS + TO_ZERO))) < NONE_LEFT
+
+
 def test_late_inputs_make_estimates_for_their_stamps():
     late = started().play(moments(600, 640, late=200))
     in_time = started().play(moments(600, 640))

@@ -49,7 +49,8 @@ def test_a_bag_of_either_format_and_any_compression_replays_and_verifies(recorde
     bag = in_the_format(recorded, tmp_path / 'bag', form, mode)
     assert any(path.suffix == '.zstd' for path in bag.iterdir()) == (mode == 'file')
     before = sorted((path.name, path.stat().st_size) for path in bag.iterdir())
-    assert list(b.read_messages(bag)) == list(b.read_messages(recorded))
+    sent = {} if form == 'mcap' else {'publish_time': None}  # SQLite has no time of sending
+    assert list(b.read_messages(bag)) == [message._replace(**sent) for message in b.read_messages(recorded)]
     assert b.bag_topics(bag) == b.bag_topics(recorded)
     assert main(['replay', str(bag), '--verify']) == 0
     assert 'identical to the byte' in capsys.readouterr().out

@@ -66,19 +66,31 @@ def assert_same_verdict(bag: Path, override: Configuration | None = None) -> Rep
     return expected
 
 
-def read_back(path: Path) -> list[tuple[str, bytes]]:
-    """Topic and bytes of each message, read in bulk."""
+Read = list[tuple[str, bytes, int, int]]
+"""Topic, bytes, log time and time of sending of each message."""
+
+
+def read_back(path: Path) -> Read:
+    """A bag read in bulk."""
     numbers = {topic: number for number, topic in enumerate(bag_topics(path))}
     names = list(numbers)
     return [
-        (names[kind], messages.message(number))
+        (names[kind], messages.message(number), int(messages.received[number]), int(messages.sent[number]))
         for messages in read_in_bulk(path, lambda topic, _: numbers[topic])
         for number, kind in enumerate(messages.kinds.tolist())
     ]
 
 
+def one_by_one(path: Path) -> Read:
+    """A bag read message by message; one whose time of sending is not known was sent at its log time."""
+    return [
+        (m.topic, m.data, m.log_time, m.log_time if m.publish_time is None else m.publish_time)
+        for m in read_messages(path)
+    ]
+
+
 def assert_same_messages(path: Path) -> None:
-    expected = [(message.topic, message.data) for message in read_messages(path)]
+    expected = one_by_one(path)
     assert expected
     assert read_back(path) == expected
 
@@ -280,7 +292,7 @@ def test_any_order_of_messages_and_any_rubbish_gets_the_same_verdict(folder: Pat
 def test_a_file_of_a_stranger_is_read_alike_or_left_to_the_general_reader(name: str):
     path = CORPUS / 'mcap' / name
     try:
-        expected = [(message.topic, message.data) for message in read_messages(path)]
+        expected = one_by_one(path)
     except BagError:
         with pytest.raises((UnsuitedError, *compiled_replay.ERRORS)):
             list(read_in_bulk(path, lambda *_: Kind.OTHER))
@@ -303,7 +315,9 @@ def write_mcap(path: Path, chance: random.Random, *, overlap: int, compression: 
             channels.append(writer.register_channel(topic, 'cdr', schema))
         for i in range(chance.choice([1, 30, 400])):
             time = max(i // chance.choice([1, 3]) - chance.randint(0, overlap), 0)
-            writer.add_message(chance.choice(channels), time, chance.randbytes(chance.randint(0, 60)), time)
+            writer.add_message(
+                chance.choice(channels), time, chance.randbytes(chance.randint(0, 60)), chance.randint(1, 1 << 62)
+            )
         writer.finish()
 
 
@@ -330,7 +344,7 @@ def test_a_flipped_bit_is_read_alike_or_left_to_the_general_reader(tmp_path: Pat
         data[bit // 8] ^= 1 << bit % 8
         path.write_bytes(data)
         try:
-            expected = [(message.topic, message.data) for message in read_messages(path)]
+            expected = one_by_one(path)
             bag_topics(path)
         except BagError:
             expected = None
