@@ -15,6 +15,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from harness.browser import Page, browser, chromium
+from harness.compensation import LIVE
 from harness.live_graph import Probe
 from harness.moving_machine import FRICTION, LAG, NAMES, machine
 from harness.processes import STOP_TIMEOUT, free_domain, graph_environment, node_process
@@ -87,7 +88,7 @@ def axis(tmp_path_factory) -> Iterator[int]:
     simulator = ROOT / 'config' / 'servo_simulator.yaml'
     with (
         node_process('servo_simulator', domain, {'rate': 500.0}, log, parameter_file=simulator),
-        node_process('friction_estimator', domain, {'adaptation.mode': 'observe'}, log),
+        node_process('friction_estimator', domain, {**LIVE, 'adaptation.mode': 'observe'}, log),
     ):
         end = time.monotonic() + 2 * STOP_TIMEOUT
         while 'simulating' not in log.read_text():
