@@ -164,8 +164,9 @@ def test_a_slider_sets_the_parameter_and_shows_the_answer_of_the_node(axis: int,
 @NO_BROWSER
 def test_a_machine_of_three_shows_each_actuator_and_off_takes_out_all_forces(tmp_path: Path):
     domain, recording = free_domain(), {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    scales = {f'{name}.feedforward.scale': 0.9 for name in NAMES}
     with (
-        machine(tmp_path, domain, 200.0, **recording),
+        machine(tmp_path, domain, 200.0, **recording, **scales),
         monitor(domain, '--allow-changes') as running,
         shown(running.url, tmp_path, 1400) as page,
     ):
