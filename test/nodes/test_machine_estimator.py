@@ -149,6 +149,19 @@ def test_a_joint_that_no_message_holds_is_named_and_the_others_go_on(tmp_path):
         assert 'buckett' not in drivers.status('arm').message
 
 
+def test_a_joint_that_is_named_twice_is_ambiguous_in_the_diagnostics_and_the_others_go_on(tmp_path):
+    with machine(tmp_path) as (nodes, node, drivers):
+        heard(nodes, node, drivers)
+        for number in range(3):
+            drivers.send((0.05, -0.03, 0.02, 0.04), (*NAMES, 'bucket'))
+            assert nodes.spin_until(lambda n=number: len(drivers.estimates['arm']) > n)
+        assert not drivers.estimates['bucket']
+        node.publish_diagnostics()
+        assert nodes.spin_until(lambda: drivers.diagnostics and 'ambiguous' in drivers.status('bucket').message)
+        assert "'bucket' stands 2 times in name" in drivers.status('bucket').message
+        assert 'ambiguous' not in drivers.status('arm').message
+
+
 def test_malformed_bytes_are_counted_and_the_estimate_goes_on(tmp_path):
     with machine(tmp_path) as (nodes, node, drivers):
         heard(nodes, node, drivers)
