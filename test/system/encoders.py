@@ -124,9 +124,9 @@ def answers_of(
                 pieces.append(encode(record))
                 kinds.append(kind)
                 times.append(stamp + 100_000)
-        sizes = np.array([len(piece) for piece in pieces])
+        sizes, received = np.array([len(piece) for piece in pieces]), np.array(times)
         data = np.frombuffer(b''.join(pieces), np.uint8)
-        messages = Messages(data, np.array(kinds, np.uint8), np.cumsum(sizes) - sizes, sizes, np.array(times))
+        messages = Messages(data, np.array(kinds, np.uint8), np.cumsum(sizes) - sizes, sizes, received, received)
         state, answers = receive_all(parameters, state, messages)
         for i in np.flatnonzero(answers.estimate_sizes):
             at, size = answers.estimate_offsets[i], answers.estimate_sizes[i]

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fault_rows import AFTER, BEFORE, UNKNOWN, Tick
+from fault_rows import AFTER, BEFORE, SLEW_LIMIT, UNKNOWN, Tick
 from fault_stage import Outputs, Stage, broken_invariants, stage, statuses, unless, verified
 from harness.blocked_disk import BlockedDisk
 from harness.spin_nodes import ros_context
@@ -32,14 +32,16 @@ from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.offline.bags import mcap_writer
 
 
-def unrecovered(place: Stage, spoil: Callable[[Tick, int], Tick] | None = None) -> list[str]:
+def unrecovered(
+    place: Stage, spoil: Callable[[Tick, int], Tick] | None = None, live_slew_limit: float | None = None
+) -> list[str]:
     """Send good samples; differences from normal operation, and broken invariants since the start."""
     place.run(BEFORE, spoil)
     outputs = place.run(AFTER, spoil)
     forces = [output for output in outputs if isinstance(output, FeedForward)]
     wrong = unless(statuses(outputs) == {0}, f'after the fault: statuses {statuses(outputs)}')
     wrong += unless(forces and not forces[-1].limited, f'after the fault: feed-forward {forces[-1:]}')
-    return wrong + broken_invariants(place.driver.outputs)
+    return wrong + broken_invariants(place.driver.outputs, live_slew_limit)
 
 
 def recording_to(folder: Path) -> dict[str, Any]:
@@ -280,7 +282,7 @@ def simulated_time_is_reset(chance: random.Random, folder: Path) -> list[str]:
         after = place.run(60, move)
         marked = [o.status & ~Status.MOTION_UNCERTAIN for o in after if isinstance(o, records.FrictionEstimate)]
         wrong = unless(marked == [Status.STAMP_NOT_INCREASING] + [0] * 59, f'{marked[:5]}')
-        wrong += unrecovered(place, move)
+        wrong += unrecovered(place, move, SLEW_LIMIT)
         place.estimator.finish()
     return wrong + verified(folder / 'bag')
 
