@@ -59,7 +59,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'seal_friction = seal_friction_ros.offline.commands.main:run_and_exit',
+            'seal_friction = seal_friction_ros.offline.commands.entry_point:seal_friction',
             'friction_estimator = seal_friction_ros.nodes.entry_points:friction_estimator',
             'machine_estimator = seal_friction_ros.nodes.entry_points:machine_estimator',
             'servo_simulator = seal_friction_ros.nodes.entry_points:servo_simulator',

@@ -43,6 +43,7 @@ from rich.table import Table
 from seal_friction_msgs.msg import CylinderPressure, ForceSum, FrictionEstimate, FrictionFeedForward, RodVelocity
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.compensation import LIVE
 from harness.processes import free_domain, graph_environment, node_process
 
 from seal_friction_ros.core.estimation.messages import encode
@@ -129,7 +130,6 @@ class Asker:
             self.node.create_subscription(
                 FrictionFeedForward, 'friction_feedforward', lambda _: None, qos.STREAM, raw=True
             )
-        self.stamp = time.time_ns()
 
     def __enter__(self) -> 'Asker':
         self._stopped = Future()
@@ -158,7 +158,7 @@ class Asker:
 
     def ask(self) -> None:
         """Publish the inputs of one moment, the velocity last."""
-        self.stamp += 1_000_000
+        self.stamp = time.time_ns()
         for publisher, encoded in self.others:
             publisher.publish(encoded(self.stamp))
         data = encode(Velocity(self.stamp, 0.1, b''))
@@ -262,7 +262,7 @@ def node(case: str, folder: Path, realtime: int, before: Path | None = None) -> 
             process = stack.enter_context(subprocess.Popen(command, env=environment))
             stack.callback(process.kill)
         else:
-            values: dict[str, Any] = {'feedforward.use_measured_velocity': True, 'realtime_priority': realtime}
+            values: dict[str, Any] = {**LIVE, 'feedforward.use_measured_velocity': True, 'realtime_priority': realtime}
             if case in (RECORDING, BEFORE_RECORDING):
                 values |= {'record': True, 'record_directory': str(folder), 'record_name': case}
             tree = of_tree(before) if before is not None and case in (BEFORE, BEFORE_RECORDING) else {}

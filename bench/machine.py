@@ -43,6 +43,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.compensation import LIVE, SCALE
 from harness.processes import free_domain, graph_environment, node_process
 
 from seal_friction_ros.core.estimation.feedforward import FeedForward
@@ -88,6 +89,7 @@ def mapping(case: Case) -> str:
     actuators = {
         f'axis_{i}': fixed
         | {
+            'parameters': {'feedforward': {'scale': SCALE}},
             'inputs': {
                 'velocity': f'/joint_states velocity[axis_{i}]',
                 'reference_velocity': f'/set velocity[axis_{i}]',
@@ -227,6 +229,8 @@ def node(case: Case, folder: Path) -> Iterator[Asker]:
         path = folder / f'{case.name}.yaml'
         path.write_text(mapping(case))
         values['machine'] = str(path)
+    else:
+        values |= LIVE
     with ExitStack() as stack:
         name, log = 'machine_estimator' if case.count else 'friction_estimator', folder / f'{case.name}.log'
         if case.bare:

@@ -30,6 +30,7 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 from harness.browser import browser, chromium
+from harness.compensation import LIVE
 from harness.monitor_process import Reader, monitor
 from harness.moving_machine import machine
 from harness.processes import free_domain, node_process
@@ -106,7 +107,7 @@ def estimator(case: str, folder: Path, domain: int) -> Iterator[int]:
             simulator = ROOT / 'config' / 'servo_simulator.yaml'
             log = folder / 'log'
             stack.enter_context(node_process('servo_simulator', domain, {}, log, parameter_file=simulator))
-            process = stack.enter_context(node_process('friction_estimator', domain, {}, log))
+            process = stack.enter_context(node_process('friction_estimator', domain, LIVE, log))
         yield process.pid
 
 

@@ -25,6 +25,7 @@ from rich.table import Table
 from rich.text import Text
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.compensation import LIVE
 from harness.processes import free_domain, node_process
 
 from seal_friction_ros.nodes.discovery import set_up_discovery
@@ -64,7 +65,7 @@ def first_estimate() -> Start:
     domain = free_domain()
     with Asker(ALONE, domain, None) as asker, tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        with node_process('friction_estimator', domain, {}, Path(folder) / 'log') as process:
+        with node_process('friction_estimator', domain, LIVE, Path(folder) / 'log') as process:
             while not asker.round_trips:
                 if time.perf_counter() > start + PATIENCE:
                     raise RuntimeError('no estimate comes')

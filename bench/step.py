@@ -29,17 +29,16 @@ from rich.text import Text
 from seal_friction_msgs.msg import RodVelocity
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
+from harness.compensation import compensating
 from harness.processes import free_domain
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, step
 from seal_friction_ros.core.estimation.estimator import init as init_estimator
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, Output, decode, encode
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init, init_running, receive
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, ServoReference, Velocity
 from seal_friction_ros.core.friction.presliding import Presliding
-from seal_friction_ros.files import default_configuration
 from seal_friction_ros.nodes.discovery import set_up_discovery
 from seal_friction_ros.offline.bags.recorder import Recorder
 
@@ -83,10 +82,8 @@ def drop(_record: Output, _frame_id: bytes) -> None:
 
 def stages() -> dict[str, Callable[[], object]]:
     """Each stage of the live path but the middleware's, as a function without arguments."""
-    parameters = default_configuration().parameters()
-    measured = replace(
-        default_configuration(), feedforward=FeedForwardSettings(use_measured_velocity=True)
-    ).parameters()
+    parameters = compensating().parameters()
+    measured = compensating(use_measured_velocity=True).parameters()
     pressure, force, velocity = Pressure(1, 3e6, 1e6), Force(1, 20.0), Velocity(1, 0.1, b'rod')
 
     sample = RodSample(1, 0.1, pressure, force)

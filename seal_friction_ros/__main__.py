@@ -1,6 +1,6 @@
 """``python -m seal_friction_ros``: the command ``seal_friction``."""
 
-from seal_friction_ros.offline.commands.main import run_and_exit
+from seal_friction_ros.offline.commands.entry_point import seal_friction
 
 if __name__ == '__main__':
-    run_and_exit()
+    seal_friction()

@@ -2,13 +2,15 @@
 
 It is in ``$XDG_CACHE_HOME/seal_friction_ros``, by default ``~/.cache/seal_friction_ros``, in a folder whose name is a
 hash of path, size and time of the sources: a change compiles anew. ``NUMBA_CACHE_DIR`` names another folder. Where none
-can be written, nothing is kept.
+can be written, nothing is kept. What stands there is run: a folder that another user could write to is refused with one
+line, and nothing is kept.
 """
 
 import fcntl
 import hashlib
 import os
 import shutil
+import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -39,17 +41,45 @@ def keep_compiled_code(parent: Path | None = None) -> None:
 def use_folder(parent: Path | None) -> None:
     """Name the folder for numba, if none is named; in ``parent``, or in that of the user."""
     if VARIABLE in os.environ:
+        if _is_refused(Path(os.environ[VARIABLE])):
+            _set_folder('')
         return
     try:
-        folder = (parent or _folder_of_user()) / key_of(_HERE)
-        (folder / 'locks').mkdir(mode=0o700, parents=True, exist_ok=True)
+        above = parent or _folder_of_user()
+        folder = above / key_of(_HERE)
+        above.parent.mkdir(parents=True, exist_ok=True)
+        for one in (above, folder, folder / 'locks'):
+            one.mkdir(mode=0o700, exist_ok=True)
+            if _is_refused(one):
+                return
         os.utime(folder)
         _remove_old(folder)
     except (OSError, RuntimeError):  # the latter: there is no home
         return
-    os.environ[VARIABLE] = str(folder)
+    _set_folder(str(folder))
+
+
+def _is_refused(folder: Path) -> bool:
+    """Whether a folder exists that another user owns or may write to; says so."""
+    try:
+        found = folder.stat()
+    except OSError:
+        return False
+    if found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return False
+    whose = 'others may write there' if found.st_uid == os.geteuid() else 'it belongs to another user'
+    sys.stderr.write(f'compiled code is not kept in {folder}: {whose}; make it yours alone (chmod go-w)\n')
+    return True
+
+
+def _set_folder(folder: str) -> None:
+    """Name the folder for numba, loaded or not; empty: none."""
+    if folder:
+        os.environ[VARIABLE] = folder
+    else:
+        del os.environ[VARIABLE]
     if 'numba' in sys.modules:
-        sys.modules['numba'].config.CACHE_DIR = str(folder)
+        sys.modules['numba'].config.CACHE_DIR = folder
 
 
 def _folder_of_user() -> Path:

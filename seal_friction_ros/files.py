@@ -24,6 +24,7 @@ from seal_friction_ros.core.estimation.node_options import (
     REMOVED_PARAMETERS,
     ROS_PARAMETERS,
 )
+from seal_friction_ros.core.foundation.documents import DEEPEST
 from seal_friction_ros.core.foundation.parameters import ParameterGroup, from_mapping, meant, printable, similar_names
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.seal_file import mounting_of
@@ -33,7 +34,6 @@ from seal_friction_ros.core.machine.outputs import check_outputs
 _CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # PyYAML raises these for '!!int foo'
 DEFAULT_FEEDFORWARD = FeedForwardSettings()
 _LARGEST_YAML = 1 << 16  # [bytes] seal and parameter files have a few thousand
-_DEEPEST_YAML = 40  # levels
 _LONGEST_SCALAR = 1 << 14  # characters without quotes: the time to parse a base-60 number grows with its length squared
 
 
@@ -60,8 +60,8 @@ def _check_cost(text: str) -> None:
         if isinstance(event, yaml.AliasEvent):
             raise yaml.YAMLError('aliases (*name) are not allowed')
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > _DEEPEST_YAML:
-            raise yaml.YAMLError(f'more than {_DEEPEST_YAML} levels deep')
+        if depth > DEEPEST:
+            raise yaml.YAMLError(f'more than {DEEPEST} levels deep')
         if isinstance(event, yaml.ScalarEvent) and event.implicit[0] and len(event.value) > _LONGEST_SCALAR:
             raise yaml.YAMLError(f'a value of {len(event.value)} characters without quotes')
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -22,11 +23,13 @@ print(json.dumps([function(grease, 3.0), sum(function.stats.cache_hits.values())
 """
 
 
-def started(folder: Path | str, program: str = PROGRAM, kinds: str = '00000', **more: str) -> subprocess.Popen[str]:
+def started(
+    folder: Path | str, program: str = PROGRAM, kinds: str = '00000', errors: int | None = None, **more: str
+) -> subprocess.Popen[str]:
     environment = {name: value for name, value in os.environ.items() if name != compiled_code.VARIABLE}
     environment |= {'XDG_CACHE_HOME': str(folder), 'PYTHONPATH': str(ROOT), **more}
     command = [sys.executable, '-c', program, kinds]
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=errors, text=True)
 
 
 def result(process: subprocess.Popen[str]) -> list[float]:
@@ -62,6 +65,45 @@ def test_damaged_files_are_as_good_as_none(tmp_path):
     for path in (*tmp_path.rglob('*.nbi'), *tmp_path.rglob('*.nbc')):
         path.write_bytes(path.read_bytes()[:40])
     assert result(started(tmp_path)) == [value, 0]
+
+
+def open_to_all(folder: Path) -> None:
+    folder.chmod(0o777)
+
+
+def open_to_the_group(folder: Path) -> None:
+    folder.chmod(0o770)
+
+
+def of_another_user(folder: Path) -> None:
+    if os.geteuid() == 0:
+        os.chown(folder, 65534, 65534)
+    else:
+        shutil.rmtree(folder)
+        folder.symlink_to('/usr')
+
+
+@pytest.mark.parametrize('make', [open_to_all, open_to_the_group, of_another_user])
+@pytest.mark.parametrize('variable', ['XDG_CACHE_HOME', compiled_code.VARIABLE])
+def test_a_folder_that_another_user_could_write_to_is_refused_with_one_line(tmp_path, make, variable):
+    """Whoever may write there could let this process run anything."""
+    folder = tmp_path / 'seal_friction_ros'
+    named = {variable: str(folder)} if variable == compiled_code.VARIABLE else {}
+    value, _ = result(started(tmp_path, **named))
+    make(folder)
+    before = sorted(tmp_path.rglob('*'))
+    out, errors = started(tmp_path, errors=subprocess.PIPE, **named).communicate(timeout=100.0)
+    assert json.loads(out) == [value, 0]
+    assert errors.startswith(f'compiled code is not kept in {folder}: ')
+    assert errors.count('\n') == 1
+    assert sorted(tmp_path.rglob('*')) == before
+
+
+def test_the_folder_is_for_its_user_alone_whatever_the_umask(tmp_path):
+    result(started(tmp_path, PROGRAM.replace('import json, sys', 'import json, os, sys; os.umask(0)')))
+    made = [tmp_path / 'seal_friction_ros', *(tmp_path / 'seal_friction_ros').iterdir()]
+    assert len(made) == 2
+    assert all(folder.stat().st_mode & 0o777 == 0o700 for folder in made)
 
 
 GONE = "import os, pathlib, shutil; place = pathlib.Path(os.environ['NUMBA_CACHE_DIR']); shutil.rmtree(place); "

@@ -47,6 +47,9 @@ _INPUT_PERIOD = 0.5  # [s]
 _LARGEST_CLOCK_STEP = 10_000_000  # [ns] a clock that is further off was set
 _BACKLOG = 5_000_000  # [ns] late by more, others may wait behind a message: the node takes them all in one go
 _MOST_WAITING = 10_000  # [messages] that it takes in one go
+_SORTING = (
+    1_000_000_000  # [ns] after a late message, until the executor has heard of all that was taken before its turn
+)
 STOP_PERIOD = 0.005  # [s] between two forces while the node stops
 LAST_FORCES = (
     10  # number of forces of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
@@ -85,6 +88,7 @@ class EstimatorNode(ManagedNode, ABC):
         self.has_viewer = False  # by a live view
         self._watchdog_called = self._ticked = self._watched = 0  # [ns] of `time.perf_counter_ns`
         self._is_ticking = False
+        self._sorts_until = 0  # [ns] of `time.perf_counter_ns`
         self._is_change_due, self._applied = False, 0  # [ns] of `time.perf_counter_ns`
         self._sets = self._applications = 0  # of parameters since the last report
         self._timers: list[Any] = []
@@ -230,22 +234,36 @@ class EstimatorNode(ManagedNode, ABC):
         """Message type of each input; simulated time is one with ``use_sim_time``."""
         return {**types, CLOCK_TOPIC: CLOCK_TYPE} if self.get_parameter('use_sim_time').value else dict(types)
 
-    def _on_message(self, name: str, data: bytes, source: int) -> None:
-        """Take a message that was sent at ``source`` [ns, system clock], and those that wait behind a late one."""
-        lateness = _lateness(source)
-        self.on_input(name, data, lateness)
-        if lateness > _BACKLOG:
-            self._take_backlog()
+    def _on_message(self, name: str, data: bytes, source: int, received: int) -> None:
+        """Take a message that was sent at ``source`` [ns, system clock], and those that wait behind a late one.
 
-    def _take_backlog(self) -> None:
-        """Take all messages that wait in the middleware, in order of their receipt there.
+        Args:
+            name: Input.
+            data: Bytes.
+            source: When it was sent [ns of the system clock]; 0: not known.
+            received: When the middleware received it [ns].
+        """
+        lateness, now = _lateness(source), time.perf_counter_ns()
+        if lateness > _BACKLOG:
+            self._sorts_until = now + _SORTING
+        if now >= self._sorts_until:
+            self.on_input(name, data, lateness)
+            return
+        for _, of, its_data, its_source in self._backlog((received, name, data, source)):
+            self.on_input(of, its_data, _lateness(its_source))
+
+    def _backlog(self, first: tuple[int, str, bytes, int]) -> list[tuple[int, str, bytes, int]]:
+        """A message and all that wait in the middleware, in order of their receipt there.
 
         An executor takes messages one by one, with a pass through itself for each: a node that is behind would stay
-        behind.
+        behind. It hears of each message once, also of those that are taken here: for them it takes the next one of the
+        same topic, before older ones of other topics. So all messages are sorted until it has heard of all of them.
         """
-        waiting = [message for name in list(self._inputs) for message in self._waiting(name)]
-        for _, name, data, source in sorted(waiting, key=itemgetter(0)):
-            self.on_input(name, data, _lateness(source))
+        waiting, found = [first], [first]
+        while found and len(waiting) < _MOST_WAITING:  # what comes while another topic is emptied is in order, too
+            found = [message for name in list(self._inputs) for message in self._waiting(name)]
+            waiting += found
+        return sorted(waiting, key=itemgetter(0))
 
     def _waiting(self, name: str) -> list[tuple[int, str, bytes, int]]:
         """Messages that wait in the middleware: time of receipt there [ns], input, bytes, time of sending [ns]."""

@@ -144,7 +144,7 @@ class FrictionEstimator(EstimatorNode):
             self.look_after_timers(taken)
             return
         received = self._now()
-        sent = received - lateness
+        sent = max(received - lateness, 0)
         self._sent.clear()
         before = self._state
         self._state = receive(self._known, before, message, received, self._send, sent)

@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Future
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -31,11 +32,12 @@ from seal_friction_ros.nodes import qos
 from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.managed_node import message_class
 from seal_friction_ros.offline.bags.bag import message_definition
-from seal_friction_ros.offline.monitor.live_view import RATE, Answer, LiveView, Wanted
+from seal_friction_ros.offline.monitor.live_view import RATE, LiveView, Wanted
 from seal_friction_ros.offline.monitor.node_view import NodeView
+from seal_friction_ros.offline.monitor.off_latch import ANSWER_TIMEOUT, Answer
 from seal_friction_ros.offline.monitor.server import MonitorServer
+from seal_friction_ros.offline.monitor.token_file import kept_token
 
-ANSWER_TIMEOUT = 3.0  # [s] until a node that does not answer counts as one that did not change
 NICENESS = 10  # where processors are short, an estimator has nine times the share of the monitor (our choice)
 _SEARCH_PERIOD = 1.0  # [s] between two looks for new estimators
 _CONFIGURATION, _NEWEST = '/configuration', '/monitor'  # ends of topics of a node
@@ -73,6 +75,7 @@ class FrictionMonitor(Node):
         self.view = LiveView(self._received(), self._change if allow_changes else None)
         self._nodes: dict[str, NodeView] = {}
         self._configurations: dict[str, Any] = {}
+        self._senders: dict[str, Any] = {}
         self._newest: dict[str, Any] = {}
         self._asked: queue.SimpleQueue[_Asked] = queue.SimpleQueue()
         self._waiting: list[_Asked] = []
@@ -96,11 +99,16 @@ class FrictionMonitor(Node):
     # --- what is there ---
 
     def _search(self) -> None:
-        """Listen to estimators that have appeared, by their configurations."""
+        """Listen to estimators that have appeared, by their configurations; know those that have left."""
+        for node, view in self._nodes.items():
+            if not self.count_publishers(node + _CONFIGURATION):
+                with self.view.lock:
+                    view.presence = view.presence._replace(has_left=True)
         for topic, types in self.get_topic_names_and_types():
             node = topic.removesuffix(_CONFIGURATION)
             if types == [CONFIGURATION_TYPE] and node != topic and node not in self._nodes:
                 self._nodes[node] = NodeView(node, _definitions)
+                self._nodes[node].hear(self._received())
                 self.view.add(self._nodes[node])
                 self._configurations[node] = self._listener.create_subscription(
                     message_class(CONFIGURATION_TYPE), topic, _never_called, qos.LATCHED, raw=True
@@ -116,6 +124,7 @@ class FrictionMonitor(Node):
             for status in array.status:
                 node, _, part = status.name.rpartition(': ')
                 if node in self._nodes:
+                    self._nodes[node].hear(self._received())
                     self._nodes[node].diagnostics[part] = {
                         'level': ord(status.level),
                         'message': status.message,
@@ -129,23 +138,39 @@ class FrictionMonitor(Node):
         now = self._received()
         with self.view.lock:
             for node, subscription in self._configurations.items():
-                for data in _taken(subscription):
+                for data, about in _taken(subscription):
+                    self._note_start(node, about.get('publisher_gid'))
+                    self._nodes[node].hear(now)
                     self._nodes[node].take(node + _CONFIGURATION, CONFIGURATION_TYPE, data, now)
             for node, subscription in self._newest.items():
-                for data in _taken(subscription):
+                for data, _ in _taken(subscription):
                     self._nodes[node].take_newest(data, now)
         self.view.sample(now)
+        for node, values in self.view.still_on().items():
+            self._ask(node, values, time.monotonic() + ANSWER_TIMEOUT)
         self._send_changes()
+
+    def _note_start(self, node: str, publisher: Any) -> None:
+        """Know that a node has begun again: another publisher sends its configuration."""
+        if self._senders.setdefault(node, publisher) != publisher:
+            self._senders[node] = publisher
+            self._nodes[node].starts += 1
 
     # --- changes ---
 
     def _change(self, wanted: Wanted) -> list[Answer]:
         """Set parameters of nodes and read them back; called by a thread of the server."""
         deadline = time.monotonic() + ANSWER_TIMEOUT
-        asked = [_Asked(node, values, deadline, Future()) for node, values in wanted.items()]
-        for one in asked:
-            self._asked.put(one)
+        asked = [self._ask(node, values, deadline) for node, values in wanted.items()]
         return [one.outcome() for one in asked]
+
+    def _ask(self, node: str, values: dict[str, float], deadline: float) -> _Asked:
+        """Ask a node for values; what it answers to OFF is told to the view, also if it is late."""
+        asked = _Asked(node, values, deadline, Future())
+        if _is_off(values):
+            asked.answer.add_done_callback(lambda done: self.view.answered(node, done.result()))
+        self._asked.put(asked)
+        return asked
 
     def _send_changes(self) -> None:
         """Send what the page has asked for to the nodes that are there; what waits too long is not sent any more."""
@@ -192,8 +217,12 @@ class FrictionMonitor(Node):
                 Answer(False, f'NOT CONFIRMED by {asked.node}: it has {shown or "no such parameter"}')
             )
             return
-        word = 'OFF' if all(n.endswith('scale') and v == 0.0 for n, v in values.items()) else 'changed'
+        word = 'OFF' if _is_off(values) else 'changed'
         asked.answer.set_result(Answer(True, f'{word}: confirmed by {asked.node} at {at}: {shown}'))
+
+
+def _is_off(values: Mapping[str, float]) -> bool:
+    return all(name.endswith('scale') and value == 0.0 for name, value in values.items())
 
 
 def _definitions(types: Iterable[str]) -> Mapping[str, Definition]:
@@ -209,29 +238,31 @@ def _never_called(_data: bytes) -> None:
     """Callback of a subscription whose messages are taken."""
 
 
-def _taken(subscription: Any) -> list[bytes]:
-    """Messages that have come since the last call, as bytes."""
+def _taken(subscription: Any) -> list[tuple[bytes, dict[str, Any]]]:
+    """Messages that have come since the last call, as bytes, and what the middleware knows of each."""
     found = []
     with subscription.handle:
         while (message := subscription.handle.take_message(subscription.msg_type, True)) is not None:
-            found.append(message[0])
+            found.append(message)
     return found
 
 
 def main() -> int:
-    """Run ``friction_monitor [--allow-changes] [--port N]``; prints the address of the page."""
+    """Run ``friction_monitor [--allow-changes] [--port N] [--token-file FILE]``; prints the address of the page."""
     parser = argparse.ArgumentParser(prog='friction_monitor', description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--allow-changes', action='store_true', help='let the page change the feed-forward')
     parser.add_argument('--port', type=int, default=0, help='port on 127.0.0.1; 0: any free one')
+    parser.add_argument('--token-file', type=Path, help='file that keeps the token of the address')
     parser.add_argument('--json', action='store_true', help='print the address as JSON')
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
     os.nice(NICENESS)
     servers: list[MonitorServer] = []
 
     def start(node: FrictionMonitor) -> bool:
-        """Serve the page; False, with one line, if the port is taken."""
+        """Serve the page; False, with one line, if the port is taken or the token is no secret."""
         try:
-            server = MonitorServer(node.view, arguments.port)
+            token = kept_token(arguments.token_file) if arguments.token_file else ''
+            server = MonitorServer(node.view, arguments.port, token)
         except ValueError as error:
             print(f'friction_monitor: {error}', file=sys.stderr)
             return False

@@ -183,7 +183,7 @@ class MachineEstimator(EstimatorNode):
         if not self.active:
             return
         received, before = self._now(), self._state
-        sent = received - lateness
+        sent = max(received - lateness, 0)
         self._sent.clear()
         try:
             if name == CLOCK_TOPIC:

@@ -7,8 +7,10 @@ from typing import Any
 _TWO = inspect.Signature([inspect.Parameter(name, inspect.Parameter.POSITIONAL_ONLY) for name in ('message', 'info')])
 
 
-def with_source_time(callback: Callable[[Any, int], None]) -> Callable[..., None]:
-    """Callback for rclpy that calls ``callback`` with a message and when it was sent [ns of the sender's system clock].
+def with_source_time(callback: Callable[[Any, int, int], None]) -> Callable[..., None]:
+    """Callback for rclpy that calls ``callback`` with a message, and when it was sent and received by the middleware.
+
+    Both times are [ns] of the system clocks of sender and receiver.
 
     rclpy gives the information about a message to a callback of two arguments; its events executor gives both as one
     tuple.
@@ -17,7 +19,7 @@ def with_source_time(callback: Callable[[Any, int], None]) -> Callable[..., None
     def call(*taken: Any) -> None:
         """What rclpy calls."""
         message, info = taken[0] if len(taken) == 1 else taken
-        callback(message, info['source_timestamp'])
+        callback(message, info['source_timestamp'], info['received_timestamp'])
 
     call.__signature__ = _TWO  # type: ignore[attr-defined]
     return call

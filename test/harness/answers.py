@@ -19,9 +19,13 @@ NOTHING = Answer(None, None, b'')
 
 
 def receive_one(
-    parameters: PipelineParameters, state: PipelineState, message: Any, received: int | None = None
+    parameters: PipelineParameters,
+    state: PipelineState,
+    message: Any,
+    received: int | None = None,
+    sent: int | None = None,
 ) -> tuple[PipelineState, Answer]:
-    """The next state and the answer; by default the message is received at its stamp."""
+    """The next state and the answer; by default the message is received at its stamp, and sent just then."""
     answer = NOTHING
 
     def take(record: Any, frame_id: bytes) -> None:
@@ -29,4 +33,5 @@ def receive_one(
         field = 'estimate' if isinstance(record, FrictionEstimate) else 'feedforward'
         answer = answer._replace(**{field: record, 'frame_id': frame_id})
 
-    return receive(parameters, state, message, message.stamp if received is None else received, take), answer
+    received = message.stamp if received is None else received
+    return receive(parameters, state, message, received, take, sent), answer

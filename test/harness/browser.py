@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+_numbers = itertools.count(1)  # of the calls, whatever tab they are for
 NAMES = ('chromium', 'chromium-browser', 'google-chrome')
 TIMEOUT = 60.0  # [s] ends a test that hangs; no test measures time by it
 
@@ -29,12 +30,12 @@ class Page:
     Args:
         send: File descriptor to write to.
         receive: File descriptor to read from.
+        read: What was read and not taken; all tabs of a browser share it.
     """
 
-    def __init__(self, send: int, receive: int) -> None:
+    def __init__(self, send: int, receive: int, read: bytearray | None = None) -> None:
         self._send, self._receive = send, receive
-        self._numbers = itertools.count(1)
-        self._read = b''
+        self._read = bytearray() if read is None else read
         self._session = ''
         self.requests: list[str] = []
         """URL of everything that the page asked for"""
@@ -45,13 +46,17 @@ class Page:
         for domain in ('Page', 'Runtime', 'Network', 'Log'):
             self.call(f'{domain}.enable')
 
+    def another(self) -> 'Page':
+        """Another tab of the same browser."""
+        return Page(self._send, self._receive, self._read)
+
     def call(self, method: str, **parameters: Any) -> Any:
         """Call a method of the protocol; its result.
 
         Raises:
             RuntimeError: The browser refuses, or does not answer.
         """
-        number = next(self._numbers)
+        number = next(_numbers)
         message: dict[str, Any] = {'id': number, 'method': method, 'params': parameters}
         if self._session:
             message['sessionId'] = self._session
@@ -71,7 +76,8 @@ class Page:
             if not select.select([self._receive], [], [], wait)[0]:
                 return {}
             self._read += os.read(self._receive, 1 << 16)
-        text, _, self._read = self._read.partition(b'\0')
+        text, _, rest = self._read.partition(b'\0')
+        self._read[:] = rest
         message: dict[str, Any] = json.loads(text)
         self._note(message.get('method', ''), message.get('params', {}))
         return message

@@ -1,10 +1,10 @@
 """Bags of a closed servo loop: the servo of the simulator, estimate and feed-forward in one loop, without ROS."""
 
-import dataclasses
 from pathlib import Path
 
+from harness.compensation import SCALE, compensating
 from seal_friction_ros.core.estimation import pipeline
-from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, snapshot_text
+from seal_friction_ros.core.estimation.configuration import Snapshot, snapshot_text
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     FEEDFORWARD_TYPE,
@@ -16,7 +16,6 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.core.servo.motions import Sine, Wave
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step
-from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS
 
@@ -24,25 +23,20 @@ RATE = 1000  # [Hz]
 START = 1_700_000_000_000_000_000  # [ns]
 
 
-def with_scale(scale: float) -> Configuration:
-    configuration = default_configuration()
-    return dataclasses.replace(configuration, feedforward=dataclasses.replace(configuration.feedforward, scale=scale))
-
-
 def write_closed_loop(
-    path: Path, scales: tuple[float, ...] = (0.0, 0.9), seconds: float = 2.0, waves: tuple[Wave, ...] = (Sine(),)
+    path: Path, scales: tuple[float, ...] = (0.0, SCALE), seconds: float = 2.0, waves: tuple[Wave, ...] = (Sine(),)
 ) -> Path:
     """A servo that follows a wave, ``seconds`` with each Coulomb scale, changed live (and the wave with it)."""
     servo = ServoParameters(
-        seals=default_configuration().parameters().estimator.seals, control_period=1.0 / RATE, inner_step=1e-4
+        seals=compensating().parameters().estimator.seals, control_period=1.0 / RATE, inner_step=1e-4
     )
     state = init(servo)
     now = outputs(servo, state.plant)
-    known = pipeline.init_running(with_scale(scales[0]).parameters())
+    known = pipeline.init_running(compensating(scale=scales[0]).parameters())
     samples = round(seconds * RATE)
     with b.BagWriter(path) as writer:
         for stretch, scale in enumerate(scales):
-            configuration = with_scale(scale)
+            configuration = compensating(scale=scale)
             parameters, wave = configuration.parameters(), waves[stretch % len(waves)]
             text = encode_text(snapshot_text(Snapshot(configuration, known)))
             stamp = START + stretch * samples * (1_000_000_000 // RATE)

@@ -7,12 +7,10 @@ from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import (
     Configuration,
-    SealSelection,
     first_snapshot,
     parse_snapshot,
     snapshot_text,
 )
-from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     INPUTS,
@@ -22,7 +20,6 @@ from seal_friction_ros.core.estimation.messages import (
     type_of,
 )
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
-from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.replay.replay import replay
 
@@ -82,7 +79,3 @@ def rewrite(source: Path, out: Path, change: Callable[[int, b.BagMessage], b.Bag
             if changed is not None:
                 writer.write(*changed)
     return out
-
-
-def default_configuration(**settings: float) -> Configuration:
-    return load_configuration(SealSelection(), EstimatorSettings(**settings))

@@ -11,9 +11,9 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from seal_friction_msgs.msg import FrictionEstimate
 
+from harness.compensation import LIVE, SCALE
 from harness.processes import node_process
 from harness.spin_nodes import SpunNodes, ros_context
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 
 _SCALE = 'feedforward.scale'
 
@@ -83,14 +83,14 @@ def record_closed_loop(out: Path, domain: int, seconds: float, simulator: Path, 
     recording = {'record': True, 'record_directory': str(out.parent), 'record_name': out.name}
     realtime = {'realtime_priority': priority}
     with (
-        node_process('friction_estimator', domain, {**recording, **realtime, _SCALE: 0.0}, log),
+        node_process('friction_estimator', domain, {**LIVE, **recording, **realtime, _SCALE: 0.0}, log),
         node_process('servo_simulator', domain, realtime, log, parameter_file=simulator),
         operator_on(domain) as operator,
     ):
         if not operator.spin_until(lambda: operator.is_estimating):  # the simulator compiles first
             raise RuntimeError(f'no estimate; {log}: {log.read_text().strip()}')
         operator.spin(seconds)
-        operator.set_scale(FeedForwardSettings().scale)
+        operator.set_scale(SCALE)
         operator.spin(seconds)
         diagnostics = dict(operator.diagnostics)
     if not (out / 'metadata.yaml').is_file():

@@ -19,6 +19,14 @@ from seal_friction_msgs.msg import (
 
 from harness.counted_estimator import CountedEstimator
 from harness.spin_nodes import SpunNodes, ros_context
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+
+DEFAULTS = {
+    'stamp_age_max': EstimatorSettings().stamp_age_max,
+    'feedforward.lateness_max': FeedForwardSettings().lateness_max,
+}
+"""Parameters of a graph on which time matters, see `graph`."""
 
 
 class Probe(Node):
@@ -47,13 +55,13 @@ class Probe(Node):
 
     def send_pressure(self, stamp: int, pressure: float) -> None:
         message = CylinderPressure(chamber_a=pressure, chamber_b=pressure)
-        self.pressure.publish(_stamped(message, stamp))
+        self.pressure.publish(stamped(message, stamp))
 
     def send_force(self, stamp: int, force: float) -> None:
-        self.force.publish(_stamped(ForceSum(force=force), stamp))
+        self.force.publish(stamped(ForceSum(force=force), stamp))
 
     def send_velocity(self, stamp: int, velocity: float) -> None:
-        self.velocity.publish(_stamped(RodVelocity(velocity=velocity), stamp))
+        self.velocity.publish(stamped(RodVelocity(velocity=velocity), stamp))
 
     def values(self, part: str) -> dict[str, str]:
         """Newest diagnostics of ``estimate`` or ``recorder``: values by key, level and message."""
@@ -65,7 +73,8 @@ class Probe(Node):
         return {}
 
 
-def _stamped(message: Any, stamp: int) -> Any:
+def stamped(message: Any, stamp: int) -> Any:
+    """The message with a stamp [ns] and a frame name."""
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
     message.header.frame_id = 'rod'
     return message
@@ -111,9 +120,10 @@ def graph(
 ) -> Iterator[Graph]:
     """Estimator with ROS ``parameters`` and command-line ``arguments`` (remapping), and a probe in ``namespace``.
 
-    The age of stamps is not checked: tests choose them.
+    The age of stamps is not checked: tests choose them. Nor is it a fault that a machine with other work is late.
     """
-    overrides = [Parameter(name, value=value) for name, value in {'stamp_age_max': 0.0, **(parameters or {})}.items()]
+    values = {'stamp_age_max': 0.0, 'feedforward.lateness_max': 10.0, **(parameters or {})}
+    overrides = [Parameter(name, value=value) for name, value in values.items()]
     with ros_context() as context:
         estimator = CountedEstimator(
             context=context, parameter_overrides=overrides, cli_args=['--ros-args', *arguments] if arguments else None

@@ -3,8 +3,8 @@
 import time
 from pathlib import Path
 
+from harness.compensation import SCALE
 from harness.processes import node_process
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.files import read_machine
 
 TIMEOUT = 120.0  # [s] until a node is ready: it may compile first
@@ -31,7 +31,7 @@ def record_machine(folder: Path, domain: int, seconds: float, simulator: Path, m
     bags = {}
     with node_process('servo_simulator', domain, {}, log := folder / 'machine.log', parameter_file=simulator):
         _wait_for('simulating', log)
-        for name, scale in (('none', 0.0), ('on', FeedForwardSettings().scale)):
+        for name, scale in (('none', 0.0), ('on', SCALE)):
             bags[name] = bag = folder / f'machine_{name}'
             recording = {'record': True, 'record_directory': str(folder), 'record_name': bag.name}
             parameters = {'machine': mapping, f'{actuator.name}.feedforward.scale': scale, **recording}

@@ -18,6 +18,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from harness.compensation import SCALE
 from harness.processes import graph_environment, node_process
 
 NAMES = ('boom', 'arm', 'bucket')
@@ -45,6 +46,7 @@ def mapping() -> str:
                 'pressure_b': {'topic': '/b', 'field': f'data[{i}]', 'unit': 'bar'},
             },
             'force_sum': {'pressures': True, 'load_force': f'/joint_states effort[{name}]'},
+            'parameters': {'feedforward': {'scale': SCALE}},
         }
         for i, name in enumerate(NAMES)
     }

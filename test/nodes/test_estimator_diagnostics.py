@@ -6,11 +6,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from seal_friction_ros.core.estimation.estimator import init
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
-from seal_friction_ros.core.estimation.messages import INPUTS
+from seal_friction_ros.core.estimation.messages import CLOCK_TOPIC, INPUTS
 from seal_friction_ros.core.estimation.records import NO_ESTIMATE, Status
 from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.files import default_configuration
-from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, Lateness, MissingSamples
+from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics, MissingSamples
 from seal_friction_ros.nodes.graph_watch import GraphFindings
 
 PERIOD = 1_000_000  # [ns]
@@ -35,7 +35,7 @@ def level_of(bit: Status, share: float) -> tuple[bytes, str]:
     """Level and message of a second in which this share of the estimates had the bit."""
     diagnostics = EstimatorDiagnostics()
     for i in range(100):
-        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(bit) if i < 100 * share else 0), 1000, 0)
+        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(bit) if i < 100 * share else 0), 1000)
     report = diagnostics.report(True, False, GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {}))
     return report.level, report.message
 
@@ -51,7 +51,7 @@ def test_slow_motion_as_each_reversal_has_it_is_no_warning_and_a_quarter_of_a_se
 def test_a_velocity_that_hums_is_named():
     diagnostics, watched = EstimatorDiagnostics(), GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {})
     for i in range(100):
-        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(Status.MOTION_UNCERTAIN) if i < 50 else 0), 1000, 0)
+        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(Status.MOTION_UNCERTAIN) if i < 50 else 0), 1000)
     known = init(default_configuration().parameters().estimator)._replace(swing=NO_SWING._replace(doubted=64e-6))
     report = diagnostics.report(True, False, watched, known=known)
     assert report.message.endswith('swings by 64 um, the force sum does not show it: hum, or a wrong force sum')
@@ -68,55 +68,70 @@ def test_who_looks_on_gets_the_newest_answers_with_the_bits_of_all_since_the_las
     statistics = EstimatorDiagnostics()
     assert statistics.take_newest('boom') == []
     for number, (status, limited) in enumerate([(0, 0), (int(Status.FORCE_STALE), int(Limited.CLAMP)), (0, 0)]):
-        statistics.on_estimate(NO_ESTIMATE._replace(stamp=number, status=status), 1, number)
+        statistics.on_estimate(NO_ESTIMATE._replace(stamp=number, status=status), 1)
         statistics.on_feedforward(FeedForward(number, float(number), 0.9, limited))
     estimate, feedforward = statistics.take_newest('boom')
     assert (estimate.actuator, estimate.record.stamp, estimate.record.status) == ('boom', 2, Status.FORCE_STALE)
     assert (feedforward.record.force, feedforward.record.limited) == (2.0, Limited.CLAMP)
     assert statistics.take_newest('boom') == []
-    statistics.on_estimate(NO_ESTIMATE, 1, 0)
+    statistics.on_estimate(NO_ESTIMATE, 1)
     assert [answer.record.status for answer in statistics.take_newest('boom')] == [0]
 
 
-def message_of(ages: list[int]) -> tuple[bytes, str]:
-    """Level and message of a second whose velocities were received so long [ns] after their stamps."""
+GOOD = GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {})
+
+
+def reported(lateness: list[int]) -> tuple[DiagnosticStatus, EstimatorDiagnostics]:
+    """Report of a second whose velocities came so long [ms] after they were sent."""
     diagnostics = EstimatorDiagnostics()
-    for number, age in enumerate(ages):
-        diagnostics.on_estimate(NO_ESTIMATE._replace(stamp=number * PERIOD), 1000, number * PERIOD + age)
-    report = diagnostics.report(True, False, GraphFindings(dict.fromkeys(INPUTS, 1), [], [], {}))
-    return report.level, report.message
+    for number, late in enumerate(lateness):
+        diagnostics.on_input('rod_velocity', number * PERIOD, late * PERIOD)
+        diagnostics.on_estimate(NO_ESTIMATE._replace(stamp=number * PERIOD), 1000)
+    return diagnostics.report(True, False, GOOD), diagnostics
 
 
-@pytest.mark.parametrize('clock', [-(10**12), 0, 10**12])
-def test_velocities_that_waited_are_a_warning_whatever_their_clock_shows(clock):
-    assert message_of([clock + i % 40 * PERIOD for i in range(100)]) == (DiagnosticStatus.OK, 'estimating')
-    level, message = message_of([clock + i * PERIOD for i in range(100)])
-    assert level == DiagnosticStatus.WARN
-    assert message.startswith('rod_velocity comes up to 99 ms late')
+@pytest.mark.parametrize(
+    ('lateness', 'level', 'begins'),
+    [
+        ([0, 50, 0], DiagnosticStatus.OK, 'estimating'),
+        ([0, 51, 0], DiagnosticStatus.WARN, 'rod_velocity comes up to 51 ms late: this node is too slow'),
+        ([9999], DiagnosticStatus.WARN, 'rod_velocity comes up to 9999 ms late'),
+        ([0, -49, 0], DiagnosticStatus.OK, 'estimating'),
+        ([0, -51, 20], DiagnosticStatus.WARN, 'the clock of the publisher of rod_velocity differs by 0.051 s'),
+        ([10001], DiagnosticStatus.WARN, 'the clock of the publisher of rod_velocity differs by -10.001 s'),
+    ],
+)
+def test_an_input_that_comes_late_and_a_clock_that_differs_are_a_warning(lateness, level, begins):
+    report, _ = reported(lateness)
+    assert (report.level, report.message[: len(begins)]) == (level, begins)
 
 
-def lateness_of(intervals: list[list[int]]) -> list[int]:
-    """Lateness [ms] of each interval of velocities that came so long [ms] after their stamps."""
-    late, found = Lateness(), []
-    for ages in intervals:
-        late.start_interval()
-        for age in ages:
-            late.on_velocity(age * PERIOD)
-        found.append(late.largest // PERIOD)
-    return found
+def test_the_latest_of_each_input_is_in_the_values_until_the_next_report():
+    report, diagnostics = reported([0, 70, 20])
+    values = {value.key: value.value for value in report.values}
+    assert values['rod_velocity late [ms]'] == '70.0'
+    assert values['force_sum late [ms]'] == '0.0'
+    diagnostics.start_interval()
+    later = diagnostics.report(True, False, GOOD)
+    assert {value.key: value.value for value in later.values}['rod_velocity late [ms]'] == '0.0'
 
 
-def test_late_is_later_than_usual_in_the_last_minute():
-    slow = lateness_of([[5, 6]] * 20 + [[40, 70]] * 100)
-    assert slow[:20] == [1] * 20
-    assert slow[20:39] == [65] * 19  # as long as most of the last minute was quicker
-    assert slow[39:] == [30] * 81
-
-
-def test_wrong_stamps_for_a_moment_do_not_make_the_others_late():
-    assert lateness_of([[0, 1], [-500, 0, 1], [0, 1], [0, 1]]) == [1, 1, 1, 1]
-
-
-def test_a_clock_that_was_set_is_not_late():
-    assert lateness_of([[0, 1], [0, 5000, 5001], [5000, 5020], [5000, 5001]]) == [1, 0, 20, 1]
-    assert lateness_of([[0, 1], [0, -5000], [-5000, -4980], [-5000, -4999]])[-1] == 1
+@pytest.mark.parametrize('times', [[], [0], [7, 7, 7]])
+def test_simulated_time_that_stands_still_is_an_error_after_a_second_without_news(times, monkeypatch):
+    clock = 0.0
+    monkeypatch.setattr('time.monotonic', lambda: clock)
+    diagnostics = EstimatorDiagnostics([*INPUTS, CLOCK_TOPIC])
+    watched = GraphFindings(dict.fromkeys([*INPUTS, CLOCK_TOPIC], 1), [], [], {})
+    for stamp in times:
+        diagnostics.on_clock(stamp)
+    clock = 1.0
+    diagnostics.start_interval()
+    diagnostics.on_estimate(NO_ESTIMATE, 1000)
+    for stamp in times[-1:]:
+        diagnostics.on_clock(stamp)
+    clock = 2.0
+    report = diagnostics.report(True, False, watched)
+    assert report.level == DiagnosticStatus.ERROR
+    assert report.message.startswith('simulated time stands still')
+    diagnostics.on_clock(8)
+    assert 'stands still' not in diagnostics.report(True, False, watched).message

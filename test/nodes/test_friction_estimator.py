@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import time
 from functools import partial
 from itertools import count
@@ -11,7 +12,8 @@ from types import SimpleNamespace
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
-from harness.live_graph import graph
+from harness.compensation import LIVE, REAL_SEALS, SCALE
+from harness.live_graph import DEFAULTS, graph
 from harness.processes import STOP_TIMEOUT
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -24,7 +26,7 @@ from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
-from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import encode
@@ -83,7 +85,7 @@ def test_timers_for_which_the_executor_has_no_time_are_called_after_a_message(
         end = time.monotonic() + STOP_TIMEOUT
         for number in count(1):
             data = b'' if malformed else encode(Velocity(number * 10**6, 0.0, b'rod'))
-            g.estimator.on_input('rod_velocity', data)
+            g.estimator.on_input('rod_velocity', data, 0)
             if called.count('publish_diagnostics') >= 2 and called.count('on_watchdog') >= 5:
                 break
             assert time.monotonic() < end, called
@@ -99,6 +101,8 @@ def test_a_clock_that_is_set_changes_no_time_of_receipt_and_what_was_recorded_ve
     recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     with graph({'stamp_age_max': EstimatorSettings().stamp_age_max, **recording}) as g:
         g.connect()
+        take = g.estimator.on_input
+        g.estimator.on_input = lambda name, data, late: take(name, data, late - step)  # senders have the same clock
         assert g.estimate(time.time_ns(), 0.1).status == 0
         for number, step in enumerate((100 * SECOND, -100 * SECOND), 2):
             assert g.spin_until(lambda number=number: len(g.probe.configurations) == number)
@@ -290,9 +294,19 @@ def test_an_unknown_parameter_is_logged_with_a_suggestion(capfd):
         assert 'no parameter stick_velocty (did you mean stick_velocity?), wave (a parameter of servo_sim' in logged
 
 
+@pytest.mark.parametrize(
+    'name', ['feedfoward.scale', 'Feed_Forward.scale', 'feedforward.scal', 'feedforwardscale', 'scale', 'boom.scale']
+)
+def test_a_mistyped_off_switch_ends_the_start(name: str):
+    """Who typed it believes that the force is off."""
+    with pytest.raises(ValueError, match=f'no parameter {re.escape(name)}') as error, graph({**LIVE, name: 0.0}):
+        pass
+    assert '\n' not in str(error.value)
+
+
 @pytest.mark.parametrize('nested', [False, True])
 def test_every_parameter_of_the_node_is_accepted_in_a_parameter_file(nested: bool, tmp_path: Path):
-    with graph({'stamp_age_max': EstimatorSettings().stamp_age_max}) as g:
+    with graph(DEFAULTS) as g:
         names = g.estimator.list_parameters([], 0).names
         values = {name: g.estimator.get_parameter(name).value for name in names}
     assert {'realtime_priority', 'refuse_second_publisher', 'use_sim_time', 'feedforward.lead_time'} <= values.keys()
@@ -401,13 +415,6 @@ def test_a_bag_is_never_overwritten_and_the_estimate_continues(tmp_path: Path, c
     assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['precious']
 
 
-def test_simulated_time_that_stands_still_does_not_stop_the_node():
-    with graph({'use_sim_time': True}) as g:
-        g.connect()
-        assert g.estimate(SECOND, 0.1).state == FrictionEstimate.SLIDING
-        assert g.spin_until(lambda: g.probe.values('estimate').get('estimates') == '1')
-
-
 def test_an_invalid_seal_file_prevents_the_start_and_the_log_names_the_field(tmp_path: Path, capfd):
     seal = tmp_path / 'seal.yaml'
     text = ROOT.joinpath('config/seals/ms28775_114.yaml').read_text()
@@ -426,6 +433,23 @@ def test_an_invalid_seal_file_prevents_the_start_and_the_log_names_the_field(tmp
 def test_placeholder_seals_are_a_warning_in_the_log(seals: dict[str, object], warnings: int, capfd):
     with graph(seals):
         assert capfd.readouterr().err.count('the seals are the placeholder of the default configuration') == warnings
+
+
+def test_placeholder_seals_make_no_force_and_a_scale_is_rejected_with_the_reason():
+    with graph({'feedforward.scale': SCALE}) as g:
+        assert g.estimator._configuration.feedforward.scale == 0.0
+        for value, is_accepted in ((0.5, False), (1e-3, False), (0.0, True)):
+            (result,) = g.estimator.set_parameters([RclpyParameter('feedforward.scale', value=value)])
+            assert result.successful is is_accepted
+            assert (PLACEHOLDER_WARNING in result.reason) is not is_accepted
+        assert g.estimator._configuration.feedforward.scale == 0.0
+        assert g.estimator.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+        assert g.estimator.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+        changes = {'seals': list(REAL_SEALS), 'feedforward.scale': SCALE}
+        for name, value in changes.items():
+            assert g.estimator.set_parameters([RclpyParameter(name, value=value)])[0].successful
+        assert g.estimator.autostart()
+        assert g.estimator._configuration.feedforward.scale == SCALE
 
 
 def test_the_node_declares_the_parameters_of_its_table_and_no_other():

@@ -1,5 +1,7 @@
 """A machine with standard messages only: three actuators in one node, live, recorded and replayed."""
 
+import re
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +11,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
+from harness.compensation import SCALE
 from harness.machines import BENCH, EXCAVATOR
 from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.node import Node
@@ -18,8 +21,10 @@ from seal_friction_msgs.msg import FrictionEstimate, FrictionFeedForward, Machin
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.nodes.machine_estimator import MachineEstimator
+from seal_friction_ros.offline.bags.bag import read_messages
 from seal_friction_ros.offline.replay.replay import replay
 
 NAMES = ('boom', 'arm', 'bucket')
@@ -61,6 +66,10 @@ class Drivers(Node):
         """Newest diagnostics of a part."""
         found = [s for array in self.diagnostics for s in array.status if s.name.endswith(part)]
         return found[-1]
+
+    def value(self, part: str, key: str) -> str:
+        """Newest value of the diagnostics of a part; empty if there is none."""
+        return next((v.value for v in self.status(part).values if v.key == key), '') if self.diagnostics else ''
 
 
 @contextmanager
@@ -140,14 +149,27 @@ def test_a_joint_that_no_message_holds_is_named_and_the_others_go_on(tmp_path):
         assert 'buckett' not in drivers.status('arm').message
 
 
+def test_a_joint_that_is_named_twice_is_ambiguous_in_the_diagnostics_and_the_others_go_on(tmp_path):
+    with machine(tmp_path) as (nodes, node, drivers):
+        heard(nodes, node, drivers)
+        for number in range(3):
+            drivers.send((0.05, -0.03, 0.02, 0.04), (*NAMES, 'bucket'))
+            assert nodes.spin_until(lambda n=number: len(drivers.estimates['arm']) > n)
+        assert not drivers.estimates['bucket']
+        node.publish_diagnostics()
+        assert nodes.spin_until(lambda: drivers.diagnostics and 'ambiguous' in drivers.status('bucket').message)
+        assert "'bucket' stands 2 times in name" in drivers.status('bucket').message
+        assert 'ambiguous' not in drivers.status('arm').message
+
+
 def test_malformed_bytes_are_counted_and_the_estimate_goes_on(tmp_path):
     with machine(tmp_path) as (nodes, node, drivers):
         heard(nodes, node, drivers)
         move(nodes, drivers, 2)
-        node.on_input('/joint_states', b'\x00\x01\x00\x00garbage')
+        node.on_input('/joint_states', b'\x00\x01\x00\x00garbage', 0)
         move(nodes, drivers, 2)
         node.publish_diagnostics()
-        assert nodes.spin_until(lambda: 'malformed' in drivers.status('boom').message)
+        assert nodes.spin_until(lambda: drivers.value('boom', '/joint_states malformed') == '1')
 
 
 def test_the_forces_fall_to_0_when_the_node_stops(tmp_path):
@@ -157,6 +179,46 @@ def test_the_forces_fall_to_0_when_the_node_stops(tmp_path):
         node.finish()
         assert nodes.spin_until(lambda: drivers.commands[-1] == [0.0, 0.0, 0.0])
         assert drivers.commands[-1] == [0.0, 0.0, 0.0]
+
+
+def test_what_waited_while_the_node_was_held_up_makes_no_force_and_replays_to_the_byte(tmp_path):
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    with machine(tmp_path, **recording) as (nodes, node, drivers):
+        heard(nodes, node, drivers)
+        move_until(nodes, drivers, lambda force: force[0] > 10.0)
+        drivers.commands.clear()
+        for _ in range(50):
+            drivers.send((0.05, -0.03, 0.02))
+            time.sleep(PERIOD)
+        time.sleep(0.25)  # the executor takes nothing meanwhile
+        assert nodes.spin_until(lambda: len(drivers.commands) >= 3)  # the watchdog answers for one after the other
+        assert [0.0, 0.0, 0.0] in drivers.commands[:3]
+        move_until(nodes, drivers, lambda force: force[0] > 10.0)
+        node.finish()
+    result = replay(tmp_path / 'bag')
+    assert result.identical, result.first_difference
+    late = [message.log_time - message.publish_time for message in read_messages(tmp_path / 'bag')]
+    assert max(late) > 0.2e9
+
+
+@pytest.mark.parametrize('name', ['bom.feedforward.scale', 'boom.feedfoward.scale', 'feedforward.scale', 'boom.scale'])
+def test_a_mistyped_off_switch_ends_the_start(tmp_path, name):
+    """A force of 32 N came from a machine whose operator believed it off."""
+    with pytest.raises(ValueError, match=f'no parameter {re.escape(name)}') as error, machine(tmp_path, **{name: 0.0}):
+        pass
+    assert '\n' not in str(error.value)
+
+
+def test_placeholder_seals_make_no_force_and_a_scale_is_rejected_with_the_reason(tmp_path):
+    text = EXCAVATOR.replace('seals: [ms28775_114@a, ms28775_114@b]', 'seals: [placeholder@a, placeholder@b]', 1)
+    with machine(tmp_path, text) as (nodes, node, drivers):
+        heard(nodes, node, drivers)
+        move_until(nodes, drivers, lambda force: force[1] < -5.0)  # the others have their seals
+        assert {force[0] for force in drivers.commands} == {0.0}
+        (result,) = node.set_parameters([Parameter('boom.feedforward.scale', value=0.5)])
+        assert not result.successful
+        assert PLACEHOLDER_WARNING in result.reason
+        assert node.set_parameters([Parameter('arm.feedforward.scale', value=0.5)])[0].successful
 
 
 class SensorDrivers(Node):
@@ -213,6 +275,7 @@ def sensor_bench(tmp_path: Path, text: str) -> Iterator[tuple[SpunNodes, Any, Se
 WITH_REFERENCE = BENCH.replace(
     'pressure_b: /p_b}', "pressure_b: /p_b, reference_velocity: '/set velocity[axis]'}"
 ).replace('topics: {', 'topics: {/set: sensor_msgs/msg/JointState, ')
+WITH_REFERENCE += f'    parameters: {{feedforward: {{scale: {SCALE}}}}}\n'
 
 
 def test_drivers_with_the_qos_of_sensors_give_good_estimates_without_any_qos_parameter(tmp_path):

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from harness.compensation import LIVE
 from harness.pages import blocks_of
 from harness.processes import free_domain, graph_environment, node_process
 from paths import ROOT
@@ -24,7 +25,7 @@ def domain(tmp_path_factory):
     log, recording = folder / 'nodes.log', {'record_directory': str(folder)}
     simulator = ROOT / 'config' / 'servo_simulator.yaml'
     with (
-        node_process('friction_estimator', domain, recording, log),
+        node_process('friction_estimator', domain, {**LIVE, **recording}, log),
         node_process('servo_simulator', domain, {'rate': 500.0}, log, parameter_file=simulator),
     ):
         code, said = run(domain, 'echo', 'friction_estimate', '--count', '1', '--seconds', '120')

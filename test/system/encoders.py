@@ -19,18 +19,18 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness import compiled_code  # noqa: F401  before anything is compiled
+from harness.compensation import compensating
 
 from seal_friction_ros.core.estimation.compiled_pipeline import MOST_MESSAGES, Kind, Messages, receive_all
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, decode, encode
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init
 from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity
-from seal_friction_ros.files import default_configuration
 
 START = 1_700_000_000_000_000_000  # [ns]
 PRESSURE = 2e6  # [Pa]
 ANGULAR_RATE = 2.0 * math.pi  # [rad/s] of every sine
 HOLDING_FORCE = 20.0  # [N]
-CONFIGURATION = default_configuration()
+CONFIGURATION = compensating()
 PARAMETERS = CONFIGURATION.parameters()
 BY_MEASURED_VELOCITY = PARAMETERS._replace(feedforward=replace(CONFIGURATION.feedforward, use_measured_velocity=True))
 SCALE, SMOOTHING = CONFIGURATION.feedforward.scale, CONFIGURATION.feedforward.smoothing_velocity
@@ -124,9 +124,9 @@ def answers_of(
                 pieces.append(encode(record))
                 kinds.append(kind)
                 times.append(stamp + 100_000)
-        sizes = np.array([len(piece) for piece in pieces])
+        sizes, received = np.array([len(piece) for piece in pieces]), np.array(times)
         data = np.frombuffer(b''.join(pieces), np.uint8)
-        messages = Messages(data, np.array(kinds, np.uint8), np.cumsum(sizes) - sizes, sizes, np.array(times))
+        messages = Messages(data, np.array(kinds, np.uint8), np.cumsum(sizes) - sizes, sizes, received, received)
         state, answers = receive_all(parameters, state, messages)
         for i in np.flatnonzero(answers.estimate_sizes):
             at, size = answers.estimate_offsets[i], answers.estimate_sizes[i]

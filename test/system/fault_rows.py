@@ -164,13 +164,12 @@ def _unusable() -> Iterator[Row]:
             feedforward='fades',
             estimate='UNKNOWN, Coulomb friction as usual',
         )
-        if not math.isfinite(value):
-            yield Row(
-                f'reference {words}',
-                with_value('servo_reference', value),
-                feedforward='fades',
-                estimate='as usual',
-            )
+        yield Row(
+            f'reference {words}',
+            with_value('servo_reference', value),
+            feedforward='fades',
+            estimate='as usual',
+        )
 
 
 def _spikes() -> Iterator[Row]:
@@ -299,9 +298,16 @@ SIGNAL_ROWS: tuple[Row, ...] = (
         'all stamps jump back by 5 s',
         delayed('all', -5000 * MS),
         'STAMP_NOT_INCREASING STAMP_AGE',
+        feedforward='fades',
         estimate='as usual, marked',
     ),
-    Row('all stamps jump ahead by 5 s', delayed('all', 5000 * MS), 'STAMP_AGE', estimate='as usual, marked'),
+    Row(
+        'all stamps jump ahead by 5 s',
+        delayed('all', 5000 * MS),
+        'STAMP_AGE',
+        feedforward='fades',
+        estimate='as usual, marked',
+    ),
     Row(
         'velocity frozen, its stamp too',
         frozen('rod_velocity'),

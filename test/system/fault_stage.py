@@ -9,6 +9,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from fault_rows import AFTER, BEFORE, FADE_TIME, FAULT, MS, SLEW_LIMIT, TIMEOUT, Row, Tick, good
+from harness.compensation import LIVE, SCALE
 from harness.counted_estimator import CountedEstimator
 from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.context import Context
@@ -27,6 +28,7 @@ from seal_friction_ros.offline.replay.replay import replay
 
 START = 1_000_000_000_000  # [ns]
 SETTINGS = {
+    **LIVE,
     'pressure_timeout': TIMEOUT,
     'force_timeout': TIMEOUT,
     'feedforward.estimate_timeout': TIMEOUT,
@@ -287,14 +289,13 @@ def try_row(place: Stage, row: Row) -> list[str]:
 
 
 def _wrong_feedforward(row: Row, estimates: list[FrictionEstimate], forces: list[FeedForward]) -> list[str]:
-    scale = FeedForwardSettings().scale
     if not forces:
         return ['no feed-forward']
     last = forces[-1]
     if row.feedforward == 'fades':
         faded = last.force == 0.0 and last.limited & Limited.FADE
         return [] if faded else [f'the feed-forward is still {last.force:.3f} N']
-    right = {estimate.stamp: scale * estimate.coulomb_friction for estimate in estimates}
+    right = {estimate.stamp: SCALE * estimate.coulomb_friction for estimate in estimates}
     shares = [force.force / right.get(force.stamp, right[estimates[-1].stamp]) for force in forces]
     lowest, highest = LOWEST_SHARE[row.feedforward]
     holds = lowest - 1e-9 <= min(shares) <= highest + 1e-9 and max(shares) <= 1.0 + 1e-9

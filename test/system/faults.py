@@ -113,6 +113,14 @@ TRIALS = (
         graph.simulated_time_is_reset,
     ),
     Trial(
+        'simulated time stands still',
+        'as usual, marked',
+        'fades to 0, back when it goes on',
+        '`LATE_INPUT`; ERROR, `/clock` named',
+        'verifies',
+        graph.simulated_time_stands_still,
+    ),
+    Trial(
         '50 more topics on the graph',
         'every sample answered',
         'as usual',

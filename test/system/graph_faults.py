@@ -6,12 +6,12 @@ Each function is one try: it takes random numbers and an empty folder and return
 import os
 import random
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fault_rows import AFTER, BEFORE, MS, UNKNOWN, Tick
+from fault_rows import AFTER, BEFORE, SLEW_LIMIT, UNKNOWN, Tick
 from fault_stage import Outputs, Stage, broken_invariants, stage, statuses, unless, verified
 from harness.blocked_disk import BlockedDisk
 from harness.spin_nodes import ros_context
@@ -32,14 +32,16 @@ from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 from seal_friction_ros.offline.bags import mcap_writer
 
 
-def unrecovered(place: Stage) -> list[str]:
+def unrecovered(
+    place: Stage, spoil: Callable[[Tick, int], Tick] | None = None, live_slew_limit: float | None = None
+) -> list[str]:
     """Send good samples; differences from normal operation, and broken invariants since the start."""
-    place.run(BEFORE)
-    outputs = place.run(AFTER)
+    place.run(BEFORE, spoil)
+    outputs = place.run(AFTER, spoil)
     forces = [output for output in outputs if isinstance(output, FeedForward)]
     wrong = unless(statuses(outputs) == {0}, f'after the fault: statuses {statuses(outputs)}')
     wrong += unless(forces and not forces[-1].limited, f'after the fault: feed-forward {forces[-1:]}')
-    return wrong + broken_invariants(place.driver.outputs)
+    return wrong + broken_invariants(place.driver.outputs, live_slew_limit)
 
 
 def recording_to(folder: Path) -> dict[str, Any]:
@@ -252,31 +254,66 @@ def lifecycle_in_any_order(chance: random.Random, folder: Path) -> list[str]:
         return wrong + unrecovered(place)
 
 
-def simulated_time_is_reset(chance: random.Random, folder: Path) -> list[str]:
-    """``/clock`` jumps back to 0 and goes on from there."""
-    del chance
-    with stage(recording_to(folder) | {'use_sim_time': True}) as place:
+@contextmanager
+def simulated_time(folder: Path) -> Iterator[tuple[Stage, Callable[[Tick, int], Tick]]]:
+    """An estimator with ``use_sim_time``, and a function that moves ``/clock`` to the moment of a tick."""
+    slow = {'feedforward.lateness_max': 10.0, 'feedforward.estimate_timeout': 0.2, 'feedforward.reference_timeout': 0.2}
+    with stage(recording_to(folder) | slow | {'use_sim_time': True}) as place:  # on the clock of a busy machine
         clock = place.driver.create_publisher(Clock, '/clock', 10)
         place.connect()
 
-        def run(ticks: int) -> Outputs:
-            """Move the clock and send, ``ticks`` times."""
-            outputs: Outputs = []
-            for _ in range(ticks):
-                now = Clock()
-                now.clock.sec, now.clock.nanosec = divmod(place.now + MS, 10**9)
-                clock.publish(now)
-                outputs += place.run(1)
-            return outputs
+        def move(tick: Tick, _: int) -> Tick:
+            """Publish the clock."""
+            taken, now = place.estimator.taken, Clock()
+            now.clock.sec, now.clock.nanosec = divmod(place.now, 10**9)
+            clock.publish(now)
+            place.spin_until(lambda: place.estimator.taken > taken)
+            return tick
 
-        run(60)
+        yield place, move
+
+
+def simulated_time_is_reset(chance: random.Random, folder: Path) -> list[str]:
+    """``/clock`` jumps back to 0 and goes on from there."""
+    del chance
+    with simulated_time(folder) as (place, move):
+        place.run(60, move)
         place.now = 0
-        after = run(60)
+        after = place.run(60, move)
         marked = [o.status & ~Status.MOTION_UNCERTAIN for o in after if isinstance(o, records.FrictionEstimate)]
         wrong = unless(marked == [Status.STAMP_NOT_INCREASING] + [0] * 59, f'{marked[:5]}')
-        wrong += unrecovered(place)
+        wrong += unrecovered(place, move, SLEW_LIMIT)
         place.estimator.finish()
     return wrong + verified(folder / 'bag')
+
+
+def simulated_time_stands_still(chance: random.Random, folder: Path) -> list[str]:
+    """``/clock`` stops, while all inputs go on with its last time; later it goes on."""
+    del chance
+    with simulated_time(folder) as (place, move):
+
+        def is_pushing() -> bool:
+            """Whether there is a force, after one more moment."""
+            return newest_force(place.run(1, move)) > 1.0
+
+        def is_off() -> bool:
+            """Likewise whether there is none; the clock stands still."""
+            return newest_force(place.run(1)) == 0.0
+
+        wrong = unless(place.spin_until(is_pushing), 'no force to begin with')
+        wrong += unless(place.spin_until(is_off), 'the force stays')
+        marked = statuses(place.run(5))
+        wrong += unless(marked == {Status.LATE_INPUT}, f'{marked} while it stands still')
+        named = place.spin_until(lambda: 'simulated time stands still' in message(place))
+        wrong += unless(named and place.estimator.diagnostics()['estimate'].level == b'\x02', message(place))
+        wrong += unless(place.spin_until(is_pushing), 'no force although the clock goes on')
+        place.estimator.finish()
+    return wrong + verified(folder / 'bag')
+
+
+def newest_force(outputs: Outputs) -> float:
+    """Force of the last feed-forward [N]."""
+    return next(output.force for output in reversed(outputs) if isinstance(output, FeedForward))
 
 
 def fifty_more_topics(chance: random.Random, folder: Path) -> list[str]:

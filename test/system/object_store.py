@@ -25,9 +25,12 @@ from rich.console import Console
 from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.compensation import compensating
 from harness.dask_cluster import ENVIRONMENT, dask_cluster, wait_for
-from harness.example_bags import default_configuration, write_recorded
+from harness.example_bags import write_recorded
 from paths import ROOT
+
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 
 BUCKET = 's3://rig-7'
 COMMAND = [sys.executable, '-m', 'seal_friction_ros.offline.commands.main']
@@ -86,7 +89,9 @@ def put(store: ObjectStore, bag: Path, name: str) -> None:
 
 def recording(folder: Path, number: int) -> Path:
     """A recorded bag; each number has a configuration of its own."""
-    made = write_recorded(folder / f'made{number}', default_configuration(pressure_timeout=0.02 + 0.001 * number))
+    made = write_recorded(
+        folder / f'made{number}', compensating(EstimatorSettings(pressure_timeout=0.02 + 0.001 * number))
+    )
     return made.rename(folder / f'bag{number}')
 
 

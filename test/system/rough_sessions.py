@@ -30,6 +30,7 @@ from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.compensation import LIVE
 from harness.machines import EXCAVATOR
 from harness.processes import free_domain, node_process
 from harness.spin_nodes import SpunNodes, ros_context
@@ -171,7 +172,7 @@ def session(case: Case, seed: int, moments: int, folder: Path) -> Outcome:
     values: dict[str, Any] = {'record': True, 'record_directory': str(folder)}
     made: Callable[[random.Random, int, float], Messages] = of_one
     if case.answers == 'one':
-        values |= {'stamp_age_max': 0.0, 'record_state_period': 0.5}
+        values |= {**LIVE, 'stamp_age_max': 0.0, 'record_state_period': 0.5}
     else:
         made, path = of_machine, folder / 'robot.yaml'
         path.write_text(f'answers: {case.answers}\n{EXCAVATOR}')

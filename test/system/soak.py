@@ -26,6 +26,7 @@ from rich.table import Table
 from rich.text import Text
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.compensation import LIVE
 from harness.processes import free_domain, node_process
 from harness.spin_nodes import SpunNodes, ros_context
 
@@ -87,13 +88,17 @@ def soak(minutes: float, look_every: float, folder: Path) -> dict[str, Any]:
     """
     domain, log, bag = free_domain(), folder / 'log', folder / 'bag'
     recording = {
+        **LIVE,
         'record': True,
         'record_directory': str(folder),
         'record_name': bag.name,
         'record_split_duration': 60.0,
     }
     looks: dict[str, list[Look]] = {'estimator': [], 'simulator': []}
-    with node_process('friction_estimator', domain, recording, log) as estimator, ros_context(domain) as context:
+    with (
+        node_process('friction_estimator', domain, recording, log) as estimator,
+        ros_context(domain) as context,
+    ):
         listener = Listener(context)
         spun = SpunNodes(context, listener)
         with (

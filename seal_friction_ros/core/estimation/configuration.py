@@ -18,6 +18,7 @@ from seal_friction_ros.core.estimation.pipeline import PipelineParameters, Pipel
 from seal_friction_ros.core.estimation.records import NEVER, NO_TEMPERATURE, Force, Pressure
 from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED
 from seal_friction_ros.core.estimation.swings import NO_SWING
+from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.mounting import CHAMBERS_TEXT, check_chambers
@@ -233,11 +234,16 @@ def parse_snapshot(text: str) -> Snapshot:
     The default seals of version 1 had no mark: they count as `PLACEHOLDER`.
 
     Raises:
-        ValueError: The text is not the JSON of a snapshot, or a value in it is not valid.
+        ValueError: The text is not the JSON of a snapshot, a value in it is not valid, or a later version made it.
     """
     try:
-        document = json.loads(text)
+        document = parse_json(text, 'configuration')
         version = int(document.get('version', 1))
+        if version > ALGORITHM_VERSION:
+            raise ValueError(
+                f'configuration: made by version {version} of the algorithm, this is version {ALGORITHM_VERSION}: '
+                'update seal_friction_ros'
+            )
         selection = from_mapping(SealSelection, document['selection'], 'configuration: selection')
         if version == 1 and selection.seals == _DEFAULT_OF_VERSION_1:
             selection = dataclasses.replace(selection, seals=(PLACEHOLDER, PLACEHOLDER))
@@ -250,13 +256,13 @@ def parse_snapshot(text: str) -> Snapshot:
         )
         state = _state(configuration, document['state'], version)
         return Snapshot(configuration, state, version, _recorded(document.get('recorded'), version))
-    except (TypeError, AttributeError, LookupError, OverflowError, RecursionError) as error:
+    except (TypeError, AttributeError, LookupError, OverflowError) as error:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
 
 def snapshot_version(text: str) -> int:
     """Version of the algorithm that made a snapshot, from its valid text."""
-    return int(json.loads(text).get('version', 1))
+    return int(parse_json(text, 'configuration').get('version', 1))
 
 
 def _recorded(document: Any, version: int) -> Recorded | None:

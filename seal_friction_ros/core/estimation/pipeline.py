@@ -218,8 +218,7 @@ def receive_velocity(
     known, guided, _, pressure, force, reference, receipt, refused, offset, temperature, clock = state
     stamp, given, frame_id = velocity
     is_new = known.stamp != stamp
-    stands_still = clock != NEVER and not _is_younger(receipt.clock, received, parameters.feedforward.estimate_timeout)
-    is_late = since == NEVER or stands_still
+    is_late = since == NEVER or _stands_still(clock, receipt, received, parameters.feedforward.estimate_timeout)
     age = (received + offset - stamp) * 1e-9
     sample = RodSample(stamp, given, pressure, force, refused, age, temperature, is_late)
     known, estimate, seen, friction_by_law = estimate_at(parameters.estimator, known, sample)
@@ -384,13 +383,20 @@ def _feed_forward(
     """Make and emit the feed-forward of this moment."""
     known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock = state
     settings = parameters.feedforward
-    present, acceleration = _reference_motion(settings, known, reference, receipt, received)
+    present, acceleration = _reference_motion(settings, known, reference)
+    is_wanted = settings.use_measured_velocity or _is_younger(receipt.reference, received, settings.reference_timeout)
+    turns = present * guided.velocity <= 0.0 and guided.velocity != 0.0
+    if not is_wanted and not turns:
+        present = math.nan  # the force fades as it is
     velocity = led = present
     if not settings.use_measured_velocity:
         velocity = wanted_velocity(settings, present, acceleration)
         led = led_velocity(settings, present, acceleration)
     ground = friction
-    if refused or not _is_fresh(receipt, received, settings.estimate_timeout):
+    is_fresh = _is_fresh(receipt, received, settings.estimate_timeout)
+    if refused or not is_fresh or _stands_still(clock, receipt, received, settings.estimate_timeout):
+        ground = -1.0
+    if turns and not is_wanted:  # a reference that came late: the force fades on its side
         ground = -1.0
     if ground >= 0.0 and parameters.estimator.depends_on_velocity and not math.isnan(velocity):
         seals, used = parameters.estimator.seal_numbers, known.pressure
@@ -412,16 +418,14 @@ def _feed_forward(
 
 @compilable
 def _reference_motion(
-    settings: FeedForwardSettings, known: EstimatorState, reference: Reference, receipt: ReceiptTimes, received: int
+    settings: FeedForwardSettings, known: EstimatorState, reference: Reference
 ) -> tuple[float, float]:
-    """Conditioned velocity [m/s] and acceleration [m/s^2] of the reference, or of the rod.
+    """Conditioned velocity [m/s] and acceleration [m/s^2] of the newest reference, late or not, or of the rod.
 
-    With ``use_measured_velocity`` they are the rod's, its acceleration 0. The velocity is NaN if it is not usable.
+    With ``use_measured_velocity`` they are the rod's, its acceleration 0.
     """
     if settings.use_measured_velocity:
         return confirmed_velocity(known.motion), 0.0
-    if not _is_younger(receipt.reference, received, settings.reference_timeout):
-        return math.nan, 0.0
     given = reference.velocity
     velocity, acceleration = confirmed_velocity(given), 0.0
     if given.samples >= SETTLING and (velocity != 0.0 or given.half_width == 0.0):  # noise at rest is no start
@@ -432,12 +436,16 @@ def _reference_motion(
 @compilable
 def _is_fresh(receipt: ReceiptTimes, received: int, timeout: float) -> bool:
     """Whether every input of the estimator that ever came has come within ``timeout`` [s]."""
-    velocity, pressure, force, _, clock = receipt
+    velocity, pressure, force, _, _ = receipt
     if force != NEVER and not _is_younger(force, received, timeout):
         return False
-    if clock != NEVER and not _is_younger(clock, received, timeout):
-        return False
     return _is_younger(velocity, received, timeout) and _is_younger(pressure, received, timeout)
+
+
+@compilable
+def _stands_still(clock: int, receipt: ReceiptTimes, received: int, timeout: float) -> bool:
+    """Whether there is simulated time and it has not moved for ``timeout`` [s], or never did."""
+    return clock != NEVER and not _is_younger(receipt.clock, received, timeout)
 
 
 @compilable

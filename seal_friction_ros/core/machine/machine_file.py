@@ -324,7 +324,7 @@ def _source(value: Any, quantity: str, topics: Mapping[str, str], where: str) ->
         return _number(value, quantity, where)
     check_names(value, ('topic', 'field', 'unit', 'gain', 'offset', 'absolute'), where)
     topic: Any = value.get('topic')
-    if topic not in topics:
+    if not isinstance(topic, str) or topic not in topics:
         known = ', '.join(topics) or 'none'
         raise ValueError(f'{where}: topic {printable(topic)!r} is not among topics: {known}: add it with its type')
     kind = topics[topic]

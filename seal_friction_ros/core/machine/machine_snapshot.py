@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, parse_snapshot, snapshot_text
+from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.machine.machine import (
     ActuatorState,
     Machine,
@@ -43,7 +44,7 @@ def machine_text(document: Mapping[str, Any], machine: Machine, state: MachineSt
 def is_machine_text(text: str) -> bool:
     """Whether the text of a configuration is that of a machine."""
     try:
-        document = json.loads(text)
+        document = parse_json(text, _WHERE)
     except ValueError:
         return False
     return isinstance(document, dict) and 'machine' in document
@@ -81,13 +82,13 @@ def parse_machine_text(text: str, definitions: Mapping[str, Definition]) -> tupl
             )
             for actuator in machine.actuators
         ]
-    except (TypeError, AttributeError, LookupError, OverflowError, RecursionError) as error:
+    except (TypeError, AttributeError, LookupError, OverflowError) as error:
         raise ValueError(f'{_WHERE}: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
     return machine, MachineState(tuple(states))
 
 
 def _document(text: str) -> Any:
-    document = json.loads(text)
+    document = parse_json(text, _WHERE)
     if not isinstance(document, dict) or not {'machine', 'actuators'} <= document.keys():
         raise ValueError(f'{_WHERE}: not the JSON of a snapshot: no machine and actuators in it')
     return document

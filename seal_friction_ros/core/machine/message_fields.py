@@ -24,6 +24,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.messages import LONGEST_FRAME, SECOND
+from seal_friction_ros.core.foundation.documents import DEEPEST
 from seal_friction_ros.core.foundation.parameters import printable
 
 LARGEST_MESSAGE = 1 << 18  # [bytes] our choice; a JointState of 100 joints has 5000
@@ -80,7 +81,7 @@ def parse_definition(type_name: str, text: str) -> Definition:
         text: Its fields, then those of each message in it after a line of ``=`` and ``MSG: package/Name``.
 
     Raises:
-        ValueError: The text is not such a definition, or a message in it is not defined.
+        ValueError: The text is not such a definition, a message in it is not defined, or there are too many levels.
     """
     found: dict[str, list[Field]] = {}
     name = short_name(type_name)
@@ -160,20 +161,27 @@ def _kind(name: str) -> str:
 def _checked(found: Mapping[str, tuple[Field, ...]], type_name: str) -> Definition:
     """The definition with every message in it known, none inside itself, and a byte for a message without fields."""
     complete = {kind: fields or (Field(*_EMPTY),) for kind, fields in found.items()}
+    levels: dict[str, int] = {}  # of each message that was checked
 
-    def visit(kind: str, above: tuple[str, ...]) -> None:
-        """Check a message, which is a field of those ``above``, and all messages in it."""
+    def visit(kind: str, above: tuple[str, ...]) -> int:
+        """Check a message, which is a field of those ``above``, and all messages in it; the number of its levels."""
         if kind in above:
             raise ValueError(f'{type_name}: {printable(kind)} contains itself')
         if kind not in complete:
             raise ValueError(f'{type_name}: the definition lacks {printable(kind)}')
+        if len(above) + levels.get(kind, 1) > DEEPEST:
+            raise ValueError(f'{type_name}: more than {DEEPEST} levels deep')
+        if kind in levels:
+            return levels[kind]
+        levels[kind] = 1
         for field in complete[kind]:
             if field.kind == WIDE_STRING:
                 raise ValueError(f'{type_name}: {field.name} of {kind} is a wstring, which cannot be read')
             if '/' in field.kind:
-                visit(field.kind, (*above, kind))
+                levels[kind] = max(levels[kind], 1 + visit(field.kind, (*above, kind)))
             elif field.kind not in PRIMITIVES and field.kind != STRING:
                 raise ValueError(f'{type_name}: {field.name} of {kind} has the unknown type {printable(field.kind)}')
+        return levels[kind]
 
     visit(type_name, ())
     return complete
@@ -521,12 +529,16 @@ class _Found:
         self.place = (node.offset, node.code)
 
     def _named(self, walk: _Walk, node: Any, scopes: Sequence[dict[str, Any]], step: _Step) -> int:
-        """Index of the element that a name stands for; -1 if the message does not have the name."""
+        """Index of the element that a name stands for; -1 if the message does not have the name once."""
         texts = scopes[step.scope][step.names] if step.scope >= 0 else [element['name'] for element in node]
         self.used += texts
         names = [walk.text(text) for text in texts]
-        if step.key in names:
+        given = names.count(str(step.key))
+        if given == 1:
             return names.index(str(step.key))
+        if given:
+            self.missing = f'{step.key!r} stands {given} times in {step.names or "name"}: ambiguous, none is taken'
+            return -1
         close = difflib.get_close_matches(str(step.key), names, n=1)
         hint = f'; did you mean {printable(close[0])}?' if close else ''
         shown = ', '.join(printable(name) for name in names[:_SHOWN]) or 'none'

@@ -15,6 +15,7 @@ from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import DECODERS
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.documents import NotJsonError, parse_json
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum, one_correction
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
@@ -128,7 +129,11 @@ class _RunCollector:
     def _take(self, message: BagMessage) -> None:
         topic, topics, held = message.topic, self._topics, self._held
         record = DECODERS[message.type_name](message.data)
-        if topic == topics.velocity:
+        if topic == topics.configuration:
+            with suppress(NotJsonError):  # such a text is shown as it is
+                parse_json(record, 'configuration')
+            self._configurations.append((message.log_time, len(self.stamps), record))
+        elif topic == topics.velocity:
             self._take_velocity(record)
         elif topic == topics.pressure:
             held['pressure_a'], held['pressure_b'] = record.chamber_a, record.chamber_b
@@ -138,16 +143,17 @@ class _RunCollector:
             held['position'] = record.position
         elif topic == topics.reference:
             held['reference'] = record.position
-        elif topic == topics.estimate:
+        else:
+            self._take_answer(topic, record)
+
+    def _take_answer(self, topic: str, record: Any) -> None:
+        if topic == self._topics.estimate:
             self.stamps.append(record.stamp)
             inputs = self._pending.pop(record.stamp, (math.nan,) * len(_INPUTS))
             for column, number in zip(self._columns, (*inputs, *record[1:], math.nan, math.nan), strict=True):
                 column.append(number)
-        elif topic in (topics.feedforward, self.acted):
-            if self.stamps and self.stamps[-1] == record.stamp:
-                self._columns[-1 if topic == self.acted else -2][-1] = record.force
-        else:
-            self._configurations.append((message.log_time, len(self.stamps), record))
+        elif topic in (self._topics.feedforward, self.acted) and self.stamps and self.stamps[-1] == record.stamp:
+            self._columns[-1 if topic == self.acted else -2][-1] = record.force
 
     def _take_velocity(self, sample: Velocity) -> None:
         self._held['velocity'] = sample.velocity

@@ -36,6 +36,7 @@ from seal_friction_ros.offline.commands import (
     tune,
 )
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.work.interrupt import take_interrupts
 from seal_friction_ros.offline.work.outcome import THREAD_VARIABLES, error_text
 from seal_friction_ros.offline.work.status import as_typed, show_status
 from seal_friction_ros.packages import as_missing, needed
@@ -122,6 +123,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run_and_exit() -> None:
     """Entry point; a reader that closes the pipe early is no error."""
+    take_interrupts()
     keep_compiled_code()
     try:
         code = main()

@@ -25,6 +25,8 @@ def add_parser(commands: Any) -> None:
         '--allow-changes', action='store_true', help='let the page set scale, lead time and limit, and switch off'
     )
     parser.add_argument('--port', type=int, default=0, metavar='N', help='port on 127.0.0.1; default: any free one')
+    help_text = 'keep the token of the address in this file, for the next start; default: a new one each time'
+    parser.add_argument('--token-file', type=Path, metavar='FILE', help=help_text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -40,6 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     if find_spec('rclpy') is None:
         raise ValueError('monitor without a bag needs ROS 2: run make setup, or source a distribution')
     options = [option for option, given in _OPTIONS.items() if getattr(arguments, given)]
+    options += ['--token-file', str(arguments.token_file)] if arguments.token_file else []
     command = [sys.executable, '-m', _NODE, '--port', str(arguments.port), *options]
     return os.execv(sys.executable, command)  # noqa: S606  nothing of the command is from a stranger
 
@@ -51,8 +54,10 @@ _OPTIONS = {'--allow-changes': 'allow_changes', '--json': 'json'}
 def _show_bag(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.monitor.recorded_view import RecordedView
     from seal_friction_ros.offline.monitor.server import MonitorServer
+    from seal_friction_ros.offline.monitor.token_file import kept_token
 
-    server = MonitorServer(RecordedView(arguments.bag), arguments.port)
+    token = kept_token(arguments.token_file) if arguments.token_file else ''
+    server = MonitorServer(RecordedView(arguments.bag), arguments.port, token)
     print(server.told(as_json=arguments.json), flush=True)
     try:
         server.serve_forever(poll_interval=0.2)

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.records import (
     NEVER,
@@ -36,6 +36,7 @@ OFF = 'off'  # mode of the adaptation
 PAIRED = 0.03  # [s] our choice, as reference_timeout: longest time between the stamps of a reference and a position
 RECENT = 0.5  # [s] our choice: a lamp stays lit for this time
 TOO_OLD = 0.5  # [s] our choice: an estimate or an input without a message for this time is called missing
+GONE = 2.5  # [s] our choice: a node of which nothing comes for so long is gone; its diagnostics come every second
 _MOST_FRAME = 80  # characters of a frame name that are shown
 
 COLUMNS = (
@@ -57,7 +58,7 @@ COLUMNS = (
     'status',  # bits of every estimate since the row before
     'limited',  # bits of every feed-forward since the row before
 )
-"""Numbers of a row; None where there is none."""
+"""Numbers of a row; None where none came since the row before: a curve ends where its data end."""
 Row = tuple[Any, ...]
 
 INPUT_NAMES: dict[type, str] = {
@@ -119,6 +120,11 @@ USUAL = Status.MOTION_UNCERTAIN | Status.SLOWER_THAN_IDENTIFIED | Status.PRESLID
 """Bits that every reversal has."""
 
 
+def serious_words(status: int) -> list[str]:
+    """What the bits of a status mean that not every reversal has."""
+    return [words for bit, words in STATUS_WORDS.items() if status & bit and not USUAL & bit]
+
+
 class Known(NamedTuple):
     """What the configuration tells of an actuator."""
 
@@ -130,6 +136,7 @@ class Known(NamedTuple):
     pressure_high: float = math.inf  # [Pa]
     adaptation: str = OFF
     correction: ForceSumCorrection = NO_CORRECTION
+    has_placeholder: bool = False
 
 
 UNKNOWN_CONFIGURATION = Known()
@@ -167,6 +174,7 @@ def known_of(configuration: Configuration) -> Known:
         min(seal.pressure_max for seal in seals),
         configuration.adaptation.mode,
         estimator.force_sum_correction,
+        configuration.has_placeholder,
     )
 
 
@@ -187,7 +195,7 @@ def next_interval(held: Held) -> Held:
     return held._replace(status=held.estimate.status, limited=newest.limited if newest else 0)
 
 
-def row(known: Known, held: Held, time: float) -> Row:
+def row(known: Known, held: Held, time: float, since: int = -1) -> Row:
     """Numbers of one moment.
 
     The band is that of the next reading while the rod slides: friction force plus and minus `BAND` standard deviations.
@@ -196,11 +204,14 @@ def row(known: Known, held: Held, time: float) -> Row:
         known: Configuration of the actuator.
         held: Newest records.
         time: [s] on the axis of the view.
+        since: [ns] of the row before: what was received until then is in no row again.
     """
-    records, estimate = held.records, held.estimate
-    pressure, feedforward = records.get(Pressure), records.get(FeedForward)
+    estimate = held.estimate
+    new = {kind: record for kind, record in held.records.items() if held.receipts[kind] > since}
+    pressure, feedforward = new.get(Pressure), new.get(FeedForward)
+    source, measured = measured_friction(known, held)
     friction = low = high = scale = spread = residual = None
-    if estimate.stamp != NEVER:
+    if FrictionEstimate in new and estimate.stamp != NEVER:
         friction = estimate.friction_force
         if estimate.state == FrictionState.SLIDING:
             half = BAND * estimate.coulomb_friction_std
@@ -208,14 +219,14 @@ def row(known: Known, held: Held, time: float) -> Row:
         if known.adaptation != OFF:
             scale, spread, residual = estimate.adaptation_scale, BAND * estimate.adaptation_scale_std, estimate.residual
     values = (
-        measured_friction(known, held),
+        measured if source in new else None,
         friction,
         low,
         high,
         None if feedforward is None else feedforward.force,
-        known.force_limit,
-        -known.force_limit,
-        tracking_error(held),
+        None if feedforward is None else known.force_limit,
+        None if feedforward is None else -known.force_limit,
+        tracking_error(held) if Position in new else None,
         None if pressure is None else pressure.chamber_a / BAR,
         None if pressure is None else pressure.chamber_b / BAR,
         scale,
@@ -249,8 +260,10 @@ def tracking_error(held: Held) -> float | None:
     return float(reference.position + velocity * apart - position.position) / MICROMETRE
 
 
-def measured_friction(known: Known, held: Held) -> float | None:
+def measured_friction(known: Known, held: Held) -> tuple[type, float | None]:
     """Friction [N] that the measurements show: the force sum, which is the friction while the speed is even.
+
+    With it the record that it is of.
 
     Once adaptation has learnt a scale, inertia and offset are known while the rod slides: the friction is estimate plus
     residual. Before, the offset would hide what the law misses.
@@ -258,13 +271,13 @@ def measured_friction(known: Known, held: Held) -> float | None:
     estimate, force = held.estimate, held.records.get(Force)
     has_learnt = known.adaptation != OFF and estimate.adaptation_scale != 1.0
     if has_learnt and estimate.state == FrictionState.SLIDING and estimate.residual != 0.0:
-        return estimate.friction_force + estimate.residual
+        return FrictionEstimate, estimate.friction_force + estimate.residual
     if force is None:
-        return None
+        return Force, None
     pressure = held.records.get(Pressure)
     if known.correction == NO_CORRECTION or pressure is None:
-        return float(force.force)
-    return float(corrected_force_sum(known.correction, force.force, pressure.chamber_a, pressure.chamber_b))
+        return Force, float(force.force)
+    return Force, float(corrected_force_sum(known.correction, force.force, pressure.chamber_a, pressure.chamber_b))
 
 
 class Said(NamedTuple):
@@ -275,6 +288,8 @@ class Said(NamedTuple):
 
 
 WARN = 1
+INACTIVE = 'inactive'
+"""message of a node that is not to estimate"""
 NOTHING_SAID = Said(0, '')
 
 
@@ -296,7 +311,24 @@ def recent_bits(rows: Iterable[Row], until: float) -> Bits:
     return Bits(status, limited)
 
 
-def situation(known: Known, held: Held, bits: Bits, now: int, said: Said = NOTHING_SAID) -> dict[str, Any]:
+class Presence(NamedTuple):
+    """Whether a node is there."""
+
+    heard: int = 0  # [ns] when anything came from it
+    has_left: bool = False  # the graph
+
+    def is_gone(self, now: int) -> bool:
+        """Whether it has left the graph, or nothing came for `GONE`."""
+        return self.has_left or self.silence(now) > GONE
+
+    def silence(self, now: int) -> float:
+        """Time since anything came from it [s]."""
+        return (now - self.heard) * 1e-9
+
+
+def situation(
+    known: Known, held: Held, bits: Bits, now: int, said: Said = NOTHING_SAID, presence: Presence | None = None
+) -> dict[str, Any]:
     """The situation in words and numbers, ready for JSON.
 
     Args:
@@ -305,23 +337,22 @@ def situation(known: Known, held: Held, bits: Bits, now: int, said: Said = NOTHI
         bits: Of the last answers.
         now: [ns] on the clock of receipt.
         said: What the diagnostics of the node say of the actuator.
+        presence: Whether the node is there; None: not known, in a bag.
     """
     estimate, feedforward = held.estimate, held.records.get(FeedForward)
-    verdict, reason = _verdict(held, bits.status, now, said)
+    cause, why = _cause(held, now, said, presence)
+    verdict, reason = ('bad', why) if cause else _verdict(known, held, bits.status, now, said)
     frame = getattr(held.records.get(Velocity), 'frame_id', b'')
     return {
         'verdict': verdict,
         'reason': reason,
+        'cause': cause,
         'state': STATE_WORDS.get((FrictionState(estimate.state), estimate.direction), 'unknown'),
-        'faults': [
-            words + (' (usual at a reversal)' if USUAL & bit else '')
-            for bit, words in STATUS_WORDS.items()
-            if bits.status & bit
-        ],
+        'faults': [why] if cause else _faults(bits.status),
         'friction': finite(estimate.friction_force),
         'coulomb': finite(estimate.coulomb_friction),
         'band': finite(BAND * estimate.coulomb_friction_std),
-        'measured': finite(measured_friction(known, held)),
+        'measured': finite(measured_friction(known, held)[1]),
         'breakaway': finite(estimate.breakaway_force),
         'feedforward': None if feedforward is None else finite(feedforward.force),
         'lamps': {bit.name: bool(bits.limited & bit) for bit in Limited},
@@ -329,6 +360,8 @@ def situation(known: Known, held: Held, bits: Bits, now: int, said: Said = NOTHI
             name: _age(held, kind, now) for kind, name in INPUT_NAMES.items() if kind in held.records or kind in NEEDED
         },
         'answer_age': _age(held, FrictionEstimate, now),
+        'feedforward_age': _age(held, FeedForward, now),
+        'error_age': _age(held, Position, now),
         'frame': frame.decode(errors='replace')[:_MOST_FRAME],
         'adaptation': known.adaptation,
         'adaptation_scale': finite(estimate.adaptation_scale),
@@ -345,23 +378,48 @@ def situation(known: Known, held: Held, bits: Bits, now: int, said: Said = NOTHI
     }
 
 
+def _faults(status: int) -> list[str]:
+    """What the bits of a status mean."""
+    usual = ' (usual at a reversal)'
+    return [words + (usual if USUAL & bit else '') for bit, words in STATUS_WORDS.items() if status & bit]
+
+
 def _age(held: Held, kind: type, now: int) -> float | None:
     """Time since the last record of a kind [s]; None if there was none."""
     received = held.receipts.get(kind)
     return None if received is None else round(max(now - received, 0) * 1e-9, 3)
 
 
-def _verdict(held: Held, status: int, now: int, said: Said) -> tuple[str, str]:
-    """good, look or bad, and why."""
+def _cause(held: Held, now: int, said: Said, presence: Presence | None) -> tuple[str, str]:
+    """Why there is no estimate: ``node`` or ``inputs`` that are gone, or only that there is no ``estimate``; in words.
+
+    Both are empty while there is one. Inputs come by the node, too: it has to be heard after its last estimate, before
+    they can be told to be gone.
+    """
     age = _age(held, FrictionEstimate, now)
-    if age is None:
-        missing = [INPUT_NAMES[kind] for kind in NEEDED if kind not in held.records]
-        return 'bad', 'no estimate yet' + (f': no {" and no ".join(missing)} came' if missing else '')
-    if age > TOO_OLD:
-        return 'bad', f'no estimate for {age:.1f} s: everything shown is old'
+    if age is not None and age <= TOO_OLD:
+        return '', ''
+    since = 'no estimate yet' if age is None else f'no estimate for {age:.1f} s'
+    if presence is not None and presence.is_gone(now):
+        how = 'it has left the graph' if presence.has_left else f'nothing from it for {presence.silence(now):.1f} s'
+        return 'node', f'the node is gone or stopped: {how}; what is shown is old'
+    if said.message == INACTIVE:
+        return 'estimate', f'{since}: the node is inactive'
+    kinds = [kind for kind in INPUT_NAMES if kind in NEEDED or (kind in held.records and kind is not Temperature)]
+    seen = {kind: _age(held, kind, now) for kind in kinds}
+    missing = [INPUT_NAMES[kind] for kind, old in seen.items() if old is None or old > TOO_OLD]
+    is_heard = presence is None or age is None or (presence.heard - held.receipts[FrictionEstimate]) * 1e-9 > TOO_OLD
+    if missing and is_heard:
+        there = '' if presence is None else '; the node is there'
+        return 'inputs', f'{since}: no {", no ".join(missing)}{there}'
+    return 'estimate', since + ('' if age is None else ': what is shown is old')
+
+
+def _verdict(known: Known, held: Held, status: int, now: int, said: Said) -> tuple[str, str]:
+    """good, look or bad, and why, while there is an estimate."""
     if said.level > WARN:
         return 'bad', f'the node says: {said.message}'
-    serious = [words for bit, words in STATUS_WORDS.items() if status & bit and not USUAL & bit]
+    serious = serious_words(status)
     if serious:
         return 'look', serious[0] + (f', and {len(serious) - 1} more' if serious[1:] else '')
     old = [
@@ -373,4 +431,6 @@ def _verdict(held: Held, status: int, now: int, said: Said) -> tuple[str, str]:
         return 'look', f'no {", no ".join(old)}'
     if said.level == WARN:
         return 'look', f'the node says: {said.message}'
+    if known.has_placeholder:
+        return 'look', PLACEHOLDER_WARNING
     return 'good', 'estimating, no fault'

@@ -2,11 +2,12 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, Row, next_interval, recent_bits, row, situation
 from seal_friction_ros.offline.monitor.node_view import NodeView
+from seal_friction_ros.offline.monitor.off_latch import Answer, OffLatch, Scale
 
 RATE = 100.0  # [Hz] of the rows: 20 points of a motion at 5 Hz, 5 new ones a frame (our choice)
 KEPT = 30.0  # [s] of rows that are kept
@@ -15,18 +16,11 @@ CHANGEABLE = {'scale': '1', 'lead_time': 's', 'force_limit': 'N'}
 
 Wanted = dict[str, dict[str, float]]
 """Name of a node -> values by ROS name of the parameter."""
-Change = Callable[[Wanted], 'list[Answer]']
+Change = Callable[[Wanted], list[Answer]]
 """Sets parameters, of each node all or none, of all nodes at once; one answer a node."""
 
 
-class Answer(NamedTuple):
-    """What came of a change of parameters."""
-
-    confirmed: bool  # whether the node said yes and reads back what was asked for
-    text: str  # for a person
-
-
-def no_changes(wanted: Wanted) -> list[Answer]:
+def no_changes(wanted: Iterable[str]) -> list[Answer]:
     """`Change` of a view that only reads."""
     return [Answer(False, f'{node}: read only: start the monitor with --allow-changes') for node in wanted]
 
@@ -44,6 +38,7 @@ class LiveView:
         self._change = change
         self._nodes: dict[str, NodeView] = {}
         self._rows: dict[tuple[str, str], deque[Row]] = {}
+        self._latch = OffLatch()
         self._lock = threading.Lock()
 
     @property
@@ -59,19 +54,43 @@ class LiveView:
     def sample(self, now: int) -> None:
         """Add a row of every actuator at ``now`` [ns]."""
         with self._lock:
-            self._now = now
+            before, self._now = self._now, now
             time = (now - self._start) * 1e-9
             for view in self._nodes.values():
                 for actuator, known in view.known.items():
                     rows = self._rows.setdefault((view.node, actuator), deque(maxlen=round(KEPT * RATE)))
-                    rows.append(row(known, view.held[actuator], time))
+                    rows.append(row(known, view.held[actuator], time, before))
                     view.held[actuator] = next_interval(view.held[actuator])
+
+    # --- OFF ---
+
+    def still_on(self) -> Wanted:
+        """Scales that have to be set to 0 now, while OFF is latched; they count as asked for."""
+        with self._lock:
+            return self._latch.wanted(self._scales(), self._now)
+
+    def answered(self, node: str, answer: Answer) -> None:
+        """Take what came of setting the scales of a node to 0, in time or late."""
+        with self._lock:
+            starts = self._nodes[node].starts if node in self._nodes else 0
+            self._latch.answered(node, answer, starts, self._now)
+
+    def _scales(self) -> list[Scale]:
+        return [one for view in self._nodes.values() for one in view.scales(self._now)]
+
+    def _unread(self) -> dict[str, str]:
+        """Nodes whose configuration is not known, and why."""
+        return {name: view.refused for name, view in self._nodes.items() if not view.known}
+
+    def _off_document(self) -> dict[str, Any] | None:
+        return self._latch.document(self._scales(), self._unread(), self._now)
 
     # --- for the page ---
 
     def describe(self) -> dict[str, Any]:
-        """What does not change from frame to frame."""
-        return {'mode': 'live', 'name': '', 'columns': COLUMNS, 'can_change': self._change is not None}
+        """What does not change from frame to frame; ``start`` tells one monitor from another."""
+        about = {'mode': 'live', 'name': '', 'columns': COLUMNS, 'can_change': self._change is not None}
+        return {**about, 'start': str(self._start), 'period': 1.0 / RATE}
 
     def view(self, label: str, since: float, until: float | None = None) -> dict[str, Any]:
         """Rows of an actuator after ``since`` [s], and the situation of all.
@@ -84,8 +103,9 @@ class LiveView:
         del until
         with self._lock:
             found = {view.label(name): (view, name) for view in self._nodes.values() for name in view.known}
+            off, unread = self._off_document(), self._unread()
             if not found:
-                return {'label': '', 'rows': [], 'actuators': [], 'diagnostics': [], 'nodes': list(self._nodes)}
+                return {'label': '', 'rows': [], 'actuators': [], 'diagnostics': [], 'nodes': unread, 'off': off}
             label = label if label in found else next(iter(found))
             shown, actuator = found[label]
             every = {name: self._situation(view, key) for name, (view, key) in found.items()}
@@ -97,6 +117,8 @@ class LiveView:
             'rows': rows,
             'now': every[label],
             'node': shown.node,
+            'nodes': unread,
+            'off': off,
             'actuators': [
                 {'label': name, 'verdict': one['verdict'], 'feedforward': one['feedforward']}
                 for name, one in every.items()
@@ -107,7 +129,8 @@ class LiveView:
     def _situation(self, view: NodeView, actuator: str) -> dict[str, Any]:
         rows, time = self._rows.get((view.node, actuator), ()), (self._now - self._start) * 1e-9
         bits = recent_bits(reversed(rows), time)
-        return situation(view.known[actuator], view.held[actuator], bits, self._now, view.said(actuator))
+        known, held = view.known[actuator], view.held[actuator]
+        return situation(known, held, bits, self._now, view.said(actuator), view.presence)
 
     def change(self, label: str, parameter: str, value: float) -> list[Answer]:
         """Set a parameter of the feed-forward of one actuator.
@@ -122,17 +145,32 @@ class LiveView:
         if label not in found:
             raise ValueError(f'no actuator {label!r}')
         view, actuator = found[label]
+        if self._latch.since is not None and parameter == 'scale' and value > 0.0:
+            return [Answer(False, f'REJECTED: {label} is OFF: lift OFF first')]
         return (self._change or no_changes)({view.node: {view.parameter(actuator, parameter): value}})
 
     def off(self) -> list[Answer]:
-        """Set the scale of every feed-forward to 0; one answer a node."""
+        """Latch OFF and set the scale of every feed-forward to 0; one answer an actuator, failures first."""
         with self._lock:
-            wanted: Wanted = {
-                view.node: {view.parameter(name, 'scale'): 0.0 for name in view.known} for view in self._nodes.values()
-            }
-        if not wanted:
-            return [Answer(False, 'NOT OFF: no estimator is known')]
-        return (self._change or no_changes)(wanted)
+            nodes = [view for view in self._nodes.values() if view.known]
+            wanted: Wanted = {view.node: {view.parameter(name, 'scale'): 0.0 for name in view.known} for view in nodes}
+            if self._change is not None:
+                self._latch.press(list(wanted), self._now)
+        if self._change is None:
+            return no_changes(wanted) or [Answer(False, 'NOT OFF: no estimator is known')]
+        for node, answer in zip(wanted, self._change(wanted), strict=True):
+            self.answered(node, answer)
+        with self._lock:
+            state = self._off_document()
+        return [Answer(kind == 'yes', text) for kind, text in (state or {'lines': []})['lines']]
+
+    def lift(self) -> list[Answer]:
+        """End OFF: scales may be set again, none is."""
+        if self._change is None:
+            return no_changes(self._nodes)
+        with self._lock:
+            self._latch.lift()
+        return [Answer(True, 'OFF is lifted: every scale stays as it is until somebody sets it')]
 
 
 def newer(rows: Any, since: float) -> list[Row]:

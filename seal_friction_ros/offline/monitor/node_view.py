@@ -20,10 +20,12 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     UNKNOWN_CONFIGURATION,
     Held,
     Known,
+    Presence,
     Said,
     known_of,
     take,
 )
+from seal_friction_ros.offline.monitor.off_latch import Scale
 
 DefinitionsOf = Callable[[Iterable[str]], Mapping[str, Definition]]
 """Definition of each message type."""
@@ -47,6 +49,11 @@ class NodeView:
         """newest status of each part: level, message, values"""
         self.malformed = 0
         """messages that could not be read"""
+        self.refused = ''
+        """why the newest configuration could not be read; empty if it could"""
+        self.starts = 1
+        """times that the node began, as far as is known"""
+        self.presence = Presence()
         self._definitions_of = definitions_of
         self._machine: Machine | None = None
         self._memories: list[Memory] = []
@@ -92,6 +99,19 @@ class NodeView:
         else:
             self._machine, self.known = None, {'': known_of(parse_snapshot(text).configuration)}
         self.held = {name: self.held.get(name, NOTHING_HELD) for name in self.known}
+        self.refused = ''
+
+    def hear(self, received: int) -> None:
+        """Know that the node was there at ``received`` [ns]."""
+        self.presence = Presence(received)
+
+    def scales(self, now: int) -> list[Scale]:
+        """What is known of the scale of each actuator at ``now`` [ns]."""
+        is_gone = self.presence.is_gone(now)
+        return [
+            Scale(self.node, self.label(name), self.parameter(name, 'scale'), known.scale, self.starts, is_gone)
+            for name, known in self.known.items()
+        ]
 
     def without_configuration(self) -> None:
         """Show the answers of an estimator whose configuration is not known."""
@@ -100,6 +120,7 @@ class NodeView:
 
     def take_newest(self, data: bytes, received: int) -> None:
         """Take the newest messages of the estimator, received at ``received`` [ns]."""
+        self.hear(received)
         try:
             newest = decode_newest(data)
         except ValueError:
@@ -112,8 +133,10 @@ class NodeView:
         """Take one message, received at ``received`` [ns]; one that cannot be read is counted."""
         try:
             self._take(topic, type_name, data, received)
-        except (ValueError, LookupError):
+        except (ValueError, LookupError) as error:
             self.malformed += 1
+            if type_name == CONFIGURATION_TYPE:
+                self.refused = str(error)
 
     def _take(self, topic: str, type_name: str, data: bytes, received: int) -> None:
         if type_name == CONFIGURATION_TYPE:

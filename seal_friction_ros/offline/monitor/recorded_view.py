@@ -13,21 +13,26 @@ from seal_friction_ros.offline.bags.definitions import read_definitions
 from seal_friction_ros.offline.bags.topics import RECORDED
 from seal_friction_ros.offline.monitor.actuator_view import (
     COLUMNS,
+    RECENT,
+    TOO_OLD,
     Held,
     Known,
     Row,
     next_interval,
     recent_bits,
     row,
+    serious_words,
     situation,
 )
-from seal_friction_ros.offline.monitor.live_view import CHANGEABLE, RATE, Answer
+from seal_friction_ros.offline.monitor.live_view import CHANGEABLE, RATE
 from seal_friction_ros.offline.monitor.node_view import NodeView
+from seal_friction_ros.offline.monitor.off_latch import Answer
 from seal_friction_ros.offline.work.progress import progress
 
 MOST_ROWS = 120_000  # of an actuator, 20 minutes at full pace; a longer bag has rows further apart (our choice)
 _ROWS_A_MOMENT = 10  # rows from one moment whose words are kept to the next
 _MOST_ROWS_AT_ONCE = 12_000  # in one answer to the page
+_MOST_MARKS = 200  # on the slider
 _CONFIGURATION = '/configuration'
 
 
@@ -43,17 +48,44 @@ class _Track:
         self.rows = array('d')  # flat, NaN for None
         self.moments: list[tuple[Known, Held]] = []
 
-    def add(self, known: Known, held: Held, time: float) -> None:
-        """Add a row, and after some of them a moment."""
+    def add(self, known: Known, held: Held, time: float, since: int) -> None:
+        """Add a row, and after some of them a moment; arguments as of `row`."""
         if len(self.rows) // len(COLUMNS) % _ROWS_A_MOMENT == 0:
             self.moments.append((known, held))
-        self.rows.extend(math.nan if value is None else value for value in row(known, held, time))
+        self.rows.extend(math.nan if value is None else value for value in row(known, held, time, since))
 
     def slice(self, first: int, last: int) -> list[Row]:
         """Rows ``first`` to ``last``."""
         width = len(COLUMNS)
         flat = self.rows[max(first - self._start, 0) * width : max(last + 1 - self._start, 0) * width]
         return [_as_row(flat[i : i + width]) for i in range(0, len(flat), width)]
+
+    @property
+    def first(self) -> float:
+        """Time of the first estimate [s]; infinite without one."""
+        width, estimate = len(COLUMNS), COLUMNS.index('estimate')
+        places = (i for i in range(0, len(self.rows), width) if not math.isnan(self.rows[i + estimate]))
+        return next((self.rows[i] for i in places), math.inf)
+
+    def faults(self, gap: float) -> list[tuple[float, float, str]]:
+        """Begin and end [s] of each stretch with a fault or without estimates, and its words.
+
+        Args:
+            gap: Longest time from one fault to the next in a stretch [s].
+        """
+        found: list[tuple[float, float, dict[str, None]]] = []
+        width, estimate, status = len(COLUMNS), COLUMNS.index('estimate'), COLUMNS.index('status')
+        newest = math.nan
+        for i in range(0, len(self.rows), width):
+            time = self.rows[i]
+            newest = newest if math.isnan(self.rows[i + estimate]) else time
+            words = ['no estimate'] if time - newest > TOO_OLD else serious_words(int(self.rows[i + status]))
+            if not words:
+                continue
+            is_next = bool(found) and time - found[-1][1] <= gap
+            begin, said = (found[-1][0], found.pop()[2]) if is_next else (time, {})
+            found.append((begin, time, said | dict.fromkeys(words)))
+        return [(begin, end, '; '.join(said)) for begin, end, said in found]
 
     def moment(self, number: int) -> tuple[int, Known, Held]:
         """The last moment that is kept up to a row: number of its row, configuration, records."""
@@ -91,7 +123,8 @@ class RecordedView:
         self._period = max(1.0 / RATE, self._duration / MOST_ROWS)
         self._fill(bag, known, total)
         if not self._tracks:
-            raise BagError(f'{bag}: the configuration of the estimator in it cannot be read')
+            reason = next((view.refused for view, _ in self._nodes if view.refused), 'there is none')
+            raise BagError(f'{bag}: the configuration of the estimator in it cannot be read: {reason}')
 
     def _fill(self, bag: Path, known: dict[str, TopicInfo], total: int) -> None:
         step = round(self._period * 1e9)
@@ -121,15 +154,22 @@ class RecordedView:
         for view, _ in self._nodes:
             for actuator, known in view.known.items():
                 track = self._tracks.setdefault(view.label(actuator), _Track(number))
-                track.add(known, view.held[actuator], time)
+                track.add(known, view.held[actuator], time, now - round(self._period * 1e9))
                 view.held[actuator] = next_interval(view.held[actuator])
 
     # --- for the page ---
 
     def describe(self) -> dict[str, Any]:
         """What does not change."""
-        about = {'mode': 'bag', 'name': self._name, 'columns': COLUMNS, 'can_change': False}
-        return {**about, 'duration': round(self._duration, 3)}
+        about = {'mode': 'bag', 'name': self._name, 'columns': COLUMNS, 'can_change': False, 'start': str(self._first)}
+        gap = max(RECENT, 2.0 * self._period, self._duration / _MOST_MARKS)
+        return {
+            **about,
+            'duration': round(self._duration, 3),
+            'period': self._period,
+            'first': min(*(track.first for track in self._tracks.values()), self._duration),
+            'faults': {label: track.faults(gap) for label, track in self._tracks.items()},
+        }
 
     def view(self, label: str, since: float, until: float | None = None) -> dict[str, Any]:
         """Rows of an actuator in ``since`` to ``until`` [s], and the situation of all at ``until``."""
@@ -171,6 +211,10 @@ class RecordedView:
     def off(self) -> list[Answer]:
         """Nothing in a bag can be switched off."""
         return [Answer(False, 'this is a recording: nothing is switched off')]
+
+    def lift(self) -> list[Answer]:
+        """Nothing in a bag is switched off."""
+        return self.off()
 
 
 def _span(bag: Path) -> tuple[int, int]:

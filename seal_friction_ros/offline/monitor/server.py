@@ -7,7 +7,7 @@ that rebinds its name is refused. Its Origin, where it has one, has to be this p
 
 import hmac
 import json
-import secrets
+import re
 import socket
 import threading
 import time
@@ -17,11 +17,13 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
-from seal_friction_ros.offline.monitor.live_view import Answer
+from seal_friction_ros.core.foundation.documents import parse_json
+from seal_friction_ros.offline.monitor.off_latch import Answer
 from seal_friction_ros.offline.monitor.page import make_page
+from seal_friction_ros.offline.monitor.token_file import new_token
 
 ADDRESS = '127.0.0.1'
-HOSTS = ('127.0.0.1', 'localhost')
+HOST = re.compile(r'(127\.0\.0\.1|localhost)(:\d{1,5})?', re.ASCII)
 """Names of this machine; the port may be another one, at the near end of a tunnel."""
 FRAME_PERIOD = 0.05  # [s] 20 frames a second
 MOST_STREAMS = 5  # browser windows at a time; a browser opens no more than six connections to a server
@@ -42,7 +44,10 @@ class View(Protocol):
         """Set a parameter."""
 
     def off(self) -> list[Answer]:
-        """Switch every feed-forward off."""
+        """Switch every feed-forward off, and keep it so."""
+
+    def lift(self) -> list[Answer]:
+        """End OFF."""
 
 
 class RefusalError(Exception):
@@ -59,17 +64,17 @@ class MonitorServer(ThreadingHTTPServer):
     Args:
         view: What to show.
         port: Port; 0: any free one.
+        token: That every request needs; empty: a new one.
 
     Raises:
         ValueError: The port is in use.
     """
 
     daemon_threads = True
-    allow_reuse_address = True
 
-    def __init__(self, view: View, port: int = 0) -> None:
+    def __init__(self, view: View, port: int = 0, token: str = '') -> None:
         self.shown = view
-        self.token = secrets.token_urlsafe(24)
+        self.token = token or new_token()
         self.page, self.policy = make_page()
         self.streams = threading.BoundedSemaphore(MOST_STREAMS)
         self.stopping = threading.Event()
@@ -93,6 +98,7 @@ class MonitorServer(ThreadingHTTPServer):
 
     def server_bind(self) -> None:
         """Bind without looking up the name of the machine, which may ask a name server."""
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # while a page of the last start is open
         self.socket.bind(self.server_address)
         self.server_address = self.socket.getsockname()
         self.server_name, self.server_port = ADDRESS, int(self.server_address[1])
@@ -121,7 +127,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer({'/': self._page, '/describe': self._describe, '/view': self._view, '/stream': self._stream})
 
     def do_POST(self) -> None:
-        self._answer({'/change': self._change, '/off': self._off})
+        self._answer({'/change': self._change, '/off': self._off, '/lift': self._lift})
 
     def _answer(self, routes: dict[str, Callable[[dict[str, str]], None]]) -> None:
         parts = urlsplit(self.path)
@@ -137,8 +143,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _check(self, query: dict[str, str]) -> None:
         """Refuse a request from another page, under another name, or without the token."""
-        host = self.headers.get('Host', '')
-        if urlsplit(f'//{host}').hostname not in HOSTS:
+        hosts = self.headers.get_all('Host', [])
+        host = hosts[0] if len(hosts) == 1 else ''
+        if not HOST.fullmatch(host):
             raise RefusalError(HTTPStatus.FORBIDDEN, 'Host is not this machine')
         origins = self.headers.get_all('Origin', [])
         if any(origin != f'http://{host}' for origin in origins):
@@ -202,6 +209,10 @@ class _Handler(BaseHTTPRequestHandler):
         self._body()
         self._send_json([answer._asdict() for answer in self.server.shown.off()])
 
+    def _lift(self, _query: dict[str, str]) -> None:
+        self._body()
+        self._send_json([answer._asdict() for answer in self.server.shown.lift()])
+
     # --- HTTP ---
 
     def _body(self) -> dict[str, Any]:
@@ -212,9 +223,9 @@ class _Handler(BaseHTTPRequestHandler):
         if self.headers.get_content_type() != 'application/json':
             raise RefusalError(HTTPStatus.BAD_REQUEST, 'not application/json')
         try:
-            document = json.loads(self.rfile.read(int(length)))
-        except (ValueError, RecursionError):
-            raise RefusalError(HTTPStatus.BAD_REQUEST, 'not JSON') from None
+            document = parse_json(self.rfile.read(int(length)), 'request')
+        except ValueError as error:
+            raise RefusalError(HTTPStatus.BAD_REQUEST, str(error)) from None
         if not isinstance(document, dict):
             raise RefusalError(HTTPStatus.BAD_REQUEST, 'not a JSON object')
         return document

@@ -10,6 +10,7 @@ import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
@@ -98,7 +99,7 @@ def mounted_seals(run: RecordedRun) -> list[str]:
     """Names of the seals of the first configuration; none if it is unknown."""
     for _, text in run.configurations[:1]:
         try:
-            return [Path(str(name)).stem for name in json.loads(text)['selection']['seals']]
+            return [Path(str(name)).stem for name in parse_json(text, 'configuration')['selection']['seals']]
         except (ValueError, LookupError, TypeError):
             return []
     return []
@@ -216,7 +217,7 @@ def _shown_configurations(run: RecordedRun) -> Iterator[_ShownConfiguration]:
         shown = (*shown[:_SHOWN_CONFIGURATIONS], *shown[-_SHOWN_CONFIGURATIONS:])
     for time, text in shown:
         try:
-            document = json.loads(text)
+            document = parse_json(text, 'configuration')
             settings, selection = dict(document['settings']), dict(document['selection'])
             mounted = list(zip(selection['seals'], selection['seal_chambers'], strict=True))
             seals = [json.dumps(seal, indent=2, ensure_ascii=False) for seal in document['seal_documents']]

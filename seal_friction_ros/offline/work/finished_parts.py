@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.executor import Workers, nothing, run_all, try_all
 from seal_friction_ros.offline.work.outcome import CRASHED, Outcome
@@ -174,7 +175,7 @@ def _read(kept: Kept, part: Part) -> Outcome[Values] | None:
     if kept.folder is None:
         return None
     try:
-        found = json.loads((kept.folder / f'{part.key}.json').read_text(encoding='utf-8'))
+        found = parse_json((kept.folder / f'{part.key}.json').read_text(encoding='utf-8'), part.key)
     except (OSError, ValueError):
         return None
     if not isinstance(found, dict):

@@ -8,10 +8,11 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
-from itertools import pairwise
+from itertools import cycle, pairwise
 
 import numpy as np
 import pytest
+from harness.compensation import COMPENSATING, compensating
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -57,10 +58,10 @@ from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.temperature import TemperatureScale
-from seal_friction_ros.files import default_configuration, read_yaml
+from seal_friction_ros.files import read_yaml
 
 SEALS = {path.stem: parse_seal(read_yaml(path)) for path in sorted((ROOT / 'config' / 'seals').glob('*.yaml'))}
-DEFAULT = default_configuration().parameters()
+DEFAULT = compensating().parameters()
 MS = 1_000_000  # [ns]
 
 
@@ -112,11 +113,11 @@ MOUNTED_ON = {'from_elsewhere': 'difference', 'constant': 'ambient'}
 def with_seals(names: Sequence[str], **changes: object) -> PipelineParameters:
     """The default settings, changed, with these seals on `MOUNTED_ON` or else in chambers a, b, a, ..."""
     seals = tuple(MountedSeal(SEALS[name], MOUNTED_ON.get(name, 'ab'[i % 2])) for i, name in enumerate(names))
-    known = {f.name for f in dataclasses.fields(DEFAULT.feedforward)}
+    known = {f.name for f in dataclasses.fields(COMPENSATING)}
     guiding = {name: value for name, value in changes.items() if name in known}
     rest = {name: value for name, value in changes.items() if name not in known}
     settings = dataclasses.replace(DEFAULT.estimator.settings, **rest)
-    return PipelineParameters(EstimatorParameters(settings, seals), dataclasses.replace(DEFAULT.feedforward, **guiding))
+    return PipelineParameters(EstimatorParameters(settings, seals), dataclasses.replace(COMPENSATING, **guiding))
 
 
 def serialised(record: object, frame: bytes) -> tuple[Kind, bytes]:
@@ -147,11 +148,17 @@ def receipts(pieces: Sequence[tuple[Kind, bytes]]) -> list[int]:
     return times
 
 
-def in_memory(pieces: Sequence[tuple[Kind, bytes]], times: Sequence[int] | None = None) -> Messages:
+def in_memory(
+    pieces: Sequence[tuple[Kind, bytes]], times: Sequence[int] | None = None, sent: Sequence[int] | None = None
+) -> Messages:
+    """A block; ``times`` of receipt and ``sent`` [ns], by default a little after the stamps and just then."""
+    received = np.array(times or receipts(pieces), np.int64)
     sizes = np.array([len(data) for _, data in pieces], np.int64)
     data = np.frombuffer(b''.join(data for _, data in pieces), np.uint8)
     kinds = np.array([kind for kind, _ in pieces], np.uint8)
-    return Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, np.array(times or receipts(pieces), np.int64))
+    return Messages(
+        data, kinds, np.cumsum(sizes) - sizes, sizes, received, received if sent is None else np.array(sent, np.int64)
+    )
 
 
 TYPES = {
@@ -168,29 +175,37 @@ def _collect(answers: dict[str, bytes], record: object, frame_id: bytes) -> None
     answers[type_of(record)] = encode(record, frame_id)
 
 
-def one_by_one(parameters: PipelineParameters, state: PipelineState, pieces, times):
+def one_by_one(parameters: PipelineParameters, state: PipelineState, pieces, times, sent=None):
     answers = []
-    for (kind, data), received in zip(pieces, times, strict=True):
+    for (kind, data), received, left in zip(pieces, times, sent or times, strict=True):
         given_back: dict[str, bytes] = {}
         if kind in TYPES:
             collect = partial(_collect, given_back)
-            state = receive(parameters, state, decode(TYPES[kind], data), received, collect)
+            state = receive(parameters, state, decode(TYPES[kind], data), received, collect, left)
         answers.append((given_back.get(ESTIMATE_TYPE, b''), given_back.get(FEEDFORWARD_TYPE, b'')))
     return state, answers
 
 
-def all_at_once(parameters: PipelineParameters, state: PipelineState, pieces, times):
-    state, found = receive_all(parameters, state, in_memory(pieces, times))
+def all_at_once(parameters: PipelineParameters, state: PipelineState, pieces, times, sent=None):
+    state, found = receive_all(parameters, state, in_memory(pieces, times, sent))
     places = zip(*(column.tolist() for column in found[1:]), strict=True)
     return state, [(found.data[a : a + b].tobytes(), found.data[c : c + d].tobytes()) for a, b, c, d in places]
 
 
-def assert_same(parameters: PipelineParameters, state: PipelineState, pieces: Sequence[tuple[Kind, bytes]], cuts=()):
+def assert_same(
+    parameters: PipelineParameters,
+    state: PipelineState,
+    pieces: Sequence[tuple[Kind, bytes]],
+    cuts: Sequence[int] = (),
+    lateness: Sequence[int] = (0,),
+):
+    """Both ways give the same; ``lateness`` [ns] of the messages in turn."""
     times = receipts(pieces)
-    expected_state, expected = one_by_one(parameters, state, pieces, times)
+    sent = [max(received - late, 0) for received, late in zip(times, cycle(lateness), strict=False)]
+    expected_state, expected = one_by_one(parameters, state, pieces, times, sent)
     answers = []
     for first, end in pairwise([0, *sorted(cuts), len(pieces)]):
-        state, some = all_at_once(parameters, state, pieces[first:end], times[first:end])
+        state, some = all_at_once(parameters, state, pieces[first:end], times[first:end], sent[first:end])
         answers += some
     assert answers == expected
     assert repr(state) == repr(expected_state)  # NaN is not equal to itself
@@ -253,16 +268,20 @@ changes = st.fixed_dictionaries(
         'pressure_rate_max': st.floats(1e6, 1e10),
         'force_rate_max': st.floats(1e2, 1e8),
         'acceleration_max': st.floats(1.0, 1e3),
+        'lateness_max': st.sampled_from([0.0, 0.03, 0.3]),
     },
 ).filter(lambda changed: not (changed.get('use_measured_velocity') and changed.get('presliding_against_motion')))
 
 
+lateness = st.lists(st.sampled_from([0, 0, MS, 30 * MS, 30 * MS + 1, 400 * MS, -MS, -31 * MS]), min_size=1)
+
+
 @hypothesis_settings(max_examples=250)
-@given(runs(), st.sampled_from(sorted(ACTUATORS)), changes, st.booleans(), st.integers(0, 30))
-def test_any_run_of_messages_gives_the_same_bytes_and_the_same_state(pieces, actuator, changed, refused, cut):
+@given(runs(), lateness, st.sampled_from(sorted(ACTUATORS)), changes, st.booleans(), st.integers(0, 30))
+def test_any_run_of_messages_gives_the_same_bytes_and_the_same_state(pieces, late, actuator, changed, refused, cut):
     parameters = with_seals(ACTUATORS[actuator], **changed)
     state = init(parameters)._replace(refused=refused)
-    assert_same(parameters, state, pieces, cuts=[min(cut, len(pieces))])
+    assert_same(parameters, state, pieces, cuts=[min(cut, len(pieces))], lateness=late)
 
 
 def noisy(samples: int, seed: int) -> list[tuple[Kind, bytes]]:
@@ -292,6 +311,17 @@ def test_every_law_is_on_an_actuator():
 @pytest.mark.parametrize('actuator', sorted(ACTUATORS))
 def test_twenty_seconds_with_every_law_are_the_same_to_the_byte(actuator):
     assert_same(with_seals(ACTUATORS[actuator]), init(DEFAULT), noisy(1500, len(actuator)))
+
+
+def test_inputs_in_time_and_too_late_in_turn_are_the_same_to_the_byte_and_lateness_counts():
+    parameters, pieces = with_seals(ACTUATORS['default']), noisy(600, 5)
+    late = [0] * 900 + [200 * MS] * 600 + [-200 * MS] * 300  # a backlog, then the clock of the publisher is ahead
+    assert_same(parameters, init(DEFAULT), pieces, lateness=late)
+    times = receipts(pieces)
+    sent = [received - one for received, one in zip(times, cycle(late), strict=False)]
+    in_time, too_late = (all_at_once(parameters, init(DEFAULT), pieces, times, when)[1] for when in (times, sent))
+    assert in_time[:900] == too_late[:900]
+    assert in_time[900:] != too_late[900:]
 
 
 def test_elastic_seals_are_the_same_to_the_byte_and_change_the_feed_forward():
@@ -382,11 +412,15 @@ def test_kinds_count_up_from_zero_and_each_has_a_number_of_its_own():
 
 def test_part_of_a_block_has_its_messages_and_its_times():
     pieces = [serialised(Force(stamp, 2.0), b'x' * stamp) for stamp in (1, 2, 3, 4)]
-    block = in_memory(pieces, [10, 20, 30, 40])
+    block = in_memory(pieces, [10, 20, 30, 40], [9, 18, 27, 36])
     assert [block.message(number) for number in range(4)] == [data for _, data in pieces]
     part = block.taken(1, 3)
     assert [part.message(number) for number in range(2)] == [data for _, data in pieces[1:3]]
     assert (part.received.tolist(), part.kinds.tolist()) == ([20, 30], [Kind.FORCE, Kind.FORCE])
+    assert part.sent.tolist() == [18, 27]
+    turned = block.in_order(np.array([3, 0]))
+    assert [turned.message(number) for number in range(2)] == [pieces[3][1], pieces[0][1]]
+    assert (turned.received.tolist(), turned.sent.tolist()) == ([40, 10], [36, 9])
 
 
 @pytest.mark.parametrize('received', [0, 1, 2**61])
@@ -401,7 +435,14 @@ def test_time_of_receipt_may_be_any_that_fits(received):
 def test_time_of_receipt_out_of_bounds_is_refused_with_the_number_of_its_message(received):
     pieces = [serialised(Force(1, 2.0), b'rod'), serialised(Force(2, 2.0), b'rod')]
     with pytest.raises(UnsuitedError, match=r'^message 1$'):
-        receive_all(DEFAULT, init(DEFAULT), in_memory(pieces, [5, received]))
+        receive_all(DEFAULT, init(DEFAULT), in_memory(pieces, [5, received], [5, 6]))
+
+
+@pytest.mark.parametrize('sent', [-1, 2**61 + 1])
+def test_time_of_sending_out_of_bounds_is_refused_with_the_number_of_its_message(sent):
+    pieces = [serialised(Force(1, 2.0), b'rod'), serialised(Force(2, 2.0), b'rod')]
+    with pytest.raises(UnsuitedError, match=r'^message 1$'):
+        receive_all(DEFAULT, init(DEFAULT), in_memory(pieces, [5, 6], [5, sent]))
 
 
 @pytest.mark.parametrize('frame', [b'', b'rod', b'frame', b'y' * 300])

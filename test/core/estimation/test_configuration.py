@@ -8,6 +8,7 @@ from typing import get_type_hints
 
 import pytest
 from harness.answers import receive_one
+from harness.compensation import REAL_SEALS, compensating
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
@@ -68,10 +69,11 @@ SNAPSHOT = Snapshot(
         Pressure(3, math.nan, -0.0),
         NO_FORCE,
         Reference(CONDITIONED, -0.02, 0.5),
-        ReceiptTimes(6, 4, NEVER, 5),
+        ReceiptTimes(6, 4, NEVER, 5, 3),
         refused=True,
         clock_offset=-7,
         temperature=SealTemperature(2, 313.15),
+        clock=2,
     ),
 )
 
@@ -125,10 +127,11 @@ states = st.builds(
     st.just(NO_PRESSURE) | st.builds(Pressure, stamps, anything, anything),
     st.just(NO_FORCE) | st.builds(Force, stamps, anything),
     st.just(NO_REFERENCE) | st.builds(Reference, conditioned, usable, usable),
-    st.builds(ReceiptTimes, *[stamps_or_never] * 4),
+    st.builds(ReceiptTimes, *[stamps_or_never] * 5),
     st.booleans(),
     stamps,
     st.just(NO_TEMPERATURE) | records(SealTemperature),
+    stamps_or_never,
 )
 
 
@@ -185,7 +188,12 @@ def test_the_text_is_a_fixed_point(state):
 
 @given(
     st.builds(EstimatorSettings, use_stiction=st.booleans(), pressure_timeout=st.floats(1e-3, 1.0)),
-    st.builds(FeedForwardSettings, use_measured_velocity=st.booleans(), scale=st.floats(0.0, 2.0)),
+    st.builds(
+        FeedForwardSettings,
+        use_measured_velocity=st.booleans(),
+        scale=st.floats(0.0, 2.0),
+        lateness_max=st.floats(0.0, 10.0),
+    ),
 )
 def test_settings_come_back_exactly(settings, feedforward):
     configuration = Configuration(CONFIGURATION.selection, CONFIGURATION.seal_documents, settings, feedforward)
@@ -213,7 +221,8 @@ def test_every_shipped_seal_survives_the_text_and_the_wire(path):
 
 
 def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
-    parameters = CONFIGURATION.parameters()
+    configuration = compensating()
+    parameters = configuration.parameters()
     before = []
     for stamp in range(0, 200 * MS, MS):
         before += [Pressure(stamp, 3e6, 3e6), Force(stamp, 12.0), ServoReference(stamp, 0.0, 0.02, 0.0)]
@@ -221,7 +230,7 @@ def test_an_estimator_taken_up_from_a_snapshot_goes_on_as_if_never_stopped():
     state = init(parameters)
     for message in before:
         state, _ = receive_one(parameters, state, message)
-    back = parse_snapshot(snapshot_text(Snapshot(CONFIGURATION, state)))
+    back = parse_snapshot(snapshot_text(Snapshot(configuration, state)))
     straight = receive_one(parameters, state, Velocity(200 * MS, 1.5e-3, b'rod'))
     taken_up = receive_one(back.configuration.parameters(), back.state, Velocity(200 * MS, 1.5e-3, b'rod'))
     assert straight[1].feedforward.force > 0.0
@@ -350,6 +359,16 @@ def test_a_snapshot_from_before_the_elastic_seals_begins_with_seals_not_sheared(
     assert not known.configuration.feedforward.presliding
 
 
+def test_a_snapshot_from_before_there_was_lateness_checks_none_and_knows_no_simulated_time():
+    document = json.loads(snapshot_text(SNAPSHOT))
+    del document['feedforward']['lateness_max'], document['state']['clock'], document['state']['receipt']['clock']
+    back = parse_snapshot(json.dumps(document))
+    assert back.configuration.feedforward == dataclasses.replace(CONFIGURATION.feedforward, lateness_max=0.0)
+    assert not back.configuration.tells_sending
+    assert CONFIGURATION.tells_sending
+    assert (back.state.clock, back.state.receipt) == (NEVER, ReceiptTimes(6, 4, NEVER, 5, NEVER))
+
+
 # --- the mounting ---
 
 
@@ -398,6 +417,18 @@ def test_a_configuration_needs_the_chamber_of_each_seal_and_knows_the_placeholde
     mixed = dataclasses.replace(CONFIGURATION, selection=SealSelection(('x', 'placeholder'), ('a', 'b')))
     assert mixed.has_placeholder
     assert not dataclasses.replace(CONFIGURATION, selection=SealSelection(('x', 'y'), ('a', 'b'))).has_placeholder
+
+
+def test_placeholder_seals_make_no_force_and_others_the_one_that_was_asked_for():
+    placeholder = compensating()
+    silent = placeholder.without_placeholder_force()
+    assert silent == dataclasses.replace(placeholder, feedforward=compensating(scale=0.0).feedforward)
+    real = load_configuration(SealSelection(REAL_SEALS), EstimatorSettings(), placeholder.feedforward)
+    assert real.without_placeholder_force() == real
+    one_of_two = load_configuration(
+        SealSelection(('placeholder', REAL_SEALS[1])), EstimatorSettings(), placeholder.feedforward
+    )
+    assert one_of_two.without_placeholder_force().feedforward.scale == 0.0
 
 
 def of_version_1(**parts) -> str:

@@ -266,6 +266,7 @@ PROVOKED = {
     'VELOCITY_LEAP': ([GOOD], sample(START + MS, velocity=-1.1), Status.VELOCITY_LEAP),
     'INPUT_REFUSED': ([GOOD], sample(START + MS)._replace(refused=True), Status.INPUT_REFUSED),
     'STAMP_AGE': ([GOOD], sample(START + MS)._replace(stamp_age=-1.01), Status.STAMP_AGE),
+    'LATE_INPUT': ([GOOD], sample(START + MS)._replace(is_late=True), Status.LATE_INPUT),
     'MOTION_UNCERTAIN': ([GOOD], sample(START + MS, velocity=9e-4), Status.MOTION_UNCERTAIN),
     'FASTER_THAN_IDENTIFIED': ([GOOD], sample(START + MS, velocity=0.06), Status.FASTER_THAN_IDENTIFIED),
     'SLOWER_THAN_IDENTIFIED': ([GOOD], sample(START + MS, velocity=3e-3), Status.SLOWER_THAN_IDENTIFIED),

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from harness.compensation import COMPENSATING
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -34,7 +35,7 @@ from seal_friction_ros.core.friction.states import FrictionState
 
 MS = 1_000_000  # [ns]
 NONE = -1.0  # no usable friction
-SHARP = FeedForwardSettings(slew_limit=1e9, lead_time=0.0)
+SHARP = dataclasses.replace(COMPENSATING, slew_limit=1e9, lead_time=0.0)
 
 
 def run(settings, n, friction=42.0, velocity=0.1, *, state=None, start=0, step_time=MS):
@@ -44,6 +45,11 @@ def run(settings, n, friction=42.0, velocity=0.1, *, state=None, start=0, step_t
         state, out = step(settings, state, i * step_time, i * step_time, friction, velocity)
         rows.append(out)
     return state, rows
+
+
+def test_without_a_scale_there_is_no_force():
+    _, rows = run(FeedForwardSettings(), 10)
+    assert [row.force for row in rows] == [0.0] * 10
 
 
 def test_share_of_the_friction_in_the_direction_of_the_wanted_velocity():
@@ -177,6 +183,9 @@ def test_an_estimate_is_usable_with_a_good_pressure_and_by_measured_velocity_wit
         assert not usable(SHARP, good._replace(status=int(bad)))
     unknown = good._replace(state=FrictionState.UNKNOWN, status=int(Status.FORCE_STALE))
     assert usable(SHARP, unknown)
+    other_time = good._replace(status=int(Status.STAMP_AGE))
+    assert not usable(SHARP, other_time)
+    assert usable(dataclasses.replace(SHARP, lateness_max=0.0), other_time)  # bags of before
     assert not usable(measured, unknown)
 
 
@@ -191,7 +200,7 @@ def test_an_estimate_is_usable_with_a_good_pressure_and_by_measured_velocity_wit
     )
 )
 def test_finite_bounded_and_slow_whatever_comes(events):
-    settings = FeedForwardSettings()
+    settings = COMPENSATING
     state, received, last = FADED_OUT, 0, 0.0
     for change, friction, velocity in events:
         received += change

@@ -9,11 +9,13 @@ from hypothesis import strategies as st
 from paths import ROOT
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosgraph_msgs.msg import Clock as ClockMessage
 from seal_friction_msgs import msg as messages
 
 from seal_friction_ros.core.estimation import messages as wire
 from seal_friction_ros.core.estimation.feedforward import FeedForward, Limited
 from seal_friction_ros.core.estimation.records import (
+    Clock,
     Force,
     FrictionEstimate,
     Position,
@@ -72,6 +74,17 @@ SAMPLES = {
 }
 STAMPED = pytest.mark.parametrize('type_name', SAMPLES)
 FRAMES = [b'abcdefghijklmnopqrstuvwxyz0123456789_/-.'[:length] for length in range(41)]
+
+
+def clock(nanoseconds: int) -> bytes:
+    """A message of simulated time as rclpy writes it."""
+    message = ClockMessage()
+    message.clock.sec, message.clock.nanosec = divmod(nanoseconds, 10**9)
+    return serialize_message(message)
+
+
+UNSTAMPED = {wire.CONFIGURATION_TYPE: (str, wire.encode_text('text')), wire.CLOCK_TYPE: (Clock, clock(STAMP))}
+"""Type without a header -> what its decoder makes, and a message."""
 
 
 def make_store():
@@ -191,6 +204,16 @@ def test_rclpy_and_we_read_each_others_texts(text):
     assert wire.decode_text(serialize_message(message)) == text
 
 
+@given(st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1))
+@example(0)
+@example(-1)
+def test_simulated_time_is_what_rclpy_and_rosbags_write(nanoseconds):
+    data = clock(nanoseconds)
+    assert wire.decode_clock(data) == Clock(nanoseconds)
+    time = STORE.types['builtin_interfaces/msg/Time'](*divmod(nanoseconds, 10**9))
+    assert data == bytes(STORE.serialize_cdr(STORE.types[wire.CLOCK_TYPE](time), wire.CLOCK_TYPE))
+
+
 # --- nothing else is taken ---
 
 
@@ -207,7 +230,7 @@ def test_garbage_is_refused_with_a_value_error_or_is_the_record_of_its_type(type
     if not data.startswith(b'\x00\x01'):
         assert decode_or_refuse(type_name, data) is None
     found = decode_or_refuse(type_name, b'\x00\x01\x00\x00' + data)
-    record_type = type(SAMPLES[type_name][1]) if type_name in SAMPLES else str
+    record_type = type(SAMPLES[type_name][1]) if type_name in SAMPLES else UNSTAMPED[type_name][0]
     assert found is None or type(found) is record_type
 
 
@@ -261,9 +284,20 @@ def test_messages_of_other_types_are_refused(type_name):
 @pytest.mark.parametrize('encapsulation', [b'\x00\x00', b'\x00\x03', b'\x00\x07', b'\x01\x00', b'\xff\xff'])
 @pytest.mark.parametrize('type_name', wire.DECODERS)
 def test_another_encapsulation_is_refused(type_name, encapsulation):
-    data = wire.encode_text('text') if type_name == wire.CONFIGURATION_TYPE else encode(type_name)
+    data = encode(type_name) if type_name in SAMPLES else UNSTAMPED[type_name][1]
     with pytest.raises(ValueError, match='little-endian CDR'):
         wire.DECODERS[type_name](encapsulation + data[2:])
+
+
+def test_a_time_that_is_none_is_refused():
+    data = clock(STAMP)
+    for length in range(len(data)):
+        with pytest.raises(ValueError, match=f'^{length} bytes are not a time'):
+            wire.decode_clock(data[:length])
+    for surplus, taken in ((1, True), (3, True), (4, False), (100, False)):
+        assert (decode_or_refuse(wire.CLOCK_TYPE, data + bytes(surplus)) is not None) is taken
+    with pytest.raises(ValueError, match='1000000000 ns is not valid'):
+        wire.decode_clock(data[:8] + (10**9).to_bytes(4, 'little'))
 
 
 @pytest.mark.parametrize('state', [4, 5, 255])
@@ -315,7 +349,7 @@ def test_status_bits_in_the_message_definition_are_those_of_the_code():
 
 
 def test_status_bits_are_different_powers_of_two():
-    assert [bit.value for bit in Status] == [2**i for i in range(26)]
+    assert [bit.value for bit in Status] == [2**i for i in range(27)]
 
 
 def test_the_generated_message_has_the_constants_of_the_code():

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import pytest
 from harness.answers import NOTHING, receive_one
+from harness.compensation import COMPENSATING, compensating
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -32,6 +33,7 @@ from seal_friction_ros.core.estimation.records import (
     NO_FORCE,
     NO_PRESSURE,
     NO_TEMPERATURE,
+    Clock,
     Force,
     Position,
     Pressure,
@@ -44,9 +46,8 @@ from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_frict
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
-from seal_friction_ros.files import default_configuration
 
-PARAMETERS = default_configuration().parameters()
+PARAMETERS = compensating().parameters()
 MS = 1_000_000  # [ns]
 
 
@@ -233,16 +234,12 @@ def test_an_acceleration_counts_where_two_references_agree_with_the_smaller_magn
         ((2.0, math.nan), 0.0),
         ((math.nan, 2.0), 0.0),
         ((2.0, math.nan, 3.0, 3.0), 3.0),
-        ((1e300, 1e300), 1e6),
-        ((-1e300, -1e300), -1e6),
     ):
         assert condition(*((0.1, a) for a in accelerations)).acceleration == agreed
 
 
-def test_a_clean_reference_is_kept_as_it_is_within_what_a_rod_can_do():
+def test_a_clean_reference_is_kept_as_it_is():
     assert condition((0.1, 0.0), (0.3, 0.0)).velocity.velocity == 0.3
-    assert condition((1e300, 0.0)).velocity.velocity == 100.0
-    assert condition((-1e300, 0.0)).velocity.velocity == -100.0
 
 
 def test_the_acceleration_of_a_reference_with_a_ripple_is_smoothed_over_4_times_its_smoothing():
@@ -350,7 +347,7 @@ def test_when_the_pressure_fails_the_force_fades_out_and_comes_back_with_it():
 
 
 def test_by_the_measured_velocity_no_reference_is_needed():
-    parameters = PipelineParameters(PARAMETERS.estimator, FeedForwardSettings(use_measured_velocity=True))
+    parameters = PipelineParameters(PARAMETERS.estimator, replace(COMPENSATING, use_measured_velocity=True))
     assert run(ticks(0, 300, reference=False), parameters)[-1].feedforward.force > 10.0
 
 
@@ -411,11 +408,12 @@ def test_before_the_first_message_nothing_is_known():
     assert (state.friction, state.refused, state.clock_offset) == (-1.0, False, 0)
     assert (state.pressure, state.force, state.temperature) == (NO_PRESSURE, NO_FORCE, NO_TEMPERATURE)
     assert state.reference == (NOT_CONDITIONED, 0.0, 0.0)
-    assert state.receipt == (NEVER, NEVER, NEVER, NEVER)
+    assert state.receipt == (NEVER, NEVER, NEVER, NEVER, NEVER)
+    assert state.clock == NEVER
 
 
 def receipts(message, state=None, received=7):
-    """Times of receipt after a message, of velocity, pressure, force and reference."""
+    """Times of receipt after a message, of velocity, pressure, force, reference and clock."""
     return receive_one(PARAMETERS, state or init(PARAMETERS), message, received)[0].receipt
 
 
@@ -435,11 +433,19 @@ def receipts(message, state=None, received=7):
         (ServoReference(5, 0.0, 0.1, 0.0), True),
         (ServoReference(5, 0.0, math.nan, 0.0), False),
         (ServoReference(5, 0.0, math.inf, 0.0), False),
+        (ServoReference(5, 0.0, 10.0, -1e3), True),  # the most that a rod may do
+        (ServoReference(5, 0.0, 10.1, 0.0), False),
+        (ServoReference(5, 0.0, -10.1, 0.0), False),
+        (ServoReference(5, 0.0, 0.1, 1.1e3), False),
+        (ServoReference(5, 0.0, 0.1, -1.1e3), False),
+        (ServoReference(5, 0.0, 0.1, math.inf), False),
+        (ServoReference(5, 0.0, 0.1, math.nan), True),  # not known
+        (Clock(5), True),
         (Position(5, 0.1), False),
     ],
 )
 def test_an_input_is_renewed_by_a_sample_that_is_new_and_usable(message, counts):
-    kinds = (Velocity, Pressure, Force, ServoReference)
+    kinds = (Velocity, Pressure, Force, ServoReference, Clock)
     expected = tuple(7 if counts and isinstance(message, kind) else NEVER for kind in kinds)
     assert receipts(message) == expected
     state, _ = receive_one(PARAMETERS, init(PARAMETERS), message, 7)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from harness.compensation import COMPENSATING
 from harness.simulated_day import SECOND, START, Day, samples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +14,7 @@ from paths import ROOT
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
-from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForward
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
 from seal_friction_ros.core.estimation.records import (
     NEVER,
@@ -192,7 +193,7 @@ class Run:
     """A pipeline and what it has answered."""
 
     def __init__(self, seal):
-        self.parameters = PipelineParameters(parameters(seal), FeedForwardSettings(force_limit=1e4, slew_limit=1e9))
+        self.parameters = PipelineParameters(parameters(seal), replace(COMPENSATING, force_limit=1e4, slew_limit=1e9))
         self.state, self.answers = pipeline.init_running(self.parameters), []
 
     def take(self, record, received):

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 
+from seal_friction_ros.core.foundation.documents import DEEPEST
 from seal_friction_ros.core.machine.message_fields import (
     LARGEST_MESSAGE,
     Field,
@@ -162,6 +163,15 @@ def test_what_a_message_lacks_is_none_and_is_said():
     )
 
 
+@pytest.mark.parametrize('names', [['boom', 'arm', 'boom'], ['boom', 'boom', 'arm']])
+def test_a_joint_that_is_named_twice_is_ambiguous_and_no_number_is_guessed(names: list[str]):
+    reader = reader_of(JOINT_STATE, 'position[boom]', 'position[arm]')
+    message = message_class(JOINT_STATE)(name=names, position=[1.0, 2.0, 3.0])
+    read = reader.read(serialize_message(message))
+    assert read.numbers == (None, message.position[names.index('arm')])
+    assert read.missing == ("'boom' stands 2 times in name: ambiguous, none is taken",)
+
+
 def test_a_stamp_that_nobody_filled_in_is_none():
     reader = reader_of('geometry_msgs/msg/WrenchStamped', 'wrench.force.z')
     message = message_class('geometry_msgs/msg/WrenchStamped')()
@@ -232,6 +242,21 @@ def test_a_length_of_gigabytes_costs_nothing():
 def test_a_definition_that_cannot_be_read_is_refused(text, error):
     with pytest.raises(ValueError, match=error):
         parse_definition('a/msg/A', text)
+
+
+def nested(levels: int, fields: int) -> str:
+    """Text of a definition with so many levels, each with so many fields of the next one."""
+    parts = [''.join(f'a/L{level + 1} f{field}\n' for field in range(fields)) for level in range(1, levels)]
+    return ''.join(f'{part}{"=" * 80}\nMSG: a/L{level}\n' for level, part in enumerate(parts, 2)) + 'float64 x\n'
+
+
+@pytest.mark.parametrize('fields', [1, 2])
+def test_a_definition_of_too_many_levels_is_refused_at_once(fields: int):
+    """A bag may hold any; walking through each of 2 to the 40 paths would take days, and 3000 levels end Python."""
+    assert len(parse_definition('a/msg/A', nested(DEEPEST, fields))) == DEEPEST
+    for levels in (DEEPEST + 1, 3000):
+        with pytest.raises(ValueError, match=f'^a/A: more than {DEEPEST} levels deep$'):
+            parse_definition('a/msg/A', nested(levels, fields))
 
 
 # -- what ros2_control publishes: its package is not installed, its definitions are enough ----------------------------

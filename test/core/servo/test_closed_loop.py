@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from harness.compensation import compensating
 from paths import ROOT
 
 from seal_friction_ros.core.estimation import pipeline
@@ -33,11 +34,11 @@ from seal_friction_ros.core.servo.motions import RoundedWave, Setpoint, Sine, St
 from seal_friction_ros.core.servo.position_servo import ServoParameters, init, outputs, step, step_measured
 from seal_friction_ros.core.servo.sensors import SensorSettings
 from seal_friction_ros.core.servo.tracking import reversals, tracking_rms
-from seal_friction_ros.files import default_configuration, read_yaml
+from seal_friction_ros.files import read_yaml
 
 SIMULATOR = read_yaml(ROOT / 'config/servo_simulator.yaml')['/**']['ros__parameters']
 SENSORS = SensorSettings(**SIMULATOR['sensors'])
-PIPELINE = default_configuration().parameters()
+PIPELINE = compensating().parameters()
 PERIOD = 1e-3  # [s]
 SERVO = ServoParameters(seals=PIPELINE.estimator.seals, control_period=PERIOD, inner_step=1e-4)
 DELAY = 1e-3  # [s] from a velocity sample to its feed-forward in the controller

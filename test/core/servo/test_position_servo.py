@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 import yaml
+from harness.compensation import COMPENSATING
 from paths import ROOT
 
 from seal_friction_ros.core.estimation import estimator
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters
 from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
@@ -55,7 +55,7 @@ def references(wave, n=3200):
 
 def closed_loop(wave, error=1.0):
     """Servo, estimator and feed-forward in one loop, with the estimate wrong by a factor."""
-    parameters = PipelineParameters(ESTIMATOR, FeedForwardSettings())
+    parameters = PipelineParameters(ESTIMATOR, COMPENSATING)
     return run_closed_loop(Axis(SERVO, with_wrong_friction(parameters, error - 1.0)), wave, 3200, 0.0)
 
 

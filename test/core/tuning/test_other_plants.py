@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from harness.compensation import COMPENSATING
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
@@ -24,7 +25,7 @@ SEAL = replace(parse_seal(read_yaml(ROOT / 'config/seals/ms28775_114.yaml')), pr
 
 def problem(seal):
     seals = (MountedSeal(seal, 'a'), MountedSeal(seal, 'b'))
-    pipeline = PipelineParameters(EstimatorParameters(EstimatorSettings(), seals), FeedForwardSettings())
+    pipeline = PipelineParameters(EstimatorParameters(EstimatorSettings(), seals), COMPENSATING)
     return TuningProblem(Axis(ServoParameters(seals=seals), pipeline), TuningSettings())
 
 
@@ -46,13 +47,13 @@ def test_three_seals_are_more_than_the_elastic_plant_takes():
     three = problem(SEAL)
     seals = tuple(MountedSeal(SEAL, chamber) for chamber in 'aba')
     axis = three.axis._replace(servo=replace(three.axis.servo, seals=seals))
-    assert on_plants(replace(three, axis=axis), FeedForwardSettings()) == ()
+    assert on_plants(replace(three, axis=axis), COMPENSATING) == ()
 
 
 def test_without_seals_there_are_no_other_plants():
     bare = problem(SEAL)
     axis = bare.axis._replace(servo=replace(bare.axis.servo, seals=()))
-    assert on_plants(replace(bare, axis=axis), FeedForwardSettings()) == ()
+    assert on_plants(replace(bare, axis=axis), COMPENSATING) == ()
 
 
 def test_quality_is_that_of_the_evaluated_part_of_the_sine_without_and_with_the_force(monkeypatch):
@@ -76,7 +77,7 @@ def test_quality_is_that_of_the_evaluated_part_of_the_sine_without_and_with_the_
         with_presliding,
         axis=with_presliding.axis._replace(servo=replace(with_presliding.axis.servo, control_period=1e-3)),
     )
-    outcomes = on_plants(with_presliding, FeedForwardSettings(scale=0.9))
+    outcomes = on_plants(with_presliding, COMPENSATING)
     assert [outcome.plant for outcome in outcomes] == ['rigid', 'elements', 'lugre']
     share = np.mean(np.abs(np.sin(10.0 * np.pi * 1e-3 * np.arange(200))) >= 0.8)  # of a period, 41 %
     for outcome in outcomes:
@@ -90,4 +91,4 @@ def test_quality_is_that_of_the_evaluated_part_of_the_sine_without_and_with_the_
 
 
 def test_without_presliding_in_every_seal_file_there_are_no_other_plants():
-    assert on_plants(problem(replace(SEAL, presliding=None)), FeedForwardSettings()) == ()
+    assert on_plants(problem(replace(SEAL, presliding=None)), COMPENSATING) == ()

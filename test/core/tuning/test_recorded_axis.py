@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
+from harness.compensation import COMPENSATING
 
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.tuning import recorded_axis
@@ -28,7 +28,7 @@ from seal_friction_ros.core.tuning.simulated_axis import nearest_preferred, pref
 
 RATE, SECONDS = 500.0, 4.0  # [Hz], [s]
 TIME = np.arange(round(RATE * SECONDS)) / RATE
-SETTINGS = FeedForwardSettings()
+SETTINGS = COMPENSATING
 KNOWN = RecordedAxisSettings()
 
 

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 import yaml
+from harness.compensation import COMPENSATING
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
@@ -46,7 +47,7 @@ SEAL = parse_seal(yaml.safe_load((ROOT / 'config/seals/ms28775_114.yaml').read_t
 SEALS = (MountedSeal(SEAL, 'a'), MountedSeal(SEAL, 'b'))
 PERIOD = 1e-3  # [s]
 SERVO = ServoParameters(seals=SEALS, control_period=PERIOD, inner_step=1e-4)
-PIPELINE = PipelineParameters(EstimatorParameters(EstimatorSettings(), SEALS), FeedForwardSettings())
+PIPELINE = PipelineParameters(EstimatorParameters(EstimatorSettings(), SEALS), COMPENSATING)
 AXIS = Axis(SERVO, PIPELINE)
 DEFAULT = TuningProblem(AXIS, TuningSettings(hold_time=0.2))
 SLOW_PERIOD = 2e-3  # [s]

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import yaml
-from harness.example_bags import STEP, default_configuration, rewrite, write_inputs, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import STEP, rewrite, write_inputs, write_recorded
 
 from seal_friction_ros.core.estimation.messages import (
     FORCE_TYPE,
@@ -12,8 +13,9 @@ from seal_friction_ros.core.estimation.messages import (
     VELOCITY_TYPE,
     decode,
     encode,
+    type_of,
 )
-from seal_friction_ros.core.estimation.records import Force, Status
+from seal_friction_ros.core.estimation.records import Force, Status, Temperature, WatchdogTick
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.bags import bag as b
@@ -24,7 +26,7 @@ from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory):
-    return write_recorded(tmp_path_factory.mktemp('bag'), default_configuration())
+    return write_recorded(tmp_path_factory.mktemp('bag'), compensating())
 
 
 def test_each_estimate_has_the_inputs_that_were_held_with_it(recorded):
@@ -44,6 +46,24 @@ def test_each_estimate_has_the_inputs_that_were_held_with_it(recorded):
     (configuration,) = run.configurations
     assert configuration[0] < 0.0
     assert run.configuration_rows == (0,)
+
+
+def test_ticks_of_the_watchdog_and_temperatures_are_no_configurations(recorded, tmp_path):
+    """A bag of a node that stopped ends with ticks; its seals are those of its configuration all the same."""
+    messages = list(b.read_messages(recorded))
+    end = messages[-1].log_time
+    with b.BagWriter(tmp_path / 'bag') as writer:
+        for message in messages:
+            writer.write(*message)
+        for record, topic in (
+            (WatchdogTick(end, 0.1), '/watchdog_tick'),
+            (Temperature(end, 40.0), '/seal_temperature'),
+        ):
+            writer.write(topic, type_of(record), end, encode(record, b''))
+    run = read_run(tmp_path / 'bag')
+    assert run.configurations == read_run(recorded).configurations
+    assert [type(text) for _, text in run.configurations] == [str]
+    assert run.chambers == ('a', 'b')
 
 
 def test_feedforward_belongs_to_the_estimate_of_its_stamp(recorded):

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from harness.example_bags import default_configuration, write_inputs
+from harness.compensation import compensating
+from harness.example_bags import write_inputs
 from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
@@ -22,7 +23,7 @@ NUMBER = 'std_msgs/msg/Int64'
 @pytest.fixture
 def recorded(tmp_path: Path) -> Path:
     """A recording of several files."""
-    replay(write_inputs(tmp_path / 'inputs', 1500, default_configuration()), out=tmp_path / 'replayed')
+    replay(write_inputs(tmp_path / 'inputs', 1500, compensating()), out=tmp_path / 'replayed')
     with BagWriter(tmp_path / 'bag', split_size=200_000) as writer:
         for message in read_messages(tmp_path / 'replayed'):
             writer.write(*message)

@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness.closed_loop_bags import write_closed_loop
-from harness.example_bags import TOPICS, default_configuration, rewrite, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import TOPICS, rewrite, write_recorded
 from paths import ROOT
 
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, encode
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, Temperature, Velocity
 from seal_friction_ros.offline.bags import bag as b
@@ -59,7 +61,7 @@ def test_a_row_holds_what_came_newest_before_its_velocity(tmp_path: Path):
 def test_recorded_bags_give_the_same_rows_in_bulk(tmp_path: Path):
     assert len(both(ROOT / 'bags' / 'pull_test').stamps) == 900
     assert both(ROOT / 'bags' / 'faults').configuration is not None
-    configuration = default_configuration(stick_velocity=2e-3, slip_velocity=5e-3)
+    configuration = compensating(EstimatorSettings(stick_velocity=2e-3, slip_velocity=5e-3))
     assert both(write_recorded(tmp_path, configuration)).configuration == configuration
     closed_loop = write_closed_loop(tmp_path / 'closed_loop', scales=(0.0, 0.9), seconds=40.0)
     rows = both(closed_loop)

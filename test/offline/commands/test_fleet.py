@@ -6,7 +6,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from harness.example_bags import default_configuration, write_inputs, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import write_inputs, write_recorded
 from harness.report_page import checked_page
 
 from seal_friction_ros.offline.commands.main import main
@@ -18,7 +19,7 @@ def fleet(tmp_path_factory) -> Path:
     """A good bag, one without estimates, a garbage file, a cut bag, a folder that says it is a bag."""
     folder = tmp_path_factory.mktemp('fleet') / 'bags'
     (folder / 'rig ä').mkdir(parents=True)
-    recorded = write_recorded(folder.parent, default_configuration())
+    recorded = write_recorded(folder.parent, compensating())
     shutil.copytree(recorded, folder / 'rig ä' / 'gut')
     write_inputs(folder / 'inputs', 200)
     (folder / 'garbage.mcap').write_bytes(os.urandom(5000))

@@ -9,11 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from harness.example_bags import default_configuration, write_inputs
+from harness.compensation import compensating
+from harness.example_bags import rewrite, write_inputs, write_recorded
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.messages import encode_text
-from seal_friction_ros.offline.bags.bag import BagWriter
+from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, decode_text, encode_text
+from seal_friction_ros.offline.bags.bag import BagMessage, BagWriter
 from seal_friction_ros.offline.commands.main import main, make_parser
 
 PULL_TEST = str(ROOT / 'bags' / 'pull_test')
@@ -76,7 +78,7 @@ def test_unusable_bags_are_exit_code_2_one_line_and_nothing_written(command: str
             if kind == 'other':
                 writer.write('/chatter', 'std_msgs/msg/String', 1, encode_text('hello'))
     elif kind == 'truncated':
-        write_inputs(bag, 50, default_configuration())
+        write_inputs(bag, 50, compensating())
         file = next(bag.glob('*.mcap'))
         file.write_bytes(file.read_bytes()[:-300])
     out = [] if command == 'info' else ['--out', str(tmp_path / ('out.html' if command == 'report' else 'out'))]
@@ -86,6 +88,51 @@ def test_unusable_bags_are_exit_code_2_one_line_and_nothing_written(command: str
     said = capsys.readouterr().err
     assert expected == 0 or (said.count('\n') == 1 and str(bag) in said)
     assert sorted(tmp_path.rglob('*')) == before
+
+
+DEEP = '{"a":' * 100_000 + '1' + '}' * 100_000
+
+
+@pytest.mark.parametrize('text', [DEEP, '[' * 100_000, f'{{"machine": {DEEP}, "actuators": {{}}}}'], ids=len)
+@pytest.mark.parametrize('command', ['info', 'replay', 'report', 'health', 'monitor'])
+def test_a_configuration_as_deep_as_one_likes_is_exit_code_2_and_one_line(
+    command: str, text: str, tmp_path: Path, capsys
+):
+    bag = write_recorded(tmp_path / 'good')
+    bomb = encode_text(text)
+    rewrite(bag, tmp_path / 'bag', lambda _, m: m._replace(data=bomb) if m.type_name == CONFIGURATION_TYPE else m)
+    out = {'replay': ['--out', str(tmp_path / 'x')], 'report': ['--out', str(tmp_path / 'x.html')]}
+    assert main([command, str(tmp_path / 'bag'), *out.get(command, [])]) == 2
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert len(said) < 300
+    assert 'configuration' in said
+
+
+def test_a_bag_of_a_later_version_of_the_algorithm_is_one_line_that_says_so(tmp_path: Path, capsys):
+    def later(_: int, message: BagMessage) -> BagMessage:
+        if message.type_name != CONFIGURATION_TYPE:
+            return message
+        document = json.loads(decode_text(message.data)) | {'version': ALGORITHM_VERSION + 1}
+        return message._replace(data=encode_text(json.dumps(document)))
+
+    bag = rewrite(write_recorded(tmp_path / 'good'), tmp_path / 'bag', later)
+    for command in ('replay', 'info', 'health'):
+        assert main([command, str(bag)]) == 2
+        said = capsys.readouterr().err
+        assert f'made by version {ALGORITHM_VERSION + 1} of the algorithm, this is version {ALGORITHM_VERSION}' in said
+        assert said.count('\n') == 1
+
+
+@pytest.mark.parametrize('name', ['metadata.yaml', 'seal.yaml'])
+@pytest.mark.parametrize('text', ['[' * 100_000, '{a: ' * 100_000, '- ' * 100_000])
+def test_a_yaml_file_as_deep_as_one_likes_is_exit_code_2_and_one_line(name: str, text: str, tmp_path: Path, capsys):
+    bag, seal = write_inputs(tmp_path / 'bag', 20), tmp_path / 'seal.yaml'
+    (bag / name if name == 'metadata.yaml' else seal).write_text(text)
+    assert main(['replay', str(bag), '--seal', str(seal) if name == 'seal.yaml' else 'ms28775_114']) == 2
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert name in said
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     TOO_OLD,
     Bits,
     Known,
+    Presence,
     Said,
     known_of,
     next_interval,
@@ -37,7 +38,8 @@ from seal_friction_ros.offline.monitor.actuator_view import (
     take,
 )
 
-KNOWN = known_of(dataclasses.replace(default_configuration(), adaptation=AdaptationSettings('off')))
+PLACEHOLDER = known_of(dataclasses.replace(default_configuration(), adaptation=AdaptationSettings('off')))
+KNOWN = PLACEHOLDER._replace(has_placeholder=False)
 SECOND = 10**9
 NO_BITS = Bits()
 ESTIMATE = FrictionEstimate(SECOND, 40.0, 3.0, 45.0, -40.0, SLIDING, -1, 0, 0.001)
@@ -82,13 +84,7 @@ def test_a_row_has_the_newest_numbers_in_the_units_of_the_page():
 
 def test_what_never_came_is_a_gap_and_no_zero():
     shown = as_mapping(row(KNOWN, NOTHING_HELD, 0.0))
-    assert {name for name, value in shown.items() if value is not None} == {
-        'time',
-        'limit',
-        'below',
-        'status',
-        'limited',
-    }
+    assert {name for name, value in shown.items() if value is not None} == {'time', 'status', 'limited'}
 
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
@@ -175,6 +171,64 @@ def test_the_verdict_is_good_only_if_nothing_is_wrong():
     assert words(held, bits=Bits(int(Status.MOTION_UNCERTAIN), 0))['verdict'] == 'good'  # each reversal has it
     without_reference = take(held_of(*RECORDS), ESTIMATE, late)
     assert words(without_reference, now=late)['verdict'] == 'look'
+
+
+def test_a_number_is_in_one_row_and_what_did_not_come_again_is_a_gap():
+    """Else a curve goes on, flat, for as long as one looks, when its data have stopped."""
+    held = held_of(*RECORDS)
+    again = take(held, Pressure(2 * SECOND, 3e6, 1e6), 2 * SECOND)
+    shown = as_mapping(row(KNOWN, again, 2.0, SECOND))
+    assert shown['pressure_a'] == 30.0
+    gone = ('measured', 'estimate', 'low', 'high', 'feedforward', 'limit', 'below', 'error')
+    assert [shown[name] for name in gone] == [None] * len(gone)
+    assert shown['status'] == as_mapping(row(KNOWN, held, 1.0))['status']
+
+
+def test_the_measured_friction_ends_with_the_force_sum_unless_the_estimate_has_it():
+    fresh = take(held_of(*RECORDS), ESTIMATE, 2 * SECOND)
+    assert as_mapping(row(KNOWN, fresh, 2.0, SECOND))['measured'] is None
+    adapting = KNOWN._replace(adaptation='on')
+    learnt = take(fresh, ESTIMATE._replace(residual=-2.0, adaptation_scale=1.05), 2 * SECOND)
+    assert as_mapping(row(adapting, learnt, 2.0, SECOND))['measured'] == -42.0
+
+
+def test_estimator_dead_inputs_dead_and_one_input_dead_are_told_apart():
+    """7 s after the last estimate; all inputs come by the node."""
+    held, now = held_of(*RECORDS), 8 * SECOND
+
+    def said(presence: Presence, held=held, now: int = now, said: Said = NOTHING_SAID) -> tuple[str, str]:
+        shown = situation(KNOWN, held, NO_BITS, now, said, presence)
+        assert shown['verdict'] == 'bad'
+        assert shown['faults'] == [shown['reason']]
+        return shown['cause'], shown['reason']
+
+    cause, reason = said(Presence(SECOND))
+    assert cause == 'node'
+    assert 'nothing from it for 7.0 s' in reason
+    cause, reason = said(Presence(now, has_left=True))
+    assert cause == 'node'
+    assert 'left the graph' in reason
+    cause, reason = said(Presence(now))
+    assert cause == 'inputs'
+    assert 'no estimate for 7.0 s: no velocity, no pressures, no force sum, no reference, no position' in reason
+    assert 'the node is there' in reason
+    late = take(held, Pressure(now, 1e6, 1e6), now)
+    assert 'no velocity, no force sum' in said(Presence(now), late)[1]
+    assert said(Presence(now), said=Said(0, 'inactive')) == ('estimate', 'no estimate for 7.0 s: the node is inactive')
+    soon = SECOND + round(0.8 * SECOND)  # nothing came since: the node or its inputs, nobody knows yet
+    assert said(Presence(SECOND), now=soon)[0] == 'estimate'
+
+
+def test_each_tile_has_an_age():
+    shown = words(held_of(*RECORDS), now=8 * SECOND)
+    assert shown['answer_age'] == shown['feedforward_age'] == shown['error_age'] == 7.0
+    assert words(NOTHING_HELD)['feedforward_age'] is None
+
+
+def test_placeholder_seals_are_never_good():
+    shown = words(held_of(*RECORDS), known=PLACEHOLDER)
+    assert shown['verdict'] == 'look'
+    assert 'placeholder' in shown['reason']
 
 
 def test_no_estimate_says_which_input_never_came():

@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness.closed_loop_bags import write_closed_loop
-from harness.example_bags import write_inputs, write_recorded
+from harness.example_bags import rewrite, write_inputs, write_recorded
 from paths import ROOT
 
-from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, PRESSURE_TYPE
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.recorded_run import read_run
-from seal_friction_ros.offline.monitor.actuator_view import COLUMNS
+from seal_friction_ros.offline.monitor.actuator_view import COLUMNS, serious_words
 from seal_friction_ros.offline.monitor.recorded_view import RecordedView
 
 
@@ -72,6 +73,44 @@ def test_faults_are_named_when_they_are_there_and_not_later():
     assert any('pressure is not a finite number' in fault for fault in named)
     assert any('force sum jumps' in fault or 'force sum is beyond' in fault for fault in named)
     assert any(not [fault for fault in moment if 'usual' not in fault] for moment in words)
+
+
+def test_a_bag_says_where_its_first_estimate_is_and_where_its_faults_are(tmp_path: Path):
+    """Two seconds of inputs alone, then a bag with faults: the page opens at the first estimate."""
+    source = ROOT / 'bags' / 'faults'
+    messages = list(read_messages(source))
+    pressure = next(message for message in messages if message.type_name == PRESSURE_TYPE)
+    with BagWriter(tmp_path / 'late') as writer:
+        writer.write(*pressure._replace(log_time=messages[0].log_time))
+        for message in messages:
+            writer.write(*message._replace(log_time=message.log_time + 2 * 10**9))
+    about, late = RecordedView(source).describe(), RecordedView(tmp_path / 'late').describe()
+    assert late['first'] == pytest.approx(about['first'] + 2.0, abs=0.03)
+    ((label, faults),) = about['faults'].items()
+    assert any('pressure is not a finite number' in words for _, _, words in faults)
+    assert len(faults) < 200
+    view = RecordedView(source)
+    marked = [any(begin <= at <= end for begin, end, _ in faults) for at in np.arange(0.5, about['duration'], 0.01)]
+    rows = view.view(label, -1.0)['rows']
+    serious = [one[0] for one in rows if serious_words(one[-2])]
+    assert all(any(begin <= at <= end for begin, end, _ in faults) for at in serious)
+    assert not all(marked)
+
+
+def test_a_stretch_without_estimates_is_a_fault(tmp_path: Path):
+    recorded = write_recorded(tmp_path)
+
+    def without(_: int, message: BagMessage) -> BagMessage | None:
+        return None if 2.0e9 < message.log_time < 3.0e9 and message.type_name == ESTIMATE_TYPE else message
+
+    view = RecordedView(rewrite(recorded, tmp_path / 'gap', without))
+    (faults,) = view.describe()['faults'].values()
+    rows = view.view('', -1.0)['rows']  # from 1 s of the bag on
+    missing = [one[COLUMNS.index('estimate')] for one in rows if 1.05 < one[0] < 1.95]
+    assert missing == [None] * len(missing) != []
+    assert any('no estimate' in words and begin <= 1.55 and end >= 1.95 for begin, end, words in faults)
+    (faults,) = RecordedView(recorded).describe()['faults'].values()
+    assert not any('no estimate' in words for _, _, words in faults)
 
 
 def test_what_is_before_the_start_and_after_the_end_is_the_nearest_moment(loop: Path):

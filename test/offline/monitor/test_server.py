@@ -3,6 +3,7 @@
 import http.client
 import json
 import re
+import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,6 +20,7 @@ from seal_friction_ros.offline.monitor.page import make_page
 from seal_friction_ros.offline.monitor.server import MOST_STREAMS, MonitorServer
 
 SCRIPT = '<script>window.broken = 1</script>'
+SCALE = {'actuator': '/one', 'parameter': 'scale'}
 TIMEOUT = 30.0  # [s] ends a test that hangs
 
 
@@ -56,12 +58,15 @@ def ask(server: MonitorServer, path: str, token: str | None = None, body: Any = 
     wanted = f'{path}{mark}token={server.token if token is None else token}'
     connection.request('GET' if body is None else 'POST', wanted, data, given)
     answer = connection.getresponse()
-    found = answer.status, answer.read().decode(), answer.headers
+    is_stream = answer.headers.get('Content-Type') == 'text/event-stream'  # without an end
+    found = answer.status, '' if is_stream else answer.read().decode(), answer.headers
     connection.close()
     return found
 
 
-EVERYTHING = [('/', None), ('/describe', None), ('/view', None), ('/stream', None), ('/off', {}), ('/change', {})]
+EVERYTHING = [
+    ('/', None), ('/describe', None), ('/view', None), ('/stream', None), ('/off', {}), ('/lift', {}), ('/change', {}),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(('path', 'body'), EVERYTHING)
@@ -83,6 +88,14 @@ def test_without_the_token_everything_is_403(path: str, body: Any, token: str):
         {'Origin': 'https://127.0.0.1'},
         {'Host': 'evil.example'},
         {'Host': ''},
+        {'Host': 'evil@127.0.0.1'},
+        {'Host': 'evil:x@localhost:80'},
+        {'Host': '127.0.0.1:80:80'},
+        {'Host': '127.0.0.1:'},
+        {'Host': '127.0.0.1:1234567'},
+        {'Host': '127.0.0.1/x'},
+        {'Host': '127.0.0.1.evil.example'},
+        {'Host': 'localhost '},
         {'Sec_Fetch_Site': 'cross-site'},
         {'Sec_Fetch_Site': 'same-site'},
     ],
@@ -102,6 +115,17 @@ def test_its_own_page_is_answered_also_through_a_tunnel_with_another_port():
             status, text, _ = ask(server, '/view', Host=host, Origin=f'http://{host}')
             assert status == 200
             assert json.loads(text)['label'] == '/estimator'
+
+
+def test_two_hosts_are_none():
+    with served() as server:
+        connection = http.client.HTTPConnection('127.0.0.1', server.server_port, timeout=TIMEOUT)
+        connection.putrequest('GET', f'/view?token={server.token}', skip_host=True)
+        for host in ('127.0.0.1', 'evil.example'):
+            connection.putheader('Host', host)
+        connection.endheaders()
+        assert connection.getresponse().status == 403
+        connection.close()
 
 
 def test_it_listens_on_the_loopback_interface_alone():
@@ -221,13 +245,43 @@ def test_off_asks_every_node_at_once_for_scale_0_and_shows_each_answer():
     with served(view_of(('/one', '/two'), change)) as server:
         answers = json.loads(ask(server, '/off', body={})[1])
     assert asked == [{'/one': {'feedforward.scale': 0.0}, '/two': {'feedforward.scale': 0.0}}]
-    assert [answer['confirmed'] for answer in answers] == [True, False]
+    assert [answer['confirmed'] for answer in answers] == [False, True]  # failures first
+    assert answers[0]['text'] == '/two said'
+    assert answers[1]['text'].startswith('OFF: confirmed by /one at ')
+
+
+def test_lift_is_a_request_of_its_own_and_sets_nothing():
+    asked: list[Any] = []
+
+    def change(wanted):
+        asked.append(wanted)
+        return [Answer(True, f'{node} said') for node in wanted]
+
+    with served(view_of(('/one',), change)) as server:
+        for _ in range(2):
+            assert ask(server, '/off', body={})[0] == 200
+            assert json.loads(ask(server, '/view')[1])['off']['presses']
+            (refused,) = json.loads(ask(server, '/change', body={**SCALE, 'value': 0.4})[1])
+            assert refused == {'confirmed': False, 'text': 'REJECTED: /one is OFF: lift OFF first'}
+            ((lifted),) = json.loads(ask(server, '/lift', body={})[1])
+            assert lifted['confirmed']
+            assert json.loads(ask(server, '/view')[1])['off'] is None
+        assert ask(server, '/lift')[0] == 404  # no GET
+        assert json.loads(ask(server, '/change', body={**SCALE, 'value': 0.4})[1])[0]['confirmed']
+    assert asked == [*[{'/one': {'feedforward.scale': 0.0}}] * 2, {'/one': {'feedforward.scale': 0.4}}]
+
+
+def test_a_view_that_only_reads_latches_nothing():
+    with served() as server:
+        assert not json.loads(ask(server, '/off', body={})[1])[0]['confirmed']
+        assert json.loads(ask(server, '/view')[1])['off'] is None
+        assert not json.loads(ask(server, '/lift', body={})[1])[0]['confirmed']
 
 
 def test_off_without_an_estimator_is_not_confirmed():
     with served(LiveView(0, lambda _: [])) as server:
         (answer,) = json.loads(ask(server, '/off', body={})[1])
-    assert answer == {'confirmed': False, 'text': 'NOT OFF: no estimator is known'}
+    assert answer == {'confirmed': False, 'text': 'NOT OFF: no estimator is known; one that comes is set to 0'}
 
 
 def test_a_change_reaches_the_parameter_of_the_actuator():
@@ -236,6 +290,19 @@ def test_a_change_reaches_the_parameter_of_the_actuator():
         body = {'actuator': '/estimator', 'parameter': 'lead_time', 'value': 0.002}
         assert ask(server, '/change', body=body, Origin=f'http://127.0.0.1:{server.server_port}')[0] == 200
     assert asked == [{'/estimator': {'feedforward.lead_time': 0.002}}]
+
+
+def test_a_port_is_free_again_at_once_while_a_page_is_open():
+    """The page keeps its end of the connection: without SO_REUSEADDR the port is taken for a minute."""
+    with served() as server:
+        port = server.server_port
+        page = socket.create_connection(('127.0.0.1', port), timeout=TIMEOUT)
+        page.sendall(f'GET /stream?token={server.token} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n'.encode())
+        assert page.recv(15) == b'HTTP/1.1 200 OK'
+    again = MonitorServer(view_of(), port)
+    assert again.server_port == port
+    again.server_close()
+    page.close()
 
 
 def test_a_port_in_use_is_one_line():

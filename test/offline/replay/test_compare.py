@@ -6,7 +6,8 @@ import struct
 from pathlib import Path
 
 import pytest
-from harness.example_bags import STEP, default_configuration, rewrite, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import STEP, rewrite, write_recorded
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
@@ -49,7 +50,7 @@ def pair(tmp_path_factory) -> tuple[Path, Path]:
             struct.pack_into('<iI', data, 4, seconds, nanoseconds)
         return message._replace(data=bytes(data))
 
-    source = rewrite(write_recorded(folder, default_configuration()), folder / 'stalled', stall)
+    source = rewrite(write_recorded(folder, compensating()), folder / 'stalled', stall)
     seal = str(ROOT / 'config' / 'seals' / 'ms28775_114_table.yaml')
     assert main(['replay', str(source), '--seal', seal, '--out', str(folder / 'other')]) == 0
     return source, folder / 'other'

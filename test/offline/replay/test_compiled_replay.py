@@ -10,7 +10,8 @@ import pytest
 import yaml
 import zstandard
 from harness.closed_loop_bags import write_closed_loop
-from harness.example_bags import default_configuration, rewrite, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import rewrite, write_recorded
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -21,6 +22,7 @@ from paths import ROOT
 
 from seal_friction_ros.core.estimation.compiled_pipeline import Kind, UnsuitedError
 from seal_friction_ros.core.estimation.configuration import Configuration
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
@@ -64,19 +66,31 @@ def assert_same_verdict(bag: Path, override: Configuration | None = None) -> Rep
     return expected
 
 
-def read_back(path: Path) -> list[tuple[str, bytes]]:
-    """Topic and bytes of each message, read in bulk."""
+Read = list[tuple[str, bytes, int, int]]
+"""Topic, bytes, log time and time of sending of each message."""
+
+
+def read_back(path: Path) -> Read:
+    """A bag read in bulk."""
     numbers = {topic: number for number, topic in enumerate(bag_topics(path))}
     names = list(numbers)
     return [
-        (names[kind], messages.message(number))
+        (names[kind], messages.message(number), int(messages.received[number]), int(messages.sent[number]))
         for messages in read_in_bulk(path, lambda topic, _: numbers[topic])
         for number, kind in enumerate(messages.kinds.tolist())
     ]
 
 
+def one_by_one(path: Path) -> Read:
+    """A bag read message by message; one whose time of sending is not known was sent at its log time."""
+    return [
+        (m.topic, m.data, m.log_time, m.log_time if m.publish_time is None else m.publish_time)
+        for m in read_messages(path)
+    ]
+
+
 def assert_same_messages(path: Path) -> None:
-    expected = [(message.topic, message.data) for message in read_messages(path)]
+    expected = one_by_one(path)
     assert expected
     assert read_back(path) == expected
 
@@ -88,7 +102,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope='module')
 def recorded(folder: Path) -> Path:
-    return write_recorded(folder, default_configuration(stick_velocity=2e-3, slip_velocity=5e-3))
+    return write_recorded(folder, compensating(EstimatorSettings(stick_velocity=2e-3, slip_velocity=5e-3)))
 
 
 @pytest.fixture(scope='module')
@@ -112,7 +126,7 @@ def test_recorded_runs_verify_in_bulk_and_inputs_alone_do_not(recorded: Path, cl
 
 def test_frame_names_of_any_length_may_take_turns_also_in_a_bag_from_before_a_message_grew(tmp_path: Path):
     """A driver that starts again may have another frame name."""
-    bag = write_recorded(tmp_path, default_configuration(), frames=(b'', b'rod', b'x' * 300))
+    bag = write_recorded(tmp_path, compensating(), frames=(b'', b'rod', b'x' * 300))
     found = assert_same_verdict(bag)
     assert found.identical, found.first_difference
     assert found.recorded_feedforwards >= 100
@@ -144,7 +158,7 @@ def test_every_seal_is_in_a_pair():
     'pair', [*PAIRS[:2], *(pytest.param(pair, marks=pytest.mark.long) for pair in PAIRS[2:])], ids=map('-'.join, PAIRS)
 )
 def test_every_seal_gives_the_same_bytes(pair: tuple[str, str], closed_loop: Path, tmp_path: Path):
-    known = default_configuration()
+    known = compensating()
     selection = dataclasses.replace(known.selection, seals=pair)
     override = load_configuration(selection, known.settings, known.feedforward)
     assert assert_same_verdict(closed_loop, override).differing
@@ -153,7 +167,7 @@ def test_every_seal_gives_the_same_bytes(pair: tuple[str, str], closed_loop: Pat
 
 
 def test_velocity_terms_are_the_same_to_the_byte_in_estimate_and_feed_forward(closed_loop: Path, tmp_path: Path):
-    known = default_configuration()
+    known = compensating()
     terms = {'viscous_friction': 80.0, 'stribeck_friction': 6.0, 'stribeck_velocity': 0.004, 'asymmetry': 0.1}
     documents = tuple({**document, 'velocity_terms': terms} for document in known.seal_documents)
     override = dataclasses.replace(known, seal_documents=documents)
@@ -278,7 +292,7 @@ def test_any_order_of_messages_and_any_rubbish_gets_the_same_verdict(folder: Pat
 def test_a_file_of_a_stranger_is_read_alike_or_left_to_the_general_reader(name: str):
     path = CORPUS / 'mcap' / name
     try:
-        expected = [(message.topic, message.data) for message in read_messages(path)]
+        expected = one_by_one(path)
     except BagError:
         with pytest.raises((UnsuitedError, *compiled_replay.ERRORS)):
             list(read_in_bulk(path, lambda *_: Kind.OTHER))
@@ -301,7 +315,9 @@ def write_mcap(path: Path, chance: random.Random, *, overlap: int, compression: 
             channels.append(writer.register_channel(topic, 'cdr', schema))
         for i in range(chance.choice([1, 30, 400])):
             time = max(i // chance.choice([1, 3]) - chance.randint(0, overlap), 0)
-            writer.add_message(chance.choice(channels), time, chance.randbytes(chance.randint(0, 60)), time)
+            writer.add_message(
+                chance.choice(channels), time, chance.randbytes(chance.randint(0, 60)), chance.randint(1, 1 << 62)
+            )
         writer.finish()
 
 
@@ -328,7 +344,7 @@ def test_a_flipped_bit_is_read_alike_or_left_to_the_general_reader(tmp_path: Pat
         data[bit // 8] ^= 1 << bit % 8
         path.write_bytes(data)
         try:
-            expected = [(message.topic, message.data) for message in read_messages(path)]
+            expected = one_by_one(path)
             bag_topics(path)
         except BagError:
             expected = None

@@ -4,10 +4,12 @@ import hashlib
 from pathlib import Path
 
 import pytest
-from harness.example_bags import default_configuration, rewrite, write_inputs, write_recorded
+from harness.compensation import compensating
+from harness.example_bags import rewrite, write_inputs, write_recorded
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
@@ -24,7 +26,7 @@ from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
 @pytest.fixture
 def recorded(tmp_path: Path) -> Path:
-    return write_recorded(tmp_path, default_configuration(stick_velocity=2e-3, slip_velocity=5e-3))
+    return write_recorded(tmp_path, compensating(EstimatorSettings(stick_velocity=2e-3, slip_velocity=5e-3)))
 
 
 def estimates(bag: Path) -> list[bytes]:
@@ -42,7 +44,7 @@ def test_a_replayed_bag_verifies_and_replays_to_the_same_file(recorded: Path, tm
 
 
 def test_the_configuration_in_the_bag_is_the_one_used(recorded: Path, tmp_path: Path):
-    other = default_configuration(stick_velocity=0.0, slip_velocity=0.0)
+    other = compensating(EstimatorSettings(stick_velocity=0.0, slip_velocity=0.0))
     verdict = replay(recorded, other)
     assert not verdict.identical
     assert 'state' in verdict.first_difference

@@ -7,7 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from harness.example_bags import as_recorded, default_configuration, rewrite, write_inputs
+from harness.compensation import compensating
+from harness.example_bags import as_recorded, rewrite, write_inputs
 from mcap.writer import Writer
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
@@ -45,7 +46,7 @@ STATE = '/friction_estimator/state'
 def recorded(tmp_path_factory) -> Path:
     """20 s of an adapting estimator, a state every second."""
     folder = tmp_path_factory.mktemp('shared')
-    configuration = dataclasses.replace(default_configuration(), adaptation=AdaptationSettings('on'))
+    configuration = dataclasses.replace(compensating(), adaptation=AdaptationSettings('on'))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(replay_module, 'STATE_PERIOD', 1.0)
         replay(write_inputs(folder / 'inputs', SAMPLES, configuration), out=folder / 'replayed')

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from harness.closed_loop_bags import with_scale, write_closed_loop
+from harness.closed_loop_bags import write_closed_loop
+from harness.compensation import compensating
 from harness.example_bags import rewrite
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
@@ -31,7 +32,7 @@ RATE = 1000  # [Hz]
 PERIOD = 0.2  # [s]
 AMPLITUDE = 0.001  # [m]
 SETTLED = 0.2 + SETTLING_TIME  # [s] with the default fade_time
-TEXTS = {scale: snapshot_text(first_snapshot(with_scale(scale))) for scale in (0.0, 0.5, 0.9)}
+TEXTS = {scale: snapshot_text(first_snapshot(compensating(scale=scale))) for scale in (0.0, 0.5, 0.9)}
 
 
 def recorded_run(seconds=2.0, scales=(), **columns) -> RecordedRun:
@@ -92,7 +93,7 @@ def test_known_error_and_rest_are_found():
 
 
 def test_standstill_is_the_stick_velocity_of_the_configuration():
-    configuration = dataclasses.replace(with_scale(0.0), settings=EstimatorSettings(stick_velocity=0.0005))
+    configuration = dataclasses.replace(compensating(scale=0.0), settings=EstimatorSettings(stick_velocity=0.0005))
     velocity = np.where(resting_velocity(2000, 30) == 0.0, 0.0007, resting_velocity(2000, 30))
     (still,) = evaluate_tracking(recorded_run(velocity=velocity)).stretches
     text = snapshot_text(first_snapshot(configuration))
@@ -298,7 +299,7 @@ def replayed_run(tmp_path, configuration, scales=(0.0, 0.9), **kept) -> Recorded
 
 
 def test_what_acted_is_what_was_recorded(tmp_path):
-    run = replayed_run(tmp_path, with_scale(0.9), scales=(0.0,))
+    run = replayed_run(tmp_path, compensating(scale=0.9), scales=(0.0,))
     assert np.nanmax(np.abs(run.replayed_force)) > 30.0
     found = evaluate_tracking(run)
     (stretch,) = found.stretches
@@ -311,11 +312,11 @@ def test_what_acted_is_what_was_recorded(tmp_path):
 
 @pytest.mark.long
 def test_a_replay_without_feedforward_keeps_that_of_the_recording_also_when_replayed_again(tmp_path):
-    one = evaluate_tracking(replayed_run(tmp_path, with_scale(0.0)))
+    one = evaluate_tracking(replayed_run(tmp_path, compensating(scale=0.0)))
     recorded = evaluate_tracking(read_run(tmp_path / 'recorded'))
     assert one.stretches == recorded.stretches
     assert [stretch.settings.scale for stretch in one.stretches] == [0.0, 0.9]
-    replay(tmp_path / 'replayed', with_scale(0.5), tmp_path / 'again')
+    replay(tmp_path / 'replayed', compensating(scale=0.5), tmp_path / 'again')
     again = read_run(tmp_path / 'again')
     assert evaluate_tracking(again).stretches == recorded.stretches
     assert np.nanmax(np.abs(again.replayed_force)) > 10.0
@@ -331,13 +332,15 @@ def test_a_replay_without_feedforward_keeps_that_of_the_recording_also_when_repl
     ],
 )
 def test_a_feedforward_that_was_not_recorded_is_not_known(tmp_path, missing, scales, acted):
-    run = replayed_run(tmp_path, with_scale(0.9), scales, keep=lambda message: message.type_name not in missing)
+    run = replayed_run(tmp_path, compensating(scale=0.9), scales, keep=lambda message: message.type_name not in missing)
     found = evaluate_tracking(run)
     (stretch,) = found.stretches
     assert stretch.has_feedforward is acted
     assert ('feed-forward that acted: not known' in tracking_summary(found)) is (acted is None)
     json.dumps(tracking_numbers(found), allow_nan=False)
-    replay(tmp_path / 'replayed', with_scale(0.5), tmp_path / 'again')  # a replayed one never becomes one that acted
+    replay(
+        tmp_path / 'replayed', compensating(scale=0.5), tmp_path / 'again'
+    )  # a replayed one never becomes one that acted
     assert evaluate_tracking(read_run(tmp_path / 'again')).stretches == found.stretches
     with house_style():
         figures = {plot.name: plot.figure for plot in tracking_plots(run, found)}

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
+from harness.compensation import compensating
 from paths import ROOT
 
 from seal_friction_ros.core.servo.closed_loop import (
@@ -17,12 +18,11 @@ from seal_friction_ros.core.servo.motions import Sine
 from seal_friction_ros.core.servo.simulator_options import servo_parameters
 from seal_friction_ros.core.tuning import simulated_axis
 from seal_friction_ros.core.tuning.settings import TuningSettings
-from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.tuning.tune import load_machine, sensor_noise
 
 MACHINES = ROOT / 'config' / 'simulated_machines'
-PIPELINE = default_configuration().parameters()
+PIPELINE = compensating().parameters()
 
 
 def performance(name, motion, scale, friction_error=0.0, pressure_noise=500.0):

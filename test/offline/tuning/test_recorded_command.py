@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from harness.compensation import compensating
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
@@ -23,12 +24,11 @@ from seal_friction_ros.core.estimation.records import Force, Position, Pressure,
 from seal_friction_ros.core.foundation.parameters import meanings
 from seal_friction_ros.core.servo import position_servo as servo
 from seal_friction_ros.core.servo.motions import Setpoint, Sine
-from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.tuning.recorded_command import NUMBER, NUMBERS, first_number
 
-CONFIGURATION = default_configuration()
+CONFIGURATION = compensating()
 PLANT = servo.ServoParameters(seals=CONFIGURATION.parameters().estimator.seals, control_period=1e-3)
 ENCODERS = {
     NUMBER: lambda value: struct.pack('<4xd', value).replace(b'\0\0\0\0', b'\0\1\0\0', 1),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness.example_bags import default_configuration
+from harness.compensation import compensating
 from harness.report_page import checked_page
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
@@ -49,7 +49,7 @@ LEAVE_OUT = {
 def write_axis(path: Path, wave=None, seconds=2.0, leave_out='', configuration: Configuration | None = None, sign=1.0):
     """Bag of a simulated axis without feed-forward, with less friction than its model, and with noisy sensors."""
     wave = wave or Sine()
-    known = configuration or default_configuration()
+    known = configuration or compensating()
     seals = with_wrong_friction(known.parameters(), TRUE_SCALE - 1.0).estimator.seals
     plant = servo.ServoParameters(seals=seals, control_period=1e-3)
     state = servo.init(plant)
@@ -83,7 +83,7 @@ def write_axis(path: Path, wave=None, seconds=2.0, leave_out='', configuration: 
 
 def with_constant_friction(friction: float) -> Configuration:
     """One seal with ``friction`` [N]."""
-    known = default_configuration()
+    known = compensating()
     names = ('name', 'source', 'uncertainty', 'identified_pressure', 'stiction')
     seal = {name: known.seal_documents[0][name] for name in names}
     law = {'coulomb_friction_at_any_pressure': friction}
@@ -137,7 +137,7 @@ def test_two_runs_write_the_same_bytes(simulated: Path):
 def test_file_is_a_parameter_file_of_the_node(simulated: Path):
     path = simulated / 'one' / 'feedforward.yaml'
     selection, settings, feedforward, _ = load_parameter_file(path)
-    known = default_configuration()
+    known = compensating()
     assert load_configuration(selection, settings).selection == known.selection
     assert settings == known.settings
     assert feedforward != known.feedforward
@@ -191,7 +191,7 @@ BY_VELOCITY = {
 @pytest.mark.parametrize('law', ['velocity terms', pytest.param('friction map', marks=pytest.mark.long)])
 def test_friction_over_velocity_can_be_tuned(law, monkeypatch):
     monkeypatch.setattr(simulated_axis, 'MOST_CANDIDATES', 14)  # the grid, to save time
-    known = default_configuration()
+    known = compensating()
     changed = {**known.seal_documents[0], **BY_VELOCITY[law]}
     if law == 'friction map':
         del changed['normal_force'], changed['friction_coefficient']
@@ -229,7 +229,7 @@ def test_parameters_that_a_bag_does_not_identify_are_named(axis: Path, tmp_path:
     assert set(numbers) >= COMMON_KEYS
     assert numbers['tracking_rms_with'] is numbers['dwell_with'] is None
     assert not numbers['told_by_bag']['lead_time']
-    assert numbers['parameters']['lead_time'] == default_configuration().feedforward.lead_time
+    assert numbers['parameters']['lead_time'] == compensating().feedforward.lead_time
     assert numbers['recorded_tracking_rms'] > 1e-4
     assert len(numbers['robustness']) == 9
     assert 'lead_time' in (tmp_path / 'f.yaml').read_text().split('ros__parameters')[0]
@@ -247,7 +247,7 @@ def test_recording_has_the_inputs_of_the_pipeline(axis: Path):
     assert len(recording.estimates) == len(track.position) == 2000
     assert recording.motions[50].reference_velocity == Sine().at(0.05).velocity
     assert np.isfinite(recording.force_sum).all()
-    assert configuration == default_configuration()
+    assert configuration == compensating()
 
 
 @pytest.mark.long

@@ -11,8 +11,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+from harness.compensation import compensating
 from harness.dask_cluster import ENVIRONMENT, DaskCluster, begun, dask_cluster, wait_for
-from harness.example_bags import default_configuration, write_inputs, write_recorded
+from harness.example_bags import write_inputs, write_recorded
 from paths import ROOT
 
 from seal_friction_ros.offline.bags.topics import find_topics
@@ -91,7 +92,7 @@ def last_line(errors: str) -> str:
 
 def test_bags_are_replayed_to_the_same_bytes_on_a_cluster_also_by_relative_paths(cluster, tmp_path):
     (tmp_path / 'nothing').mkdir()
-    bags = [write_inputs(tmp_path / f'bäg {i}', 40 + 7 * i, default_configuration()) for i in range(5)]
+    bags = [write_inputs(tmp_path / f'bäg {i}', 40 + 7 * i, compensating()) for i in range(5)]
     names = [bag.name for bag in (*bags, write_recorded(tmp_path), tmp_path / 'nothing')]
     words = [*COMMAND, 'replay', '--verify', *names, '--json']
     here = done(*words, '--workers', '1', folder=tmp_path)
@@ -102,7 +103,7 @@ def test_bags_are_replayed_to_the_same_bytes_on_a_cluster_also_by_relative_paths
 
 def test_one_bag_is_shared_by_the_workers_of_a_cluster(cluster, tmp_path, monkeypatch):
     monkeypatch.setattr(replay_module, 'STATE_PERIOD', 0.5)
-    replay(write_inputs(tmp_path / 'inputs', 300, default_configuration()), out=tmp_path / 'bag')
+    replay(write_inputs(tmp_path / 'inputs', 300, compensating()), out=tmp_path / 'bag')
     monkeypatch.chdir(tmp_path)
     shared = verify_stretches(Path('bag'), find_topics(Path('bag')), Cluster(cluster.address))
     assert shared == replay(tmp_path / 'bag')
@@ -114,7 +115,7 @@ def test_health_and_a_fleet_are_the_same_on_a_cluster(cluster, tmp_path):
     (tmp_path / 'bags').mkdir()
     for number in range(2):
         (tmp_path / f'{number}').mkdir()
-        bag = write_recorded(tmp_path / f'{number}', default_configuration())
+        bag = write_recorded(tmp_path / f'{number}', compensating())
         shutil.copytree(bag, tmp_path / 'bags' / f'bag {number}')
     (tmp_path / 'bags' / 'garbage.mcap').write_bytes(b'garbage')
     health = ['health', 'bags/bag 0', 'bags/bag 1', 'bags/garbage.mcap', '--out', 'page.html']

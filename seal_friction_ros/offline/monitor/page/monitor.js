@@ -8,9 +8,17 @@ const address = (path, values = {}) => `${path}?${new URLSearchParams({...values
 const GREY = '#7f7f7f', BLUE = '#0072b2', SKY = '#56b4e9', ORANGE = '#e69f00', VERMILLION = '#d55e00', GREEN = '#009e73',
   PURPLE = '#cc79a7', RED = '#b3261e';
 const LOST_AFTER = 1500;  // [ms] without a frame
+const UNCONFIRMED_AFTER = 2500;  // [ms] after a click on OFF without an answer of the monitor
+const ARMED_FOR = 5000;  // [ms] the second click that lifts OFF
+const JOINED = 0.2;  // [s] data further apart are not joined by a line
+const TOO_OLD = 0.5;  // [s]
 const WORDS_PERIOD = 250;  // [ms] numbers that change faster cannot be read
 const KEPT = 30;  // [s] of rows in the page while it follows; while it holds, up to MOST_ROWS
 const MOST_ROWS = 12000;
+const CAUSES = {node: 'NODE GONE', inputs: 'NO INPUTS', estimate: 'NO ESTIMATE'};
+const EARLIER = 'this page is of an earlier monitor: open the new address, which the command printed';
+const UNANSWERED = 'NOT CONFIRMED: the monitor does not answer; stop the machine another way';
+const KINDS = ['no', 'waiting', 'gone', 'yes'];  // of the lines of OFF, failures first
 const LEVELS = ['good', 'look', 'bad', 'bad'];
 const LEVEL_WORDS = ['OK', 'WARN', 'ERROR', 'STALE'];
 const LAMPS = {
@@ -53,6 +61,9 @@ let lastFrame = 0;  // [ms] when a frame came
 let drawing = false;
 let charts = [];
 let stream = null;
+let watch = null;  // timer that looks for frames
+let off = null;  // state of OFF in the monitor; null: not latched
+let pressed = null;  // a click on OFF that is not in a frame yet: time [ms], presses before it, what was answered
 
 // -- small helpers ------------------------------------------------------------------------------------------------
 
@@ -88,6 +99,15 @@ const line = (...cells) => {
   return made;
 };
 
+// Newest number of a curve at a row or shortly before.
+function valueAt(list, index) {
+  const times = columns.time || [];
+  for (let place = index; place >= 0 && times[index] - times[place] <= joined(); place -= 1) {
+    if (list[place] !== null && list[place] !== undefined) return list[place];
+  }
+  return null;
+}
+
 // -- plots --------------------------------------------------------------------------------------------------------
 
 function range() {
@@ -95,12 +115,44 @@ function range() {
   return about.mode === 'bag' && end < span ? [0, span] : [end - span, end];
 }
 
+const joined = () => Math.max(JOINED, 2.5 * about.period);
+
+// Pairs of neighbouring numbers of a curve that no line joins, -1 before the first and after the last one. A band ends where
+// the rod rests: there are estimates and no band.
+function breaksOf(isBand, times, values, first, last) {
+  const found = [], longest = joined();
+  let before = -1, rests = false;
+  for (let place = first; place <= last; place += 1) {
+    if (values[place] === null || values[place] === undefined) {
+      rests = rests || (isBand && columns.estimate[place] !== null);
+      continue;
+    }
+    if (before < 0 || rests || times[place] - times[before] > longest) found.push([before, place]);
+    before = place;
+    rests = false;
+  }
+  return [...found, [before, -1]];
+}
+
+const curve = (column, isBand = false) => ({
+  label: column, spanGaps: false,
+  gaps: (chart, index, first, last) => {
+    const at = (place) => chart.valToPos(chart.data[0][place], 'x', true);
+    const breaks = breaksOf(isBand, chart.data[0], chart.data[index], first, last);
+    return breaks.slice(1, -1).map(([before, place]) => [at(before), at(place)]);
+  },
+  points: {show: false, size: 3, filter: (chart, index) => {  // a number that no line reaches
+    const breaks = breaksOf(isBand, chart.data[0], chart.data[index], ...chart.series[0].idxs);
+    const alone = breaks.slice(1).filter(([before], place) => before >= 0 && before === breaks[place][1]);
+    return alone.length ? alone.map(([before]) => before) : null;
+  }},
+});
+
 function series(plot) {
   const [high, low, shade] = plot.band || [];
-  const bands = plot.band ? [{label: high, stroke: 'transparent', width: 0}, {label: low, stroke: 'transparent', width: 0}] : [];
+  const bands = plot.band ? [high, low].map((column) => ({...curve(column, true), stroke: 'transparent', width: 0})) : [];
   const curves = plot.curves.map(([column, , colour, style]) => (
-    {label: column, stroke: colour, width: column === 'estimate' ? 2 : 1.5, dash: style === 'dashed' ? [6, 4] : undefined,
-      points: {show: false}, spanGaps: false}));
+    {...curve(column), stroke: colour, width: column === 'estimate' ? 2 : 1.5, dash: style === 'dashed' ? [6, 4] : undefined}));
   return {list: [{label: 'time'}, ...bands, ...curves], bands: plot.band ? [{series: [1, 2], fill: `${shade}55`}] : undefined};
 }
 
@@ -206,8 +258,8 @@ function writeLegends() {
     const index = plot.cursor.idx;
     for (const {column, value} of values) {
       const list = columns[column] || [];
-      const given = list[index === null || index === undefined ? list.length - 1 : index];
-      setText(value, given === null || given === undefined ? '-' : number(given));
+      const given = valueAt(list, index === null || index === undefined ? list.length - 1 : index);
+      setText(value, given === null ? '-' : number(given));
     }
   }
 }
@@ -219,8 +271,8 @@ function drawSoon() {
     drawing = false;
     for (const {plot, list, empty, curves} of charts) {
       plot.setData(dataOf(list));
-      const first = columns[curves[0][0]] || [];
-      empty.hidden = first.some((value) => value !== null);
+      const first = columns[curves[0][0]] || [], [begin, last] = range();
+      empty.hidden = first.some((value, place) => value !== null && columns.time[place] >= begin && columns.time[place] <= last);
     }
     writeLegends();
   });
@@ -234,9 +286,13 @@ function clearRows() {
 
 function takeFrame(frame) {
   lastFrame = performance.now();
+  off = frame.off || null;
+  writeOff();
   if (!frame.label) {
-    verdict('waiting', 'waiting', frame.nodes.length
-      ? `for the configuration of ${frame.nodes.join(', ')}`
+    const names = Object.keys(frame.nodes), unread = unreadNodes(frame.nodes);
+    if (unread.length) verdict('bad', 'bad', `the configuration cannot be read: ${unread.join('; ')}`);
+    else verdict('waiting', 'waiting', names.length
+      ? `for the configuration of ${names.join(', ')}`
       : 'for an estimator: start friction_estimator or machine_estimator, check ROS_DOMAIN_ID');
     return;
   }
@@ -258,6 +314,8 @@ function takeFrame(frame) {
   drawSoon();
 }
 
+const unreadNodes = (nodes) => Object.entries(nodes || {}).filter(([, why]) => why).map(([name, why]) => `${name}: ${why}`);
+
 function verdict(kind, word, reason) {
   byId('verdict').className = kind;
   setText(byId('verdict-word'), word);
@@ -270,6 +328,7 @@ function writeWords(frame) {
   writeTabs(frame.actuators);
   if (frame.diagnostics) writeDiagnostics(frame.diagnostics);
   writeSliders();
+  writeAges();
   const moment = performance.now();
   if (about.mode === 'live' && moment - lastWords < WORDS_PERIOD) return;
   lastWords = moment;
@@ -284,16 +343,31 @@ function writeWords(frame) {
   setText(byId('adaptation'), isOff ? 'off' : number(now.adaptation_scale));
   setText(byId('adaptation-more'), isOff ? '' : `${now.adaptation === 'on' ? 'in use' : 'observed only'}, std ${number(now.adaptation_scale_std, '', 2)}, offset ${number(now.offset, 'N', 2)}`);
   replaceIfChanged(byId('faults'), now.faults, () => (now.faults.length ? now.faults.map((text) => element('li', text)) : [element('li', 'none')]));
-  replaceIfChanged(byId('ages'), [now.ages, now.answer_age].map((one) => JSON.stringify(one)), () => (
-    [...Object.entries(now.ages), ['estimate', now.answer_age]].map(([name, age]) => {
-      const made = line(name, age === null ? 'never came' : `${age.toFixed(2)} s`);
-      if (age === null || age > 0.5) made.className = 'old';
-      return made;
-    })));
+  writeInputAges();
   replaceIfChanged(byId('seals'), now.seals, () => now.seals.map((name) => element('li', name)));
   setText(byId('range'), now.range[1] === null ? '' : `identified from ${number(now.range[0])} to ${number(now.range[1], 'bar')}`);
-  const source = [['node', frame.node], ['frame', now.frame || 'none']];
+  const source = [['node', frame.node], ['frame', now.frame || 'none'], ...unreadNodes(frame.nodes).map((text) => ['not shown', text])];
   replaceIfChanged(byId('source'), source, () => source.map(([name, text]) => line(name, text)));
+}
+
+// Ages grow while no frame comes.
+const grown = (age) => (age === null || about.mode === 'bag' ? age : age + (performance.now() - lastFrame) / 1000);
+
+function writeInputAges() {
+  const ages = [...Object.entries(now.ages), ['estimate', now.answer_age]].map(([name, age]) => [name, grown(age)]);
+  byId('ages').replaceChildren(...ages.map(([name, age]) => {
+    const made = line(name, age === null ? 'never came' : `${age.toFixed(2)} s`);
+    if (age === null || age > TOO_OLD) made.className = 'old';
+    return made;
+  }));
+}
+
+function writeAges() {
+  for (const tile of document.querySelectorAll('.tile')) {
+    const age = grown(now[tile.dataset.age]), isOld = age !== null && age > TOO_OLD;
+    tile.classList.toggle('old', isOld);
+    setText(tile.querySelector('em'), isOld ? `${age.toFixed(1)} s old` : '');
+  }
 }
 
 function writeLamps() {
@@ -351,23 +425,69 @@ function writeDiagnostics(list) {
 
 // -- changes ------------------------------------------------------------------------------------------------------
 
-async function post(path, document, output) {
-  output.hidden = false;
-  output.className = 'waiting';
-  output.textContent = 'sent, waiting for the answer of the node';
+// Why the monitor refuses a request: its own page has a wrong token only if it is of another start.
+const refusal = async (response) => (response.status === 403 ? EARLIER : response.text());
+
+// What the monitor answers, however late; what it refuses counts as an answer that confirms nothing.
+async function send(path, document) {
   try {
     const response = await fetch(address(path), {
       method: 'POST', headers: {'Content-Type': 'application/json'}, body: JSON.stringify(document),
-      signal: AbortSignal.timeout(8000),
     });
-    if (!response.ok) throw new Error(await response.text());
-    const answers = await response.json();
-    output.className = answers.every((answer) => answer.confirmed) ? 'yes' : 'no';
-    output.textContent = answers.map((answer) => answer.text).join('; ');
+    return response.ok ? await response.json() : [{confirmed: false, text: `NOT CONFIRMED: ${await refusal(response)}`}];
   } catch (error) {
-    output.className = 'no';
-    output.textContent = `NOT CONFIRMED: ${error.message || error}`;
+    return [{confirmed: false, text: UNANSWERED}];
   }
+}
+
+async function change(name, value, inputs) {
+  const output = byId('change-answer');
+  output.className = 'waiting';
+  output.textContent = 'sent, waiting for the answer of the node';
+  const answers = await send('/change', {actuator: label, parameter: name, value});
+  const isDone = answers.every((answer) => answer.confirmed);
+  output.className = isDone ? 'yes' : 'no';
+  output.textContent = answers.map((answer) => answer.text).join('; ');
+  if (!isDone) for (const input of inputs) input.value = input.dataset.shown;
+}
+
+async function pressOff() {
+  const mine = {time: performance.now(), presses: off ? off.presses : 0, lines: null};
+  pressed = mine;
+  writeOff();
+  setTimeout(writeOff, UNCONFIRMED_AFTER);
+  mine.lines = (await send('/off', {})).map((answer) => [answer.confirmed ? 'yes' : 'no', answer.text]);
+  writeOff();
+}
+
+function offLines() {
+  if (pressed && off && off.presses > pressed.presses) pressed = null;  // the state of the monitor has it
+  if (pressed && pressed.lines) return isLost() ? pressed.lines.map(([kind, text]) => [kind === 'yes' ? 'gone' : kind, text]) : pressed.lines;
+  if (pressed && performance.now() - pressed.time < UNCONFIRMED_AFTER) return [['waiting', 'sent, waiting for the answer of the node']];
+  if (pressed) return [['no', UNANSWERED]];
+  if (off && isLost()) return [['no', `NOT KNOWN: no connection to the monitor; pressed at ${off.since}`]];
+  return off ? off.lines : [];
+}
+
+function writeOff() {
+  const lines = offLines(), events = off ? off.events : [];
+  byId('off-state').hidden = !lines.length;
+  byId('off-answer').className = KINDS.find((kind) => lines.some((one) => one[0] === kind)) || '';
+  replaceIfChanged(byId('off-answer'), lines, () => lines.map(([kind, text]) => element('li', text, kind)));
+  replaceIfChanged(byId('off-events'), events, () => events.map((text) => element('li', text)));
+  byId('lift').hidden = !off || isLost();
+}
+
+// Two clicks: the first one arms the second.
+function pressLift() {
+  const button = byId('lift'), isArmed = button.classList.contains('armed');
+  const arm = (armed) => {
+    button.classList.toggle('armed', armed);
+    setText(button, armed ? 'Really lift? A scale may then be set again' : 'Lift OFF');
+  };
+  arm(!isArmed);
+  if (isArmed) send('/lift', {});
+  else setTimeout(() => arm(false), ARMED_FOR);
 }
 
 function writeSliders() {
@@ -389,11 +509,7 @@ function writeSliders() {
     for (const input of [slide, field]) {
       input.min = 0;
       input.step = step;
-      input.disabled = !about.can_change;
-      input.addEventListener('change', () => {
-        const asked = {actuator: label, parameter: name, value: Number(input.value) / factor};
-        if (input.value !== '') post('/change', asked, byId('change-answer'));
-      });
+      input.addEventListener('change', () => input.value !== '' && change(name, Number(input.value) / factor, [slide, field]));
     }
     field.step = 'any';
     slide.max = max || Math.max(Math.ceil(value * 2), 10);
@@ -403,6 +519,7 @@ function writeSliders() {
   for (const [name, {factor}] of Object.entries(SETTINGS)) {  // what the node has, unless somebody is changing it
     const value = now.settings[name];
     for (const input of [byId(`slide-${name}`), byId(`field-${name}`)]) {
+      input.disabled = !about.can_change || (name === 'scale' && off !== null);
       const shown = value === null ? '' : String(+(value * factor).toPrecision(6));
       if (input !== document.activeElement && input.dataset.shown !== shown) input.value = input.dataset.shown = shown;
     }
@@ -423,16 +540,36 @@ function connect(wanted = '', since = -1) {
   stream = new EventSource(address('/stream', {actuator: wanted, since}));
   const mine = stream;
   stream.onmessage = (event) => {
-    mode('live', 'LIVE');
-    takeFrame(JSON.parse(event.data));
+    const frame = JSON.parse(event.data);
+    if (frame.label && frame.now.cause) mode('dead', CAUSES[frame.now.cause]);
+    else mode('live', 'LIVE');
+    takeFrame(frame);
   };
   stream.onerror = () => {
     mine.close();
     if (mine !== stream) return;
     lost();
-    setTimeout(() => mine === stream && connect(label || wanted, columns.time && columns.time.length ? columns.time.at(-1) : -1), 1000);
+    setTimeout(() => mine === stream && reconnect(label || wanted), 1000);
   };
 }
+
+// Go on where the stream broke off; with another monitor from the beginning. A refusal has a reason: no stream tells it.
+async function reconnect(wanted) {
+  try {
+    const response = await fetch(address('/describe'));
+    if (!response.ok) {
+      refused(await refusal(response));
+      return;
+    }
+    const before = about.start;
+    about = await response.json();
+    if (about.start !== before) clearRows();
+  } catch (error) {  // not there yet
+  }
+  connect(wanted, columns.time.length ? columns.time.at(-1) : -1);
+}
+
+const isLost = () => document.body.classList.contains('lost');
 
 function mode(kind, text) {
   byId('mode').className = `badge ${kind}`;
@@ -442,7 +579,19 @@ function mode(kind, text) {
 
 function lost() {
   mode('lost', 'NO CONNECTION');
-  verdict('lost', 'old', 'what is shown is old: the monitor does not answer. Is it still running, and the tunnel?');
+  verdict('lost', 'old', 'the monitor is gone: it does not answer. Is it still running, and the tunnel? What is shown is old');
+  if (now) {
+    writeAges();
+    writeInputAges();
+  }
+  writeOff();
+}
+
+function refused(text) {
+  clearInterval(watch);
+  mode('lost', 'NO CONNECTION');
+  verdict('lost', 'refused', text);
+  writeOff();
 }
 
 let busy = false, again = null, playing = null;
@@ -460,6 +609,7 @@ async function showBag(wanted = label) {
     const frame = await response.json();
     if (columns.time) clearRows();
     takeFrame(frame);
+    writeMarks();
     setText(byId('clock'), `${until.toFixed(1)} of ${about.duration.toFixed(1)} s`);
     mode('bag', `RECORDING ${about.name}`);
   } catch (error) {
@@ -471,6 +621,24 @@ async function showBag(wanted = label) {
     again = null;
     showBag(next);
   }
+}
+
+// A mark on the slider for each fault of the actuator, which goes there.
+function writeMarks() {
+  const marks = byId('marks'), share = (time) => `${100 * Math.max(time, 0) / about.duration}%`;
+  replaceIfChanged(marks, label, () => about.faults[label].map(([begin, last, words]) => {
+    const made = element('button');
+    made.type = 'button';
+    made.title = `${begin.toFixed(1)} s: ${words}`;
+    made.setAttribute('aria-label', made.title);
+    made.style.left = share(begin);
+    made.style.width = share(last - begin);
+    made.addEventListener('click', () => {
+      byId('time').value = Math.min(begin + span / 2, about.duration);
+      showBag();
+    });
+    return made;
+  }));
 }
 
 function play() {
@@ -519,7 +687,7 @@ async function begin() {
     return;
   }
   if (!response.ok) {
-    verdict('lost', 'refused', await response.text());
+    refused(await refusal(response));
     return;
   }
   about = await response.json();
@@ -533,7 +701,8 @@ async function begin() {
   byId('off').disabled = !about.can_change;
   byId('off').append(element('small', about.can_change ? 'all feed-forwards' : 'read only'));
   byId('off').title = about.can_change ? 'sets the scale of every feed-forward to 0' : 'start the monitor with --allow-changes';
-  byId('off').addEventListener('click', () => post('/off', {}, byId('off-answer')));
+  byId('off').addEventListener('click', pressOff);
+  byId('lift').addEventListener('click', pressLift);
   byId('hold').addEventListener('click', () => {
     held = !held;
     byId('hold').setAttribute('aria-pressed', String(held));
@@ -541,11 +710,11 @@ async function begin() {
   });
   if (isLive) {
     connect();
-    setInterval(() => performance.now() - lastFrame > LOST_AFTER && lastFrame && lost(), 500);
+    watch = setInterval(() => performance.now() - lastFrame > LOST_AFTER && lastFrame && lost(), 500);
   } else {
     document.title = `Seal friction: ${about.name}`;
     byId('time').max = about.duration;
-    byId('time').value = Math.min(span, about.duration);
+    byId('time').value = Math.min(about.first + span, about.duration);
     byId('time').addEventListener('input', () => showBag());
     byId('play').addEventListener('click', play);
     showBag('');
