@@ -1,24 +1,46 @@
-"""Writer of one MCAP file (profile ``ros2``): that of the ``mcap`` library on a stream of our own.
+"""Writer of one MCAP file (profile ``ros2``) from the records of the ``mcap`` library.
 
-Ours is what the library does not do: a written chunk is with the operating system at once, so that it outlives the
-process; and after a failure, also on a full disk, the file ends after a complete chunk.
+Ours is what its ``Writer`` does not do:
+
+- A written chunk is with the operating system at once, so that it outlives the process. After a failure, also on a full
+  disk, the file ends after a complete chunk.
+- A message is packed in one step: field by field, as there, recording takes 1.7 times the processor time. The bytes are
+  the same.
 """
 
 import errno
 import os
+import struct
 from collections import deque
 from pathlib import Path
-from typing import IO, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
+from zlib import crc32
 
 from mcap.data_stream import RecordBuilder
-from mcap.records import DataEnd, Footer
-from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap.writer import MCAP0_MAGIC
 
 CHUNK_SIZE = 64 * 1024  # [bytes] small, so that the writing thread blocks briefly; the file does not get larger
 FILE_MODE = 0o640  # of the files of a bag, less what the umask of the process forbids
-_MESSAGE_OVERHEAD = 47  # [bytes] head of a message and its entry in the index
+_MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length of the rest, channel, sequence number, log time, publish time
+_MESSAGE_OPCODE, _MESSAGE_FIELDS = int(Opcode.MESSAGE), _MESSAGE.size - 9  # [bytes] without opcode and length
+_MESSAGE_OVERHEAD = _MESSAGE.size + 16  # [bytes] with the entry in the index of its chunk
 _MARKS = 4  # chunks that can be dropped to make room for the end of the file
-_BY_FLUSH_ALONE = 1 << 62  # [bytes] largest chunk for the library: `McapOutput.flush` ends each one
 
 
 class Description(NamedTuple):
@@ -44,6 +66,54 @@ class Contents(NamedTuple):
         return sum(self.counts.values())
 
 
+class _Chunk:
+    """Messages that are written together."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.first_time = self.last_time = 0
+        """log times of the first and the last message [ns]"""
+        self._index: dict[int, list[tuple[int, int]]] = {}  # channel -> log time and offset of each of its messages
+
+    def add(self, channel: int, log_time: int, publish_time: int, data: bytes) -> None:
+        """Append one message."""
+        if not self._index:
+            self.first_time = log_time
+        self.last_time = log_time
+        self._index.setdefault(channel, []).append((log_time, len(self.data)))
+        length = _MESSAGE_FIELDS + len(data)
+        self.data += _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, 0, log_time, publish_time)
+        self.data += data
+
+    def packed(self, start: int) -> tuple[bytes, bytes]:
+        """Bytes of the chunk written at offset ``start``, and its entry in the summary."""
+        times = {'message_start_time': self.first_time, 'message_end_time': self.last_time}
+        data, size = bytes(self.data), len(self.data)
+        chunk = _packed(Chunk(**times, compression='', data=data, uncompressed_size=size, uncompressed_crc=crc32(data)))
+        offsets = {}
+        indices: Any = RecordBuilder()
+        for channel, messages in self._index.items():
+            offsets[channel] = start + len(chunk) + indices.count
+            MessageIndex(channel_id=channel, records=messages).write(indices)
+        entry = ChunkIndex(
+            **times,
+            chunk_start_offset=start,
+            chunk_length=len(chunk),
+            compression='',
+            compressed_size=size,
+            uncompressed_size=size,
+            message_index_offsets=offsets,
+            message_index_length=indices.count,
+        )
+        return chunk + indices.end(), _packed(entry)
+
+
+def _packed(record: McapRecord) -> bytes:
+    builder: Any = RecordBuilder()
+    record.write(builder)
+    return cast(bytes, builder.end())
+
+
 class McapOutput:
     """A file being written.
 
@@ -57,11 +127,8 @@ class McapOutput:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._stream = _Stream(path)
-        self._writer: Any = Writer(
-            cast(IO[bytes], self._stream), chunk_size=_BY_FLUSH_ALONE, compression=CompressionType.NONE
-        )
         try:
-            self._writer.start('ros2', 'seal_friction_ros')
+            self._stream.write(MCAP0_MAGIC + _packed(Header('ros2', 'seal_friction_ros')))
         except OSError:
             self._stream.close()
             path.unlink(missing_ok=True)
@@ -70,6 +137,8 @@ class McapOutput:
         """topic and type -> messages"""
         self.first_time = self._last_time = self._pending = 0
         self._channels: dict[tuple[str, str], int] = {}  # topic and type -> number
+        self._schema_records, self._channel_records, self._chunk_entries = list[bytes](), list[bytes](), list[bytes]()
+        self._chunk = _Chunk()
         self._marks = deque([self.contents], maxlen=_MARKS)  # ends of complete chunks
 
     @property
@@ -95,7 +164,7 @@ class McapOutput:
             publish_time: [ns] on any clock; None: ``log_time``.
         """
         channel = self._channels.get(key) or self._add_channel(key, description, log_time)
-        self._writer.add_message(channel, log_time, data, log_time if publish_time is None else publish_time)
+        self._chunk.add(channel, log_time, log_time if publish_time is None else publish_time, data)
         self.counts[key] += 1
         self._last_time = log_time
         self._pending += len(data) + _MESSAGE_OVERHEAD
@@ -105,23 +174,65 @@ class McapOutput:
     def _add_channel(self, key: tuple[str, str], description: Description, log_time: int) -> int:
         if not self._channels:
             self.first_time = log_time
-        schema = self._writer.register_schema(*description[:3])
-        self._channels[key] = self._writer.register_channel(key[0], 'cdr', schema, description.metadata)
+        number = self._channels[key] = len(self._channels) + 1
+        type_name, encoding, definition, metadata = description
+        schema = Schema(id=number, name=type_name, encoding=encoding, data=definition)
+        channel = Channel(id=number, schema_id=number, topic=key[0], message_encoding='cdr', metadata=metadata)
+        self._schema_records.append(_packed(schema))
+        self._channel_records.append(_packed(channel))
+        self._chunk.data += self._schema_records[-1] + self._channel_records[-1]
         self.counts[key] = 0
-        return self._channels[key]
+        return number
 
     def flush(self) -> None:
         """Pass pending messages to the operating system, so that they outlive this process."""
         if self._pending:
-            self._writer.flush()
-            self._pending = 0
+            chunk, entry = self._chunk.packed(self._stream.tell())
+            self._stream.write(chunk)
+            self._stream.check()
+            self._chunk_entries.append(entry)
+            self._chunk, self._pending = _Chunk(), 0
             self._marks.append(self.contents)
 
     def finish(self, metadata: str) -> None:
         """Write pending messages, ``metadata`` for rosbag2, the index and the end of the file."""
         self.flush()
-        self._writer.add_metadata('rosbag2', {'serialized_metadata': metadata})
-        self._writer.finish()
+        record = _packed(Metadata('rosbag2', {'serialized_metadata': metadata}))
+        place = MetadataIndex(offset=self._stream.tell(), length=len(record), name='rosbag2')
+        self._stream.write(record + _packed(DataEnd(data_section_crc=0)))
+        self._stream.write(self._summary(self._stream.tell(), _packed(place)))
+
+    def _summary(self, start: int, metadata: bytes) -> bytes:
+        """Bytes from ``start`` to the end of the file."""
+        groups = {
+            Opcode.SCHEMA: b''.join(self._schema_records),
+            Opcode.CHANNEL: b''.join(self._channel_records),
+            Opcode.STATISTICS: _packed(self._statistics()),
+            Opcode.CHUNK_INDEX: b''.join(self._chunk_entries),
+            Opcode.ATTACHMENT_INDEX: b'',
+            Opcode.METADATA_INDEX: metadata,
+        }
+        summary, offsets = b'', b''
+        for opcode, group in groups.items():
+            place = SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(group))
+            offsets += _packed(place)
+            summary += group
+        footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
+        footer.summary_crc = crc32(_packed(footer)[:-4], crc32(summary + offsets))
+        return summary + offsets + _packed(footer) + MCAP0_MAGIC
+
+    def _statistics(self) -> Statistics:
+        return Statistics(
+            message_count=sum(self.counts.values()),
+            channel_message_counts={self._channels[key]: count for key, count in self.counts.items()},
+            message_start_time=self.first_time,
+            message_end_time=self._last_time,
+            schema_count=len(self._schema_records),
+            channel_count=len(self._channel_records),
+            chunk_count=len(self._chunk_entries),
+            metadata_count=1,
+            attachment_count=0,
+        )
 
     def finish_early(self) -> None:
         """After a failure, cut off incomplete records and write an end of the file without index.
@@ -130,11 +241,9 @@ class McapOutput:
         """
         size, self.first_time, self._last_time, counts = self._marks[-1]
         self.counts, self._pending = dict(counts), 0
-        end: Any = RecordBuilder()
-        DataEnd(data_section_crc=0).write(end)
-        Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(end)
         self._stream.cut(size)
-        self._stream.write(end.end() + MCAP0_MAGIC)
+        footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
+        self._stream.write(_packed(DataEnd(data_section_crc=0)) + _packed(footer) + MCAP0_MAGIC)
 
     def give_back(self) -> bool:
         """Drop the newest chunk to make room; False if there is none."""
@@ -169,7 +278,7 @@ class _Stream:
     def tell(self) -> int:
         return self._size
 
-    def flush(self) -> None:
+    def check(self) -> None:
         if not os.fstat(self._handle).st_nlink:  # writes to a removed file are lost without an error
             raise FileNotFoundError(errno.ENOENT, 'removed while it was written', str(self._path))
 

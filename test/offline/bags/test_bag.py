@@ -3,6 +3,7 @@
 import os
 import shutil
 import stat
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,9 @@ import pytest
 import yaml
 from harness.example_bags import write_inputs, write_recorded
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from paths import ROOT
 from rosbags.highlevel import AnyReader
@@ -102,6 +105,41 @@ def test_message_definitions_keep_the_comments_with_the_units(path: Path):
     assert ours.keys() == others.keys()
     foreign = [name for name in ours if 'seal_friction_msgs' not in name]  # those of this project have comments
     assert [ours[name] for name in foreign] == [others[name] for name in foreign]
+
+
+def test_a_file_is_byte_for_byte_that_of_the_writer_of_mcap(tmp_path: Path):
+    with BagWriter(tmp_path / 'bag', custom_data={'by': 'us'}) as writer:
+        for number in range(5000):
+            name = 'ab'[number % 3 == 0]
+            writer.write(f'/{name}', CONFIGURATION_TYPE, 7 + number, encode_text(name * (number % 50)), number)
+    ours = (tmp_path / 'bag' / 'bag_0.mcap').read_bytes()
+    assert ours == written_by_mcap(ours)
+
+
+def written_by_mcap(data: bytes) -> bytes:
+    """The same records by the writer of the ``mcap`` library, with a chunk where there was one."""
+    theirs = BytesIO()
+    writer = Writer(theirs, chunk_size=1 << 40, compression=CompressionType.NONE)
+    for record in StreamReader(BytesIO(data), emit_chunks=True).records:
+        if isinstance(record, Header):
+            writer.start(record.profile, record.library)
+        elif isinstance(record, Metadata):
+            writer.add_metadata(record.name, record.metadata)
+        elif isinstance(record, Chunk):
+            for part in breakup_chunk(record):
+                repeat(writer, part)
+            writer.flush()
+    writer.finish()
+    return theirs.getvalue()
+
+
+def repeat(writer: Writer, record: McapRecord) -> None:
+    if isinstance(record, Schema):
+        writer.register_schema(record.name, record.encoding, record.data)
+    elif isinstance(record, Channel):
+        writer.register_channel(record.topic, record.message_encoding, record.schema_id, record.metadata)
+    elif isinstance(record, Message):
+        writer.add_message(record.channel_id, record.log_time, record.data, record.publish_time)
 
 
 def test_messages_come_back_in_the_order_written_even_at_equal_times(tmp_path: Path):
