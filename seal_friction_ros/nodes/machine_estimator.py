@@ -15,12 +15,12 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CLOCK_TOPIC,
+    CLOCK_TYPE,
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,
     OUTPUTS,
     TICK_TYPE,
     Output,
-    decode_clock,
     encode,
     type_of,
 )
@@ -43,11 +43,10 @@ from seal_friction_ros.core.machine.machine import (
     make_machine,
     missing,
     receive,
-    receive_clock,
-    receive_tick,
+    record_plan,
 )
 from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile
-from seal_friction_ros.core.machine.machine_snapshot import machine_text
+from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
 from seal_friction_ros.core.machine.message_fields import Definition, full_name, parse_definition
 from seal_friction_ros.core.machine.outputs import Command, due_commands
 from seal_friction_ros.files import load_configuration, read_machine, read_machine_document
@@ -93,6 +92,8 @@ class MachineEstimator(EstimatorNode):
         self._machine = self._made()
         if any(actuator.configuration.has_placeholder for actuator in self._machine.actuators):
             self.get_logger().warning(PLACEHOLDER_WARNING)
+        clock = record_plan(CLOCK_TOPIC, CLOCK_TYPE, range(len(self._file.actuators)))
+        self._plans = {**self._machine.plans, CLOCK_TOPIC: clock}
         self._types = self.input_types({topic: full_name(self._file.topics[topic]) for topic in self._machine.plans})
         self._new_statistics()
         answers = {('', MACHINE_TYPE): '~/friction'}
@@ -186,10 +187,8 @@ class MachineEstimator(EstimatorNode):
         sent = max(received - lateness, 0)
         self._sent.clear()
         try:
-            if name == CLOCK_TOPIC:
-                self._state = receive_clock(self._machine, before, decode_clock(data), received, sent)
-            else:
-                self._state = receive(self._machine, before, name, data, received, self._send, sent)
+            plan = self._plans[name]
+            self._state = receive(self._machine, before, plan, plan.read(data), received, self._send, sent)
         except ValueError as error:
             for listener in self._listeners[name]:
                 self._statistics[listener].on_malformed(name)
@@ -282,7 +281,8 @@ class MachineEstimator(EstimatorNode):
         made = self._state.actuators[number].pipeline.feedforward.received
         tick = WatchdogTick(received + self.clock_offset, (received - made) * 1e-9)
         self._sent.clear()
-        self._state = receive_tick(self._machine, self._state, number, tick, received, self._send)
+        plan = record_plan(self._ticks[number], TICK_TYPE, (number,))
+        self._state = receive(self._machine, self._state, plan, tick, received, self._send)
         self._send_together()
         made = self._command(received)
         self._recording.record(self._ticks[number], TICK_TYPE, received, encode(tick))
@@ -347,7 +347,7 @@ class MachineEstimator(EstimatorNode):
 
     def snapshot(self) -> str:
         """All that the next answer depends on, as text."""
-        return machine_text(self._document, self._machine, self._state)
+        return machine_text(snapshot_of(self._machine, self._state))
 
     def reset_adaptation(self) -> None:
         """Forget what the adaptation of every actuator has learnt."""
