@@ -114,6 +114,11 @@ class TopicPlan(NamedTuple):
     read: Callable[[bytes], Any]  # makes a `Reading`, or a record of the estimator; ValueError for other bytes
     taken: tuple[tuple[int, tuple[_Taken, ...]], ...]  # number of an actuator, what it takes; (): the record itself
 
+    @property
+    def holds_records(self) -> bool:
+        """Whether a message is a record of the estimator."""
+        return not self.taken[0][1]
+
 
 @dataclass(frozen=True)
 class Machine:
