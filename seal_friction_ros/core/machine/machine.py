@@ -19,11 +19,12 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration
-from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.feedforward import newest_force
 from seal_friction_ros.core.estimation.messages import DECODERS, Input, Output
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
 from seal_friction_ros.core.estimation.records import (
@@ -398,20 +399,11 @@ def _passed(
     sent: int | None,
 ) -> ActuatorState:
     """State after some records have taken the path of their actuator."""
-    if not records:
-        return ActuatorState(state.pipeline, memory, state.force)
-    known, name, force = state.pipeline, actuator.mapping.name, state.force
-
-    def pass_on(answer: Output, frame_id: bytes) -> None:
-        """Pass an answer on with the name of the actuator; keep its force."""
-        nonlocal force
-        emit(name, answer, frame_id)
-        if type(answer) is FeedForward:
-            force = answer.force
-
+    known, named = state.pipeline, partial(emit, actuator.mapping.name)
     for record in records:
-        known = pipeline.receive(actuator.pipeline, known, record, received, pass_on, sent)
-    return ActuatorState(known, memory, force)
+        known = pipeline.receive(actuator.pipeline, known, record, received, named, sent)
+    guided = known.feedforward
+    return ActuatorState(known, memory, state.force if guided is state.pipeline.feedforward else newest_force(guided))
 
 
 def records_of(
