@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from harness.example_bags import rewrite
-from harness.machines import EXCAVATOR, made, message
+from harness.machines import BENCH, EXCAVATOR, made, message
 
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
@@ -18,6 +18,7 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.machine import machine as m
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, parse_machine_text, snapshot_of
 from seal_friction_ros.offline.bags.bag import STATE_TYPE, BagMessage, BagWriter, read_messages
+from seal_friction_ros.offline.bags.info import bag_info
 from seal_friction_ros.offline.bags.topics import RECORDED
 from seal_friction_ros.offline.replay.replay import chosen_configuration, replay
 
@@ -119,3 +120,13 @@ def test_the_version_of_a_bag_is_that_of_its_oldest_actuator(bag: Path, tmp_path
 
     assert replay(bag).recorded_version == 2
     assert replay(rewrite(bag, tmp_path / 'older', older)).recorded_version == 1
+
+
+def test_info_names_the_seals_as_they_are_mounted(tmp_path: Path):
+    """Also those whose chambers the mapping file does not name."""
+    machine = made(BENCH, seals=['ms28775_114', 'ms28775_114'])
+    with BagWriter(tmp_path / 'bag') as writer:
+        text = machine_text(snapshot_of(machine, m.init(machine)))
+        writer.write('/machine_estimator/configuration', CONFIGURATION_TYPE, 1, encode_text(text))
+    seals = bag_info(tmp_path / 'bag').seals
+    assert seals == ['axis: ms28775_114 on chamber a', 'axis: ms28775_114 on chamber b']
