@@ -273,11 +273,6 @@ def parse_snapshot_document(document: Any) -> Snapshot:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
 
 
-def snapshot_version(text: str) -> int:
-    """Version of the algorithm that made a snapshot, from its valid text."""
-    return int(parse_json(text, 'configuration').get('version', 1))
-
-
 def _recorded(document: Any, version: int) -> Recorded | None:
     if document is None:
         return None
