@@ -119,7 +119,7 @@ class EstimatorNode(ManagedNode):
 
     def __init__(self, name: str, groups: tuple[ParameterGroup, ...], **kwargs: Any) -> None:
         self._mapping: MachineFile | None = None
-        self._sent: list[NamedAnswer] = []
+        self._sent: list[tuple[str, Output, bytes]] = []  # name of the actuator, answer, its bytes or frame name
         self._together = b''
         self._newest: dict[str, bytes] = {}
         self._logged_errors: dict[str, str] = {}
@@ -189,7 +189,7 @@ class EstimatorNode(ManagedNode):
         for key, topic in answers.items():
             self._create_output(key, topic, key[1])
         outputs = {a.output.topic: a.output.type_name for a in self._file.actuators if a.output}
-        self._has_outputs = bool(outputs)
+        self._has_rest = self._file.together or bool(outputs)  # to be sent after the answers
         for topic, kind in outputs.items():
             self._create_output(('', topic), topic, full_name(kind))
         self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
@@ -319,7 +319,7 @@ class EstimatorNode(ManagedNode):
         sent = max(received - lateness, 0)
         self._sent.clear()
         self._state = receive(self._machine, before, plan, message, received, self._send, sent)
-        commands = self._send_rest(received)
+        commands = self._send_rest(received) if self._has_rest else []
         done = time.perf_counter_ns()
 
         # Nobody waits for what follows.
@@ -351,16 +351,14 @@ class EstimatorNode(ManagedNode):
         if not self._file.together:
             data = encode(answer, frame_id)
             self._publish[name, type_of(answer)](data)
-        self._sent.append(NamedAnswer(name, answer, data))
+        self._sent.append((name, answer, data))
 
     def _send_rest(self, received: int) -> list[Command]:
         """Publish the answers to a message that are one, and what the controllers take, which is returned."""
         self._together = b''
         if self._file.together and self._sent:
-            self._together = encode_together(self._sent)
+            self._together = encode_together([NamedAnswer(*one) for one in self._sent])
             self._publish['', MACHINE_TYPE](self._together)
-        if not self._has_outputs:
-            return []
         guided = FeedForward in [type(answer) for _, answer, _ in self._sent]
         commands = due_commands(self._machine, self._state, guided, received)
         for command in commands:
@@ -388,7 +386,8 @@ class EstimatorNode(ManagedNode):
         for number, (actuator, known, newest) in enumerate(states):
             if newest is known:
                 continue
-            self._lowest[number] = self._lowest[number].after(newest.pipeline.pressure)
+            if actuator.wiring.pressure:
+                self._lowest[number] = self._lowest[number].after(newest.pipeline.pressure)
             parameters = actuator.pipeline.estimator
             if parameters.adapts:
                 turn = newest.pipeline.turn_since(known.pipeline)
@@ -408,7 +407,7 @@ class EstimatorNode(ManagedNode):
         tick = WatchdogTick(received + self._clock_offset, (received - made) * 1e-9)
         self._sent.clear()
         self._state = receive(self._machine, self._state, plan, tick, received, self._send)
-        commands = self._send_rest(received)
+        commands = self._send_rest(received) if self._has_rest else []
         self._recording.record(plan.topic, TICK_TYPE, received, encode(tick))
         self._record_answers(commands)
 

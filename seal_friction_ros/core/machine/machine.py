@@ -114,11 +114,7 @@ class TopicPlan(NamedTuple):
     topic: str
     read: Callable[[bytes], Any]  # makes a `Reading`, or a record of the estimator; ValueError for other bytes
     taken: tuple[tuple[int, tuple[_Taken, ...]], ...]  # number of an actuator, what it takes; (): the record itself
-
-    @property
-    def holds_records(self) -> bool:
-        """Whether a message is a record of the estimator."""
-        return not self.taken[0][1]
+    holds_records: bool = False  # whether a message is a record of the estimator
 
 
 @dataclass(frozen=True)
@@ -194,7 +190,7 @@ def record_plan(topic: str, kind: str, numbers: Iterable[int]) -> TopicPlan:
         kind: Message type of this project.
         numbers: Of the actuators that take each record.
     """
-    return TopicPlan(topic, DECODERS[kind], tuple((number, ()) for number in numbers))
+    return TopicPlan(topic, DECODERS[kind], tuple((number, ()) for number in numbers), holds_records=True)
 
 
 def _plan(
@@ -303,13 +299,19 @@ def receive(
         actuator, known = machine.actuators[number], states[number]
         memory: Memory = known.memory
         records: Sequence[Input] = (message,)
+        before = after = known.pipeline
+        named = partial(emit, actuator.mapping.name)
         try:
             if taken:
                 stamp = message.stamp if message.stamp is not None else _stamp(actuator, known, received, sent)
                 memory, records = records_of(actuator, memory, taken, message.numbers, stamp, message.frame_id)
-            states[number] = _passed(actuator, known, memory, records, received, emit, sent)
+            for record in records:
+                after = pipeline.receive(actuator.pipeline, after, record, received, named, sent)
         except (ArithmeticError, ValueError) as error:
             states[number] = known._replace(force=0.0, fault=f'{plan.topic}: {type(error).__name__}: {error}')
+            continue
+        force = known.force if after.feedforward is before.feedforward else newest_force(after.feedforward)
+        states[number] = ActuatorState(after, memory, force)
     return MachineState(tuple(states))
 
 
@@ -387,23 +389,6 @@ def missing(machine: Machine, number: int, topic: str, data: bytes) -> list[str]
     without = [place for place, value in enumerate(reading.numbers) if value is None]
     texts = dict(zip(without, reading.missing, strict=True))
     return list(dict.fromkeys(texts[place] for place in wanted if place in texts))
-
-
-def _passed(
-    actuator: MachineActuator,
-    state: ActuatorState,
-    memory: Memory,
-    records: Sequence[Input],
-    received: int,
-    emit: Emit,
-    sent: int | None,
-) -> ActuatorState:
-    """State after some records have taken the path of their actuator."""
-    known, named = state.pipeline, partial(emit, actuator.mapping.name)
-    for record in records:
-        known = pipeline.receive(actuator.pipeline, known, record, received, named, sent)
-    guided = known.feedforward
-    return ActuatorState(known, memory, state.force if guided is state.pipeline.feedforward else newest_force(guided))
 
 
 def records_of(
