@@ -106,13 +106,11 @@ class EstimatorDiagnostics:
 
     Args:
         inputs: Names of the inputs.
-        counted: Messages of each input, if the node counts them for several estimators; then their stamps do not tell
-            what is missing, and `on_input` is not called.
     """
 
-    def __init__(self, inputs: Collection[str] = INPUTS, counted: Counter[str] | None = None) -> None:
+    def __init__(self, inputs: Collection[str] = INPUTS) -> None:
         self._inputs = inputs
-        self._received: Counter[str] = Counter() if counted is None else counted
+        self._received: Counter[str] = Counter()
         self._malformed: Counter[str] = Counter()
         self._missing = {name: MissingSamples() for name in inputs}
         self._by_status: Counter[int] = Counter()
@@ -139,20 +137,20 @@ class EstimatorDiagnostics:
         self._lateness: dict[str, int] = {}  # [ns] the largest of each input in this interval
         self._clock_moved = False
 
-    def on_input(self, name: str, stamp: int, lateness: int = 0) -> None:
-        """Count one message of an input with its stamp [ns], ``lateness`` [ns] after it was sent."""
-        self._received[name] += 1
-        self._missing[name].on_stamp(stamp)
-        self.on_lateness(name, lateness)
+    def on_input(self, name: str, stamp: int | None, lateness: int = 0) -> None:
+        """Count one message of an input.
 
-    def on_lateness(self, name: str, lateness: int) -> None:
-        """Note how long after its sending a message of an input came [ns]; negative if the clocks differ."""
+        Args:
+            name: Input.
+            stamp: Its stamp [ns]; None: the stamps do not tell what is missing, or there are none.
+            lateness: How long after its sending it came [ns]; negative if the clocks differ.
+        """
+        self._received[name] += 1
+        if stamp is not None:
+            self._missing[name].on_stamp(stamp)
         if abs(lateness) > abs(self._lateness.get(name, 0)):
             self._lateness[name] = lateness
-
-    def on_clock(self, stamp: int) -> None:
-        """Note simulated time [ns]."""
-        if stamp != self._clock:
+        if name == CLOCK_TOPIC and stamp is not None and stamp != self._clock:
             self._clock, self._clock_moved = stamp, True
 
     def on_malformed(self, name: str) -> None:

@@ -1,11 +1,12 @@
-"""What the estimator of one actuator and that of a machine share: clock of receipt, recording, watch of the graph."""
+"""The live node: estimates friction and feed-forward of every actuator of a machine, and records all."""
 
+import sys
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from functools import partial
 from operator import itemgetter
-from typing import Any, ClassVar
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -13,29 +14,63 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
-from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, Configuration, SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.feedforward import FeedForward, FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
     CLOCK_TOPIC,
     CLOCK_TYPE,
     CONFIGURATION_TYPE,
+    ESTIMATE_TYPE,
     OUTPUTS,
+    TICK_TYPE,
+    Output,
     encode,
     encode_text,
     type_of,
 )
-from seal_friction_ros.core.estimation.node_options import FEEDFORWARD_PREFIX, InputOptions, RecordingOptions
+from seal_friction_ros.core.estimation.node_options import (
+    ADAPTATION_PREFIX,
+    FEEDFORWARD_PREFIX,
+    InputOptions,
+    MachineOptions,
+    RecordingOptions,
+)
+from seal_friction_ros.core.estimation.records import WatchdogTick
 from seal_friction_ros.core.foundation.parameters import ParameterGroup
-from seal_friction_ros.core.machine.answers_together import NamedAnswer
+from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
+from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
+from seal_friction_ros.core.machine.machine import (
+    Machine,
+    MachineActuator,
+    MachineState,
+    TopicPlan,
+    due,
+    init,
+    make_machine,
+    missing,
+    receive,
+    record_plan,
+)
+from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile, own_file
+from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
+from seal_friction_ros.core.machine.message_fields import full_name, parse_definition
 from seal_friction_ros.core.machine.newest_messages import NEWEST_TYPE, TopicMessage, encode_newest
+from seal_friction_ros.core.machine.outputs import Command, due_commands
+from seal_friction_ros.files import load_configuration, read_machine
 from seal_friction_ros.nodes import qos
+from seal_friction_ros.nodes.estimator_diagnostics import EstimatorDiagnostics
+from seal_friction_ros.nodes.executor import run
 from seal_friction_ros.nodes.graph_watch import GraphFindings, GraphWatch
 from seal_friction_ros.nodes.input_watch import InputWatch
 from seal_friction_ros.nodes.managed_node import OVERDUE, ManagedNode, message_class
 from seal_friction_ros.nodes.recording import Recording
 from seal_friction_ros.nodes.subscription import with_source_time
-from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE
+from seal_friction_ros.offline.bags.bag import STATE_NAME, STATE_TYPE, message_definition
 
+SWITCH_INTERVAL = 5e-5  # [s] longest time that the recorder thread delays a sample; Python's default is 5 ms
+_OPTIONAL_INPUTS = ('servo_reference', 'rod_position', 'seal_temperature')  # without them there are good estimates
 _WATCH_PERIOD = 45_000_000  # [ns] of the graph and the clocks: every other call of the watchdog, even of an early one
 _WATCHDOG_PERIOD = 0.025  # [s] less than the default timeouts of the feed-forward; a call costs 0.3 ms, mostly waking
 _TICK_PERIOD = 0.01  # [s] while ticks keep a force up; more than `pipeline.TICK_INTERVAL`, so that jitter skips no tick
@@ -50,8 +85,8 @@ _MOST_WAITING = 10_000  # [messages] that it takes in one go
 _SORTING = (
     1_000_000_000  # [ns] after a late message, until the executor has heard of all that was taken before its turn
 )
-STOP_PERIOD = 0.005  # [s] between two forces while the node stops
-LAST_FORCES = (
+_STOP_PERIOD = 0.005  # [s] between two forces while the node stops
+_LAST_FORCES = (
     10  # number of forces of 0 N at the end: a subscriber may lose what it has not taken when a publisher goes
 )
 _HEALTH, _MONITOR = 'health', 'monitor'  # keys of their publishers
@@ -63,22 +98,30 @@ def _lateness(source: int) -> int:
     return time.time_ns() - source if source else 0
 
 
-class EstimatorNode(ManagedNode, ABC):
-    """Lifecycle node that estimates and records; a subclass has the live path.
+class EstimatorNode(ManagedNode):
+    """Lifecycle node around `core.machine.machine`.
 
-    A subclass overrides what is listed first, makes ``_watch`` and calls `create_timers` in `make`, and calls `begin`
-    at the end of `start`.
+    With a parameter ``machine`` it has the actuators of that mapping file; without, one with the built-in mapping.
+
+    Args:
+        name: Default name of the node.
+        groups: Its parameters, besides those of the actuators of a mapping file.
+        kwargs: Arguments of `rclpy.lifecycle.LifecycleNode`.
 
     Raises:
-        ValueError: A parameter has the wrong type or is out of bounds.
+        ValueError: A parameter has the wrong type or is out of bounds, or the mapping file is not valid.
     """
 
-    RECORDS_STATES: ClassVar = False
-    """whether a bag can be replayed from a state amid it"""
     _watch: GraphWatch
     _input_watch: InputWatch
+    _machine: Machine
+    _state: MachineState
 
     def __init__(self, name: str, groups: tuple[ParameterGroup, ...], **kwargs: Any) -> None:
+        self._mapping: MachineFile | None = None
+        self._sent: list[tuple[str, Output, bytes]] = []  # name of the actuator, answer, its bytes or frame name
+        self._together = b''
+        self._newest: dict[str, bytes] = {}
         self._logged_errors: dict[str, str] = {}
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[Any, Any] = {}
@@ -98,67 +141,111 @@ class EstimatorNode(ManagedNode, ABC):
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
         self.create_service(Trigger, '~/reset_adaptation', self._on_reset_adaptation)
 
-    # --- overridden by subclasses ---
-
-    @property
-    @abstractmethod
-    def clock_offset(self) -> int:
-        """What the clock of the stamps shows after the clock of receipt [ns]."""
-
-    @abstractmethod
-    def set_clock_offset(self, offset: int) -> None:
-        """Use another offset [ns] from now on."""
-
-    @abstractmethod
-    def snapshot(self) -> str:
-        """All that the next answer depends on, as text."""
-
-    @abstractmethod
-    def reset_adaptation(self) -> None:
-        """Forget what the adaptation has learnt."""
-
-    @abstractmethod
-    def input_type(self, name: str) -> str:
-        """Message type of an input."""
-
-    @abstractmethod
-    def on_input(self, name: str, data: bytes, lateness: int) -> None:
-        """Take one message of an input, ``lateness`` [ns] after it was sent."""
-
-    @property
-    @abstractmethod
-    def needed_inputs(self) -> Collection[str]:
-        """Inputs without which there is no good estimate."""
-
-    @abstractmethod
-    def received(self) -> Mapping[str, int]:
-        """Messages of each input since activation."""
-
-    @abstractmethod
-    def apply_change(self) -> None:
-        """Apply the present parameters."""
-
-    @abstractmethod
-    def has_placeholder(self, prefix: str) -> bool:
-        """Whether the parameters with a prefix are of an actuator with a placeholder seal, while configured."""
-
-    @abstractmethod
-    def on_watchdog(self) -> bool:
-        """Renew each feed-forward that no sample renews, so that it fades out; whether there was one."""
-
-    @abstractmethod
-    def fade_out(self) -> None:
-        """Fade every force to 0 N."""
-
-    @abstractmethod
-    def health(self) -> dict[str, DiagnosticStatus]:
-        """Indicators of the seals, by the name of the part."""
-
-    @abstractmethod
-    def newest_answers(self) -> list[NamedAnswer]:
-        """The newest answers of each actuator since the last call, see `EstimatorDiagnostics.take_newest`."""
-
     # --- lifecycle ---
+
+    def more_groups(self) -> tuple[ParameterGroup, ...]:
+        """Read the mapping file; the parameters of each of its actuators begin with its name."""
+        if not self.has_parameter('machine'):
+            return ()
+        name = self.settings(MachineOptions).machine
+        if not name:
+            raise ValueError('machine is not set: give the mapping file, -p machine:=robot.yaml')
+        self._mapping = read_machine(name)
+        return tuple(group for actuator in self._mapping.actuators for group in _groups(actuator))
+
+    def make(self) -> None:
+        """Read the seal files; create publishers and subscriptions."""
+        self._file = self._mapping or own_file(self.settings(SealSelection))
+        self._machine = self._made()
+        if any(actuator.configuration.has_placeholder for actuator in self._machine.actuators):
+            self.get_logger().warning(PLACEHOLDER_WARNING)
+        numbers = range(len(self._file.actuators))
+        self._plans: dict[str, TopicPlan] = {
+            **self._machine.plans,
+            CLOCK_TOPIC: record_plan(CLOCK_TOPIC, CLOCK_TYPE, numbers),
+        }
+        self._types = {topic: full_name(self._file.topics[topic]) for topic in self._machine.plans}
+        if self.get_parameter('use_sim_time').value:
+            self._types[CLOCK_TOPIC] = CLOCK_TYPE
+        self._new_statistics()
+        self._create_outputs()
+        ticks = [self.resolve_topic_name(f'{actuator.name or "~"}/watchdog_tick') for actuator in self._file.actuators]
+        self._ticks = [record_plan(topic, TICK_TYPE, (number,)) for number, topic in enumerate(ticks)]
+        for topic in self._types:
+            self.subscribe(topic, qos.STREAM)
+        self._create_timers()
+
+    def _create_outputs(self) -> None:
+        """Publishers of answers, commands and configuration."""
+        answers = {('', MACHINE_TYPE): '~/friction'}
+        if not self._file.together:
+            answers = {
+                (actuator.name, kind): f'{actuator.name}/{topic}'.removeprefix('/')
+                for actuator in self._file.actuators
+                for topic, kind in OUTPUTS.items()
+            }
+        types = {key: key[1] for key in answers}
+        self._watch = GraphWatch(self, self._inputs, self._types, self._outputs, types, self.subscribe)
+        for key, topic in answers.items():
+            self._create_output(key, topic, key[1])
+        outputs = {a.output.topic: a.output.type_name for a in self._file.actuators if a.output}
+        self._has_rest = self._file.together or bool(outputs)  # to be sent after the answers
+        for topic, kind in outputs.items():
+            self._create_output(('', topic), topic, full_name(kind))
+        self._outputs[CONFIGURATION_TYPE] = self.create_lifecycle_publisher(
+            message_class(CONFIGURATION_TYPE), '~/configuration', qos.LATCHED
+        )
+        self._topics = {key: publisher.topic_name for key, publisher in self._outputs.items()}
+
+    def _made(self) -> Machine:
+        """Machine with the present parameters."""
+        configurations = {actuator.name: self._configuration(actuator) for actuator in self._file.actuators}
+        kinds = self._file.topics.values() if self._mapping else ()
+        definitions = {kind: parse_definition(kind, message_definition(full_name(kind))[0]) for kind in kinds}
+        return make_machine(self._file, configurations, definitions)
+
+    def _configuration(self, actuator: Actuator) -> Configuration:
+        try:
+            return load_configuration(actuator.selection, *self._settings(actuator)).without_placeholder_force()
+        except ValueError as error:
+            raise ValueError(f'{actuator.name}: {error}'.removeprefix(': ')) from None
+
+    def _changed(self, actuator: MachineActuator) -> MachineActuator:
+        """Actuator with the present parameters; itself if they are as they were."""
+        settings, feedforward, adaptation = self._settings(actuator.mapping)
+        configuration = replace(
+            actuator.configuration, settings=settings, feedforward=feedforward, adaptation=adaptation
+        ).without_placeholder_force()
+        if configuration == actuator.configuration:
+            return actuator
+        return replace(
+            actuator,
+            configuration=configuration,
+            pipeline=configuration.parameters(actuator.pipeline.estimator.seals),
+        )
+
+    def _settings(self, actuator: Actuator) -> list[Any]:
+        """Present settings of estimator, feed-forward and adaptation of an actuator."""
+        return [self.settings(group.record_type, group.prefix) for group in _groups(actuator)]
+
+    def _new_statistics(self) -> None:
+        """Count anew."""
+        self._statistics = {
+            actuator.name: EstimatorDiagnostics([t for t in self._types if number in dict(self._plans[t].taken)])
+            for number, actuator in enumerate(self._file.actuators)
+        }
+        every = list(self._statistics.values())
+        self._listeners = {topic: [every[number] for number, _ in self._plans[topic].taken] for topic in self._types}
+        self._lowest = [Lowest() for _ in every]
+
+    def start(self) -> None:
+        """Start to estimate from the initial state, and to record if ``record`` is set."""
+        self._state = _with(init(self._machine), refused=self._is_refused(self._watch.duplicate_publishers()))
+        if CLOCK_TOPIC in self._types:
+            self._state = _with(self._state, clock=0)  # stands still until it comes
+        self._new_statistics()
+        self._newest.clear()
+        self._begin()
 
     def release(self) -> None:
         """Destroy publishers, subscriptions and timers."""
@@ -173,7 +260,7 @@ class EstimatorNode(ManagedNode, ABC):
         self._publish.clear()
         self._timers.clear()
 
-    def create_timers(self) -> None:
+    def _create_timers(self) -> None:
         """Timers of the graph, the watchdog and the health, and the publisher of the health."""
         self._outputs[_HEALTH] = self.create_publisher(DiagnosticArray, '~/health', 10)
         self._outputs[_MONITOR] = self.create_publisher(
@@ -192,12 +279,13 @@ class EstimatorNode(ManagedNode, ABC):
             self.create_steady_timer(_INPUT_PERIOD, self._on_input_timer),
         ]
 
-    def begin(self) -> None:
-        """Begin to record if ``record`` is set; at the end of `start`."""
+    def _begin(self) -> None:
+        """Begin to record if ``record`` is set."""
         self._logged_errors.clear()
         self._watchdog_called = time.perf_counter_ns()
         self._receipt_offset = time.time_ns() - time.monotonic_ns()
-        self._input_watch = InputWatch(self.needed_inputs, time.monotonic(), self._watch.publishers_text)
+        needed = [name for name in self._types if name not in _OPTIONAL_INPUTS]
+        self._input_watch = InputWatch(needed, time.monotonic(), self._watch.publishers_text)
         if self.settings(RecordingOptions).record:
             self._start_recording()
         else:
@@ -213,13 +301,140 @@ class EstimatorNode(ManagedNode, ABC):
         if outcome:
             self.get_logger().info(outcome)
 
+    # --- the live path ---
+
+    def on_input(self, name: str, data: bytes, lateness: int) -> None:
+        """Take one message of an input, ``lateness`` [ns] after it was sent."""
+        taken = time.perf_counter_ns()
+        if not self.active:
+            return
+        plan = self._plans[name]
+        try:
+            message = plan.read(data)
+        except ValueError as error:
+            self._on_malformed(name, error)
+            self._look_after_timers(taken)
+            return
+        received, before = self._now(), self._state
+        sent = max(received - lateness, 0)
+        self._sent.clear()
+        self._state = receive(self._machine, before, plan, message, received, self._send, sent)
+        commands = self._send_rest(received) if self._has_rest else []
+        done = time.perf_counter_ns()
+
+        # Nobody waits for what follows.
+        self._recording.record(self._topics[name], self._types[name], received, data, sent)
+        if self.has_viewer:
+            self._newest_inputs[self._topics[name]] = TopicMessage(self._topics[name], self._types[name], data)
+        stamp = None
+        if plan.holds_records:
+            stamp = message.stamp
+        else:
+            self._newest[name] = data
+        for listener in self._listeners[name]:
+            listener.on_input(name, stamp, lateness)
+        if self._sent:
+            self._record_answers(commands, done - taken)
+            self._follow(before)
+            self._recording.flush_if_idle()
+        self._look_after_timers(done)
+
+    def _on_malformed(self, name: str, error: ValueError) -> None:
+        """Count a message that cannot be read, and say why."""
+        for listener in self._listeners[name]:
+            listener.on_malformed(name)
+        self.get_logger().error(f'{self._topics[name]}: {error}', throttle_duration_sec=1.0)
+
+    def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
+        """Publish an answer at once, if it is a message of its own; the rest waits until all answers are out."""
+        data = frame_id
+        if not self._file.together:
+            data = encode(answer, frame_id)
+            self._publish[name, type_of(answer)](data)
+        self._sent.append((name, answer, data))
+
+    def _send_rest(self, received: int) -> list[Command]:
+        """Publish the answers to a message that are one, and what the controllers take, which is returned."""
+        self._together = b''
+        if self._file.together and self._sent:
+            self._together = encode_together([NamedAnswer(*one) for one in self._sent])
+            self._publish['', MACHINE_TYPE](self._together)
+        guided = FeedForward in [type(answer) for _, answer, _ in self._sent]
+        commands = due_commands(self._machine, self._state, guided, received)
+        for command in commands:
+            self._publish['', command.topic](command.data)
+        return commands
+
+    def _record_answers(self, commands: list[Command], latency: int = 0) -> None:
+        """Record and count what was sent, ``latency`` [ns] after its input was taken."""
+        for name, answer, data in self._sent:
+            kind, statistics = type_of(answer), self._statistics[name]
+            if not self._together:
+                self._recording.record(self._topics[name, kind], kind, self._now(), data)
+            if kind == ESTIMATE_TYPE:
+                statistics.on_estimate(answer, latency)
+            else:
+                statistics.on_feedforward(answer)
+        if self._together:
+            self._recording.record(self._topics['', MACHINE_TYPE], MACHINE_TYPE, self._now(), self._together)
+        for command in commands:
+            self._recording.record(command.topic, full_name(command.type_name), self._now(), command.data)
+
+    def _follow(self, before: MachineState) -> None:
+        """Follow pressures and adaptation of the actuators that have answered."""
+        states = zip(self._machine.actuators, before.actuators, self._state.actuators, strict=True)
+        for number, (actuator, known, newest) in enumerate(states):
+            if newest is known:
+                continue
+            if actuator.wiring.pressure:
+                self._lowest[number] = self._lowest[number].after(newest.pipeline.pressure)
+            parameters = actuator.pipeline.estimator
+            if parameters.adapts:
+                turn = newest.pipeline.turn_since(known.pipeline)
+                self._statistics[actuator.name].on_adaptation(parameters, turn)
+
+    def on_watchdog(self) -> bool:
+        """Renew each feed-forward that no velocity sample renews, so that it fades out."""
+        if not self.active:
+            return False
+        numbers = due(self._state, self._now())
+        for number in numbers:
+            self._tick(number, self._now())  # a bag holds each message at a time of its own
+        return bool(numbers)
+
+    def _tick(self, number: int, received: int) -> None:
+        made, plan = self._state.actuators[number].pipeline.feedforward.received, self._ticks[number]
+        tick = WatchdogTick(received + self._clock_offset, (received - made) * 1e-9)
+        self._sent.clear()
+        self._state = receive(self._machine, self._state, plan, tick, received, self._send)
+        commands = self._send_rest(received) if self._has_rest else []
+        self._recording.record(plan.topic, TICK_TYPE, received, encode(tick))
+        self._record_answers(commands)
+
+    def fade_out(self) -> None:
+        """Fade every force to 0 N within ``fade_time``, whatever comes."""
+        acting = [number for number, known in enumerate(self._state.actuators) if known.force != 0.0]
+        if not acting:
+            return
+        self._state = _with(self._state, refused=True)
+        self.publish_configuration()  # a replay fades from here on
+        left = _LAST_FORCES
+        while left:
+            time.sleep(_STOP_PERIOD)
+            for number in acting:
+                self._tick(number, self._now())
+            self.publish_newest()
+            left -= all(self._state.actuators[number].pipeline.feedforward.fade == 0.0 for number in acting)
+
+    # --- subscriptions and publishers ---
+
     def subscribe(self, name: str, profile: QoSProfile) -> None:
         """Subscribe to an input, in place of the present subscription."""
         if name in self._inputs:
             self.destroy_subscription(self._inputs[name])
         overriding = qos.overridable() if profile is qos.STREAM else None
         self._inputs[name] = self.create_subscription(
-            message_class(self.input_type(name)),
+            message_class(self._types[name]),
             name,
             with_source_time(partial(self._on_message, name)),
             profile,
@@ -228,11 +443,8 @@ class EstimatorNode(ManagedNode, ABC):
             # An event of a subscription that is replaced meanwhile is a segmentation fault of the events executor.
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
-        self._topics[name] = self._inputs[name].topic_name
-
-    def input_types(self, types: Mapping[str, str]) -> dict[str, str]:
-        """Message type of each input; simulated time is one with ``use_sim_time``."""
-        return {**types, CLOCK_TOPIC: CLOCK_TYPE} if self.get_parameter('use_sim_time').value else dict(types)
+        # A bag has the names of a mapping file, and the resolved ones of the built-in mapping.
+        self._topics[name] = name if name.startswith('/') else self._inputs[name].topic_name
 
     def _on_message(self, name: str, data: bytes, source: int, received: int) -> None:
         """Take a message that was sent at ``source`` [ns, system clock], and those that wait behind a late one.
@@ -278,7 +490,7 @@ class EstimatorNode(ManagedNode, ABC):
                 found.append((info['received_timestamp'], name, data, info['source_timestamp']))
         return found
 
-    def create_output(self, key: Any, topic: str, type_name: str) -> None:
+    def _create_output(self, key: Any, topic: str, type_name: str) -> None:
         """Create the publisher of an answer or a command; ``_publish[key]`` sends the bytes of one.
 
         Only an active node answers, so the publisher is none of the life cycle, and the bytes go past the checks of
@@ -313,7 +525,7 @@ class EstimatorNode(ManagedNode, ABC):
             self._watched = now
             self._look_at_graph()
 
-    def look_after_timers(self, now: int) -> None:
+    def _look_after_timers(self, now: int) -> None:
         """Call what is overdue, if the watchdog was not called for long; after a message, at ``now`` [ns].
 
         Args:
@@ -322,24 +534,56 @@ class EstimatorNode(ManagedNode, ABC):
         if now - self._watchdog_called > _STARVED:
             self.call_overdue_timers()
 
-    def keep_for_view(self, topic: str, type_name: str, data: bytes) -> None:
-        """Keep a message of an input for the live view; to be called while `has_viewer`."""
-        self._newest_inputs[topic] = TopicMessage(topic, type_name, data)
-
     def publish_newest(self) -> None:
         """Publish the newest messages for the live view, if there is one: 100 a second and not thousands."""
         if not self.has_viewer:
             return
         newest = list(self._newest_inputs.values())
         self._newest_inputs.clear()
-        for actuator, answer, frame_id in self.newest_answers():
+        for actuator, answer, frame_id in self._newest_answers():
             type_name = type_of(answer)
             topic = f'{actuator}/{_TOPIC_OF[type_name]}'
             newest.append(TopicMessage(topic, type_name, encode(answer, frame_id)))
         if newest:
             self._outputs[_MONITOR].publish(encode_newest(newest))
 
-    # --- parameters ---
+    # --- parameters and state ---
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, while the node is configured."""
+        return self._machine
+
+    @property
+    def _clock_offset(self) -> int:
+        """What the clock of the stamps shows after the clock of receipt [ns]."""
+        return self._state.actuators[0].pipeline.clock_offset
+
+    def _apply_change(self) -> None:
+        """Apply the present parameters."""
+        self._refuse_inputs(self._watch.duplicate_publishers())
+        changed = tuple(map(self._changed, self._machine.actuators))
+        if all(new is old for new, old in zip(changed, self._machine.actuators, strict=True)):
+            return
+        self._machine = replace(self._machine, actuators=changed)
+        if self.active:
+            self.publish_configuration()
+
+    def _snapshot(self) -> str:
+        """All that the next answer depends on, as text."""
+        return machine_text(snapshot_of(self._machine, self._state))
+
+    def _reset_adaptation(self) -> None:
+        """Forget what the adaptation of every actuator has learnt."""
+        states = [
+            known._replace(
+                pipeline=known.pipeline._replace(estimator=known.pipeline.estimator._replace(adaptation=NOT_ADAPTED))
+            )
+            for known in self._state.actuators
+        ]
+        self._state = MachineState(tuple(states))
+        for statistics in self._statistics.values():
+            statistics.on_reset()
 
     def on_change(self, changed: Collection[Parameter]) -> None:
         """Apply changed settings between two samples, at most every `_CHANGE_PERIOD`; a force that is off, at once."""
@@ -353,9 +597,9 @@ class EstimatorNode(ManagedNode, ABC):
         if self._is_change_due and (is_urgent or now - self._applied >= _CHANGE_PERIOD):
             self._is_change_due, self._applied = False, now
             self._applications += 1
-            self.apply_change()
+            self._apply_change()
 
-    def report_sets(self) -> dict[str, DiagnosticStatus]:
+    def _report_sets(self) -> dict[str, DiagnosticStatus]:
         """A warning if parameters are set more often than they are applied."""
         sets, applied = self._sets, self._applications
         self._sets = self._applications = 0
@@ -364,14 +608,22 @@ class EstimatorNode(ManagedNode, ABC):
         message = f'parameters were set {sets} times since the last report and applied {applied} times'
         return {'parameters': DiagnosticStatus(level=DiagnosticStatus.WARN, message=message)}
 
+    def _has_placeholder(self, prefix: str) -> bool:
+        """Whether the parameters with a prefix are of an actuator with a placeholder seal, while configured."""
+        actuators = self._machine.actuators if self.configured else ()
+        return any(one.configuration.has_placeholder for one in actuators if prefix.startswith(_prefix(one.name)))
+
     def check_change(self, changed: Mapping[ParameterGroup, Any]) -> None:
         """Reject a force from placeholder seals.
+
+        Args:
+            changed: Record of each group with a changed parameter.
 
         Raises:
             ValueError: The change is invalid.
         """
         for group, record in changed.items():
-            if isinstance(record, FeedForwardSettings) and record.scale > 0.0 and self.has_placeholder(group.prefix):
+            if isinstance(record, FeedForwardSettings) and record.scale > 0.0 and self._has_placeholder(group.prefix):
                 raise ValueError(f'{group.prefix}scale = {record.scale}: {PLACEHOLDER_WARNING}')
 
     # --- clock and graph ---
@@ -388,18 +640,18 @@ class EstimatorNode(ManagedNode, ABC):
         if following:
             self.publish_configuration()
             self.get_logger().info(f'recording to {following}')
-        if self.active and self.RECORDS_STATES and self._recording.is_state_due(time.monotonic()):
-            self._recording.record(self._state_topic, STATE_TYPE, self._now(), encode_text(self.snapshot()))
+        if self.active and self._mapping is None and self._recording.is_state_due(time.monotonic()):
+            self._recording.record(self._state_topic, STATE_TYPE, self._now(), encode_text(self._snapshot()))
         if self.active and CLOCK_TOPIC not in self._inputs:
             offset = time.time_ns() - self._now()
-            if abs(offset - self.clock_offset) > _LARGEST_CLOCK_STEP:
+            if abs(offset - self._clock_offset) > _LARGEST_CLOCK_STEP:
                 self._follow_clock(offset)
 
     def _on_input_timer(self) -> None:
         """Say what the node waits for, which input has stopped, and which is back."""
         if not self.active:
             return
-        for remark in self._input_watch.look(self.received(), time.monotonic()):
+        for remark in self._input_watch.look(self._received(), time.monotonic()):
             if remark.is_warning:
                 self.get_logger().warning(remark.text)
             else:  # a line of its own: rclpy allows one severity a line
@@ -407,8 +659,8 @@ class EstimatorNode(ManagedNode, ABC):
 
     def _follow_clock(self, offset: int) -> None:
         """Judge the age of stamps by a clock that was set; the time of receipt goes on."""
-        self.get_logger().warning(f'the clock was set by {(offset - self.clock_offset) * 1e-9:.3f} s')
-        self.set_clock_offset(offset)
+        self.get_logger().warning(f'the clock was set by {(offset - self._clock_offset) * 1e-9:.3f} s')
+        self._state = _with(self._state, clock_offset=offset)
         self.publish_configuration()
 
     def _now(self) -> int:
@@ -419,7 +671,7 @@ class EstimatorNode(ManagedNode, ABC):
 
     def publish_configuration(self) -> None:
         """Publish and record all that the next answer depends on."""
-        self.publish_recorded(CONFIGURATION_TYPE, CONFIGURATION_TYPE, encode_text(self.snapshot()))
+        self.publish_recorded(CONFIGURATION_TYPE, CONFIGURATION_TYPE, encode_text(self._snapshot()))
 
     def publish_recorded(self, key: Any, type_name: str, data: bytes) -> None:
         """Publish a message by the publisher ``key``, and record it."""
@@ -431,7 +683,7 @@ class EstimatorNode(ManagedNode, ABC):
         try:
             path = self._recording.start(self.settings(RecordingOptions))
         except ValueError as error:
-            self.log_error_once('recorder', str(error))
+            self._log_error_once('recorder', str(error))
             self.publish_configuration()
             return False, str(error)
         self.publish_configuration()
@@ -458,36 +710,119 @@ class EstimatorNode(ManagedNode, ABC):
         response.success = self.active
         response.message = 'scale 1, offset 0 N' if self.active else 'not active: nothing is learnt'
         if self.active:
-            self.reset_adaptation()
+            self._reset_adaptation()
             self.publish_configuration()  # a replay forgets at the same message
         return response
 
     # --- diagnostics ---
 
+    def diagnostics(self) -> dict[str, DiagnosticStatus]:
+        """Status of each actuator, of the inputs and outputs, and of the recorder."""
+        silent = dict.fromkeys(name for statistics in self._statistics.values() for name in statistics.silent_inputs)
+        graph = self._watch.findings(list(silent), retry=self.active)
+        self._refuse_inputs(graph.duplicates)
+        parts = {}
+        for number, actuator in enumerate(self._machine.actuators):
+            name, active = actuator.name, self.active
+            adapting = actuator.pipeline.estimator if active and actuator.pipeline.estimator.adapts else None
+            known = self._state.actuators[number].pipeline if active else None
+            refused = known is not None and known.refused
+            status = self._statistics[name].report(active, refused, graph, adapting, known.estimator if known else None)
+            said = self._unanswered(number) if active else []
+            if said:
+                status.level = max(status.level, DiagnosticStatus.WARN)
+                status.message = '; '.join([*said, status.message])
+            parts[name or 'estimate'] = status
+        return {**parts, 'recorder': self._report_graph(graph), **self._report_sets()}
+
+    def _unanswered(self, number: int) -> list[str]:
+        """What is wrong with the messages of an actuator: not taken, without its numbers, gauge or absolute."""
+        said = [self._state.actuators[number].fault] if self._state.actuators[number].fault else []
+        for topic, data in self._newest.items():
+            said += [f'{topic}: {text}' for text in missing(self._machine, number, topic, data)]
+        return said + pressure_remarks(self._file, self._file.actuators[number], self._lowest[number])
+
+    def _health_of_seals(self) -> dict[str, DiagnosticStatus]:
+        """Indicators of the seals of each actuator whose adaptation learns."""
+        found = {}
+        for actuator, known in zip(self._machine.actuators, self._state.actuators if self.active else (), strict=False):
+            if actuator.pipeline.estimator.adapts:
+                adaptation = known.pipeline.estimator.adaptation
+                found[f'{actuator.name} seals'.lstrip()] = self._statistics[actuator.name].health(
+                    actuator.pipeline.estimator, adaptation
+                )
+        return found
+
+    def _newest_answers(self) -> list[NamedAnswer]:
+        """The newest answers of each actuator since the last call."""
+        return [answer for name, statistics in self._statistics.items() for answer in statistics.take_newest(name)]
+
+    def _received(self) -> Mapping[str, int]:
+        """Messages of each input since activation."""
+        return {topic: count for one in self._statistics.values() for topic, count in one.received.items()}
+
+    def end_interval(self) -> None:
+        """Start a new interval of rates and latencies."""
+        for statistics in self._statistics.values():
+            statistics.start_interval()
+
+    def _refuse_inputs(self, duplicates: list[str]) -> None:
+        """Reject the inputs while ``refuse_second_publisher`` is set and topics have several publishers."""
+        refused = self._is_refused(duplicates)
+        if self.active and refused != self._state.actuators[0].pipeline.refused:
+            self._state = _with(self._state, refused=refused)
+            self.publish_configuration()  # a replay rejects the inputs from the same message on
+
     def _on_health_timer(self) -> None:
         """Publish the health of the seals while the adaptation learns."""
         message = DiagnosticArray()
-        for part, status in self.health().items():
+        for part, status in self._health_of_seals().items():
             status.name = f'{self.get_fully_qualified_name()}: {part}'
             message.status.append(status)
         if message.status:
             message.header.stamp = self.get_clock().now().to_msg()
             self._outputs[_HEALTH].publish(message)
 
-    def report_graph(self, graph: GraphFindings) -> DiagnosticStatus:
+    def _report_graph(self, graph: GraphFindings) -> DiagnosticStatus:
         """Log what is new about the graph and the recorder; status of the recorder."""
         recorder = self._recording.report()
-        self.log_error_once('publishers', '; '.join(graph.duplicates))
-        self.log_error_once('unheard', '; '.join(graph.unheard))
-        self.log_error_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
+        self._log_error_once('publishers', '; '.join(graph.duplicates))
+        self._log_error_once('unheard', '; '.join(graph.unheard))
+        self._log_error_once('recorder', recorder.message if recorder.level == DiagnosticStatus.ERROR else '')
         return recorder
 
-    def log_error_once(self, subject: str, error: str) -> None:
+    def _log_error_once(self, subject: str, error: str) -> None:
         """Log an error when it appears or changes, not every second."""
         if error and error != self._logged_errors.get(subject):
             self.get_logger().error(error)
         self._logged_errors[subject] = error
 
-    def is_refused(self, duplicates: list[str]) -> bool:
+    def _is_refused(self, duplicates: list[str]) -> bool:
         """Whether the inputs are rejected, since these topics have several publishers."""
         return bool(duplicates) and self.settings(InputOptions).refuse_second_publisher
+
+
+def _prefix(actuator: str) -> str:
+    """Start of the names of the parameters of an actuator."""
+    return f'{actuator}.' if actuator else ''
+
+
+def _groups(actuator: Actuator) -> tuple[ParameterGroup, ...]:
+    """Parameters of an actuator, which change while the node runs; their defaults are those of the mapping file."""
+    name = _prefix(actuator.name)
+    return (
+        ParameterGroup(EstimatorSettings, name, defaults=actuator.settings),
+        ParameterGroup(FeedForwardSettings, name + FEEDFORWARD_PREFIX, defaults=actuator.feedforward),
+        ParameterGroup(AdaptationSettings, name + ADAPTATION_PREFIX, defaults=actuator.adaptation),
+    )
+
+
+def _with(state: MachineState, **changed: Any) -> MachineState:
+    """State with fields of the pipeline of every actuator changed."""
+    return MachineState(tuple(k._replace(pipeline=k.pipeline._replace(**changed)) for k in state.actuators))
+
+
+def main(node: Callable[[], EstimatorNode]) -> int:
+    """Run the node that a call makes."""
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    return run(node, EstimatorNode.autostart, EstimatorNode.finish)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from seal_friction_ros.core.estimation.messages import Output
-from seal_friction_ros.core.estimation.pipeline import is_tick_due
+from seal_friction_ros.core.machine.machine import due
 from seal_friction_ros.nodes.friction_estimator import FrictionEstimator
 
 
@@ -31,7 +31,7 @@ class CountedEstimator(FrictionEstimator):
     @property
     def is_tick_due(self) -> bool:
         """Whether the watchdog will act at its next call."""
-        return self.active and is_tick_due(self._state, self._now())
+        return self.active and bool(due(self._state, self._now()))
 
     def on_input(self, name: str, data: bytes, lateness: int) -> None:
         super().on_input(name, data, 0 if self.clock else lateness)
@@ -46,6 +46,6 @@ class CountedEstimator(FrictionEstimator):
         super().fade_out()
         self.clock = kept
 
-    def _send(self, answer: Output, frame_id: bytes) -> None:
-        super()._send(answer, frame_id)
+    def _send(self, name: str, answer: Output, frame_id: bytes) -> None:
+        super()._send(name, answer, frame_id)
         self.sent += 1

@@ -123,15 +123,15 @@ def test_simulated_time_that_stands_still_is_an_error_after_a_second_without_new
     diagnostics = EstimatorDiagnostics([*INPUTS, CLOCK_TOPIC])
     watched = GraphFindings(dict.fromkeys([*INPUTS, CLOCK_TOPIC], 1), [], [], {})
     for stamp in times:
-        diagnostics.on_clock(stamp)
+        diagnostics.on_input(CLOCK_TOPIC, stamp)
     clock = 1.0
     diagnostics.start_interval()
     diagnostics.on_estimate(NO_ESTIMATE, 1000)
     for stamp in times[-1:]:
-        diagnostics.on_clock(stamp)
+        diagnostics.on_input(CLOCK_TOPIC, stamp)
     clock = 2.0
     report = diagnostics.report(True, False, watched)
     assert report.level == DiagnosticStatus.ERROR
     assert report.message.startswith('simulated time stands still')
-    diagnostics.on_clock(8)
+    diagnostics.on_input(CLOCK_TOPIC, 8)
     assert 'stands still' not in diagnostics.report(True, False, watched).message

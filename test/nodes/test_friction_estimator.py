@@ -26,9 +26,10 @@ from seal_friction_msgs.msg import FrictionEstimate
 from std_srvs.srv import Trigger
 
 from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
-from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, SealSelection
+from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING, SealSelection, parse_snapshot
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.friction_change import REFERENCE_REVERSALS
 from seal_friction_ros.core.estimation.messages import encode
 from seal_friction_ros.core.estimation.node_options import FRICTION_ESTIMATOR_PARAMETERS, ROS_PARAMETERS
 from seal_friction_ros.core.estimation.records import Velocity
@@ -283,7 +284,7 @@ def test_the_seals_change_by_single_parameters_while_the_node_is_unconfigured():
         ):
             assert g.estimator.set_parameters([RclpyParameter('seals', value=seals)])[0].successful
             assert g.estimator.trigger_configure() == TransitionCallbackReturn.SUCCESS
-            selection = g.estimator._configuration.selection
+            selection = g.estimator.machine.actuators[0].configuration.selection
             assert list(zip(selection.seals, selection.seal_chambers, strict=True)) == mounted
             assert g.estimator.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
 
@@ -437,19 +438,19 @@ def test_placeholder_seals_are_a_warning_in_the_log(seals: dict[str, object], wa
 
 def test_placeholder_seals_make_no_force_and_a_scale_is_rejected_with_the_reason():
     with graph({'feedforward.scale': SCALE}) as g:
-        assert g.estimator._configuration.feedforward.scale == 0.0
+        assert g.estimator.machine.actuators[0].configuration.feedforward.scale == 0.0
         for value, is_accepted in ((0.5, False), (1e-3, False), (0.0, True)):
             (result,) = g.estimator.set_parameters([RclpyParameter('feedforward.scale', value=value)])
             assert result.successful is is_accepted
             assert (PLACEHOLDER_WARNING in result.reason) is not is_accepted
-        assert g.estimator._configuration.feedforward.scale == 0.0
+        assert g.estimator.machine.actuators[0].configuration.feedforward.scale == 0.0
         assert g.estimator.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
         assert g.estimator.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
         changes = {'seals': list(REAL_SEALS), 'feedforward.scale': SCALE}
         for name, value in changes.items():
             assert g.estimator.set_parameters([RclpyParameter(name, value=value)])[0].successful
         assert g.estimator.autostart()
-        assert g.estimator._configuration.feedforward.scale == SCALE
+        assert g.estimator.machine.actuators[0].configuration.feedforward.scale == SCALE
 
 
 def test_the_node_declares_the_parameters_of_its_table_and_no_other():
@@ -464,7 +465,8 @@ def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it():
         g.connect()
         g.estimate(SECOND, 0.005)
         assert g.call(Trigger, 'friction_estimator/reset_adaptation', Trigger.Request()).success
-        assert g.estimator._state.estimator.adaptation == NOT_ADAPTED
+        assert g.spin_until(lambda: len(g.probe.configurations) == 2)
+        assert parse_snapshot(g.probe.configurations[-1].json).state.estimator.adaptation == NOT_ADAPTED
         values = {item.key: item.value for item in g.estimator.diagnostics()['estimate'].values}
         assert values['adaptation mode'] == 'observe'
         assert values['adaptation scale std'] == 'not learnt'
@@ -473,16 +475,19 @@ def test_what_is_learnt_is_in_diagnostics_and_a_reset_forgets_it():
 def test_the_ends_of_strokes_are_followed_and_a_reset_forgets_them():
     with graph({'adaptation.mode': 'observe', 'stamp_age_max': 0.0}) as g:
         g.connect()
-        for i in range(400):  # a reversal a second, 5 cm/s
-            side = 1.0 if i // 100 % 2 else -1.0
-            g.estimate(SECOND + 10 * i * 10**6, side * 0.05, force=40.0 * side)
-        statistics = g.estimator._statistics
-        learnt = g.estimator._state.estimator.adaptation.learnt.reversals
-        assert learnt >= 1
-        assert statistics._health.learnt == learnt
-        assert len(statistics._health.reversals) == learnt
-        g.estimator.reset_adaptation()
-        assert statistics._health.learnt == 0
+        for i in range(1200):  # 24 strokes of a second, 5 cm/s
+            side = 1.0 if i // 50 % 2 else -1.0
+            g.estimate(SECOND + 20 * i * 10**6, side * 0.05, force=40.0 * side)
+        assert int(reported(g)['reversals learnt from']) >= REFERENCE_REVERSALS
+        assert reported(g)['scale over that of the first reversals'] != 'none'
+        assert g.call(Trigger, 'friction_estimator/reset_adaptation', Trigger.Request()).success
+        assert reported(g)['reversals learnt from'] == '0'
+        assert reported(g)['scale over that of the first reversals'] == 'none'
+
+
+def reported(g) -> dict[str, str]:
+    """Values of the diagnostics of the estimate."""
+    return {item.key: item.value for item in g.estimator.diagnostics()['estimate'].values}
 
 
 def test_a_velocity_that_hums_on_a_rod_that_is_held_is_a_warning():

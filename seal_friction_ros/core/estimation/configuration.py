@@ -212,6 +212,11 @@ def first_snapshot(configuration: Configuration) -> Snapshot:
 
 def snapshot_text(snapshot: Snapshot) -> str:
     """Snapshot as JSON; equal snapshots give equal text. Numbers of the state are hexadecimal, NaN included."""
+    return json.dumps(snapshot_document(snapshot), sort_keys=True, allow_nan=False)
+
+
+def snapshot_document(snapshot: Snapshot) -> dict[str, Any]:
+    """Snapshot for JSON, see `snapshot_text`."""
     configuration, state, version, recorded = snapshot
     document = {
         'version': version,
@@ -225,19 +230,27 @@ def snapshot_text(snapshot: Snapshot) -> str:
     if recorded is not None:
         acted = recorded.feedforward
         document['recorded'] = {'feedforward': vars(acted) if acted is not None else None}
-    return json.dumps(document, sort_keys=True, allow_nan=False)
+    return document
 
 
 def parse_snapshot(text: str) -> Snapshot:
     """Snapshot from its JSON text.
 
-    The default seals of version 1 had no mark: they count as `PLACEHOLDER`.
-
     Raises:
         ValueError: The text is not the JSON of a snapshot, a value in it is not valid, or a later version made it.
     """
+    return parse_snapshot_document(parse_json(text, 'configuration'))
+
+
+def parse_snapshot_document(document: Any) -> Snapshot:
+    """Snapshot from its JSON document: inverse of `snapshot_document`.
+
+    The default seals of version 1 had no mark: they count as `PLACEHOLDER`.
+
+    Raises:
+        ValueError: The document is not a snapshot, a value in it is not valid, or a later version made it.
+    """
     try:
-        document = parse_json(text, 'configuration')
         version = int(document.get('version', 1))
         if version > ALGORITHM_VERSION:
             raise ValueError(
@@ -258,11 +271,6 @@ def parse_snapshot(text: str) -> Snapshot:
         return Snapshot(configuration, state, version, _recorded(document.get('recorded'), version))
     except (TypeError, AttributeError, LookupError, OverflowError) as error:
         raise ValueError(f'configuration: not the JSON of a snapshot: {type(error).__name__}: {error}') from None
-
-
-def snapshot_version(text: str) -> int:
-    """Version of the algorithm that made a snapshot, from its valid text."""
-    return int(parse_json(text, 'configuration').get('version', 1))
 
 
 def _recorded(document: Any, version: int) -> Recorded | None:

@@ -1,6 +1,6 @@
 """ROS parameters of the friction estimator: the table of their groups, and the options of the node itself.
 
-The ROS declaration (``nodes/friction_estimator.py``), the check of a parameter file (``files.load_parameter_file``) and
+The ROS declaration (``nodes/estimator_node.py``), the check of a parameter file (``files.load_parameter_file``) and
 the tables in docs/interfaces.md (``tools/make_docs.py``) follow from the table.
 """
 

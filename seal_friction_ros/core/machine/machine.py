@@ -1,9 +1,10 @@
 """A machine of several actuators: raw messages in, answers of each actuator out.
 
-``state = init(machine)``, then ``state = receive(machine, state, topic, data, received, emit)`` for the bytes of every
-message, live and in replay alike. A message is read once, whatever it holds for whichever actuator. What it holds
-becomes records of the estimator (`records_of`), and those take the path of one actuator (`pipeline.receive`) in this
-order: temperature, pressure, force, position, reference, velocity, since the velocity makes the estimate.
+``state = init(machine)``, then ``state = receive(machine, state, plan, plan.read(data), received, emit)`` for the bytes
+of every message, live and in replay alike. A message is read once, whatever it holds for whichever actuator. A message
+of this project is a record of the estimator already (`record_plan`). What another message holds becomes records
+(`records_of`), and those take the path of one actuator (`pipeline.receive`) in this order: temperature, pressure,
+force, position, reference, velocity, since the velocity makes the estimate.
 
 A record made from several messages has the stamp of the oldest of them, and is made when that stamp changes: so one
 that stops makes the record old, which the estimator flags. A number that a message does not hold (another joint, an
@@ -16,25 +17,24 @@ others go on.
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import pipeline
 from seal_friction_ros.core.estimation.configuration import Configuration
-from seal_friction_ros.core.estimation.feedforward import FeedForward
-from seal_friction_ros.core.estimation.messages import Input, Output
+from seal_friction_ros.core.estimation.feedforward import newest_force
+from seal_friction_ros.core.estimation.messages import DECODERS, Input, Output
 from seal_friction_ros.core.estimation.pipeline import ZERO_CELSIUS, PipelineParameters, PipelineState
 from seal_friction_ros.core.estimation.records import (
     NEVER,
-    Clock,
     Force,
     Position,
     Pressure,
     ServoReference,
     Temperature,
     Velocity,
-    WatchdogTick,
 )
 from seal_friction_ros.core.machine.differentiator import NO_WINDOW, Differentiator, Window, differentiate
 from seal_friction_ros.core.machine.machine_file import Actuator, ForceSum, LoadTable, MachineFile, Signal
@@ -111,8 +111,10 @@ class _Taken(NamedTuple):
 class TopicPlan(NamedTuple):
     """How the messages of a topic are read, and what of them goes where."""
 
-    reader: Reader
-    taken: tuple[tuple[int, tuple[_Taken, ...]], ...]  # number of the actuator, and what it takes
+    topic: str
+    read: Callable[[bytes], Any]  # makes a `Reading`, or a record of the estimator; ValueError for other bytes
+    taken: tuple[tuple[int, tuple[_Taken, ...]], ...]  # number of an actuator, what it takes; (): the record itself
+    holds_records: bool = False  # whether a message is a record of the estimator
 
 
 @dataclass(frozen=True)
@@ -161,12 +163,14 @@ def make_machine(
     Args:
         file: The mapping.
         configurations: Name of each actuator -> its seals and settings.
-        definitions: Type of each topic (``package/Name``) -> its definition.
+        definitions: Type of each topic (``package/Name``) -> its definition; not used by the built-in mapping.
 
     Raises:
         ValueError: A type is not known, or has no such field; one line that names topic and field.
     """
     actuators = tuple(_actuator(mapping, file, configurations[mapping.name]) for mapping in file.actuators)
+    if file.document is None:
+        return Machine(file, actuators, {topic: record_plan(topic, kind, (0,)) for topic, kind in file.topics.items()})
     wanted: dict[str, list[tuple[int, int, Signal]]] = {}
     for number, mapping in enumerate(file.actuators):
         signals = mapping.signals()
@@ -176,6 +180,17 @@ def make_machine(
             wanted.setdefault(signal.topic, []).append((number, _PLACE[name], signal))
     plans = {topic: _plan(topic, file.topics[topic], signals, definitions) for topic, signals in wanted.items()}
     return Machine(file, actuators, plans)
+
+
+def record_plan(topic: str, kind: str, numbers: Iterable[int]) -> TopicPlan:
+    """Plan of a topic whose messages are records of the estimator.
+
+    Args:
+        topic: Its name.
+        kind: Message type of this project.
+        numbers: Of the actuators that take each record.
+    """
+    return TopicPlan(topic, DECODERS[kind], tuple((number, ()) for number in numbers), holds_records=True)
 
 
 def _plan(
@@ -192,7 +207,7 @@ def _plan(
     for number, quantity, signal in wanted:
         entry = _Taken(paths.index(signal.field), quantity, signal.gain, signal.offset)
         taken.setdefault(number, []).append(entry)
-    return TopicPlan(reader, tuple((number, tuple(entries)) for number, entries in taken.items()))
+    return TopicPlan(topic, reader.read, tuple((number, tuple(entries)) for number, entries in taken.items()))
 
 
 def _actuator(mapping: Actuator, file: MachineFile, configuration: Configuration) -> MachineActuator:
@@ -259,8 +274,8 @@ def init(machine: Machine) -> MachineState:
 def receive(
     machine: Machine,
     state: MachineState,
-    topic: str,
-    data: bytes,
+    plan: TopicPlan,
+    message: Any,
     received: int,
     emit: Emit,
     sent: int | None = None,
@@ -270,53 +285,33 @@ def receive(
     Args:
         machine: From `make_machine`.
         state: From `init` or the message before.
-        topic: One of ``machine.plans``.
-        data: The message, CDR.
+        plan: Of the topic of the message: one of ``machine.plans``, or `record_plan` of a tick or simulated time.
+        message: As ``plan.read`` makes it.
         received: When it was received [ns], on the clock of `pipeline.receive`.
         emit: Called with each answer.
         sent: When its publisher sent it [ns], as `pipeline.receive`.
 
     Returns:
         The next state.
-
-    Raises:
-        ValueError: The bytes are not a message of the type of the topic; no actuator takes anything of them.
     """
-    plan = machine.plans[topic]
-    reading = plan.reader.read(data)
     states = list(state.actuators)
     for number, taken in plan.taken:
         actuator, known = machine.actuators[number], states[number]
+        memory: Memory = known.memory
+        records: Sequence[Input] = (message,)
+        before = after = known.pipeline
+        named = partial(emit, actuator.mapping.name)
         try:
-            stamp = reading.stamp if reading.stamp is not None else _stamp(actuator, known, received, sent)
-            memory, records = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
-            states[number] = _passed(actuator, known, memory, records, received, emit, sent)
+            if taken:
+                stamp = message.stamp if message.stamp is not None else _stamp(actuator, known, received, sent)
+                memory, records = records_of(actuator, memory, taken, message.numbers, stamp, message.frame_id)
+            for record in records:
+                after = pipeline.receive(actuator.pipeline, after, record, received, named, sent)
         except (ArithmeticError, ValueError) as error:
-            states[number] = known._replace(force=0.0, fault=f'{topic}: {type(error).__name__}: {error}')
-    return MachineState(tuple(states))
-
-
-def receive_tick(
-    machine: Machine,
-    state: MachineState,
-    number: int,
-    tick: WatchdogTick,
-    received: int,
-    emit: Emit,
-) -> MachineState:
-    """The watchdog acts on one actuator, see `due`."""
-    states = list(state.actuators)
-    known = states[number]
-    states[number] = _passed(machine.actuators[number], known, known.memory, [tick], received, emit)
-    return MachineState(tuple(states))
-
-
-def receive_clock(machine: Machine, state: MachineState, clock: Clock, received: int, sent: int) -> MachineState:
-    """Every actuator follows simulated time."""
-    states = []
-    for actuator, known in zip(machine.actuators, state.actuators, strict=True):
-        since = pipeline.acting_since(actuator.pipeline.feedforward, received, sent)
-        states.append(known._replace(pipeline=pipeline.receive_clock(known.pipeline, clock, received, since)))
+            states[number] = known._replace(force=0.0, fault=f'{plan.topic}: {type(error).__name__}: {error}')
+            continue
+        force = known.force if after.feedforward is before.feedforward else newest_force(after.feedforward)
+        states[number] = ActuatorState(after, memory, force)
     return MachineState(tuple(states))
 
 
@@ -387,37 +382,13 @@ def missing(machine: Machine, number: int, topic: str, data: bytes) -> list[str]
         ValueError: As `receive`.
     """
     plan = machine.plans[topic]
-    reading = plan.reader.read(data)
+    wanted = [entry.number for taker, entries in plan.taken if taker == number for entry in entries]
+    if not wanted:
+        return []
+    reading = plan.read(data)
     without = [place for place, value in enumerate(reading.numbers) if value is None]
     texts = dict(zip(without, reading.missing, strict=True))
-    wanted = [entry.number for taker, entries in plan.taken if taker == number for entry in entries]
     return list(dict.fromkeys(texts[place] for place in wanted if place in texts))
-
-
-def _passed(
-    actuator: MachineActuator,
-    state: ActuatorState,
-    memory: Memory,
-    records: list[Input],
-    received: int,
-    emit: Emit,
-    sent: int | None = None,
-) -> ActuatorState:
-    """State after some records have taken the path of their actuator."""
-    if not records:
-        return ActuatorState(state.pipeline, memory, state.force)
-    known, name, force = state.pipeline, actuator.mapping.name, state.force
-
-    def pass_on(answer: Output, frame_id: bytes) -> None:
-        """Pass an answer on with the name of the actuator; keep its force."""
-        nonlocal force
-        emit(name, answer, frame_id)
-        if type(answer) is FeedForward:
-            force = answer.force
-
-    for record in records:
-        known = pipeline.receive(actuator.pipeline, known, record, received, pass_on, sent)
-    return ActuatorState(known, memory, force)
 
 
 def records_of(

@@ -46,6 +46,7 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.configuration import SealSelection
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.messages import INPUTS as OWN_TOPICS
 from seal_friction_ros.core.estimation.node_options import ADAPTATION_PREFIX, FEEDFORWARD_PREFIX
 from seal_friction_ros.core.foundation.parameters import ParameterGroup, check_names, from_mapping, printable
 from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, unit_size
@@ -195,6 +196,7 @@ class MachineFile(NamedTuple):
     ambient_pressure: Source  # [Pa, absolute]
     actuators: tuple[Actuator, ...]
     together: bool = False  # whether the answers to a message are one message
+    document: Mapping[str, Any] | None = None  # the file as it was read; None: the built-in mapping, see `own_file`
 
 
 # -- reading ----------------------------------------------------------------------------------------------------------
@@ -253,7 +255,19 @@ def parse_machine(document: Any, where: str) -> MachineFile:
         ambient,
         tuple(_actuator(key, value, topics, where) for key, value in actuators.items()),
         answers == ANSWERS[1],
+        document,
     )
+
+
+def own_file(selection: SealSelection, topics: Mapping[str, str] = OWN_TOPICS) -> MachineFile:
+    """The built-in mapping: one actuator without a name, whose messages are the records of this project.
+
+    Args:
+        selection: Its seals.
+        topics: Topic -> message type; a message of another project cannot be mapped.
+    """
+    settings = EstimatorSettings(), FeedForwardSettings(), AdaptationSettings()
+    return MachineFile('', topics, 0.0, (Actuator('', selection, {}, 0.0, 0.0, None, None, None, *settings),))
 
 
 def check_mapping(document: Any, where: str) -> None:

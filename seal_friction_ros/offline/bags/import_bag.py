@@ -22,12 +22,13 @@ from seal_friction_ros.core.machine.machine import (
     QUANTITIES,
     Machine,
     MachineActuator,
+    TopicPlan,
     first_memory,
     make_machine,
     records_of,
 )
 from seal_friction_ros.core.machine.machine_file import MachineFile
-from seal_friction_ros.core.machine.message_fields import Reader, Reading, short_name
+from seal_friction_ros.core.machine.message_fields import Reading, short_name
 from seal_friction_ros.files import machine_configurations, read_machine
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
@@ -169,7 +170,7 @@ def _clock_offset(machine: Machine, bag: Path) -> int:
     """
     for message in read_messages(bag):
         plan = machine.plans.get(message.topic)
-        stamp = plan.reader.read(message.data).stamp if plan is not None else None
+        stamp = plan.read(message.data).stamp if plan is not None else None
         if stamp is not None:
             offset = stamp - message.log_time
             return offset if abs(offset) > LARGEST_CLOCK_STEP else 0
@@ -208,7 +209,7 @@ def _write(
             if message.topic not in machine.plans:
                 continue
             plan = machine.plans[message.topic]
-            reading = _read(plan.reader, message, bag)
+            reading = _read(plan, message, bag)
             missing.update(f'{message.topic}: {text}' for text in reading.missing)
             stamp = reading.stamp if reading.stamp is not None else message.log_time + offset
             for number, taken in plan.taken:
@@ -228,11 +229,12 @@ def _write(
     return counts, [f'{text} ({count} messages)' for text, count in missing.items()], lowest, tracks
 
 
-def _read(reader: Reader, message: BagMessage, bag: Path) -> Reading:
+def _read(plan: TopicPlan, message: BagMessage, bag: Path) -> Reading:
     try:
-        return reader.read(message.data)
+        reading: Reading = plan.read(message.data)
     except ValueError as error:
         raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
+    return reading
 
 
 def _awaited(actuator: MachineActuator, present: set[str]) -> set[type]:

@@ -4,11 +4,10 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, ESTIMATE_TYPE, decode, decode_text
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.friction.states import FrictionState
-from seal_friction_ros.core.machine.machine_snapshot import is_machine_text, machine_of_text
+from seal_friction_ros.core.machine.machine_snapshot import parse_machine_text
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
 
 
@@ -79,12 +78,8 @@ def _seals(text: str) -> list[str]:
     Raises:
         ValueError: The text is no configuration.
     """
-    if is_machine_text(text):
-        selections = {f'{one.name}: ': one.selection for one in machine_of_text(text).actuators}
-    else:
-        selections = {'': parse_snapshot(text).configuration.selection}
     return [
-        f'{name}{seal} on chamber {chamber}'
-        for name, one in selections.items()
-        for seal, chamber in zip(one.seals, one.seal_chambers, strict=True)
+        f'{name}: {seal} on chamber {chamber}'.removeprefix(': ')
+        for name, one in parse_machine_text(text).configurations.items()
+        for seal, chamber in zip(one.selection.seals, one.selection.seal_chambers, strict=True)
     ]

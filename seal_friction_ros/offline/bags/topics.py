@@ -83,19 +83,28 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
     Raises:
         BagError: There is no velocity topic, or a type of this project has several topics.
     """
-    names = []
-    below = f'/{namespace.strip("/")}/'.replace('//', '/')
     known = bag_topics(bag) if known is None else known
-    topics = {topic: info for topic, info in known.items() if topic.startswith(below) and not topic.endswith(RECORDED)}
-    for wanted in TYPES:
-        place = known if wanted == TYPES.clock else topics  # simulated time is one for all
-        found = sorted(topic for topic, info in place.items() if info.type_name == wanted and info.message_count)
-        if len(found) > 1 and wanted == TYPES.temperature:  # a standard type: others may be of a motor or a battery
-            found = [topic for topic in found if topic.endswith(TEMPERATURE_TOPIC)]
-        if len(found) > 1:
-            raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
-        names.append(found[0] if found else '')
-    result = Topics(*names)
+    result = Topics(*(find_topic(bag, wanted, namespace, known) for wanted in TYPES))
     if not result.velocity:
         raise BagError(f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from')
     return result
+
+
+def find_topic(bag: Path, wanted: str, namespace: str, known: Mapping[str, TopicInfo]) -> str:
+    """The topic of a message type, see `find_topics`; empty if there is none.
+
+    Raises:
+        BagError: A type of this project has several topics.
+    """
+    below = f'/{namespace.strip("/")}/'.replace('//', '/')
+    found = [
+        topic
+        for topic, info in sorted(known.items())
+        if info.type_name == wanted and info.message_count and not topic.endswith(RECORDED)
+        if topic.startswith(below) or wanted == TYPES.clock  # simulated time is one for all
+    ]
+    if len(found) > 1 and wanted == TYPES.temperature:  # a standard type: others may be of a motor or a battery
+        found = [topic for topic in found if topic.endswith(TEMPERATURE_TOPIC)]
+    if len(found) > 1:
+        raise BagError(f'{bag}: several topics of {wanted}: {", ".join(found)}: choose with --namespace')
+    return found[0] if found else ''

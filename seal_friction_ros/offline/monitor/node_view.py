@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     DECODERS,
@@ -11,7 +10,7 @@ from seal_friction_ros.core.estimation.messages import (
 )
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine import Machine, Memory, first_memory, records_of
-from seal_friction_ros.core.machine.machine_snapshot import is_machine_text, machine_of_text, parse_machine_text
+from seal_friction_ros.core.machine.machine_snapshot import machine_of, parse_machine_text
 from seal_friction_ros.core.machine.message_fields import Definition
 from seal_friction_ros.core.machine.newest_messages import decode_newest
 from seal_friction_ros.offline.monitor.actuator_view import (
@@ -89,15 +88,15 @@ class NodeView:
         Raises:
             ValueError: It is not valid.
         """
-        if is_machine_text(text):
-            definitions = self._definitions_of(machine_of_text(text).topics.values())
-            machine, _ = parse_machine_text(text, definitions)
+        snapshot = parse_machine_text(text)
+        self.known = {name: known_of(one) for name, one in snapshot.configurations.items()}
+        if snapshot.file.document is not None:
+            machine, _ = machine_of(snapshot, self._definitions_of(snapshot.file.topics.values()))
             if self._machine is None or machine.file != self._machine.file:
                 self._memories = [first_memory(actuator) for actuator in machine.actuators]
             self._machine = machine
-            self.known = {actuator.name: known_of(actuator.configuration) for actuator in machine.actuators}
         else:
-            self._machine, self.known = None, {'': known_of(parse_snapshot(text).configuration)}
+            self._machine = None
         self.held = {name: self.held.get(name, NOTHING_HELD) for name in self.known}
         self.refused = ''
 
@@ -153,7 +152,7 @@ class NodeView:
     def _take_of_machine(self, machine: Machine, topic: str, data: bytes, received: int) -> None:
         """Records that a message of a machine makes, as its estimator makes them."""
         plan = machine.plans[topic]
-        reading = plan.reader.read(data)
+        reading = plan.read(data)
         stamp = received if reading.stamp is None else reading.stamp
         for number, taken in plan.taken:
             actuator = machine.actuators[number]

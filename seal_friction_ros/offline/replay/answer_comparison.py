@@ -8,6 +8,7 @@ from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
 from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE, FEEDFORWARD_TYPE, GROWN
+from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE
 
 LONGEST_QUEUE = 100_000  # replayed answers that may wait for a recorded one; bounds memory if recording has stopped
 
@@ -108,25 +109,33 @@ class AnswerStream:
 
 
 def replay_result(
-    velocities: int, streams: Mapping[str, AnswerStream], versions: Iterable[int], *, is_cut: bool
+    velocities: int,
+    streams: Mapping[str, AnswerStream],
+    versions: Iterable[int],
+    *,
+    is_cut: bool,
+    names_topics: bool = False,
 ) -> ReplayResult:
     """Result at the end of a bag.
 
     Args:
         velocities: Number of velocity samples.
-        streams: By message type.
+        streams: By message type or topic.
         versions: Of the algorithm, of each recorded configuration.
         is_cut: The answer to the last message may be missing.
+        names_topics: Whether the first difference begins with its topic.
     """
+    recorded: Counter[str] = Counter()
     for stream in streams.values():
         stream.finish(may_lack=int(is_cut))
-    recorded = Counter({type_name: stream.recorded for type_name, stream in streams.items()})
+        recorded[stream.type_name] += stream.recorded
+    first = next(((topic, stream.first) for topic, stream in streams.items() if stream.first), ('', ''))
     return ReplayResult(
         velocities,
-        recorded[ESTIMATE_TYPE],
+        recorded[ESTIMATE_TYPE] + recorded[MACHINE_TYPE],
         recorded[FEEDFORWARD_TYPE],
         sum(stream.differing for stream in streams.values()),
-        next((stream.first for stream in streams.values() if stream.first), ''),
+        ': '.join(first) if names_topics and first[1] else first[1],
         min(versions, default=ALGORITHM_VERSION),
     )
 

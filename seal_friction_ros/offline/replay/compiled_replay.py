@@ -18,10 +18,8 @@ from seal_friction_ros.core.estimation.compiled_pipeline import (
     UnsuitedError,
     receive_all,
 )
-from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot, snapshot_version
+from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, parse_snapshot
 from seal_friction_ros.core.estimation.messages import (
-    CONFIGURATION_TYPE,
-    DECODERS,
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
     GROWN,
@@ -89,6 +87,8 @@ class Run:
         self.configuration, self._has_override = configuration, has_override
         self._parameters = configuration.parameters()
         self._tells_sending = state is not None and configuration.tells_sending
+        self.versions: set[int] = set()
+        """of the algorithm that made the recorded configurations used"""
         self.state = init(self._parameters) if state is None else state
 
     def compared(
@@ -111,7 +111,6 @@ class Run:
             UnsuitedError: As `receive_all`.
         """
         velocities, is_cut = 0, False
-        versions: set[int] = set()
         streams = {type_name: _BulkAnswerStream(type_name) for type_name, topic in topics.answers.items() if topic}
         for messages, answers in self.answered(blocks):
             kinds = messages.kinds
@@ -119,12 +118,10 @@ class Run:
             for type_name, stream in streams.items():
                 stream.compare_block(messages, answers, _RECORDED[type_name])
             if len(kinds):
-                if kinds[0] == Kind.CONFIGURATION and not self._has_override:
-                    versions.add(snapshot_version(decode_text(messages.message(0))))
                 answered = answers.estimate_sizes[-1] or answers.feedforward_sizes[-1]
                 is_cut = bool(answered) or int(kinds[-1]) in (Kind.ESTIMATE, Kind.OTHER_ESTIMATE)
             advance(len(kinds))
-        return replay_result(velocities, streams, versions, is_cut=is_cut and may_be_cut)
+        return replay_result(velocities, streams, self.versions, is_cut=is_cut and may_be_cut)
 
     def answered(self, blocks: Iterable[Messages]) -> Iterator[tuple[Messages, Answers]]:
         """Blocks of messages and the answers to them; a block ends before each configuration."""
@@ -134,14 +131,18 @@ class Run:
             for first, end in pairwise(ends):
                 messages = block.taken(first, end)
                 if messages.kinds[0] == Kind.CONFIGURATION:
-                    configuration, self.state = parse_snapshot(DECODERS[CONFIGURATION_TYPE](messages.message(0)))[:2]
-                    self._tells_sending = configuration.tells_sending
-                    if not self._has_override:
-                        self.configuration, self._parameters = configuration, configuration.parameters()
+                    self._configure(parse_snapshot(decode_text(messages.message(0))))
                 if not self._tells_sending:
                     messages = messages._replace(sent=messages.received)
                 self.state, answers = receive_all(self._parameters, self.state, messages)
                 yield messages, answers
+
+    def _configure(self, snapshot: Snapshot) -> None:
+        configuration, self.state = snapshot.configuration, snapshot.state
+        self._tells_sending = configuration.tells_sending
+        if not self._has_override:
+            self.configuration, self._parameters = configuration, configuration.parameters()
+            self.versions.add(snapshot.version)
 
 
 def compile_now(configurations: Iterable[Configuration] = ()) -> None:

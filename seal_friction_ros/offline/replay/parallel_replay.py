@@ -10,10 +10,9 @@ from typing import Any
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
-from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.bags.topics import Topics, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.bag_parts import try_bags
-from seal_friction_ros.offline.replay.machine_replay import is_machine_bag
 from seal_friction_ros.offline.replay.replay import count_messages, replay
 from seal_friction_ros.offline.work.executor import Workers, nothing
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
@@ -37,13 +36,13 @@ def verify(
     Raises:
         BagError: The bag cannot be read.
     """
-    known = bag_topics(bag)
-    total = count_messages(known)
-    if total >= bulk_from and has_compiler() and not is_machine_bag(bag, known):
+    total = count_messages(bag_topics(bag))
+    topics = _own_topics(bag, namespace) if total >= bulk_from and has_compiler() else None
+    if topics is not None:
         from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk  # noqa: PLC0415  loads the compiler
 
         with progress(f'replay {bag.name}', total) as advance:
-            result = replay_in_bulk(bag, find_topics(bag, namespace, known), override, advance)
+            result = replay_in_bulk(bag, topics, override, advance)
         if result is not None:
             return result
     return replay(bag, override, namespace=namespace)
@@ -55,19 +54,27 @@ def verify_shared(
     """Result of `verify` with the bag's own configuration, by several workers.
 
     Returns:
-        None: the bag is too short to share, of a machine, without states between which it can be shared, or it is not
-        identical, so that it has to be replayed in one go.
+        None: the bag is too short to share, without states between which it can be shared, or it is not identical, so
+        that it has to be replayed in one go.
 
     Raises:
         BagError: The bag cannot be read.
         ValueError: The cluster cannot be used.
     """
-    known = bag_topics(bag)
-    if workers == 1 or count_messages(known) < bulk_from or not has_compiler() or is_machine_bag(bag, known):
+    if workers == 1 or count_messages(bag_topics(bag)) < bulk_from or not has_compiler():
         return None
     from seal_friction_ros.offline.replay.shared_replay import verify_stretches  # noqa: PLC0415  loads the compiler
 
-    return verify_stretches(bag, find_topics(bag, namespace, known), workers)
+    topics = _own_topics(bag, namespace)
+    return None if topics is None else verify_stretches(bag, topics, workers)
+
+
+def _own_topics(bag: Path, namespace: str) -> Topics | None:
+    """Topics of this project, whose messages are replayed in bulk; None: there are not what the estimator needs."""
+    try:
+        return find_topics(bag, namespace)
+    except BagError:
+        return None
 
 
 def replay_many(

@@ -1,34 +1,43 @@
 """Replay of a bag through the estimator, without ROS graph or clock: byte for byte the answers of the live node."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.configuration import (
-    ALGORITHM_VERSION,
-    Configuration,
-    Recorded,
-    SealSelection,
-    Snapshot,
-    first_snapshot,
-    parse_snapshot,
-    snapshot_text,
-    snapshot_version,
-)
+from seal_friction_ros.core.estimation.configuration import Configuration, SealSelection
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorSettings
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import (
+    CLOCK_TYPE,
     CONFIGURATION_TYPE,
-    DECODERS,
     ESTIMATE_TYPE,
+    FEEDFORWARD_TYPE,
+    OUTPUTS,
+    TICK_TYPE,
+    Output,
     decode_text,
+    encode,
     encode_text,
+    type_of,
 )
-from seal_friction_ros.core.estimation.pipeline import answered, init
 from seal_friction_ros.core.estimation.records import NEVER
+from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, NamedAnswer, encode_together
+from seal_friction_ros.core.machine.machine import Machine, MachineState, TopicPlan, receive, record_plan
+from seal_friction_ros.core.machine.machine_file import MachineFile
+from seal_friction_ros.core.machine.machine_snapshot import (
+    MachineSnapshot,
+    first_of_replay,
+    machine_of,
+    machine_text,
+    parse_machine_text,
+    snapshot_of,
+)
+from seal_friction_ros.core.machine.message_fields import full_name
+from seal_friction_ros.core.machine.outputs import due_commands
 from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file, with_seal
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
+    STATE_NAME,
     STATE_PERIOD,
     STATE_TYPE,
     BagError,
@@ -38,9 +47,9 @@ from seal_friction_ros.offline.bags.bag import (
     bag_topics,
     read_messages,
 )
-from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS, RECORDED, Topics, find_topics
+from seal_friction_ros.offline.bags.definitions import read_definitions
+from seal_friction_ros.offline.bags.topics import ANSWER_TOPICS, RECORDED, TYPES, find_topic, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
-from seal_friction_ros.offline.replay.machine_replay import is_machine_bag, replay_machine
 from seal_friction_ros.offline.work.progress import progress
 
 
@@ -63,60 +72,213 @@ def chosen_configuration(params: Path | None, seal: str | Path | None) -> Config
     return load_configuration(selection, settings, feedforward, adaptation)
 
 
+class Answer(NamedTuple):
+    """One message that the estimator makes."""
+
+    topic: str
+    type_name: str
+    data: bytes
+
+
 class Step(NamedTuple):
     """One message, and the answers of the estimator to it."""
 
     message: BagMessage
-    answers: tuple[tuple[str, bytes], ...]  # message type and bytes of each answer
+    answers: tuple[Answer, ...]
 
 
-def steps(messages: Iterable[BagMessage], topics: Topics, override: Configuration | None) -> Iterator[Step]:
-    """Each message in order, with the serialised answers of the estimator to it.
+class Replay:
+    """The machine of a bag on its way through the messages, and what it answers to each.
 
-    The estimator uses ``override``, or else the newest configuration in the bag, or else the default configuration. The
-    configuration messages that are returned hold the configuration used: ``override`` replaces recorded ones, and if
-    the bag has none, one is inserted at the start. They are marked as replayed, with the settings that acted. Every
-    `STATE_PERIOD` there is the state, too, in place of those in the bag.
+    A bag of ``friction_estimator`` is that of a machine with the built-in mapping. The machine is that of the newest
+    configuration in the bag. A bag without configuration is replayed by the default one, with the built-in mapping.
+
+    Args:
+        bag: The bag.
+        override: Configuration of each actuator instead of the recorded one.
+        namespace: Use only topics below it.
 
     Raises:
-        BagError: A message does not match its type.
+        BagError: The bag cannot be read, or has not what the estimator needs.
     """
-    configuration = override or default_configuration()
-    parameters = configuration.parameters()
-    state = init(parameters)
-    inputs, tells_sending = topics.inputs, False
-    if not topics.configuration:
-        data = encode_text(snapshot_text(first_snapshot(configuration)._replace(recorded=Recorded(None))))
-        yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, data), ())
-    newest, due = NEVER, NEVER  # [ns] log time of the message before, and of the next state
-    for message in messages:
-        if message.topic == topics.state:
-            continue
-        if due <= message.log_time > newest:  # of messages of one time none is before a state and another after it
-            if due != NEVER:
-                data = encode_text(snapshot_text(Snapshot(configuration, state)))
-                yield Step(BagMessage(topics.state, STATE_TYPE, message.log_time, data), ())
-            due = message.log_time + round(STATE_PERIOD * 1e9)
-        newest = message.log_time
-        answers: list[tuple[str, bytes]] = []
-        used = message if tells_sending else message._replace(publish_time=message.log_time)
+
+    def __init__(self, bag: Path, override: Configuration | None = None, namespace: str = '') -> None:
+        self.topics: Mapping[str, TopicInfo] = bag_topics(bag)
+        """topics of the bag"""
+        self.answers: dict[str, str] = {}
+        """topic -> message type of all that the machine makes, in the order in which it makes them"""
+        self.compared: dict[str, str] = {}
+        """those of them that the bag has"""
+        self.has_names = False
+        """whether its actuators have names"""
+        self.estimates = 0
+        """made so far"""
+        self.versions: set[int] = set()
+        """of the algorithm that made the recorded configurations used"""
+        self._bag, self._override, self._namespace = bag, override, namespace
+        self._configuration = find_topic(bag, CONFIGURATION_TYPE, namespace, self.topics)
+        self._state_topic = f'{(self._configuration or CONFIGURATION_TOPIC).rpartition("/")[0]}/{STATE_NAME}'
+        self.kept: Collection[str] = {*self.topics, self._state_topic}
+        """topics that the bag of a replay keeps, besides the answers"""
+        self._topic_of: dict[tuple[str, str], str] = {}  # name of an actuator and message type -> topic
+        self._plans: dict[str, TopicPlan] = {}
+        self._machine: Machine | None = None
+        self._state: MachineState | None = None
+        self._tells_sending = False
+        self._made: list[NamedAnswer] = []
+        first = self._first_snapshot() if self._configuration else None
+        self.is_replayed = first is not None and first.is_replayed
+        """whether the answers in the bag are replayed, so that they did not act"""
+        if first is None or first.file.document is None:
+            self._take_up(first_of_replay(override or default_configuration()))
+
+    def steps(self) -> Iterator[Step]:
+        """Each message in order, with the answers to it.
+
+        The configuration messages that are returned hold the configuration used: that of the replay replaces recorded
+        ones, and if the bag has none, one is inserted at the start. They are marked as replayed, with the settings that
+        acted. Every `STATE_PERIOD` there is the state, too, in place of those in the bag.
+
+        Raises:
+            BagError: A message does not match its type.
+        """
+        if not self._configuration:
+            text = machine_text(first_of_replay(self._override or default_configuration()))
+            yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, encode_text(text)), ())
+        newest, due = NEVER, NEVER  # [ns] log time of the message before, and of the next state
+        for message in read_messages(self._bag):
+            if message.topic == self._state_topic:
+                continue
+            if due <= message.log_time > newest:  # of messages of one time none is before a state and another after it
+                if due != NEVER:
+                    yield from self._state_at(message.log_time)
+                due = message.log_time + round(STATE_PERIOD * 1e9)
+            newest = message.log_time
+            used = message if self._tells_sending else message._replace(publish_time=message.log_time)
+            if message.topic == self._configuration:
+                yield Step(self._configure(message), ())
+            else:
+                yield Step(used, tuple(self._answers_to(used)))
+
+    def acted(self) -> dict[str, str]:
+        """Topic of each recorded feed-forward that acted -> topic that keeps it in the bag of a replay."""
+        guided = [topic for topic, kind in self.answers.items() if kind == FEEDFORWARD_TYPE]
+        kept = {topic: topic + RECORDED for topic in guided}
+        return {name if name in self.topics or self.is_replayed else topic: name for topic, name in kept.items()}
+
+    def _state_at(self, log_time: int) -> Iterator[Step]:
+        if self._machine is not None and self._state is not None:
+            text = encode_text(machine_text(snapshot_of(self._machine, self._state)))
+            yield Step(BagMessage(self._state_topic, STATE_TYPE, log_time, text), ())
+
+    def _failed(self, message: BagMessage, error: ValueError) -> BagError:
+        return BagError(f'{self._bag}: message on {message.topic} at {message.log_time} ns: {error}')
+
+    def _first_snapshot(self) -> MachineSnapshot | None:
+        found = (message for message in read_messages(self._bag) if message.topic == self._configuration)
+        first = next(found, None)
+        return None if first is None else self._parsed(first)
+
+    def _parsed(self, message: BagMessage) -> MachineSnapshot:
         try:
-            if message.topic in inputs:
-                record = DECODERS[message.type_name](message.data)
-                state, answers = answered(parameters, state, record, message.log_time, used.publish_time)
-            elif message.topic == topics.configuration:
-                snapshot = parse_snapshot(DECODERS[CONFIGURATION_TYPE](message.data))
-                state, tells_sending = snapshot.state, snapshot.configuration.tells_sending
-                recorded = snapshot.recorded or Recorded(snapshot.configuration.feedforward)
-                if override:
-                    snapshot = Snapshot(override, state)
-                else:
-                    configuration = snapshot.configuration
-                    parameters = configuration.parameters()
-                used = message._replace(data=encode_text(snapshot_text(snapshot._replace(recorded=recorded))))
+            return parse_machine_text(decode_text(message.data))
         except ValueError as error:
-            raise BagError(f'message on {message.topic} at {message.log_time} ns: {error}') from None
-        yield Step(used, tuple(answers))
+            raise self._failed(message, error) from None
+
+    def _configure(self, message: BagMessage) -> BagMessage:
+        """Take a configuration; the message with the one that is used."""
+        snapshot = self._parsed(message)
+        self._tells_sending = snapshot.tells_sending
+        if self._override is None:
+            self.versions.add(snapshot.version)
+        used = snapshot.replayed(self._override)
+        try:
+            self._take_up(used)
+        except ValueError as error:
+            raise self._failed(message, error) from None
+        return message._replace(data=encode_text(machine_text(used)))
+
+    def _take_up(self, snapshot: MachineSnapshot) -> None:
+        """Continue with the machine and the state of a snapshot."""
+        file = snapshot.file
+        self.has_names = file.document is not None
+        if self.has_names:
+            self._machine, self._state = machine_of(snapshot, read_definitions(self._bag, file.topics.values()))
+            self._plans = {**self._machine.plans, **self._ticks_and_clock(file)}
+            self._topic_of = self._answers_of(file)
+        else:
+            topics = find_topics(self._bag, self._namespace, self.topics)
+            inputs = {topic: kind for topic, kind in zip(topics, TYPES, strict=True) if topic in topics.inputs}
+            self._machine, self._state = machine_of(snapshot, {}, inputs)
+            self._plans = dict(self._machine.plans)
+            self._topic_of = {('', kind): topic or ANSWER_TOPICS[kind] for kind, topic in topics.answers.items()}
+            self.kept = {*topics, CONFIGURATION_TOPIC, self._state_topic}
+        outputs = {one.output.topic: full_name(one.output.type_name) for one in file.actuators if one.output}
+        self.answers = {topic: kind for (_, kind), topic in self._topic_of.items()} | outputs
+        self.compared = {t: kind for t, kind in self.answers.items() if t in self.kept and self._has(t)}
+
+    def _has(self, topic: str) -> bool:
+        return topic in self.topics and self.topics[topic].message_count > 0
+
+    def _ticks_and_clock(self, file: MachineFile) -> dict[str, TopicPlan]:
+        numbers = range(len(file.actuators))
+        ticks = {self._topic(f'/{file.actuators[number].name}/watchdog_tick', TICK_TYPE): number for number in numbers}
+        plans = {topic: record_plan(topic, TICK_TYPE, (number,)) for topic, number in ticks.items()}
+        clocks = [topic for topic, info in self.topics.items() if info.type_name == CLOCK_TYPE]
+        return plans | {topic: record_plan(topic, CLOCK_TYPE, numbers) for topic in clocks}
+
+    def _answers_of(self, file: MachineFile) -> dict[tuple[str, str], str]:
+        if file.together:
+            return {('', MACHINE_TYPE): self._topic('/friction', MACHINE_TYPE)}
+        return {
+            (actuator.name, kind): self._topic(f'/{actuator.name}/{topic}', kind)
+            for actuator in file.actuators
+            for topic, kind in OUTPUTS.items()
+        }
+
+    def _topic(self, end: str, kind: str) -> str:
+        """Topic in the bag, whatever the namespace of the node was."""
+        found = [topic for topic, info in self.topics.items() if info.type_name == kind and topic.endswith(end)]
+        return found[0] if found else end
+
+    def _answers_to(self, message: BagMessage) -> Iterable[Answer]:
+        """Answers to a message.
+
+        Raises:
+            BagError: The message does not match its type.
+        """
+        plan = self._plans.get(message.topic)
+        if plan is None or self._machine is None or self._state is None:
+            return ()
+        try:
+            record = plan.read(message.data)
+        except ValueError as error:
+            if self.has_names:  # as the node: it counts the message as malformed
+                return ()
+            raise self._failed(message, error) from None
+        self._made.clear()
+        self._state = receive(
+            self._machine, self._state, plan, record, message.log_time, self._collect, message.publish_time
+        )
+        return self._encoded(self._machine, self._state, message.log_time)
+
+    def _collect(self, name: str, answer: Output, frame_id: bytes) -> None:
+        self._made.append(NamedAnswer(name, answer, frame_id))
+
+    def _encoded(self, machine: Machine, state: MachineState, received: int) -> list[Answer]:
+        """What was collected, and the commands that follow from it, as bytes."""
+        kinds = [type_of(answer.record) for answer in self._made]
+        self.estimates += kinds.count(ESTIMATE_TYPE)
+        answers = []
+        if not machine.file.together:
+            made = zip(kinds, self._made, strict=True)
+            answers = [
+                Answer(self._topic_of[n, kind], kind, encode(record, frame)) for kind, (n, record, frame) in made
+            ]
+        elif self._made:
+            answers = [Answer(self._topic_of['', MACHINE_TYPE], MACHINE_TYPE, encode_together(self._made))]
+        commands = due_commands(machine, state, FEEDFORWARD_TYPE in kinds, received)
+        return answers + [Answer(command.topic, full_name(command.type_name), command.data) for command in commands]
 
 
 def replay(
@@ -127,27 +289,21 @@ def replay(
     The new bag keeps the recorded feed-forward, which acted on the axis, on a topic whose name ends with `RECORDED`.
 
     Args:
-        bag: The bag.
-        override: Configuration instead of the recorded one.
+        bag: The bag, of any machine.
+        override: Configuration instead of the recorded one, of every actuator.
         out: Bag to write.
         namespace: Use only topics below it.
 
     Raises:
         BagError: The bag cannot be read, or ``out`` exists already; then nothing is left at ``out``.
     """
-    known = bag_topics(bag)
-    if is_machine_bag(bag, known):
-        return replay_machine(bag, out)
-    topics = find_topics(bag, namespace, known)
-    total = count_messages(known)
-    with progress(f'replay {bag.name}', total) as advance:
-        replayed = _counted(steps(read_messages(bag), topics, override), advance)
+    replayed = Replay(bag, override, namespace)
+    with progress(f'replay {bag.name}', count_messages(replayed.topics)) as advance:
+        steps = _counted(replayed.steps(), advance)
         if out is None:
-            return _compare(replayed, topics)
+            return _compare(steps, replayed)
         with BagWriter(out) as writer:
-            acted = topics.feedforward + RECORDED
-            kept = acted if acted in known or _is_replayed(bag, topics) else topics.feedforward
-            return _compare(_written(replayed, topics, writer, kept), topics)
+            return _compare(_written(steps, replayed, writer), replayed)
 
 
 def count_messages(topics: Mapping[str, TopicInfo]) -> int:
@@ -155,60 +311,45 @@ def count_messages(topics: Mapping[str, TopicInfo]) -> int:
     return sum(info.message_count for info in topics.values())
 
 
-def _counted(replayed: Iterable[Step], advance: Callable[[int], None]) -> Iterator[Step]:
-    for count, step in enumerate(replayed, start=1):
+def _counted(steps: Iterable[Step], advance: Callable[[int], None]) -> Iterator[Step]:
+    for count, step in enumerate(steps, start=1):
         if count % 1000 == 0:
             advance(1000)
         yield step
 
 
-def _is_replayed(bag: Path, topics: Topics) -> bool:
-    """Whether the answers in a bag are replayed, so that they did not act."""
-    texts = (message.data for message in read_messages(bag) if message.topic == topics.configuration)
-    first = next(texts, None) if topics.configuration else None
-    return first is not None and parse_snapshot(decode_text(first)).recorded is not None
-
-
-def _of_this_version(message: BagMessage) -> BagMessage:
-    """A message of the new bag: its configuration is of the version that makes the answers."""
-    if message.type_name != CONFIGURATION_TYPE:
-        return message
-    snapshot = parse_snapshot(decode_text(message.data))._replace(version=ALGORITHM_VERSION)
-    return message._replace(data=encode_text(snapshot_text(snapshot)))
-
-
-def _written(replayed: Iterable[Step], topics: Topics, writer: BagWriter, acted: str) -> Iterator[Step]:
-    """Write inputs, configuration and new answers, and the recorded feed-forward on the topic ``acted``."""
-    answered, kept = topics.answers, topics.feedforward + RECORDED
-    for step in replayed:
-        message = step.message
-        is_used = message.topic in (*topics, topics.state) or message.type_name == CONFIGURATION_TYPE
-        if is_used and message.type_name not in answered:
-            log_time = writer.write(*_of_this_version(message))
-            for type_name, data in step.answers:
-                writer.write(answered[type_name] or ANSWER_TOPICS[type_name], type_name, log_time, data)
-        elif message.topic == acted:
-            writer.write(*message._replace(topic=kept))
+def _written(steps: Iterable[Step], replayed: Replay, writer: BagWriter) -> Iterator[Step]:
+    """Write inputs, configuration and new answers, and the recorded feed-forward that acted on a topic of its own."""
+    for step in steps:
+        message, acted = step.message, replayed.acted()
+        if message.topic in acted:
+            writer.write(*message._replace(topic=acted[message.topic]))
+        elif message.topic in replayed.kept and message.topic not in replayed.answers:
+            log_time = writer.write(*message)
+            for answer in step.answers:
+                writer.write(answer.topic, answer.type_name, log_time, answer.data)
         yield step
 
 
-def _compare(replayed: Iterable[Step], topics: Topics) -> ReplayResult:
+def _compare(steps: Iterable[Step], replayed: Replay) -> ReplayResult:
     """Compare recorded and replayed answers in order.
 
     A recorded estimate answers the velocity sample before it; an estimate without one is a difference. A recording may
-    stop between a message and its answer, so the answer to its last message may be missing.
+    stop between a message and the last of its answers, so an answer to its last message may be missing.
     """
-    velocities, is_cut, compared = 0, False, topics.answers
-    versions: set[int] = set()
-    streams = {type_name: AnswerStream(type_name) for type_name, topic in compared.items() if topic}
-    for message, answers in replayed:
-        velocities += message.topic == topics.velocity
-        if message.type_name == CONFIGURATION_TYPE and message.topic == topics.configuration:
-            versions.add(snapshot_version(decode_text(message.data)))
-        for type_name, data in answers:
-            if type_name in streams:
-                streams[type_name].add_replayed(data)
-        if message.topic and message.topic == compared.get(message.type_name):
-            streams[message.type_name].compare_recorded(message.data)
+    is_cut, streams = False, dict[str, AnswerStream]()
+    for message, answers in steps:
+        for answer in answers:
+            if answer.topic in replayed.compared:
+                _stream(streams, answer.topic, answer.type_name).add_replayed(answer.data)
+        is_answer = replayed.compared.get(message.topic) == message.type_name
+        if is_answer:
+            _stream(streams, message.topic, message.type_name).compare_recorded(message.data)
         is_cut = bool(answers) or message.type_name == ESTIMATE_TYPE
-    return replay_result(velocities, streams, versions, is_cut=is_cut)
+        is_cut = is_cut or (is_answer and message.topic != next(reversed(replayed.answers)))
+    ordered = {topic: streams[topic] for topic in replayed.answers if topic in streams}
+    return replay_result(replayed.estimates, ordered, replayed.versions, is_cut=is_cut, names_topics=replayed.has_names)
+
+
+def _stream(streams: dict[str, AnswerStream], topic: str, kind: str) -> AnswerStream:
+    return streams.get(topic) or streams.setdefault(topic, AnswerStream(kind))

@@ -52,9 +52,9 @@ from seal_friction_ros.core.tuning.settings import (
 )
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration, read_parameters
-from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
+from seal_friction_ros.offline.bags.bag import BagError, bag_topics
 from seal_friction_ros.offline.bags.topics import find_topics
-from seal_friction_ros.offline.replay.replay import steps
+from seal_friction_ros.offline.replay.replay import Replay
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.progress import progress
 from seal_friction_ros.offline.work.targets import mark
@@ -355,7 +355,7 @@ def read_recording(
     motions, rows = [], []
     total = sum(info.message_count for info in bag_topics(bag).values())
     with progress(f'read {bag.name}', total) as advance:
-        for count, step in enumerate(steps(read_messages(bag), topics, override), start=1):
+        for count, step in enumerate(Replay(bag, override, namespace).steps(), start=1):
             if count % 1000 == 0:
                 advance(1000)
             message = step.message
@@ -372,7 +372,7 @@ def read_recording(
             if not isinstance(sample, Velocity) or reference is None:
                 continue
             if not estimates or sample.stamp > estimates[-1].stamp:
-                (data,) = (data for type_name, data in step.answers if type_name == messages.ESTIMATE_TYPE)
+                (data,) = (one.data for one in step.answers if one.type_name == messages.ESTIMATE_TYPE)
                 estimates.append(messages.decode(messages.ESTIMATE_TYPE, data))
                 age = (sample.stamp - reference.stamp) * 1e-9
                 given = conditioned.velocity

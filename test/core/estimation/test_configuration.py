@@ -24,7 +24,6 @@ from seal_friction_ros.core.estimation.configuration import (
     mounted,
     parse_snapshot,
     snapshot_text,
-    snapshot_version,
 )
 from seal_friction_ros.core.estimation.estimator import NO_SPEED, EstimatorSettings, EstimatorState, Speed
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, FeedForwardState
@@ -462,5 +461,5 @@ def test_settings_of_version_1_are_taken_within_the_present_bounds():
     without = json.loads(text)
     del without['settings']['stamp_age_max']
     assert parse_snapshot(json.dumps(without)).configuration.settings.stamp_age_max == 0.0  # it had no such check
-    assert snapshot_version(text) == 1
-    assert snapshot_version(snapshot_text(SNAPSHOT)) == SNAPSHOT.version == 2
+    assert parse_snapshot(text).version == 1
+    assert parse_snapshot(snapshot_text(SNAPSHOT)).version == SNAPSHOT.version == 2

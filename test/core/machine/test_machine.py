@@ -8,6 +8,7 @@ import yaml
 from harness.machines import BENCH, EXCAVATOR, made, message, message_class, parsed
 
 from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.messages import TICK_TYPE
 from seal_friction_ros.core.estimation.records import (
     NEVER,
     Force,
@@ -17,6 +18,7 @@ from seal_friction_ros.core.estimation.records import (
     ServoReference,
     Status,
     Velocity,
+    WatchdogTick,
 )
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.machine import machine as m
@@ -40,8 +42,9 @@ class Run:
 
     def take(self, topic, data, received):
         self.answers = []
+        plan = self.machine.plans[topic]
         self.state = m.receive(
-            self.machine, self.state, topic, data, received, lambda *answer: self.answers.append(answer)
+            self.machine, self.state, plan, plan.read(data), received, lambda *answer: self.answers.append(answer)
         )
 
     def estimates(self):
@@ -261,8 +264,8 @@ def test_the_watchdog_lets_every_actuator_fade_out():
     for i in range(200):
         now = 600 * MS + i * 10 * MS
         for number in m.due(run.state, now):
-            tick = m.WatchdogTick(now, 0.01)
-            run.state = m.receive_tick(run.machine, run.state, number, tick, now, lambda *_: None)
+            plan, tick = m.record_plan('/watchdog_tick', TICK_TYPE, (number,)), WatchdogTick(now, 0.01)
+            run.state = m.receive(run.machine, run.state, plan, tick, now, lambda *_: None)
     assert [state.force for state in run.state.actuators] == [0.0, 0.0, 0.0]
 
 
@@ -317,7 +320,7 @@ class Taker:
         plan = self.machine.plans[topic]
         kind = self.machine.file.topics[topic]
         has_header = 'header' in message_class(kind).get_fields_and_field_types()
-        reading = plan.reader.read(message(kind, stamp if has_header else None, **fields))
+        reading = plan.read(message(kind, stamp if has_header else None, **fields))
         taken = dict(plan.taken)[0]
         self.memory, records = m.records_of(self.actuator, self.memory, taken, reading.numbers, stamp, reading.frame_id)
         return records

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-import yaml
 from harness.machines import EXCAVATOR, installed, made
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
@@ -20,7 +19,7 @@ from seal_friction_ros.core.estimation.messages import (
 )
 from seal_friction_ros.core.estimation.records import Pressure
 from seal_friction_ros.core.machine import machine
-from seal_friction_ros.core.machine.machine_snapshot import machine_text
+from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
 from seal_friction_ros.core.machine.newest_messages import TopicMessage, encode_newest
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.monitor.live_view import LiveView
@@ -49,7 +48,7 @@ def test_newest_inputs_and_answers_are_held_with_their_time_of_receipt():
 
 TEXTS = (
     snapshot_text(first_snapshot(default_configuration())),
-    machine_text(yaml.safe_load(EXCAVATOR), made(EXCAVATOR), machine.init(made(EXCAVATOR))),
+    machine_text(snapshot_of(made(EXCAVATOR), machine.init(made(EXCAVATOR)))),
 )
 STRANGE: tuple[Any, ...] = (
     None, True, -1, 1e308, float('nan'), float('inf'), '', 'x', '0x1p2000', [], {}, [1], [[]], {'a': 1}, 2**70,

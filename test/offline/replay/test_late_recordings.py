@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-import yaml
 from harness.closed_loop_bags import write_closed_loop
 from harness.compensation import SCALE, compensating
 from harness.example_bags import as_recorded, rewrite
@@ -23,7 +22,7 @@ from seal_friction_ros.core.estimation.messages import (
 )
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.machine import machine as m
-from seal_friction_ros.core.machine.machine_snapshot import machine_text
+from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
 from seal_friction_ros.offline.bags.bag import BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk
@@ -160,7 +159,7 @@ def test_a_bag_with_simulated_time_that_stands_still_replays_to_the_byte(in_time
 def test_a_machine_with_late_inputs_replays_to_the_byte(tmp_path: Path):
     """Messages without a stamp have the time of their sending, or if they come late of their receipt."""
     machine = made(EXCAVATOR)
-    text = encode_text(machine_text(yaml.safe_load(EXCAVATOR), machine, m.init(machine)))
+    text = encode_text(machine_text(snapshot_of(machine, m.init(machine))))
     names = ['boom', 'arm', 'bucket']
     with BagWriter(tmp_path / 'inputs') as writer:
         writer.write('/machine_estimator/configuration', CONFIGURATION_TYPE, 1, text)
