@@ -308,12 +308,15 @@ def _fit_of(score: LawScore) -> LawFit:
 
 
 def _model(score: LawScore, readings: FrictionReadings, at: OperatingConditions) -> _Model:
-    """The law with what the readings could not tell: viscous friction, and friction at no pressure; both then 0."""
+    """The law with what the readings could not tell: friction at no pressure, and viscous friction; both then 0.
+
+    A law that itself depends on speed gets no viscous friction.
+    """
     law, values = score.law, dict(_fit_of(score).values)
     if 'friction_at_no_pressure' in law.fixed:
         laws = candidate_laws(Variation(speeds=False))
         law = next(found for found in laws if found.name == 'pressure_power_law_2_3')
-    if 'viscous_friction' not in law.velocity_terms:
+    if not law.depends_on_speed and 'viscous_friction' not in law.velocity_terms:
         law = with_velocity_terms(law, Variation(asymmetry=False))[0]
         values['viscous_friction'] = 0.0
     mean = float(score.fit.friction(readings.at).mean()) if score.fit else math.nan

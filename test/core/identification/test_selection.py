@@ -31,8 +31,8 @@ from seal_friction_ros.core.identification.selection import (
 )
 
 BAR = 1e5  # [Pa]
-BASES = candidate_laws(Variation())
-LAWS = {law.name: law for law in (*BASES, *with_velocity_terms(BASES[-1], Variation()))}
+LAWS = {law.name: law for law in candidate_laws(Variation())}
+LAWS |= {law.name: law for law in with_velocity_terms(LAWS['pressure_power_law'], Variation())}
 
 
 def readings(bars, speeds=(0.02,), force=None, sources=1, samples=False, count=1):
