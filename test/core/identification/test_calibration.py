@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.identification.calibration import (
     NOMINAL,
     _in_parts,
@@ -203,7 +204,7 @@ def test_between_runs_the_band_is_that_of_the_other_runs_or_has_the_prior():
     # One other run shows none: its pressures are left out, and the prior of 15 % is added.
     one = readings.taken(readings.source == 1)
     by_pressure = replace(one, group=one.level, left_out_by='pressure')
-    prior = 0.15 * t.ppf(0.975, 8.0) / 1.96
+    prior = 0.15 * t.ppf(0.975, 8.0) / BAND_95
     expected = deviations_in_std(LAW, by_pressure, out, values, prior)
     assert between_runs(LAW, one, out, values) == pytest.approx(expected, rel=1e-5)
     found = calibration(LAW, readings, values, 0.3)
