@@ -108,8 +108,8 @@ class CandidateLaw:
             ValueError: A value is out of bounds.
         """
         part_name, part_type = self.law_type.FITTED_PART or ('', self.law_type)
-        known = {**values, **self.fixed}
-        chosen = {f.name: known[f.name] for f in fields(part_type) if f.init and f.name in known}
+        given = {**values, **self.fixed}
+        chosen = {f.name: given[f.name] for f in fields(part_type) if f.init and f.name in given}
         fitted: Any = part_type(**chosen, **({} if part_name else self.parts))
         return self.law_type(**self.parts, **{part_name: fitted}) if part_name else fitted
 

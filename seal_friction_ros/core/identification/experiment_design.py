@@ -215,9 +215,9 @@ def design_experiment(
     speeds = _grid_speeds(used_speeds)
     prior = _prior(model, *pressures, speeds)
     slopes = model.slopes(at)
-    known = _without_offsets(slopes, readings) / scatter
+    weighted = _without_offsets(slopes, readings) / scatter
     worth = _readings_worth_one(chosen, readings, scatter)
-    had = known.T @ known / worth
+    had = weighted.T @ weighted / worth
 
     range_slopes = _relative_slopes(model, pressures, speeds)
     at_readings = slopes / model.friction(at)[:, np.newaxis]
@@ -432,7 +432,7 @@ def _error(slopes: FloatArray, information: FloatArray) -> float:
 def _greedy(
     model: _Model,
     range_slopes: FloatArray,
-    known: FloatArray,
+    information: FloatArray,
     scatter: float,
     first: Sequence[tuple[float, float]],
     grid: Sequence[tuple[float, float]],
@@ -442,7 +442,7 @@ def _greedy(
 
     The points ``first`` come first, then ``count`` of the ``grid``. All are one source with one unknown offset.
     """
-    total = _Information(np.zeros_like(known), np.zeros(len(known)), 0.0)
+    total = _Information(np.zeros_like(information), np.zeros(len(information)), 0.0)
     points: list[tuple[float, float]] = []
     errors: list[float] = []
     every = [*first, *grid]
@@ -453,7 +453,7 @@ def _greedy(
         rows[point] = model.slopes(at) / weight[:, np.newaxis], at.direction / weight
 
     def error_with(point: tuple[float, float]) -> float:
-        return _error(range_slopes, known + total.plus(*rows[point]).matrix)
+        return _error(range_slopes, information + total.plus(*rows[point]).matrix)
 
     for number in range(len(first) + min(count, len(grid))):
         open_points = [first[number]] if number < len(first) else [p for p in grid if p not in points]

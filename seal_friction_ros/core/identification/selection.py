@@ -178,7 +178,7 @@ def score_laws(
     1 after each law.
     """
     scores: list[LawScore] = []
-    known: dict[str, float] = {}
+    start_values: dict[str, float] = {}
     others = regroupings(readings)
     for law in laws:
         levels, count = len(readings.levels), len(law.parameters)
@@ -187,14 +187,14 @@ def score_laws(
             scores.append(LawScore(law, why_not=f'{count} parameters need {needed} pressures, there are {levels}'))
         else:
             try:
-                found = fit(law, readings, known)
+                found = fit(law, readings, start_values)
                 validation = cross_validate(law, readings, found.values)
                 more = [cross_validate(law, other, found.values).losses for other in others]
             except ValueError as error:
                 scores.append(LawScore(law, why_not=str(error)))
             else:
                 scores.append(LawScore(law, found, validation, np.concatenate((validation.losses, *more))))
-                known |= found.values
+                start_values |= found.values
         tick(1)
     return tuple(scores)
 
