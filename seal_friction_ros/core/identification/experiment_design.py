@@ -29,15 +29,13 @@ from seal_friction_ros.core.identification.diagnostics import CorrelatedPair
 from seal_friction_ros.core.identification.fitting import LawFit
 from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart
 from seal_friction_ros.core.identification.runs import PRIOR_FREEDOM, BetweenRuns
-from seal_friction_ros.core.identification.selection import LawScore, is_beaten, mean_loss
+from seal_friction_ros.core.identification.selection import LawScore, is_beaten, losses_of, mean_loss
 from seal_friction_ros.core.identification.validation import jackknife_errors
 
 READINGS = 8  # pressures and speeds that are proposed, each in both directions (our choice)
 GRID_PRESSURES, GRID_SPEEDS = 6, 5  # of the readings to choose from (our choice)
 RANGE_POINTS = 5  # pressures and speeds each at which the prediction variance is averaged (our choice)
-MOST_SPEEDS = (
-    0.95  # quantile of the speeds that is the fastest one, so that a single stroke does not count (our choice)
-)
+MOST_SPEEDS = 0.95  # quantile of the speeds that is the fastest one: a single stroke does not count (our choice)
 SPEED_VARIES = 1.5  # fastest over slowest speed, above which speed is varied (our choice)
 SPEED_FACTORS = (0.2, 0.5, 1.0, 2.0, 5.0)  # of the used speed, where speed was not varied (our choice)
 SPEED_LIMITS = (1e-4, 1.0)  # [m/s] of the speeds made with these factors (our choice)
@@ -267,7 +265,7 @@ def laws_not_beaten(scores: Sequence[LawScore]) -> list[LawScore]:
     if not scored:
         raise ValueError('no law was fitted, so there is nothing to design readings for')
     best = min(scored, key=mean_loss)
-    left = [s for s in scored if s is best or not is_beaten(_losses(s), _losses(best), many_times=True)]
+    left = [s for s in scored if s is best or not is_beaten(losses_of(s), losses_of(best), many_times=True)]
     return [s for s in left if s.fit is not None and math.isfinite(s.fit.condition_number)] or [best]
 
 
@@ -282,10 +280,6 @@ def repeated_run(between: BetweenRuns, freedom: int) -> RepeatedRun:
     had = PRIOR_FREEDOM + between.freedom
     shrink = float(stdtrit(had + freedom, 0.975) / stdtrit(had, 0.975))
     return RepeatedRun(freedom, shrink, shrink * math.sqrt(had / (had + freedom)))
-
-
-def _losses(score: LawScore) -> FloatArray:
-    return np.zeros(0) if score.losses is None else score.losses
 
 
 def _richest(near: Sequence[LawScore]) -> LawScore:

@@ -240,18 +240,19 @@ def recommended(scores: Sequence[LawScore], rise: Rise | None = None) -> LawScor
     if sound and min(map(mean_loss, sound)) <= NEAR * least:
         scored = sound
     best = min(scored, key=mean_loss)
-    left = [score for score in scored if not is_beaten(_losses(score), _losses(best), many_times=rise is None)]
+    left = [score for score in scored if not is_beaten(losses_of(score), losses_of(best), many_times=rise is None)]
     fewest = min(len(score.law.parameters) for score in left)
     return min((score for score in left if len(score.law.parameters) == fewest), key=mean_loss)
 
 
-def _losses(score: LawScore) -> FloatArray:
+def losses_of(score: LawScore) -> FloatArray:
+    """Losses of a law [-], as `LawScore.losses`; empty if it was not scored."""
     return np.zeros(0) if score.losses is None else score.losses
 
 
 def mean_loss(score: LawScore) -> float:
     """Mean loss of a scored law over the groups [-]."""
-    return float(_losses(score).mean())
+    return float(losses_of(score).mean())
 
 
 def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = False) -> bool:

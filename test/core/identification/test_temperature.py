@@ -17,7 +17,6 @@ from seal_friction_ros.core.identification.temperature import (
     _line,
     _means,
     _numbered,
-    _offsets,
     _others,
     _runs,
     at_reference,
@@ -235,14 +234,13 @@ def test_the_samples_behind_the_readings_and_their_offset_go_to_the_reference_wi
     made = readings(RUNS, noise=0.0)
     made = replace(made, samples=tuple(np.array([force - 1.0, force, force + 1.0]) for force in made.force))
     found = fit_temperature(made)
-    assert _offsets(made) == pytest.approx(np.full(6, 5.0))
     cold = at_reference(made, found)
     share = np.exp(0.012 * (made.temperature - found.reference))
     assert cold.force == pytest.approx(5.0 + share * (made.force - 5.0))
     for samples, force, one in zip(cold.samples, cold.force, share, strict=True):
         assert samples == pytest.approx(force + one * np.array([-1.0, 0.0, 1.0]))
-    part = made.taken(made.source < 5)
-    assert _offsets(part).tolist()[5] == 0.0  # of a run without readings
+    part = made.taken(made.source < 5)  # a run without readings
+    assert at_reference(part, found).force == pytest.approx(cold.force[made.source < 5])
 
 
 @pytest.mark.parametrize(('noise', 'told'), [(0.09, True), (0.11, False)])
