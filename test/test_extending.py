@@ -6,7 +6,10 @@ in `identify`, and goes through a seal file and back. One seal, since the time t
 
 import csv
 import importlib.util
+import os
 import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -30,6 +33,8 @@ from seal_friction_ros.offline.replay.parallel_replay import verify
 
 RECIPE = (ROOT / 'docs' / 'extending.md').read_text()
 SECOND = 10**9  # [ns]
+NAMED = ('test_every_law_is_on_an_actuator', 'test_tables_are_those_of_the_code')
+"""Tests that fail until the last steps of the recipe."""
 
 
 @pytest.fixture(scope='module')
@@ -129,6 +134,25 @@ def test_the_servo_simulator_runs_it(seal_file):
     assert sliding.mean() > 0.5
     error = by_momentum[sliding] - np.sign(run.velocity[sliding]) * expected[sliding]
     assert np.sqrt(np.mean(error**2)) < 0.02 * np.mean(expected[sliding])
+
+
+@pytest.mark.long  # runs the tests of three rooms
+def test_only_the_tests_that_the_recipe_names_turn_red(tmp_path):
+    tree = shutil.copytree(ROOT, tmp_path / 'tree', ignore=shutil.ignore_patterns('.*', 'build', '__pycache__'))
+    laws = tree / 'seal_friction_ros' / 'core' / 'friction' / 'laws'
+    (laws / 'tanh_law.py').write_text(re.search(r'```python\n(.*?)```', RECIPE, re.DOTALL)[1])
+    registry = (laws / '__init__.py').read_text().replace('FrictionMap]', 'FrictionMap, TanhLaw]')
+    module = 'seal_friction_ros.core.friction.laws.tanh_law'
+    (laws / '__init__.py').write_text(registry.replace('\n\n', f'\n\nfrom {module} import TanhLaw\n', 1))
+    places = ('core/friction', 'core/identification', 'core/estimation/test_compiled_pipeline.py::' + NAMED[0],
+              'test_docs.py::' + NAMED[1])  # fmt: skip
+    run = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-q', '-m', 'not long', *(f'test/{place}' for place in places)],
+        cwd=tree, env=os.environ | {'PYTHONPATH': str(tree)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    red = re.findall(r'^(?:FAILED|ERROR) \S+::(\w+)', run.stdout, re.MULTILINE)
+    assert sorted(set(red)) == sorted(NAMED), run.stdout
+    assert all(f'`{name}`' in RECIPE for name in NAMED)
 
 
 def test_identify_finds_its_parameters_again(toy_law, tmp_path):

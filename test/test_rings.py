@@ -39,6 +39,8 @@ ROOMS = {  # in order; rooms on one line do not import from each other
         ('commands',),
     ),
 }
+OPENED_ELSEWHERE = {f'{PACKAGE}.offline.bags.{name}' for name in ('velocity_rows', 'bulk_velocity_rows')}
+"""Two modules that still import each other, with the values of one and the blocks of the other."""
 MOST_ENTRIES = 10  # of core and of offline: what a newcomer reads at a glance
 SHARED_WITH_NODES = {f'{PACKAGE}.offline.{part}' for part in ('bags.recorder', 'bags.bag', 'monitor')}
 
@@ -138,6 +140,31 @@ def test_the_rooms_fit_on_a_glance(ring):
     entries = {path.name for path in (SOURCES / ring).iterdir() if path.name != '__pycache__'}
     assert entries == {'__init__.py', *(room for rooms in ROOMS[ring] for room in rooms)}
     assert len(entries) <= MOST_ENTRIES
+
+
+def circle_among(modules: dict[str, set[str]]) -> list[str]:
+    """Modules that import each other in a circle: those left when what imports none of the others is taken away."""
+    left = modules
+    while leaves := {name for name, needed in left.items() if not needed & left.keys()}:
+        left = {name: needed for name, needed in left.items() if name not in leaves}
+    while roots := left.keys() - set().union(*left.values()):
+        left = {name: needed for name, needed in left.items() if name not in roots}
+    return sorted(left)
+
+
+def test_a_circle_of_imports_is_found():
+    chain = {'a': {'b', 'math'}, 'b': {'c'}, 'c': set()}
+    assert circle_among(chain) == []
+    assert circle_among({**chain, 'b': {'c', 'd'}, 'd': {'b'}, 'e': {'d'}}) == ['b', 'd']
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    """Imports within functions and for types count, too."""
+    files = {'.'.join(file.relative_to(ROOT).with_suffix('').parts): file for file in SOURCES.rglob('*.py')}
+    files = {name.removesuffix('.__init__'): file for name, file in files.items()}
+    modules = {name: {part for full in imported(file.read_text()) for part in (full, full.rpartition('.')[0])}
+               for name, file in files.items()}  # fmt: skip
+    assert set(circle_among(modules)) <= OPENED_ELSEWHERE
 
 
 def test_nodes_do_no_arithmetic_with_numpy():

@@ -141,7 +141,7 @@ def busy_text(load: float, cores: int, figures: dict[str, str]) -> str:
 
     Args:
         load: Mean number of processes that wanted to run in the minute before.
-        cores: Cores of this machine.
+        cores: Cores of this computer.
         figures: Diagnostics of the simulator in the closed loop.
     """
     reasons = []
@@ -153,7 +153,7 @@ def busy_text(load: float, cores: int, figures: dict[str, str]) -> str:
     if not reasons:
         return ''
     return (
-        f'This machine was too busy: {"; ".join(reasons)}. Latencies and tracking above mean nothing; the replay does.'
+        f'This computer was too busy: {"; ".join(reasons)}. Latencies and tracking above mean nothing; the replay does.'
     )
 
 

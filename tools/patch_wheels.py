@@ -1,9 +1,9 @@
 """Point the CMake targets exported by the ROS 2 wheels at this environment's headers and libraries.
 
-The wheels name the Python and numpy headers of the machine that built them
+The wheels name the Python and numpy headers of the computer that built them
 (``/opt/python/cpXY-cpXY/include/pythonX.Y`` and ``.../numpy/_core/include``), so nothing would compile against them.
-They also name libraries of that machine, libtinyxml2 and lttng-ust, which C++ programs could not link. The shared
-libraries of the wheels bring both along, so they are left out where this machine does not have them. Run by
+They also name libraries of that computer, libtinyxml2 and lttng-ust, which C++ programs could not link. The shared
+libraries of the wheels bring both along, so they are left out where this computer does not have them. Run by
 ``tools/setup.sh`` with the Python of ``.venv``.
 """
 
@@ -22,7 +22,7 @@ LTTNG = re.compile(r'\blttng-ust;')
 
 
 def without_missing_libraries(text: str) -> str:
-    """Text of a target without the libraries that this machine does not have."""
+    """Text of a target without the libraries that this computer does not have."""
     if not Path('/usr/lib64/libtinyxml2.so').exists():
         text = TINYXML.sub('', text)
     return text if ctypes.util.find_library('lttng-ust') else LTTNG.sub('', text)

@@ -45,6 +45,7 @@ from typing import ClassVar, NamedTuple
 from seal_friction_ros.core.estimation.records import NEVER
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.actuator import ActuatorFriction
 
@@ -57,7 +58,6 @@ FEWEST_SAMPLES = 4  # in each of them
 LONGEST_PAUSE = 60.0  # [s] between two directions that are compared
 WIDTH_TIME = 1.0  # [s] of even sliding outside the band that make it e times as wide
 OUTSIDE = 0.05  # [-] share of the residuals that the band leaves outside
-BAND_95 = 1.959964  # [-] half the width of the band over its standard deviation
 ONE_SIDED_95 = 1.644854  # [-] 95 % of a normal distribution are below it
 OUTLIER = 4.0  # [-] residual over its standard deviation above which a sample is a spike, or a load step
 STEP_SAMPLES = 2  # outliers in a row that are a load step

@@ -35,7 +35,7 @@ class Starts(NamedTuple):
 
     resting_since: int = NEVER  # [ns]
     began: int = NEVER  # [ns] of the start that is under way
-    largest: float = 0.0  # [-] of it so far
+    largest: float = 0.0  # [-] of it so far; at rest: of the newest estimate
     number: int = 0
     mean: float = 0.0  # [-]
     squares: float = 0.0  # [-] sum of squared deviations
@@ -46,23 +46,25 @@ class Starts(NamedTuple):
         return math.sqrt(self.squares / (self.number - 1) / self.number) if self.number > 1 else math.nan
 
 
-def with_sample(known: Starts, estimate: FrictionEstimate) -> Starts:
+def with_sample(starts: Starts, estimate: FrictionEstimate) -> Starts:
     """Starts after one more estimate of an adapting estimator.
 
-    The friction of a start is force sum less offset and inertia: friction force plus residual.
+    The friction of a start is force sum less offset and inertia: friction force plus residual. The last estimate at
+    rest counts, too: the force is largest just before the rod moves.
     """
-    resting_since, began, largest, number, mean, squares = known
+    resting_since, began, largest, number, mean, squares = starts
+    coulomb = estimate.coulomb_friction
+    seen = abs(estimate.friction_force + estimate.residual) / coulomb if coulomb > 0.0 else 0.0
     if estimate.state != SLIDING:
-        return Starts(estimate.stamp, NEVER, 0.0, number, mean, squares) if resting_since == NEVER else known
+        since = estimate.stamp if resting_since == NEVER else resting_since
+        return Starts(since, NEVER, seen, number, mean, squares)
     if began == NEVER:
         if resting_since == NEVER:
-            return known
+            return starts
         if estimate.stamp - resting_since < REST:
             return Starts(NEVER, NEVER, 0.0, number, mean, squares)
-        began, largest = estimate.stamp, 0.0
+        began = estimate.stamp
     if estimate.stamp - began <= START:
-        coulomb = estimate.coulomb_friction
-        seen = abs(estimate.friction_force + estimate.residual) / coulomb if coulomb > 0.0 else 0.0
         return Starts(NEVER, began, max(largest, seen), number, mean, squares)
     deviation = largest - mean
     mean += deviation / (number + 1)

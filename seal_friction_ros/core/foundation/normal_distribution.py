@@ -1,4 +1,4 @@
 """Constants of the normal distribution."""
 
-BAND_95 = 1.96
+BAND_95 = 1.959964
 """Half the width of the interval about the mean that holds 95 % of a normal distribution [standard deviations]."""

@@ -87,6 +87,11 @@ class CandidateLaw:
         return self.law_type is not ConstantCoulomb
 
     @property
+    def depends_on_speed(self) -> bool:
+        """Whether the law itself depends on speed; it then has no velocity terms."""
+        return 'reference_speed' in meanings(self.law_type)
+
+    @property
     def velocity_terms(self) -> tuple[str, ...]:
         """Fitted parameters that belong to the velocity terms."""
         fitted = {parameter.name for parameter in self.parameters}
@@ -103,8 +108,8 @@ class CandidateLaw:
             ValueError: A value is out of bounds.
         """
         part_name, part_type = self.law_type.FITTED_PART or ('', self.law_type)
-        known = {**values, **self.fixed}
-        chosen = {f.name: known[f.name] for f in fields(part_type) if f.init and f.name in known}
+        given = {**values, **self.fixed}
+        chosen = {f.name: given[f.name] for f in fields(part_type) if f.init and f.name in given}
         fitted: Any = part_type(**chosen, **({} if part_name else self.parts))
         return self.law_type(**self.parts, **{part_name: fitted}) if part_name else fitted
 
@@ -191,7 +196,9 @@ def candidate_laws(
 
 
 def with_velocity_terms(base: CandidateLaw, variation: Variation) -> tuple[CandidateLaw, ...]:
-    """The law with each group of velocity terms that the data can identify."""
+    """The law with each group of velocity terms that the data can identify; none if the law itself depends on speed."""
+    if base.depends_on_speed:
+        return ()
     prefix = 'coulomb' if base.law_type is ConstantCoulomb else base.name
     return tuple(
         replace(
@@ -230,7 +237,7 @@ def _base(law_type: type[FrictionLaw], parts: Mapping[str, Any], with_speeds: bo
     part_name, part_type = law_type.FITTED_PART or ('', law_type)
     parameters = fitted_parameters(part_type)
     needed = [f.name for f in fields(law_type) if f.init and f.name != part_name and f.name not in meanings(law_type)]
-    depends_on_speed = 'reference_speed' in meanings(law_type)
-    if not parameters or not set(needed) <= set(parts) or (depends_on_speed and not with_speeds):
+    if not parameters or not set(needed) <= set(parts):
         return None
-    return CandidateLaw(law_type.NAME, law_type.FORMULA, law_type, parameters, {}, {n: parts[n] for n in needed})
+    law = CandidateLaw(law_type.NAME, law_type.FORMULA, law_type, parameters, {}, {n: parts[n] for n in needed})
+    return law if with_speeds or not law.depends_on_speed else None

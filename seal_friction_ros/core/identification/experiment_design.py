@@ -29,15 +29,13 @@ from seal_friction_ros.core.identification.diagnostics import CorrelatedPair
 from seal_friction_ros.core.identification.fitting import LawFit
 from seal_friction_ros.core.identification.readings import FrictionReadings, are_far_apart
 from seal_friction_ros.core.identification.runs import PRIOR_FREEDOM, BetweenRuns
-from seal_friction_ros.core.identification.selection import LawScore, is_beaten, mean_loss
+from seal_friction_ros.core.identification.selection import LawScore, is_beaten, losses_of, mean_loss
 from seal_friction_ros.core.identification.validation import jackknife_errors
 
 READINGS = 8  # pressures and speeds that are proposed, each in both directions (our choice)
 GRID_PRESSURES, GRID_SPEEDS = 6, 5  # of the readings to choose from (our choice)
 RANGE_POINTS = 5  # pressures and speeds each at which the prediction variance is averaged (our choice)
-MOST_SPEEDS = (
-    0.95  # quantile of the speeds that is the fastest one, so that a single stroke does not count (our choice)
-)
+MOST_SPEEDS = 0.95  # quantile of the speeds that is the fastest one: a single stroke does not count (our choice)
 SPEED_VARIES = 1.5  # fastest over slowest speed, above which speed is varied (our choice)
 SPEED_FACTORS = (0.2, 0.5, 1.0, 2.0, 5.0)  # of the used speed, where speed was not varied (our choice)
 SPEED_LIMITS = (1e-4, 1.0)  # [m/s] of the speeds made with these factors (our choice)
@@ -215,9 +213,9 @@ def design_experiment(
     speeds = _grid_speeds(used_speeds)
     prior = _prior(model, *pressures, speeds)
     slopes = model.slopes(at)
-    known = _without_offsets(slopes, readings) / scatter
+    weighted = _without_offsets(slopes, readings) / scatter
     worth = _readings_worth_one(chosen, readings, scatter)
-    had = known.T @ known / worth
+    had = weighted.T @ weighted / worth
 
     range_slopes = _relative_slopes(model, pressures, speeds)
     at_readings = slopes / model.friction(at)[:, np.newaxis]
@@ -267,7 +265,7 @@ def laws_not_beaten(scores: Sequence[LawScore]) -> list[LawScore]:
     if not scored:
         raise ValueError('no law was fitted, so there is nothing to design readings for')
     best = min(scored, key=mean_loss)
-    left = [s for s in scored if s is best or not is_beaten(_losses(s), _losses(best), many_times=True)]
+    left = [s for s in scored if s is best or not is_beaten(losses_of(s), losses_of(best), many_times=True)]
     return [s for s in left if s.fit is not None and math.isfinite(s.fit.condition_number)] or [best]
 
 
@@ -282,10 +280,6 @@ def repeated_run(between: BetweenRuns, freedom: int) -> RepeatedRun:
     had = PRIOR_FREEDOM + between.freedom
     shrink = float(stdtrit(had + freedom, 0.975) / stdtrit(had, 0.975))
     return RepeatedRun(freedom, shrink, shrink * math.sqrt(had / (had + freedom)))
-
-
-def _losses(score: LawScore) -> FloatArray:
-    return np.zeros(0) if score.losses is None else score.losses
 
 
 def _richest(near: Sequence[LawScore]) -> LawScore:
@@ -308,12 +302,15 @@ def _fit_of(score: LawScore) -> LawFit:
 
 
 def _model(score: LawScore, readings: FrictionReadings, at: OperatingConditions) -> _Model:
-    """The law with what the readings could not tell: viscous friction, and friction at no pressure; both then 0."""
+    """The law with what the readings could not tell: friction at no pressure, and viscous friction; both then 0.
+
+    A law that itself depends on speed gets no viscous friction.
+    """
     law, values = score.law, dict(_fit_of(score).values)
     if 'friction_at_no_pressure' in law.fixed:
         laws = candidate_laws(Variation(speeds=False))
         law = next(found for found in laws if found.name == 'pressure_power_law_2_3')
-    if 'viscous_friction' not in law.velocity_terms:
+    if not law.depends_on_speed and 'viscous_friction' not in law.velocity_terms:
         law = with_velocity_terms(law, Variation(asymmetry=False))[0]
         values['viscous_friction'] = 0.0
     mean = float(score.fit.friction(readings.at).mean()) if score.fit else math.nan
@@ -429,7 +426,7 @@ def _error(slopes: FloatArray, information: FloatArray) -> float:
 def _greedy(
     model: _Model,
     range_slopes: FloatArray,
-    known: FloatArray,
+    information: FloatArray,
     scatter: float,
     first: Sequence[tuple[float, float]],
     grid: Sequence[tuple[float, float]],
@@ -439,7 +436,7 @@ def _greedy(
 
     The points ``first`` come first, then ``count`` of the ``grid``. All are one source with one unknown offset.
     """
-    total = _Information(np.zeros_like(known), np.zeros(len(known)), 0.0)
+    total = _Information(np.zeros_like(information), np.zeros(len(information)), 0.0)
     points: list[tuple[float, float]] = []
     errors: list[float] = []
     every = [*first, *grid]
@@ -450,7 +447,7 @@ def _greedy(
         rows[point] = model.slopes(at) / weight[:, np.newaxis], at.direction / weight
 
     def error_with(point: tuple[float, float]) -> float:
-        return _error(range_slopes, known + total.plus(*rows[point]).matrix)
+        return _error(range_slopes, information + total.plus(*rows[point]).matrix)
 
     for number in range(len(first) + min(count, len(grid))):
         open_points = [first[number]] if number < len(first) else [p for p in grid if p not in points]

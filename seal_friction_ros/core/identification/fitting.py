@@ -83,13 +83,17 @@ def _means_of_sources(readings: FrictionReadings, force: FloatArray) -> FloatArr
 
 
 def fit(
-    law: CandidateLaw, readings: FrictionReadings, known: ParameterValues | None = None, *, is_close: bool = False
+    law: CandidateLaw,
+    readings: FrictionReadings,
+    start_values: ParameterValues | None = None,
+    *,
+    is_close: bool = False,
 ) -> LawFit:
     """Least-squares fit of a law, with one offset of the force sum for each source.
 
     The offsets are linear and are eliminated. The sum of squares has local minima over the Stribeck velocity: the fit
-    starts from several velocities and the best result counts. ``known`` are start values from a simpler law or similar
-    readings; if ``is_close``, they are complete and near the result, and the fit starts from them alone.
+    starts from several velocities and the best result counts. ``start_values`` are those of a simpler law or of
+    similar readings; if ``is_close``, they are complete and near the result, and the fit starts from them alone.
 
     Raises:
         ValueError: The result is not finite.
@@ -105,7 +109,7 @@ def fit(
     mean_friction = float(np.abs(readings.force).mean() / readings.at.pressure.shape[1])  # [N] of one seal
     typical = readings.at.typical(mean_friction)
     first_guess = {p.name: p.start(typical) for p in law.parameters}
-    start = first_guess | {name: value for name, value in (known or {}).items() if name in first_guess}
+    start = first_guess | {name: value for name, value in (start_values or {}).items() if name in first_guess}
     best: Any = None
     for factor in (1.0,) if is_close or 'stribeck_velocity' not in start else _START_FACTORS:
         guess = [value * (factor if name == 'stribeck_velocity' else 1.0) for name, value in start.items()]

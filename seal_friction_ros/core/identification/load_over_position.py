@@ -226,12 +226,13 @@ def _strokes(signals: Signals, position: FloatArray, sliding: Sliding) -> _Motio
     Raises:
         ValueError: There is no position, or there are too few strokes.
     """
-    known = np.isfinite(position)
-    if known.mean() < 0.99:
+    has_position = np.isfinite(position)
+    if has_position.mean() < 0.99:
         raise ValueError(
-            f'{int((~known).sum())} of {len(known)} samples have no position: the load follows it: record the position'
+            f'{int((~has_position).sum())} of {len(position)} samples have no position: the load follows it: '
+            'record the position'
         )
-    usable = known & np.isfinite(signals).all(axis=0)
+    usable = has_position & np.isfinite(signals).all(axis=0)
     moved = [(side, run[usable[run]]) for side, run in motions(signals, sliding) if side]
     moved = [(side, run) for side, run in moved if len(run) > 2]
     places = [np.concatenate([np.empty(0), *(position[run] for side, run in moved if side == s)]) for s in (1, -1)]

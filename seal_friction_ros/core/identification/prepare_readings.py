@@ -103,10 +103,10 @@ def _travel(signals: signal_preparation.Signals) -> FloatArray:
 def _temperatures(logs: Sequence[RecordedLog], rows: _Rows) -> FloatArray:
     """Mean temperature of each reading [K]; empty if a log has none."""
     columns = [log.temperature for log in logs]
-    known = [column for column in columns if column is not None]
-    if len(known) < len(columns):
+    measured = [column for column in columns if column is not None]
+    if len(measured) < len(columns):
         return np.empty(0)
-    return np.array([known[number][reading.samples].mean() for number, reading in rows])
+    return np.array([measured[number][reading.samples].mean() for number, reading in rows])
 
 
 def with_predictable_groups(readings: FrictionReadings) -> FrictionReadings:

@@ -115,7 +115,7 @@ def position_noise(position: FloatArray) -> float:
     return max(step, float(np.median(np.abs(np.diff(position, 2))) / 0.6745 / math.sqrt(6.0)))
 
 
-def _smoothed(position: FloatArray, noise: float) -> FloatArray:
+def smoothed_position(position: FloatArray, noise: float) -> FloatArray:
     """Mean of a position [m] over the samples in which the rod moves twice its noise; as it is if one is enough."""
     ways = np.abs(np.diff(position))
     way = float(np.mean(ways)) if len(ways) else 0.0
@@ -151,7 +151,7 @@ def reversal_curves(logs: Sequence[ReversalLog], length: float) -> list[Reversal
     for number, log in enumerate(logs):
         noise = position_noise(log.position)
         threshold = max(0.1 * length, NOISES * noise)
-        smooth = _smoothed(log.position, noise)
+        smooth = smoothed_position(log.position, noise)
         turns = turning_points(smooth, threshold)
         for before, turn, after in zip(turns, turns[1:], turns[2:], strict=False):
             way = log.position[turn] - log.position[before]
@@ -320,7 +320,7 @@ def fit_presliding(logs: Sequence[ReversalLog]) -> PreslidingFit:
     Raises:
         PreslidingRefusedError: There are too few reversals, the position is too coarse, or the elasticity is not told.
     """
-    names, length = [log.name for log in logs], _longest(logs)
+    names, length = [log.name for log in logs], half_stroke(logs)
     fit = fit_curves(reversal_curves(logs, length), names, length)
     for _ in range(_ROUNDS):
         wanted = BEYOND * fit.full_yield + LAGS * fit.presliding.memory_length
@@ -340,8 +340,12 @@ def fit_presliding(logs: Sequence[ReversalLog]) -> PreslidingFit:
     return fit
 
 
-def _longest(logs: Sequence[ReversalLog]) -> float:
-    """Half of the median stroke [m], the least over the logs."""
+def half_stroke(logs: Sequence[ReversalLog]) -> float:
+    """Half of the median stroke [m], the least over the logs.
+
+    Raises:
+        PreslidingRefusedError: A log has too few reversals.
+    """
     lengths = []
     for log in logs:
         spread = float(np.ptp(log.position))

@@ -178,7 +178,7 @@ def score_laws(
     1 after each law.
     """
     scores: list[LawScore] = []
-    known: dict[str, float] = {}
+    start_values: dict[str, float] = {}
     others = regroupings(readings)
     for law in laws:
         levels, count = len(readings.levels), len(law.parameters)
@@ -187,14 +187,14 @@ def score_laws(
             scores.append(LawScore(law, why_not=f'{count} parameters need {needed} pressures, there are {levels}'))
         else:
             try:
-                found = fit(law, readings, known)
+                found = fit(law, readings, start_values)
                 validation = cross_validate(law, readings, found.values)
                 more = [cross_validate(law, other, found.values).losses for other in others]
             except ValueError as error:
                 scores.append(LawScore(law, why_not=str(error)))
             else:
                 scores.append(LawScore(law, found, validation, np.concatenate((validation.losses, *more))))
-                known |= found.values
+                start_values |= found.values
         tick(1)
     return tuple(scores)
 
@@ -240,18 +240,19 @@ def recommended(scores: Sequence[LawScore], rise: Rise | None = None) -> LawScor
     if sound and min(map(mean_loss, sound)) <= NEAR * least:
         scored = sound
     best = min(scored, key=mean_loss)
-    left = [score for score in scored if not is_beaten(_losses(score), _losses(best), many_times=rise is None)]
+    left = [score for score in scored if not is_beaten(losses_of(score), losses_of(best), many_times=rise is None)]
     fewest = min(len(score.law.parameters) for score in left)
     return min((score for score in left if len(score.law.parameters) == fewest), key=mean_loss)
 
 
-def _losses(score: LawScore) -> FloatArray:
+def losses_of(score: LawScore) -> FloatArray:
+    """Losses of a law [-], as `LawScore.losses`; empty if it was not scored."""
     return np.zeros(0) if score.losses is None else score.losses
 
 
 def mean_loss(score: LawScore) -> float:
     """Mean loss of a scored law over the groups [-]."""
-    return float(_losses(score).mean())
+    return float(losses_of(score).mean())
 
 
 def is_beaten(losses: FloatArray, others: FloatArray, *, many_times: bool = False) -> bool:

@@ -272,9 +272,9 @@ def control(
     error = setpoint.position - measured.position
     integral = state.integral + k.integral_gain * error * g.period
     inertia, viscous = load.mass * setpoint.acceleration, load.viscous_damping * setpoint.velocity
-    known = inertia + viscous + load.spring_stiffness * (setpoint.position - load.spring_position)
+    model_force = inertia + viscous + load.spring_stiffness * (setpoint.position - load.spring_position)
     damping = k.velocity_gain * (setpoint.velocity - measured.velocity)
-    unlimited = k.position_gain * error + damping + integral + known + feedforward
+    unlimited = k.position_gain * error + damping + integral + model_force + feedforward
     force = min(max(unlimited, -g.retracting_force_max), g.extending_force_max)
     if force != unlimited:
         limited |= 16

@@ -8,16 +8,14 @@ them in the sources:
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.foundation.units import PSI
 from seal_friction_ros.core.servo.cylinder import Cylinder
-
-if TYPE_CHECKING:
-    from seal_friction_ros.core.servo.plant import Constants, Integrated
 
 
 @dataclass(frozen=True)
@@ -101,8 +99,10 @@ class ChamberRates(NamedTuple):
 
 
 @compiled
-def oil_rates(valve: ServoValve, c: 'Constants', y: 'Integrated') -> ChamberRates:
-    r"""Rates of both chambers filled with oil.
+def oil_rates(
+    valve: ServoValve, cylinder: Cylinder, enthalpies: tuple[float, float], y: Sequence[float]
+) -> ChamberRates:
+    r"""Rates of both chambers filled with oil, at the numbers ``y`` of a plant state.
 
     .. math::
         \dot p_a &= \beta / V_a\, (Q_a - C_i (p_a - p_b) - C_e p_a - A_a v), \quad V_a = V_{a,0} + A_a x \\
@@ -114,7 +114,6 @@ def oil_rates(valve: ServoValve, c: 'Constants', y: 'Integrated') -> ChamberRate
 
     Source: [Merritt1967]_ chapters 5 and 6, [Jelali2003]_ chapter 4; the energy is our derivation.
     """
-    cylinder = c.cylinder
     position, velocity, charge_a, charge_b, spool = y[0], y[1], y[2], y[3], y[4]
     beta, vapour = cylinder.bulk_modulus, cylinder.vapour
     a, b = max(charge_a, vapour), max(charge_b, vapour)
@@ -132,7 +131,7 @@ def oil_rates(valve: ServoValve, c: 'Constants', y: 'Integrated') -> ChamberRate
     charge_flow_b = flow_b if charge_b >= vapour else flow_b * math.exp((vapour - charge_b) / beta)
 
     density_a, density_b = math.exp(a / beta), math.exp(b / beta)
-    of_supply, of_return = c.enthalpies
+    of_supply, of_return = enthalpies
     power_in = density_a * (supply_a * of_supply + return_a * of_return) + density_b * (
         supply_b * of_supply + return_b * of_return
     )

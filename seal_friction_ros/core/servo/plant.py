@@ -138,7 +138,7 @@ def force_sum(c: Constants, y: Integrated, load_force: float) -> float:
 
 
 fluid_rates = chosen_by_type({ServoValve: oil_rates, PneumaticValve: air_rates})
-"""Rates of both chambers."""
+"""Rates of both chambers from valve, cylinder, enthalpies and the numbers of the state."""
 
 
 @compiled
@@ -156,7 +156,7 @@ def rates(c: Constants, y: Integrated, direction: int, command: float, load_forc
     valve, load = c.valve, c.load
     velocity, spool, spool_rate = y[1], y[4], y[5]
     a, b = chamber_pressures(c, y)
-    chambers = fluid_rates(valve, c, y)
+    chambers = fluid_rates(valve, c.cylinder, c.enthalpies, y)
     friction = acceleration = 0.0
     if direction != 0:
         friction = direction * sliding_friction_of_seals(c.seals, a, b, max(velocity * direction, 0.0), direction)

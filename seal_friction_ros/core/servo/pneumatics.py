@@ -7,16 +7,14 @@ leak nothing; the walls keep the temperature of the supply; air that flows back 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from seal_friction_ros.core.foundation.compiled import compiled, for_compiler
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
 from seal_friction_ros.core.servo.cylinder import AMBIENT, Cylinder
 from seal_friction_ros.core.servo.hydraulics import ChamberRates
-
-if TYPE_CHECKING:
-    from seal_friction_ros.core.servo.plant import Constants, Integrated
 
 GAS_CONSTANT = 288.0  # [J/(kg K)] R of air, ISO 6358
 ADIABATIC_INDEX = 1.4  # [-] gamma of air
@@ -154,9 +152,10 @@ def chamber_rates(
 
 
 @compiled
-def air_rates(valve: PneumaticValve, c: 'Constants', y: 'Integrated') -> ChamberRates:
+def air_rates(
+    valve: PneumaticValve, cylinder: Cylinder, _enthalpies: tuple[float, float], y: Sequence[float]
+) -> ChamberRates:
     """Rates of both chambers filled with air, see `chamber_rates`. A throttle keeps the enthalpy."""
-    cylinder = c.cylinder
     position, velocity, spool = y[0], y[1], y[4]
     to_a, to_b = max(spool, 0.0), max(-spool, 0.0)
     volume_a = cylinder.mid_volume_a + cylinder.area_a * position

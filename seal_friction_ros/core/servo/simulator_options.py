@@ -97,15 +97,15 @@ class SimulatorSettings(CheckedParameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, known in (
+        for name, choices in (
             ('wave', (*WAVES, 'topic', 'pull_test')),
             ('fluid', tuple(VALVES)),
             ('seal_elasticity', ELASTICITIES),
             ('messages', MESSAGES),
             ('feedforward_message', FEEDFORWARD_MESSAGES),
         ):
-            if getattr(self, name) not in known:
-                raise ValueError(f'SimulatorSettings.{name} = {getattr(self, name)!r} is none of {", ".join(known)}')
+            if getattr(self, name) not in choices:
+                raise ValueError(f'SimulatorSettings.{name} = {getattr(self, name)!r} is none of {", ".join(choices)}')
         if self.messages == 'standard' and self.wave not in WAVES:
             raise ValueError(f'SimulatorSettings.wave = {self.wave!r} needs messages: own')
         if self.time_factor != 1.0 and not self.publish_clock:
@@ -116,7 +116,7 @@ class SimulatorSettings(CheckedParameters):
 
 @dataclass(frozen=True)
 class StandardMessages(CheckedParameters):
-    """What a simulated machine with standard messages publishes.
+    """What a simulated axis with standard messages publishes.
 
     Raises:
         ValueError: The joint has no name, or ``reference`` is unknown.
@@ -124,7 +124,7 @@ class StandardMessages(CheckedParameters):
 
     joint: str = parameter('rod', unit='', description='Name of the joint in every JointState.')
     velocity: bool = parameter(True, unit='', description='false: joint_states has positions only, as of an encoder.')
-    load_cell: bool = parameter(True, unit='', description='false: no load_cell, a machine without force sensor.')
+    load_cell: bool = parameter(True, unit='', description='false: no load_cell, an axis without force sensor.')
     reference: str = parameter(
         'joint_state', unit='', description='joint_state: joint_reference; trajectory_point: reference_point.'
     )

@@ -138,7 +138,7 @@ def acceleration(time: FloatArray, velocity: FloatArray) -> FloatArray:
     # A value that is not finite makes its whole window not finite.
     slope[half:-half] = savgol_filter(velocity, ACCELERATION_WINDOW, 2, deriv=1, delta=period)[half:-half]
     rounding = 1e-9 * np.abs(velocity[np.isfinite(velocity)]).max(initial=0.0) / period
-    slope[np.abs(slope) < rounding] = 0.0  # a steady velocity has none on any machine
+    slope[np.abs(slope) < rounding] = 0.0  # a steady velocity has none on any computer
     for place in np.flatnonzero(~(np.abs(steps - period) <= MOST_UNEVEN * period)):
         slope[max(place + 1 - half, 0) : place + 1 + half] = math.nan
     return slope
@@ -172,12 +172,12 @@ def fit_law(recording: Recording, mass: float | None = None) -> RecordedLaw:
     columns = [recording.coulomb_friction * np.sign(velocity), slope, np.ones(len(velocity))]
     used = [0] + ([1] if mass is None else []) + ([2] if both else [])
     matrix = np.column_stack([columns[i][sliding] for i in used])
-    known = recording.force_sum[sliding] - (slope[sliding] * mass if mass is not None else 0.0)
+    without_inertia = recording.force_sum[sliding] - (slope[sliding] * mass if mass is not None else 0.0)
     size = np.linalg.norm(matrix, axis=0)
     if not size.all() or np.linalg.matrix_rank(matrix / size, tol=1e-6) < len(used):
         raise ValueError('friction, acceleration and offset cannot be separated: record several speeds')
-    found, *_ = np.linalg.lstsq(matrix, known, rcond=None)
-    left = known - matrix @ found
+    found, *_ = np.linalg.lstsq(matrix, without_inertia, rcond=None)
+    left = without_inertia - matrix @ found
     variance = float(left @ left) / (count - len(used)) * np.linalg.inv(matrix.T @ matrix)[0, 0]
     values = dict(zip(used, (float(value) for value in found), strict=True))
     moved = values[1] if mass is None else mass
@@ -234,26 +234,26 @@ def residual(law: RecordedLaw, reversal: BoolArray, force: FloatArray) -> Residu
 
 
 def tune_recorded_axis(
-    recording: Recording, settings: FeedForwardSettings, known: RecordedAxisSettings
+    recording: Recording, settings: FeedForwardSettings, axis: RecordedAxisSettings
 ) -> RecordedTuning:
     """Parameters of the feed-forward from a recording.
 
     Args:
         recording: Motion of the axis.
         settings: Settings before the tuning; those that the recording does not identify are unchanged.
-        known: Known properties of the axis, and the errors of model and delay.
+        axis: Known properties of the axis, and the errors of model and delay.
 
     Raises:
         ValueError: The recording lacks something; the message says what to record.
     """
     time = recording.time
     reversal = near_reversals(time, recording.reference_velocity)
-    law = fit_law(recording, known.mass or None)
+    law = fit_law(recording, axis.mass or None)
     largest = largest_friction(recording, law)
     identified: dict[str, float | None] = {
         'force_limit': force_limit(largest),
         'scale': round(law.scale, 2) if law.scale > 0.0 and law.scale_std <= IDENTIFIED * law.scale else None,
-        'lead_time': known.whole_delay or None,
+        'lead_time': axis.whole_delay or None,
         'smoothing_velocity': _smoothing(recording, law),
     }
     settings = _with_values(settings, identified)
@@ -262,15 +262,15 @@ def tune_recorded_axis(
 
     cases = []
     late = settings.lead_time
-    for friction in dict.fromkeys((-known.friction_error, 0.0, known.friction_error)):
+    for friction in dict.fromkeys((-axis.friction_error, 0.0, axis.friction_error)):
         force = feedforward_force(settings, recording, friction)
-        for lateness in dict.fromkeys((-known.delay_error, 0.0, known.delay_error)):
+        for lateness in dict.fromkeys((-axis.delay_error, 0.0, axis.delay_error)):
             left = residual(law, reversal, delayed(time, force, (1.0 + lateness) * late))
             cases.append(RobustnessCase(friction, lateness, left))
     acting = delayed(time, feedforward_force(settings, recording), late)
     without = residual(law, reversal, np.zeros(len(time)))
-    known_names = {name: value is not None for name, value in identified.items()}
-    return RecordedTuning(settings, without, tuple(cases), largest, known_names, law, reversal, acting)
+    is_identified = {name: value is not None for name, value in identified.items()}
+    return RecordedTuning(settings, without, tuple(cases), largest, is_identified, law, reversal, acting)
 
 
 def largest_friction(recording: Recording, law: RecordedLaw) -> float:
@@ -281,8 +281,8 @@ def largest_friction(recording: Recording, law: RecordedLaw) -> float:
 
 def _with_values(settings: FeedForwardSettings, values: dict[str, float | None]) -> FeedForwardSettings:
     """Settings with the identified values, clamped to their bounds."""
-    known: dict[str, Any] = {name: bounded(name, value) for name, value in values.items() if value is not None}
-    return replace(settings, **known)
+    bounded_values: dict[str, Any] = {name: bounded(name, value) for name, value in values.items() if value is not None}
+    return replace(settings, **bounded_values)
 
 
 def _smoothing(recording: Recording, law: RecordedLaw) -> float | None:

@@ -1,4 +1,4 @@
-"""``seal_friction doctor``: what this machine lacks for nodes and commands."""
+"""``seal_friction doctor``: what this computer lacks for nodes and commands."""
 
 import argparse
 from typing import Any
@@ -8,12 +8,12 @@ from seal_friction_ros.offline.commands import command_line as cli
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    cli.add_command(commands, 'doctor', run, 'say what this machine lacks for nodes and commands', 'doctor')
+    cli.add_command(commands, 'doctor', run, 'say what this computer lacks for nodes and commands', 'doctor')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Look and print; exit code 1 if a node cannot run or would not be discovered."""
-    from seal_friction_ros.offline.work.machine import Level, findings
+    from seal_friction_ros.offline.work.computer import Level, findings
 
     found = findings()
     numbers = [{'level': one.level.value, 'subject': one.subject, 'text': one.text} for one in found]

@@ -22,6 +22,7 @@ from seal_friction_ros.core.estimation.records import (
     Temperature,
     Velocity,
 )
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.force_sum_correction import (
     NO_CORRECTION,
     ForceSumCorrection,
@@ -31,7 +32,6 @@ from seal_friction_ros.core.friction.states import FrictionState
 
 BAR = 1e5  # [Pa]
 MICROMETRE = 1e-6  # [m]
-BAND = 1.96  # [-] standard deviations on either side that hold 95 % of the readings
 OFF = 'off'  # mode of the adaptation
 PAIRED = 0.03  # [s] our choice, as reference_timeout: longest time between the stamps of a reference and a position
 RECENT = 0.5  # [s] our choice: a lamp stays lit for this time
@@ -198,7 +198,8 @@ def next_interval(held: Held) -> Held:
 def row(known: Known, held: Held, time: float, since: int = -1) -> Row:
     """Numbers of one moment.
 
-    The band is that of the next reading while the rod slides: friction force plus and minus `BAND` standard deviations.
+    The band is that of the next reading while the rod slides: friction force plus and minus `BAND_95` standard
+    deviations.
 
     Args:
         known: Configuration of the actuator.
@@ -214,10 +215,11 @@ def row(known: Known, held: Held, time: float, since: int = -1) -> Row:
     if FrictionEstimate in new and estimate.stamp != NEVER:
         friction = estimate.friction_force
         if estimate.state == FrictionState.SLIDING:
-            half = BAND * estimate.coulomb_friction_std
+            half = BAND_95 * estimate.coulomb_friction_std
             low, high = friction - half, friction + half
         if known.adaptation != OFF:
-            scale, spread, residual = estimate.adaptation_scale, BAND * estimate.adaptation_scale_std, estimate.residual
+            scale, residual = estimate.adaptation_scale, estimate.residual
+            spread = BAND_95 * estimate.adaptation_scale_std
     values = (
         measured if source in new else None,
         friction,
@@ -351,7 +353,7 @@ def situation(
         'faults': [why] if cause else _faults(bits.status),
         'friction': finite(estimate.friction_force),
         'coulomb': finite(estimate.coulomb_friction),
-        'band': finite(BAND * estimate.coulomb_friction_std),
+        'band': finite(BAND_95 * estimate.coulomb_friction_std),
         'measured': finite(measured_friction(known, held)[1]),
         'breakaway': finite(estimate.breakaway_force),
         'feedforward': None if feedforward is None else finite(feedforward.force),

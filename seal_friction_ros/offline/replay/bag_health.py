@@ -17,6 +17,7 @@ from seal_friction_ros.core.estimation.configuration import Configuration, parse
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, LAYOUTS
 from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate
+from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.files import default_configuration
@@ -30,9 +31,6 @@ from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place
-
-REST = 0.5  # [s] our choice: after a rest of this length a start counts as a breakaway
-START = 0.1  # [s] our choice: the friction of a start is the largest within this time
 
 
 class BagHealth(NamedTuple):
@@ -73,7 +71,7 @@ def bag_health(
     """
     rows: list[FloatArray] = []
     starts: list[float] = []
-    end, follower = learnt, _Starts()
+    end, follower = learnt, Starts()
     try:
         for estimates, known in _observed(bag, namespace, override, learnt, on_block):
             end = known
@@ -90,7 +88,8 @@ def bag_health(
                     ]
                 )[:, int(first and changed.size > 0 and changed[0] == 0) :]
             )
-            starts += follower.taken(estimates)
+            follower, found = _with_block(follower, estimates)
+            starts += found
     except (UnsuitedError, OSError, *ERRORS) as error:
         raise BagError(f'{bag}: {error}: `seal_friction replay` tells more') from None
     table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
@@ -126,29 +125,21 @@ def _values(bag: Path, namespace: str, override: Configuration | None) -> dict[s
     return {name: found[name] for name in _NAMES}
 
 
-class _Starts:
-    """Friction of the starts after a rest, across blocks of estimates."""
+def _with_block(starts: Starts, estimates: Any) -> tuple[Starts, list[float]]:
+    """Starts after a block of estimates, and the largest friction of each start that ended in it.
 
-    def __init__(self) -> None:
-        self._rested_since: float | None = None
-        self._started: float | None = None
-        self._largest = 0.0
-
-    def taken(self, estimates: Any) -> list[float]:
-        """Ratios of the starts that end in this block."""
-        found = []
-        time, slides = estimates['stamp'] * 1e-9, estimates['state'] == SLIDING
-        seen = np.abs(estimates['friction_force'] + estimates['residual']) / np.maximum(
-            estimates['coulomb_friction'], 1e-9
-        )
-        turns = np.flatnonzero(np.diff(slides.astype(np.int8), prepend=np.int8(slides[0] if len(slides) else 0)))
-        for i in turns.tolist():
-            if not slides[i]:
-                self._rested_since = float(time[i])
-            elif self._rested_since is not None and time[i] - self._rested_since >= REST:
-                inside = slice(max(i - 1, 0), int(np.searchsorted(time, time[i] + START)))
-                found.append(float(seen[inside].max()))
-        return found
+    Starts follow from few estimates: around each turn, within `START` after it, and the next one.
+    """
+    found = []
+    stamps, slides = estimates['stamp'], estimates['state'] == SLIDING
+    turns = np.flatnonzero(np.append(True, slides[1:] != slides[:-1]))
+    ends = (np.searchsorted(stamps, stamps[turns] + START, 'right') + 1).tolist()
+    near = [np.arange(max(turn - 1, 0), min(end, len(stamps))) for turn, end in zip(turns.tolist(), ends, strict=True)]
+    for i in np.unique(np.concatenate([*near, [len(stamps) - 1]])).tolist():
+        after = with_sample(starts, FrictionEstimate(*estimates[i].tolist()))
+        found += [starts.largest] if after.number > starts.number else []
+        starts = after
+    return starts, found
 
 
 def _observed(

@@ -110,7 +110,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.globals |= {'BAND_95': BAND_95, 'BAR': BAR, 'MM': MM, 'MPA': MPA, 'MS': MS, 'PSI': PSI, 'UM': UM}
+    made.globals |= {'BAND_95': f'{BAND_95:.2f}', 'BAR': BAR, 'MM': MM, 'MPA': MPA, 'MS': MS, 'PSI': PSI, 'UM': UM}
     made.globals |= {f.__name__: f for f in (length_text, number, pressure_range, pressure_text, thousands)}
     return made
 

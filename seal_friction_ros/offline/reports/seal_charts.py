@@ -253,7 +253,7 @@ def seal_model_figure(shown: ChartedSeal) -> Plot:
     else:
         title = f'Coulomb friction reaches {coulomb[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
     figure, ax = style.new_figure(title, 4.4)
-    style.fill_band(ax, pressures / BAR, coulomb / size, BAND_95 * std / size, label=f'95 % band (± {BAND_95} std)')
+    style.fill_band(ax, pressures / BAR, coulomb / size, BAND_95 * std / size, label=f'95 % band (± {BAND_95:.2f} std)')
     ax.plot(pressures / BAR, coulomb / size, color=style.BLUE, lw=1.8, label='Coulomb friction, model')
     ax.plot(pressures / BAR, (coulomb + stiction) / size, color=style.ORANGE, ls='--', label='breakaway force, model')
     if shown.is_thesis_seal:

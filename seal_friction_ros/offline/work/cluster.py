@@ -1,4 +1,4 @@
-"""Calls on a Dask cluster instead of the processes of this machine: the same calls, the same results.
+"""Calls on a Dask cluster instead of the processes of this computer: the same calls, the same results.
 
 A worker runs one call at a time. It has to have the same version of this package and of its libraries, and it reads
 files by the same paths: a relative path begins at the folder where the command was started. Whoever can reach a
@@ -228,7 +228,7 @@ async def _kind_of_server(address: str, security: Any) -> str:
 
 
 def _checked_workers(client: Any) -> int:
-    """Number of workers, of which each can give the same results as this machine.
+    """Number of workers, of which each can give the same results as this computer.
 
     Raises:
         ValueError: There is none, or one that cannot.
@@ -264,7 +264,7 @@ def _of_scheduler(client: Any) -> Any:
 
 
 def _unsuited(expected: Mapping[str, str], dask_worker: Any = None) -> str:
-    """Why the worker that runs this cannot give the results of the machine with the ``expected`` versions; else empty.
+    """Why the worker that runs this cannot give the results of the computer with the ``expected`` versions; else empty.
 
     Args:
         expected: `versions` there.
@@ -299,7 +299,7 @@ def _run(
     for path in paths:
         if not os.path.lexists(path):
             return _Refusal(
-                f'{path} is on the machine of the command, and not where worker {_own_address()} reads: put it on a '
+                f'{path} is on the computer of the command, and not where worker {_own_address()} reads: put it on a '
                 'folder that both mount by the same path'
             )
     report_shares_to(lambda _: None)
@@ -312,6 +312,6 @@ def _own_address() -> str:
 
 
 def _paths_here(call: Callable[[], Any]) -> list[str]:
-    """Arguments of a call that are paths of this machine."""
+    """Arguments of a call that are paths of this computer."""
     arguments = (*getattr(call, 'args', ()), *getattr(call, 'keywords', {}).values())
     return [str(path) for path in arguments if isinstance(path, Path) and path.exists()]

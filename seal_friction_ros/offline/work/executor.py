@@ -21,7 +21,7 @@ from seal_friction_ros.offline.work.progress import progress, report_shares_to
 
 Result = TypeVar('Result')
 Workers = int | Cluster
-"""number of processes of this machine, or a cluster"""
+"""number of processes of this computer, or a cluster"""
 
 
 def nothing() -> None:
@@ -48,7 +48,7 @@ def try_all(
             the errors of a call; any other exception is a bug: its traceback goes to stderr, and the call has crashed.
         workers: Calls at a time, or a cluster.
         on_outcome: Called in this process with the number of a call and its outcome, as soon as it is done.
-        prepare: Called before the processes of this machine begin; they inherit what it loads and compiles.
+        prepare: Called before the processes of this computer begin; they inherit what it loads and compiles.
 
     Returns:
         Outcomes in the order of the calls.
@@ -180,7 +180,7 @@ def _completed(
 def _completed_here(
     calls: Sequence[Callable[[], Any]], workers: int, advance: Callable[[float], None], *, stop_at_error: bool
 ) -> Iterator[tuple[int, Outcome[Any]]]:
-    """The same in processes of this machine; ``advance`` takes the share of a call done since the last time."""
+    """The same in processes of this computer; ``advance`` takes the share of a call done since the last time."""
     waiting = list(range(len(calls)))[::-1]
     running: dict[Connection, _Worker] = {}
     try:

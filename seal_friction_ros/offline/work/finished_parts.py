@@ -145,8 +145,8 @@ def _found(parts: Sequence[Part], kept: Kept) -> tuple[dict[int, Outcome[Values]
             kept.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ValueError(f'{kept.folder}: cannot be the work folder: {error.strerror}: name another one') from None
-    known = ((number, _read(kept, part)) for number, part in enumerate(parts))
-    outcomes = {number: outcome for number, outcome in known if outcome is not None}
+    read = ((number, _read(kept, part)) for number, part in enumerate(parts))
+    outcomes = {number: outcome for number, outcome in read if outcome is not None}
     return outcomes, [number for number in range(len(parts)) if number not in outcomes]
 
 

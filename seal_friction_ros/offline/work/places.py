@@ -1,4 +1,4 @@
-"""Inputs of a command: paths, and URLs of fsspec, which are copied to the machine that reads them while it reads.
+"""Inputs of a command: paths, and URLs of fsspec, which are copied to the computer that reads them while it reads.
 
 fsspec is loaded by the first URL, never before. What speaks a protocol is the user's: ``s3://`` needs the package s3fs
 where the bag is read, and its credentials there.
@@ -32,7 +32,7 @@ def place_of(text: str) -> Place:
     """What a text names: a URL, or a path; ``file://`` is a path.
 
     Raises:
-        ValueError: It is a ``file://`` of another machine.
+        ValueError: It is a ``file://`` of another computer.
     """
     if not _URL.fullmatch(text):
         return Path(text)
@@ -40,7 +40,7 @@ def place_of(text: str) -> Place:
     if parts.scheme != 'file':
         return text
     if parts.netloc not in ('', 'localhost'):
-        raise ValueError(f'{text} is a file of machine {parts.netloc}: write file:///PATH, as this machine sees it')
+        raise ValueError(f'{text} is a file of computer {parts.netloc}: write file:///PATH, as this computer sees it')
     return Path(unquote(parts.path))
 
 
@@ -97,9 +97,9 @@ def _listed(url: str) -> tuple[Any, str, Mapping[str, Mapping[str, Any]]]:
 
 def _version(details: Mapping[str, Any]) -> str:
     """Version of a file as its store lists it; empty if the store does not tell."""
-    known = {re.sub('[^a-z0-9]', '', name.lower()): value for name, value in details.items() if value is not None}
-    found = [f'{name} {known[name]}' for name in _VERSION if name in known]
-    return ' '.join([*found, f'size {known.get("size")}']) if found else ''
+    by_name = {re.sub('[^a-z0-9]', '', name.lower()): value for name, value in details.items() if value is not None}
+    found = [f'{name} {by_name[name]}' for name in _VERSION if name in by_name]
+    return ' '.join([*found, f'size {by_name.get("size")}']) if found else ''
 
 
 def _content(system: Any, name: str) -> str:

@@ -56,9 +56,9 @@ def checked_targets(
     Raises:
         ValueError: A target may not be written; one line that says why.
     """
-    known = [path.resolve() for path in inputs if path.exists()]
+    sources = [path.resolve() for path in inputs if path.exists()]
     for path, kind in targets:
-        _check(path, kind, known, command, force=force)
+        _check(path, kind, sources, command, force=force)
     unmarked = [path for path, kind in targets if not kind.has_mark and path.exists()]
     aside = {path: path.with_name(f'.{path.name}.replaced') for path in unmarked}
     try:
@@ -92,7 +92,7 @@ def _check(target: Path, kind: Kind, inputs: Sequence[Path], command: str, *, fo
             continue
         resolved, is_folder = path.resolve(), kind is BAG or path not in (target, page)
         part_of = () if is_own else resolved.parents
-        if any(known == resolved or known in part_of or resolved in known.parents for known in inputs):
+        if any(each == resolved or each in part_of or resolved in each.parents for each in inputs):
             raise ValueError(f'{path} belongs to an input: not overwriting it: choose another name')
         if path.is_dir() != is_folder or (kind is BAG and not (path / 'metadata.yaml').is_file()):
             raise ValueError(f'{path} exists already and is {_what(path)}: not overwriting it: choose another name')

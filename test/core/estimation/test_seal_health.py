@@ -152,6 +152,11 @@ def test_a_rod_that_slid_before_it_was_seen_to_rest_does_not_start():
     assert taken(Starts(), 5, SLIDING, 60.0) == Starts()
 
 
+def test_the_friction_just_before_the_rod_moves_counts():
+    resting = taken(taken(Starts(), 0, STUCK, 80.0), 600, STUCK, 60.0)
+    assert taken(resting, 610, SLIDING, 40.0) == Starts(NEVER, 610 * MS, 1.5, 0, 0.0, 0.0)
+
+
 def test_a_start_that_stops_at_once_is_none_and_its_rest_begins_anew():
     begun = taken(taken(Starts(), 0, STUCK), 600, SLIDING, 60.0)
     assert begun == Starts(NEVER, 600 * MS, 1.5, 0, 0.0, 0.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.identification.calibration import (
     NOMINAL,
-    _in_parts,
     between_runs,
     calibration,
     repeated_runs,
@@ -170,12 +170,14 @@ def test_a_run_is_its_test_or_file_if_those_are_left_out_and_else_its_source():
 
 def test_a_run_has_four_contiguous_parts_in_each_direction():
     run = strokes(runs=1, pressures=1, count=16)
-    found = _in_parts(run)
-    for side in (-1.0, 1.0):
-        assert found.group[run.at.direction == side].tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
-    assert found.left_out_by == 'block'
-    one_way = _in_parts(run.taken(run.at.direction > 0.0))
-    assert one_way.group.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+    constant = candidate_laws(Variation(speeds=False))[0]
+    typical = {constant.parameters[0].name: np.abs(run.force).mean() / run.at.pressure.shape[1]}
+    one_way = run.taken(run.at.direction > 0.0)
+    for made, group in ((run, np.repeat([0, 1, 2, 3], 4)), (one_way, np.repeat([0, 1, 2, 3], 2))):
+        parts = replace(made, group=group, left_out_by='block')
+        ratios, groups = within_run(LAW, made, TRUTH)
+        assert groups == 4
+        assert ratios == pytest.approx(deviations_of_left_out(constant, parts, typical))
 
 
 def test_within_a_run_the_band_is_that_of_its_pressures_or_its_blocks():
@@ -203,7 +205,7 @@ def test_between_runs_the_band_is_that_of_the_other_runs_or_has_the_prior():
     # One other run shows none: its pressures are left out, and the prior of 15 % is added.
     one = readings.taken(readings.source == 1)
     by_pressure = replace(one, group=one.level, left_out_by='pressure')
-    prior = 0.15 * t.ppf(0.975, 8.0) / 1.96
+    prior = 0.15 * t.ppf(0.975, 8.0) / BAND_95
     expected = deviations_in_std(LAW, by_pressure, out, values, prior)
     assert between_runs(LAW, one, out, values) == pytest.approx(expected, rel=1e-5)
     found = calibration(LAW, readings, values, 0.3)

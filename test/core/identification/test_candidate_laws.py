@@ -1,13 +1,18 @@
 """Candidate laws: what is fitted is what the node runs, and each law has the limits that its physics has."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
+from seal_friction_ros.core.foundation.parameters import parameter
 from seal_friction_ros.core.foundation.units import INCH
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.geometry import SealGeometry
+from seal_friction_ros.core.friction.laws import FRICTION_LAWS
+from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.normal_force import AreaDeformationGain, squeeze_force
-from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.core.friction.seal_file import law_document, parse_seal
 from seal_friction_ros.core.identification.candidate_laws import (
     COMPILED_FROM,
     OperatingConditions,
@@ -18,7 +23,6 @@ from seal_friction_ros.core.identification.candidate_laws import (
 )
 
 THESIS_RING = SealGeometry(0.106 * INCH, 0.612 * INCH, 0.625 * INCH, 0.821 * INCH)
-NORMAL_FORCE = {'law': 'area_deformation_gain', 'area_deformation_gain': 0.3925, 'radial_force': 9.3}
 VALUES = {
     'coulomb_friction_at_any_pressure': 12.0,
     'friction_at_no_pressure': 5.0,
@@ -33,7 +37,8 @@ VALUES = {
 }
 NORMAL_FORCE_LAW = AreaDeformationGain(0.3925, 9.3)
 BASES = candidate_laws(Variation(), THESIS_RING, NORMAL_FORCE_LAW)
-ALL = (*BASES, *with_velocity_terms(BASES[-1], Variation()))
+PHYSICS = next(law for law in BASES if law.name == 'physics_based')
+ALL = (*BASES, *with_velocity_terms(PHYSICS, Variation()))
 
 
 def conditions(rows=50) -> OperatingConditions:
@@ -46,31 +51,18 @@ def conditions(rows=50) -> OperatingConditions:
     )
 
 
+def values_of(law):
+    """Parameters of a law: those of `VALUES`, else the first guess."""
+    typical = conditions().typical(12.0)
+    return {p.name: VALUES.get(p.name, p.start(typical)) for p in law.parameters} | law.fixed
+
+
 def seal_of(law):
-    """The seal that a seal file with these values makes."""
-    parts = {
-        'constant_coulomb': {'constant_coulomb': {'coulomb_friction_at_any_pressure': 12.0}},
-        'pressure_power_law': {
-            'pressure_power_law': {
-                key: (VALUES | law.fixed)[key]
-                for key in ('friction_at_no_pressure', 'friction_at_one_bar', 'pressure_exponent')
-            }
-        },
-        'physics_based': {
-            'geometry': {
-                name: getattr(THESIS_RING, name)
-                for name in ('section_diameter', 'ring_inner_diameter', 'rod_diameter', 'gland_diameter')
-            },
-            'normal_force': NORMAL_FORCE,
-            'friction_coefficient': {'law': 'power_law', 'coefficient': 2.0, 'exponent': 0.56},
-        },
-    }
-    names = [p.name for p in law.parameters]
-    terms = {n: VALUES[n] for n in names if n.startswith(('viscous', 'stribeck', 'asymmetry'))}
+    """The seal of the seal file that `identify` writes for these values."""
+    terms = {name: VALUES[name] for name in law.velocity_terms}
     document = {
         'name': 'test',
-        'coulomb_law': law.law_type.NAME,
-        **parts[law.law_type.NAME],
+        **law_document(law.friction_law(values_of(law))),
         'uncertainty': {'relative_std': 0.1},
         'identified_pressure': [0.0, 5e6],
     }
@@ -86,7 +78,7 @@ def test_what_is_fitted_is_what_the_node_runs(law):
     for (a, b), v in zip(at.pressure, at.velocity, strict=True):
         found = actuator_friction(mounted, a, b, v)
         node.append(found.coulomb_friction + found.velocity_friction)
-    assert law.friction(at, VALUES | law.fixed) == pytest.approx(np.array(node), rel=1e-12)
+    assert law.friction(at, values_of(law)) == pytest.approx(np.array(node), rel=1e-12)
 
 
 def test_the_candidates_are_ordered_from_constant_to_physics_based():
@@ -96,13 +88,28 @@ def test_the_candidates_are_ordered_from_constant_to_physics_based():
     assert [name for name in names if name in order] == order
     assert names[-1] == 'physics_based_asymmetric'
     assert all(law.depends_on_pressure is not law.name.startswith(('constant', 'coulomb')) for law in ALL)
-    assert not any(law.depends_on_pressure is None for law in ALL)
+
+
+def test_a_law_that_depends_on_speed_needs_speeds_and_has_no_velocity_terms(monkeypatch):
+    @dataclass(frozen=True)
+    class Fading(ConstantCoulomb):
+        NAME = 'fading'
+        reference_speed: float = parameter(0.0, unit='m/s', lower=0.0, upper=1.0, description='Of Coulomb friction.')
+
+    registry = 'seal_friction_ros.core.identification.candidate_laws.FRICTION_LAWS'
+    monkeypatch.setattr(registry, [*FRICTION_LAWS, Fading])
+    fading = candidate_laws(Variation())[-1]
+    assert (fading.name, fading.depends_on_speed, PHYSICS.depends_on_speed) == ('fading', True, False)
+    assert with_velocity_terms(fading, Variation()) == ()
+    assert 'fading' not in [law.name for law in candidate_laws(Variation(speeds=False))]
 
 
 def test_without_geometry_or_speeds_the_laws_that_need_them_are_not_there():
     bare = candidate_laws(Variation(speeds=False))
-    names = ['pressure_power_law_2_3', 'pressure_power_law_1', 'pressure_power_law_3_2', 'pressure_power_law_2']
-    assert [law.name for law in bare] == ['constant_coulomb', *names, 'pressure_power_law']
+    powers = ['pressure_power_law_2_3', 'pressure_power_law_1', 'pressure_power_law_3_2', 'pressure_power_law_2']
+    names = [law.name for law in bare]
+    assert 'physics_based' not in names
+    assert names[:6] == ['constant_coulomb', *powers, 'pressure_power_law']
     assert not any(law.parts or law.velocity_terms for law in bare)
 
 
@@ -123,7 +130,7 @@ def test_one_or_two_pressures_get_the_exponent_of_a_prior(pressures, fitted):
 
 
 def test_asymmetry_is_tried_only_where_it_is_no_offset():
-    law = candidate_laws(Variation())[-1]
+    law = PHYSICS
     assert [each.name for each in with_velocity_terms(law, Variation(speeds=False, asymmetry=False))] == []
     assert len(with_velocity_terms(law, Variation())) == 3
 
@@ -144,8 +151,8 @@ def test_stribeck_friction_has_faded_to_37_percent_at_its_velocity():
 @pytest.mark.parametrize('law', ALL, ids=lambda law: law.name)
 def test_many_readings_are_computed_by_compiled_code_to_the_same_bits(law):
     at, part = conditions(rows=400), COMPILED_FROM // 2 - 1
-    few = [law.friction(at.taken(np.arange(i, min(i + part, 400))), VALUES) for i in range(0, 400, part)]
-    assert law.friction(at, VALUES).tobytes() == np.concatenate(few).tobytes()
+    few = [law.friction(at.taken(np.arange(i, min(i + part, 400))), values_of(law)) for i in range(0, 400, part)]
+    assert law.friction(at, values_of(law)).tobytes() == np.concatenate(few).tobytes()
 
 
 def test_squeeze_force_of_the_thesis_ring_is_near_that_of_its_finite_elements():

@@ -15,14 +15,9 @@ from seal_friction_ros.core.identification.experiment_design import (
     _correlated_pair,
     _correlation,
     _disagreements,
-    _ends,
     _error,
     _greedy,
-    _grid,
-    _grid_speeds,
     _Information,
-    _is_speed_varied,
-    _levels,
     _Model,
     _model,
     _prior,
@@ -31,7 +26,6 @@ from seal_friction_ros.core.identification.experiment_design import (
     _relative_slopes,
     _richest,
     _scatter,
-    _three_digits,
     _without_offsets,
     design_experiment,
     laws_not_beaten,
@@ -206,53 +200,53 @@ def test_where_speed_was_not_varied_others_are_proposed(speed):
 # --- readings to choose from ---
 
 
-def test_a_value_to_be_set_has_three_digits_and_is_not_above():
-    values = {0.0: 0.0, -2.0: 0.0, 0.0123456: 0.0123, 123999.0: 123000.0, 9.999: 9.99, 0.3: 0.3, 1.0: 1.0, 0.57: 0.57}
-    assert {value: _three_digits(value) for value in values} == values
+def every_reading(readings, of_band=0.0):
+    """A design that proposes the whole grid."""
+    return design_experiment(score_laws([BASE], held()), readings, NO_RUNS, of_band, 99)
 
 
-def test_speeds_to_choose_from_go_from_slowest_to_fastest_or_are_multiples_of_the_only_one():
-    assert _ends(np.linspace(0.0, 1.0, 101)) == pytest.approx((0.05, 0.95))
-    assert _grid_speeds((0.01, 0.1601)) == pytest.approx([0.01, 0.02, 0.04, 0.08, 0.16], rel=0.01)
-    assert _grid_speeds((0.0, 0.5))[0] == 5e-4  # a thousandth of the fastest
-    assert _grid_speeds((0.0, 0.05))[0] == 1e-4  # no speed is slower than 0.1 mm/s
-    assert _grid_speeds((0.02,)) == pytest.approx([0.004, 0.01, 0.02, 0.04, 0.1])
-    assert _grid_speeds((0.5,)) == pytest.approx([0.1, 0.25, 0.5, 1.0])  # nor faster than 1 m/s
-    assert _grid_speeds((2e-4,)) == pytest.approx([1e-4, 2e-4, 4e-4, 1e-3])
-    assert _grid_speeds((2.0,)) == pytest.approx([0.4, 1.0, 2.0])  # but the one that was used
-    assert _grid_speeds((5e-5,)) == pytest.approx([5e-5, 1e-4, 2.5e-4])
+@pytest.mark.parametrize(
+    ('used', 'grid'),
+    [
+        ((0.01, 0.1601), (0.01, 0.02, 0.04, 0.08, 0.16)),
+        ((0.0, 0.5), (5e-4, 2.81e-3, 0.0158, 0.0889, 0.5)),  # a thousandth of the fastest
+        ((0.0, 0.05), (1e-4, 4.72e-4, 2.23e-3, 0.0105, 0.05)),  # no speed is slower than 0.1 mm/s
+        ((0.0123456,), (2.46e-3, 6.17e-3, 0.0123, 0.0246, 0.0617)),  # three digits, not above
+        ((0.02,), (0.004, 0.01, 0.02, 0.04, 0.1)),
+        ((0.5,), (0.1, 0.25, 0.5, 1.0)),  # nor faster than 1 m/s
+        ((2e-4,), (1e-4, 2e-4, 4e-4, 1e-3)),
+        ((2.0,), (0.4, 1.0, 2.0)),  # but the one that was used
+        ((5e-5,), (5e-5, 1e-4, 2.5e-4)),
+    ],
+)
+def test_speeds_to_choose_from_go_from_slowest_to_fastest_or_are_multiples_of_the_only_one(used, grid):
+    speed = np.resize(used, 36)
+    found = every_reading(measured(np.repeat([20.0, 40.0, 60.0], 12) * BAR, speed, np.random.default_rng(1)))
+    assert sorted({reading.speed for reading in found.readings}) == pytest.approx(grid, rel=0.01)
+    pressures = sorted({reading.pressure / BAR for reading in found.readings})
+    assert pressures == pytest.approx([0.0, 12.0, 24.0, 36.0, 48.0, 60.0])
+    assert len(found.readings) == 6 * len(grid)
+    assert found.speed_is_varied is (len(used) > 1)
 
 
 @pytest.mark.parametrize(('fast', 'varied'), [(0.0149, False), (0.0151, True)])
 def test_speed_is_varied_where_the_fastest_is_half_as_fast_again_in_one_direction(fast, varied):
-    speed = np.repeat([0.01, fast], 40)
-    direction = np.tile([1.0, -1.0], 40)
-    at = OperatingConditions(np.zeros((80, 1)), None, direction * speed, direction)
-    assert _is_speed_varied(at) is varied
-    one_way = np.where(direction > 0.0, direction * speed, -0.01)
-    assert _is_speed_varied(at._replace(velocity=one_way)) is varied
-    few = np.where(np.arange(80) < 3, 0.1, 0.01) * direction
-    assert not _is_speed_varied(at._replace(velocity=few))  # single strokes do not count
-
-
-def test_pressures_to_choose_from_go_from_none_to_the_highest():
-    assert _grid(60.0 * BAR, (0.01, 0.02)) == [(p * BAR, v) for p in (0.0, 12.0, 24.0, 36.0, 48.0, 60.0)
-                                               for v in (0.01, 0.02)]  # fmt: skip
-    points = _range_points((1e5, 5e5), (0.1, 0.5))
-    expected = [(p * 1e5, v / 10.0) for p in range(1, 6) for v in range(1, 6)]
-    assert np.array(points) == pytest.approx(np.array(expected))
+    made = measured(np.repeat([20.0, 60.0], 20) * BAR, np.tile([0.01, fast], 20), np.random.default_rng(1))
+    few = np.where(np.arange(80) < 3, 0.1, 0.01) * made.at.direction  # single strokes do not count
+    one_way = np.where(made.at.direction > 0.0, made.at.velocity, -0.01)
+    for velocity, expected in ((made.at.velocity, varied), (one_way, varied), (few, False)):
+        found = every_reading(replace(made, at=made.at._replace(velocity=velocity)))
+        assert found.speed_is_varied is expected
 
 
 def test_a_repeated_run_takes_ten_of_the_pressures_each_at_its_middle_speed():
     levels = np.arange(12.0) * 3.0456 * BAR
     speed = np.tile([0.01, 0.02, 0.0901], 12)
     readings = measured(np.repeat(levels, 3), speed, np.random.default_rng(0))
-    found = _levels(readings, np.abs(readings.at.velocity))
-    places = [0, 1, 2, 4, 5, 6, 7, 9, 10, 11]  # evenly
-    assert [p / BAR for p, _ in found] == pytest.approx([_three_digits(3.0456 * i) for i in places])
-    assert {v for _, v in found} == {0.02}
-    close = replace(readings, at=readings.at._replace(pressure=np.full_like(readings.at.pressure, 1e6)))
-    assert _levels(close, np.abs(close.at.velocity)) == [(1e6, 0.02)]  # the same one only once
+    repeated = [reading for reading in every_reading(readings, 0.9).readings if reading.is_repeated]
+    expected = [0.0, 3.04, 6.09, 12.1, 15.2, 18.2, 21.3, 27.4, 30.4, 33.5]  # bar, evenly, three digits, not above
+    assert [reading.pressure / BAR for reading in repeated] == pytest.approx(expected)
+    assert {reading.speed for reading in repeated} == {0.02}
 
 
 # --- information ---

@@ -42,10 +42,10 @@ from seal_friction_ros.core.identification.validation import (
 
 POWER = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 0.9, 'pressure_exponent': 0.65}
 CONSTANT = 'coulomb_friction_at_any_pressure'
-BASES = candidate_laws(Variation())
-LAWS = {r.name: r for r in (*BASES, *with_velocity_terms(BASES[-1], Variation()))}
-ELASTIC = LAWS['pressure_power_law_2_3']
-LAW = LAWS['pressure_power_law']
+LAWS = {law.name: law for law in candidate_laws(Variation())}
+BASES = tuple(LAWS.values())
+ELASTIC, LAW = LAWS['pressure_power_law_2_3'], LAWS['pressure_power_law']
+LAWS |= {law.name: law for law in with_velocity_terms(LAW, Variation())}
 
 
 def noted(scatter=0.0, seed=0, law=LAW, values=POWER, offset=0.0, pressures=11, count=3, seals=2, test_scatter=0.0):

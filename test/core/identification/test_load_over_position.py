@@ -13,7 +13,6 @@ from scipy.interpolate import CubicSpline
 from seal_friction_ros.core.identification.load_over_position import (
     FrictionTerms,
     LoadOverPosition,
-    _centred_mean,
     _check_friction,
     _check_same_load,
     _condition_number,
@@ -346,16 +345,9 @@ def test_one_sample_in_a_hundred_may_lack_its_position(missing, told):
     signals, x = drive((0.0, 120), *TO_AND_FRO, *TO_AND_FRO)
     assert len(x) == 1000
     x[300 : 300 + missing] = np.nan
-    if told:
-        assert sum(map(len, _strokes(signals, x, SLIDING).runs)) == 800 - missing
-    else:
-        with pytest.raises(ValueError, match=r'^11 of 1000 samples have no position'):
-            _strokes(signals, x, SLIDING)
-
-
-def test_a_rod_that_rests_does_not_change_its_position():
-    with pytest.raises(ValueError, match=r'^the position does not change'):
-        _strokes(*drive((0.0, 100)), SLIDING)
+    reason = r'^11 of 1000 samples have no position'
+    with nullcontext() if told else pytest.raises(ValueError, match=reason):
+        assert fit_load(signals, x, ('a',), SLIDING).strokes == 4
 
 
 @pytest.mark.parametrize(
@@ -367,8 +359,7 @@ def test_a_rod_that_rests_does_not_change_its_position():
 )
 def test_two_strokes_each_way_are_needed(parts, counts):
     with pytest.raises(ValueError, match=f'^{counts} are too few'):
-        _strokes(*drive((0.0, 20), *parts), SLIDING)
-    assert len(_strokes(*drive((0.0, 20), *TO_AND_FRO, *TO_AND_FRO), SLIDING).runs) == 4
+        fit_load(*drive((0.0, 20), *parts), ('a',), SLIDING)
 
 
 def passed(out, back):
@@ -490,22 +481,6 @@ def test_friction_over_speed_is_viscous_with_one_of_three_stribeck_speeds():
     assert terms[0][1].tolist() == speed.tolist()
     assert [column[38] for _, column in terms[1:]] == pytest.approx(np.exp([-8.0, -8.0 / 3.0, -1.0]))
     assert choices == [(), (0,), (0, 1), (0, 2), (0, 3)]
-
-
-@pytest.mark.parametrize(
-    ('intervals', 'knots'),
-    [(1, [0, 4, 8, 12]), (2, [0, 3, 6, 9, 12]), (3, [0, 2, 4, 8, 10, 12]), (4, [0, 1.5, 3, 6, 9, 10.5, 12])],
-)
-def test_a_spline_of_some_intervals_has_three_knots_more(intervals, knots):
-    assert _spline_knots(0.0, 12.0, intervals) == pytest.approx(knots)
-    assert _spline_knots(1.0, 1.3, intervals) == pytest.approx(1.0 + 0.3 * np.array(knots) / 12.0)
-
-
-def test_a_centred_mean_is_narrower_towards_the_ends():
-    values = np.array([1.0, 2.0, 6.0, 4.0, 5.0])
-    assert _centred_mean(values, 1) == pytest.approx([1.0, 3.0, 4.0, 5.0, 5.0])
-    assert _centred_mean(values, 2) == pytest.approx([1.0, 3.0, 18.0 / 5.0, 5.0, 5.0])
-    assert _centred_mean(values, 9) == pytest.approx([1.0, 3.0, 18.0 / 5.0, 5.0, 5.0])
 
 
 # --- the fit of one model ---
@@ -684,8 +659,7 @@ def test_the_simplest_model_that_predicts_strokes_left_out_is_that_of_the_machin
     signals, x = known_machine(bent, machine, lambda x: 400.0 + 0.0 * x, noise=2.0)
     load = fit_load(signals, x, ('a', 'b'), SLIDING)
     assert load.friction.names == names
-    assert len(load.knots) == 5
-    assert (load.knots[0], load.knots[-1]) == pytest.approx((0.0, 0.5), abs=1e-9)
+    assert load.knots == pytest.approx([0.0, 0.125, 0.25, 0.375, 0.5], abs=1e-9)
     assert load.forces == pytest.approx(bent(load.knots), abs=3.0)
     assert load.mass == pytest.approx(400.0, rel=0.03)
     assert load.mass_change == (0.0, 0.0)

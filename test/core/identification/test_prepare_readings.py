@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core.identification.prepare_readings import (
-    _parts_of_strokes,
     _swept,
     _travel,
     prepare_logs,
@@ -162,11 +161,11 @@ def test_the_way_of_the_rod_counts_no_pause_and_no_missing_velocity():
 
 
 def test_strokes_of_one_log_at_one_pressure_have_four_parts():
-    source, level = np.repeat([0, 1], 10), np.tile(np.repeat([0, 1], 5), 2)
-    assert _parts_of_strokes(source, level).tolist() == [0, 0, 1, 2, 3] * 4
     one = prepare_logs([log((15,) * 4)], ('a',))
     assert one.readings.left_out_by == 'block'
     assert one.readings.group.tolist() == one.breakaway.group.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+    five = prepare_logs([log((15,) * 5)], ('a',))
+    assert five.readings.group.tolist() == [0, 0, 0, 1, 1, 2, 2, 2, 3, 3]
 
 
 def test_a_reading_has_the_mean_temperature_way_and_dwell_of_its_samples():

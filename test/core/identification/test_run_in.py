@@ -9,10 +9,6 @@ from seal_friction_ros.core.identification.candidate_laws import OperatingCondit
 from seal_friction_ros.core.identification.fitting import fit, offsets_of
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.run_in import (
-    _Approach,
-    _approaches,
-    _determined,
-    _settled,
     as_measured,
     drifts,
     settled_readings,
@@ -231,76 +227,80 @@ def pairs(count):
     return np.tile([1.0, 1.0, -1.0, -1.0], count)[:count]
 
 
-def test_each_length_is_fitted_by_least_squares_with_the_offset_that_is_left():
-    """Seven strokes out and six back: the friction is that of the mean direction."""
-    rng = np.random.default_rng(3)
-    travel, direction = 0.5 + STROKE * np.arange(13), np.tile([1.0, -1.0], 7)[:13]
-    friction = 10.0 + 2.0 * np.exp(-(travel - 0.5) / 0.1) + 0.3 * direction + 0.1 * rng.normal(size=13)
-    found = _approaches(travel, friction, direction, 0.05, 1.0)
-    spanned = 12 * STROKE
-    assert [one.length for one in found] == pytest.approx(spanned * np.geomspace(0.05, 1.0, 15))
-    for one in found:
-        design = np.column_stack((np.ones(13), np.exp(-(travel - 0.5) / one.length), direction - 1.0 / 13.0))
-        values = np.linalg.lstsq(design, friction, rcond=None)[0]
-        left = friction - design @ values
-        covariance = np.linalg.inv(design.T @ design) * (left @ left) / (13 - 4)
-        follows = min(max(left[1:] @ left[:-1] / (left @ left), 0.0), 0.9)
-        worse = np.sqrt((1.0 + follows) / (1.0 - follows))
-        assert (one.asymptote, one.height) == pytest.approx(values[:2])
-        assert one.error == pytest.approx(np.sqrt(covariance[0, 0]))
-        assert one.height_error == pytest.approx(np.sqrt(covariance[1, 1]) * worse)
-        assert one.last == pytest.approx(values[0] + values[1] * np.exp(-spanned / one.length))
-        assert one.square == pytest.approx(left @ left)
+def strokes(friction, travel):
+    """One run of strokes out and back with this friction [N] at this travel [m]."""
+    made = run(np.ones_like, count=len(friction) + len(friction) % 2).taken(np.arange(len(friction)))
+    return replace(made, force=made.at.direction * friction, travel=travel)
+
+
+def least_squares(travel, friction, direction, length):
+    """Asymptote, height and offset of an approach, their standard errors, and the sum of squares."""
+    design = np.column_stack(
+        (np.ones_like(travel), np.exp(-(travel - travel.min()) / length), direction - direction.mean())
+    )
+    values = np.linalg.lstsq(design, friction, rcond=None)[0]
+    left = friction - design @ values
+    errors = np.sqrt(np.diag(np.linalg.inv(design.T @ design)) * (left @ left) / (len(friction) - 4))
+    follows = min(max(left[1:] @ left[:-1] / (left @ left), 0.0), 0.9)
+    return values, errors * [1.0, np.sqrt((1.0 + follows) / (1.0 - follows)), 1.0], left @ left
 
 
 def test_the_settled_friction_is_the_mean_over_the_lengths_by_their_likelihood():
-    def one(asymptote, square):
-        return _Approach(0.1, asymptote, 0.4, asymptote + 0.2, -1.0, 0.1, square)
+    """Seven strokes out and six back: the friction is that of the mean direction."""
+    rng = np.random.default_rng(3)
+    travel = 0.5 + STROKE * np.arange(13)
+    direction, spanned = np.tile([1.0, -1.0], 7)[:13], 12 * STROKE
+    friction = 10.0 + 6.0 * np.exp(-(travel - 0.5) / 0.1) + 0.3 * direction + 0.1 * rng.normal(size=13)
+    lengths = spanned * np.geomspace(0.05, 1.0, 15)
+    fits = [least_squares(travel, friction, direction, length) for length in lengths]
+    values, errors, squares = (np.array(column) for column in zip(*fits, strict=True))
+    asymptotes, heights = values[:, 0], values[:, 1]
+    weights = squares ** (-13 / 4.0) / np.sum(squares ** (-13 / 4.0))
+    settled = weights @ asymptotes
+    beyond = weights @ (asymptotes + heights * np.exp(-spanned / lengths)) - settled
+    variance = weights @ (errors[:, 0] ** 2 + (asymptotes - settled) ** 2)
+    std = np.sqrt(variance + (0.5 * beyond) ** 2 + (0.15 * (weights @ heights)) ** 2)
+    (drift,) = drifts(strokes(friction, travel), np.zeros(1))
+    assert drift.is_evident
+    assert drift.settled_share == pytest.approx(settled / friction.mean())
+    assert drift.settled_std == pytest.approx(std / friction.mean())
 
-    # Eight strokes: twice the squares have the likelihood 2^(-8/4).
-    settled, std = _settled([one(10.0, 1.0), one(12.0, 2.0)], 8)
-    assert settled == pytest.approx((10.0 + 12.0 / 4.0) / (1.0 + 1.0 / 4.0))
-    spread = 0.8 * (10.0 - settled) ** 2 + 0.2 * (12.0 - settled) ** 2
-    assert std == pytest.approx(np.sqrt(0.4**2 + spread + (0.5 * 0.2) ** 2 + (0.15 * 1.0) ** 2))
+
+BEND = STROKE * 23 * np.geomspace(0.05, 0.5, 15)[9]  # [m] length of an approach
 
 
 @pytest.mark.parametrize(('share', 'found'), [(0.029, True), (0.031, False)])
 def test_an_asymptote_is_determined_with_a_standard_error_of_three_percent(share, found):
     travel, direction = STROKE * np.arange(24), np.tile([1.0, -1.0], 12)
-    length = travel.max() * np.geomspace(0.05, 0.5, 15)[9]
-    course = 10.0 + 30.0 * np.exp(-travel / length)
-    unit = _approaches(travel, course + 0.01 * pairs(24), direction, 0.05, 0.5)[9]
-    friction = course + 0.01 * share * 10.0 / unit.error * pairs(24)
-    asymptote, determined = _determined(travel, friction, direction)
-    assert np.isfinite(asymptote) == found
+    course = 10.0 + 30.0 * np.exp(-travel / BEND)
+    error = least_squares(travel, course + 0.01 * pairs(24), direction, BEND)[1][0]
+    (drift,) = drifts(strokes(course + 0.01 * share * 10.0 / error * pairs(24), travel), np.zeros(1))
+    assert np.isfinite(drift.asymptote) == found
     if found:
-        assert (asymptote, determined) == pytest.approx((10.0, length), rel=0.05)
+        assert (drift.asymptote, drift.length) == pytest.approx((10.0, BEND), rel=0.05)
 
 
-def test_an_asymptote_is_determined_where_the_course_bends():
+@pytest.mark.parametrize(('share', 'found'), [(0.6, True), (0.8, False)])
+def test_an_asymptote_is_determined_where_the_course_bends(share, found):
     """Squares about the approach have to be below 70 % of those about a line."""
     travel, direction = STROKE * np.arange(24), np.tile([1.0, -1.0], 12)
-    length = travel.max() * np.geomspace(0.05, 0.5, 15)[9]
-    bend = np.exp(-travel / length)
+    bend = np.exp(-travel / BEND)
     straight = np.column_stack((np.ones(24), travel, direction))
     curved = bend - straight @ np.linalg.lstsq(straight, bend, rcond=None)[0]
     scatter = pairs(24) - straight @ np.linalg.lstsq(straight, pairs(24), rcond=None)[0]
-    for share, found in ((0.6, True), (0.8, False)):
-        # Squares of the scatter s and of the bend b that a line leaves: s / (s + b) = share.
-        size = np.sqrt(scatter @ scatter * (1.0 - share) / share / (curved @ curved))
-        friction = 100.0 + 0.1 * (pairs(24) + size * bend)
-        assert np.isfinite(_determined(travel, friction, direction)[0]) == found
+    # Squares of the scatter s and of the bend b that a line leaves: s / (s + b) = share.
+    size = np.sqrt(scatter @ scatter * (1.0 - share) / share / (curved @ curved))
+    (drift,) = drifts(strokes(100.0 + 0.1 * (pairs(24) + size * bend), travel), np.zeros(1))
+    assert np.isfinite(drift.asymptote) == found
 
 
 @pytest.mark.parametrize(('times', 'evident'), [(2.5, False), (6.0, True)])
 def test_an_approach_is_evident_from_four_standard_errors_on(times, evident):
-    course = approach(0.3, LENGTHS[3])
-    clean = run(course, count=30, scatter=0.0)
-    friction = np.abs(clean.force)
-    found = _approaches(WAY, friction + 0.01 * pairs(30), clean.at.direction, 0.05, 1.0)
-    unit = min(found, key=lambda one: one.square)
-    noisy = friction + 0.01 * 3.0 / times / unit.height_error * pairs(30)
-    (drift,) = drifts(replace(clean, force=clean.at.direction * noisy), np.zeros(1))
+    clean = run(approach(0.3, LENGTHS[3]), count=30, scatter=0.0)
+    noisy = np.abs(clean.force) + 0.01 * pairs(30)
+    error = least_squares(WAY, noisy, clean.at.direction, LENGTHS[3])[1][1]
+    friction = np.abs(clean.force) + 0.01 * 3.0 / times / error * pairs(30)
+    (drift,) = drifts(strokes(friction, WAY), np.zeros(1))
     assert drift.is_evident is evident
 
 

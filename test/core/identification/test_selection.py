@@ -17,7 +17,6 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.selection import (
     LawScore,
     Rise,
-    _errors_of_levels,
     choose_anew,
     choose_without,
     collinear_spread,
@@ -31,8 +30,8 @@ from seal_friction_ros.core.identification.selection import (
 )
 
 BAR = 1e5  # [Pa]
-BASES = candidate_laws(Variation())
-LAWS = {law.name: law for law in (*BASES, *with_velocity_terms(BASES[-1], Variation()))}
+LAWS = {law.name: law for law in candidate_laws(Variation())}
+LAWS |= {law.name: law for law in with_velocity_terms(LAWS['pressure_power_law'], Variation())}
 
 
 def readings(bars, speeds=(0.02,), force=None, sources=1, samples=False, count=1):
@@ -306,27 +305,25 @@ def test_pressures_that_scatter_by_themselves_make_the_rise_less_sure():
 
 
 def test_one_repeated_pair_of_strokes_tells_no_scatter_and_strokes_that_follow_each_other_count_as_one():
+    """Constant friction of 10 N: a line with one error at every pressure."""
     bars = np.array([10.0, 20.0, 40.0])
+    of_rise = 30.0 / np.sqrt(np.sum((bars - bars.mean()) ** 2))
     made = readings(bars, count=2)
-    one = made.taken(np.array([0, 2, 4, 6, 8, 9]))
-    assert _errors_of_levels(one, np.full(3, 10.0)) is None
+    assert rise_over_pressures(made.taken(np.array([0, 2, 4, 6, 8, 9]))) is None
     both = made.taken(np.array([0, 1, 4, 5, 8, 9]))
-    force = both.force * np.tile([1.02, 0.98], 3)
-    errors = _errors_of_levels(replace(both, force=force), np.full(3, 10.0))
+    found = rise_over_pressures(replace(both, force=both.force * np.tile([1.02, 0.98], 3)))
     # Three pairs, 0.2 N off: standard deviation 0.2 * sqrt(6 / 3) N, over the root of two strokes.
-    assert errors == pytest.approx(np.full(3, 0.2 * np.sqrt(2.0) / np.sqrt(2.0)))
-    two = both.level < 2
-    assert _errors_of_levels(replace(both, force=force).taken(two), np.full(2, 10.0)) == pytest.approx(errors[:2])
+    assert found.standard_error == pytest.approx(0.2 * of_rise)
     drifting = readings(bars, count=200, force=np.tile(10.0 + np.linspace(-0.1, 0.1, 200), 6))
     share = np.linspace(-0.01, 0.01, 200)
     std = 10.0 * np.sqrt(6.0 * np.sum(share**2) / (6.0 * 199.0))
     worth = 400.0 * 0.1 / 1.9  # the lag-one correlation counts up to 0.9
-    assert _errors_of_levels(drifting, np.full(3, 10.0)) == pytest.approx(np.full(3, std / np.sqrt(worth)))
+    assert rise_over_pressures(drifting).standard_error == pytest.approx(std / np.sqrt(worth) * of_rise)
     few = readings(bars, count=12, force=np.tile(np.repeat([9.9, 10.1], 6), 6))
     correlation = 9.0 / 12.0  # ten neighbours of a kind less one of two kinds, of twelve squares: (10 - 1) / 12
     worth = max(24.0 * (1.0 - correlation) / (1.0 + correlation), 1.0)
     std = 0.1 * np.sqrt(72.0 / 66.0)
-    assert _errors_of_levels(few, np.full(3, 10.0)) == pytest.approx(np.full(3, std / np.sqrt(worth)))
+    assert rise_over_pressures(few).standard_error == pytest.approx(std / np.sqrt(worth) * of_rise)
 
 
 # --- the ladder ---

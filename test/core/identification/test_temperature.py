@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.temperature import scale_at
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import FrictionReadings
@@ -16,7 +17,6 @@ from seal_friction_ros.core.identification.temperature import (
     _line,
     _means,
     _numbered,
-    _offsets,
     _others,
     _runs,
     at_reference,
@@ -134,7 +134,7 @@ def test_slope_and_error_are_those_of_a_line_through_the_runs_with_the_band_of_s
     friction = [np.log(made.magnitudes(np.full(6, 5.0))[made.source == run]).mean() for run in range(6)]
     line = stats.linregress(x, friction)
     assert found.coefficient == pytest.approx(-line.slope, rel=0.02)
-    assert found.error == pytest.approx(line.stderr * stats.t.ppf(0.975, 4) / 1.96, rel=0.05)
+    assert found.error == pytest.approx(line.stderr * stats.t.ppf(0.975, 4) / BAND_95, rel=0.05)
     assert found.scale.reference == np.median(made.temperature)
     assert (found.scale.coefficient, found.scale.coefficient_std) == (found.coefficient, found.error)
 
@@ -227,21 +227,20 @@ def test_cells_and_other_columns_are_taken_off_as_by_a_regression_on_them():
     assert _means(column, cells) == pytest.approx([column[cells == c].mean() for c in range(3)])
     x, y = rng.normal(size=9), rng.normal(size=9)
     line = stats.linregress(x, y)
-    assert _line(x, y) == pytest.approx((line.slope, line.stderr * stats.t.ppf(0.975, 7) / 1.96))
+    assert _line(x, y) == pytest.approx((line.slope, line.stderr * stats.t.ppf(0.975, 7) / BAND_95))
 
 
 def test_the_samples_behind_the_readings_and_their_offset_go_to_the_reference_with_them():
     made = readings(RUNS, noise=0.0)
     made = replace(made, samples=tuple(np.array([force - 1.0, force, force + 1.0]) for force in made.force))
     found = fit_temperature(made)
-    assert _offsets(made) == pytest.approx(np.full(6, 5.0))
     cold = at_reference(made, found)
     share = np.exp(0.012 * (made.temperature - found.reference))
     assert cold.force == pytest.approx(5.0 + share * (made.force - 5.0))
     for samples, force, one in zip(cold.samples, cold.force, share, strict=True):
         assert samples == pytest.approx(force + one * np.array([-1.0, 0.0, 1.0]))
-    part = made.taken(made.source < 5)
-    assert _offsets(part).tolist()[5] == 0.0  # of a run without readings
+    part = made.taken(made.source < 5)  # a run without readings
+    assert at_reference(part, found).force == pytest.approx(cold.force[made.source < 5])
 
 
 @pytest.mark.parametrize(('noise', 'told'), [(0.09, True), (0.11, False)])

@@ -295,7 +295,7 @@ def test_the_linear_model_of_oil_is_that_of_the_flows(cylinder):
 
     def load_rate(velocity, change):
         y = (0.0, velocity, alpha * b + change, b - change, 0.0, 0.0, 0.0, 0.0, 293.15, 293.15)
-        rates = oil_rates(c.valve, c, y)
+        rates = oil_rates(c.valve, c.cylinder, c.enthalpies, y)
         return rates.pressure_a - alpha * rates.pressure_b
 
     assert load_rate(0.1, 0.0) - load_rate(0.0, 0.0) == pytest.approx(-0.1 * found.motion)

@@ -114,7 +114,7 @@ def test_oil_that_flows_into_a_cavity_fills_it_by_its_volume(chamber):
     # The oil is V exp((charge - vapour) / beta) at vapour pressure; its rate is the flow.
     c, charge = SERVO.constants, -5e6
     y = list(plant(SERVO, **{f'charge_{chamber}': charge}))[:10]
-    rates = oil_rates(c.valve, c, tuple(y))
+    rates = oil_rates(c.valve, c.cylinder, c.enthalpies, tuple(y))
     beta, volume = SERVO.cylinder.bulk_modulus, SERVO.cylinder.mid_volume_a
     vapour = SERVO.cylinder.vapour
     oil = volume * math.exp((charge - vapour) / beta)

@@ -16,10 +16,10 @@ from seal_friction_ros.core.estimation.records import (
     Status,
     Velocity,
 )
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.states import SLIDING, STUCK, FrictionState
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.monitor.actuator_view import (
-    BAND,
     COLUMNS,
     NOTHING_HELD,
     NOTHING_SAID,
@@ -73,8 +73,8 @@ def test_a_row_has_the_newest_numbers_in_the_units_of_the_page():
     shown = as_mapping(row(KNOWN, held_of(*RECORDS), 12.3456))
     assert shown['time'] == 12.346
     assert (shown['measured'], shown['estimate']) == (-37.0, -40.0)
-    assert shown['low'] == pytest.approx(-40.0 - BAND * 3.0)
-    assert shown['high'] == pytest.approx(-40.0 + BAND * 3.0)
+    assert shown['low'] == pytest.approx(-40.0 - BAND_95 * 3.0)
+    assert shown['high'] == pytest.approx(-40.0 + BAND_95 * 3.0)
     assert (shown['feedforward'], shown['limit'], shown['below']) == (-36.0, 150.0, -150.0)
     assert shown['error'] == pytest.approx(2000.0)  # [um]
     assert (shown['pressure_a'], shown['pressure_b']) == (20.0, 10.0)  # [bar]
@@ -118,7 +118,7 @@ def test_with_adaptation_what_is_measured_is_estimate_plus_residual_while_the_ro
     shown = as_mapping(row(known_of(adapting), held_of(Force(SECOND, 400.0), estimate), 0.0))
     assert shown['measured'] == -42.0
     assert (shown['scale'], shown['residual']) == (1.05, -2.0)
-    assert shown['scale_high'] - shown['scale_low'] == pytest.approx(2 * BAND * 0.01)
+    assert shown['scale_high'] - shown['scale_low'] == pytest.approx(2 * BAND_95 * 0.01, abs=1e-4)
     nothing_learnt = estimate._replace(adaptation_scale=1.0)  # its offset would hide what the law misses
     raw = as_mapping(row(known_of(adapting), held_of(Force(SECOND, 400.0), nothing_learnt), 0.0))
     assert raw['measured'] == 400.0

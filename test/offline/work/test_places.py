@@ -43,7 +43,7 @@ def test_a_text_is_a_path_or_a_url_and_a_file_url_is_a_path():
     assert place_of('a/b: c') == Path('a/b: c')
     assert place_of('file:///a/b%20c') == place_of('file://localhost/a/b%20c') == Path('/a/b c')
     assert place_of('s3://bucket/bag') == 's3://bucket/bag'
-    with pytest.raises(ValueError, match='of machine other: write file:///PATH'):
+    with pytest.raises(ValueError, match='of computer other: write file:///PATH'):
         place_of('file://other/a')
     assert [name_of(place) for place in ('s3://a/run/', 's3://a/log.csv', Path('a/log.csv'))] == ['run', 'log', 'log']
 
@@ -123,7 +123,7 @@ def test_a_log_is_imported_and_named_as_in_the_store(tmp_path):
         ('memory://nowhere', 'there is no such file or bag'),
         ('local:///nowhere/bag', 'there is no such file or bag'),
         (f'local://{ROOT}/config', 'not a rosbag2 bag: there is no metadata.yaml'),
-        ('file://other/bag', 'of machine other'),
+        ('file://other/bag', 'of computer other'),
     ],
 )
 def test_what_cannot_be_read_is_one_line(url, said, capsys):

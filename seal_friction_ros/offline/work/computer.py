@@ -1,4 +1,4 @@
-"""What this machine has and lacks for nodes and commands, looked up without a graph: ``seal_friction doctor``."""
+"""What this computer has and lacks for nodes and commands, looked up without a graph: ``seal_friction doctor``."""
 
 import os
 import platform
@@ -17,7 +17,7 @@ from seal_friction_ros.packages import OPTIONAL, how_to_install
 
 PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
 _FIRST_PORT, _PORTS_OF_A_DOMAIN = 7410, 250  # UDP port of participant 0 of domain 0; RTPS 2.5, 9.6.2
-_MOST_PARTICIPANTS = 120  # of a domain on one machine: so many ports it has
+_MOST_PARTICIPANTS = 120  # of a domain on one computer: so many ports it has
 _ANNOUNCED_TO = {'rclpy': 32, 'profile': 100}  # participants that a new one announces itself to
 _SMALLEST_SHARED_MEMORY = 64 << 20  # [bytes] of /dev/shm for a few nodes (our choice)
 _SHARED_MEMORY = Path('/dev/shm')  # noqa: S108  looked at, never written
@@ -32,7 +32,7 @@ class Level(Enum):
 
 
 class Finding(NamedTuple):
-    """One line about this machine."""
+    """One line about this computer."""
 
     level: Level
     subject: str
@@ -44,7 +44,7 @@ def findings(environment: Mapping[str, str] = os.environ, udp: Path = Path('/pro
 
     Args:
         environment: Environment variables.
-        udp: Table of the UDP sockets of this machine.
+        udp: Table of the UDP sockets of this computer.
     """
     return [
         *_versions(),
@@ -97,7 +97,7 @@ def _middleware(environment: Mapping[str, str]) -> Iterator[Finding]:
         yield Finding(Level.OK if from_wheels else Level.NOTE, 'profile', own if from_wheels else without)
     default = 'SUBNET' if 'ROS_DISTRO' in environment else 'LOCALHOST'
     reach = environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE', default)
-    where = {'LOCALHOST': 'nodes of this machine', 'OFF': 'no other node', 'SUBNET': 'every machine of the network'}
+    where = {'LOCALHOST': 'nodes of this computer', 'OFF': 'no other node', 'SUBNET': 'every computer of the network'}
     text = f'{reach}: {where.get(reach, "not a range: use SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT")}'
     level = Level.OK if reach in (*where, 'SYSTEM_DEFAULT') else Level.FAULT
     yield Finding(level, 'discovery range', f'{text}; domain {_domain(environment)}')

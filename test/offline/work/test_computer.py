@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from seal_friction_ros.offline.commands.main import main
-from seal_friction_ros.offline.work import machine
-from seal_friction_ros.offline.work.machine import Level, findings
+from seal_friction_ros.offline.work import computer
+from seal_friction_ros.offline.work.computer import Level, findings
 from seal_friction_ros.packages import OPTIONAL
 
 PROFILE = 'FASTDDS_DEFAULT_PROFILES_FILE'
@@ -21,7 +21,7 @@ def about(subject: str, environment: dict[str, str], udp: Path = Path('/proc/net
 
 
 def test_a_missing_package_is_named_with_the_command_that_installs_it(monkeypatch):
-    monkeypatch.setattr(machine, 'find_spec', lambda _: None)
+    monkeypatch.setattr(computer, 'find_spec', lambda _: None)
     for module, package in OPTIONAL.items():
         level, text = about(module, {})
         assert level is Level.NOTE
@@ -47,8 +47,8 @@ def test_the_profile_is_looked_for(tmp_path: Path):
 @pytest.mark.parametrize(
     ('environment', 'level', 'text'),
     [
-        ({}, Level.OK, 'LOCALHOST: nodes of this machine; domain 0'),
-        ({'ROS_DISTRO': 'jazzy'}, Level.OK, 'SUBNET: every machine of the network; domain 0'),
+        ({}, Level.OK, 'LOCALHOST: nodes of this computer; domain 0'),
+        ({'ROS_DISTRO': 'jazzy'}, Level.OK, 'SUBNET: every computer of the network; domain 0'),
         ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF', 'ROS_DOMAIN_ID': '7'}, Level.OK, 'OFF: no other node; domain 7'),
         ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCAL'}, Level.FAULT, 'not a range'),
     ],
@@ -75,12 +75,12 @@ def test_participants_are_counted_by_their_ports_in_the_domain():
 
 
 def test_a_small_shared_memory_is_noted(monkeypatch, tmp_path: Path):
-    monkeypatch.setattr(machine, '_SHARED_MEMORY', tmp_path)
+    monkeypatch.setattr(computer, '_SHARED_MEMORY', tmp_path)
     (tmp_path / 'fastrtps_1').touch()
     level, text = about('shared memory', {'ROS_DISTRO': 'jazzy'})
     assert level is Level.OK
     assert text.endswith(' MiB free, 1 files of Fast DDS')
-    monkeypatch.setattr(machine, '_SMALLEST_SHARED_MEMORY', 1 << 62)
+    monkeypatch.setattr(computer, '_SMALLEST_SHARED_MEMORY', 1 << 62)
     assert about('shared memory', {'ROS_DISTRO': 'jazzy'})[0] is Level.NOTE
     assert 'not used' in about('shared memory', {})[1]
 
@@ -95,7 +95,7 @@ def test_the_priority_is_what_a_process_gets(monkeypatch):
         os._exit(0)
     granted = os.waitpid(process, 0)[1] == 0
     assert about('real-time priority', {})[0] is (Level.OK if granted else Level.NOTE)
-    monkeypatch.setattr(machine.sys, 'executable', '/bin/false')
+    monkeypatch.setattr(computer.sys, 'executable', '/bin/false')
     assert about('real-time priority', {})[0] is Level.NOTE
 
 
