@@ -288,7 +288,7 @@ def receive(
     for number, taken in plan.taken:
         actuator, known = machine.actuators[number], states[number]
         try:
-            stamp = reading.stamp if reading.stamp is not None else _stamp(actuator, known, received, sent)
+            stamp = reading.stamp if reading.stamp is not None else stamp_of(actuator, known.pipeline, received, sent)
             memory, records = records_of(actuator, known.memory, taken, reading.numbers, stamp, reading.frame_id)
             states[number] = _passed(actuator, known, memory, records, received, emit, sent)
         except (ArithmeticError, ValueError) as error:
@@ -320,10 +320,10 @@ def receive_clock(machine: Machine, state: MachineState, clock: Clock, received:
     return MachineState(tuple(states))
 
 
-def _stamp(actuator: MachineActuator, known: ActuatorState, received: int, sent: int | None) -> int:
+def stamp_of(actuator: MachineActuator, known: PipelineState, received: int, sent: int | None) -> int:
     """Stamp [ns] of a message that has none: when it was sent, if it came in time."""
     since = NEVER if sent is None else pipeline.acting_since(actuator.pipeline.feedforward, received, sent)
-    return (received if since == NEVER else since) + known.pipeline.clock_offset
+    return (received if since == NEVER else since) + known.clock_offset
 
 
 def due(state: MachineState, now: int) -> list[int]:

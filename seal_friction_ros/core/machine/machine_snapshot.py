@@ -59,6 +59,18 @@ def machine_of_text(text: str) -> MachineFile:
     return parse_machine(_document(text)['machine'], _WHERE)
 
 
+def actuator_text(text: str, name: str) -> str:
+    """Configuration and state of one actuator in a snapshot, as the text of `configuration.snapshot_text`.
+
+    Raises:
+        ValueError: The text is no snapshot of a machine with this actuator.
+    """
+    try:
+        return json.dumps(_document(text)['actuators'][name]['snapshot'], sort_keys=True, allow_nan=False)
+    except (TypeError, LookupError) as error:
+        raise ValueError(f'{_WHERE}: no snapshot of {name} in it: {type(error).__name__}: {error}') from None
+
+
 def parse_machine_text(text: str, definitions: Mapping[str, Definition]) -> tuple[Machine, MachineState]:
     """Machine and state from the text of `machine_text`.
 

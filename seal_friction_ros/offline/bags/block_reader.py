@@ -66,7 +66,7 @@ def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch | None = None) ->
     """
     files = storage(path)
     if not files.is_plain_mcap:
-        yield from _gathered(read_messages(path), kind_of)
+        yield from gathered(read_messages(path), kind_of)
         return
     for number, file_path in enumerate(files.files):
         span = (0, _LAST_TIME + 1) if stretch is None else stretch.in_file(number)
@@ -114,7 +114,7 @@ def compile_now() -> None:
     _walk(*_room_for(bytes(1), 0), 0, 0, 0, 0, 0, np.zeros(1, np.uint8))
 
 
-def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
+def gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
     """Messages of the general reader in blocks."""
     source = iter(messages)
     while block := list(islice(source, MOST_MESSAGES // 4)):
