@@ -1,7 +1,6 @@
 """`velocity_rows` in bulk: messages in place, columns of numbers at once."""
 
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,24 +16,25 @@ from seal_friction_ros.core.estimation.messages import (
     decode_text,
 )
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.offline.bags.block_reader import read_in_bulk
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
-from seal_friction_ros.offline.bags.topics import TYPES, Topics
+from seal_friction_ros.offline.bags.topics import TYPES
 from seal_friction_ros.offline.bags.velocity_rows import COLUMNS, INPUTS, VelocityRows
 
 _KINDS = {name: Kind[name.upper()] for name in INPUTS}
 _HEAD = 16  # [bytes] encapsulation, stamp, length of the frame name
 
 
-def rows_in_bulk(path: Path, topics: Topics) -> VelocityRows | None:
+def rows_in_bulk(source: ActuatorBag) -> VelocityRows | None:
     """Rows of a bag; None if it is malformed, unreadable or unusual, so that only the general reader can handle it."""
     try:
-        return _rows(path, topics)
+        return _rows(source)
     except (UnsuitedError, OSError, *ERRORS):
         return None
 
 
-def _rows(path: Path, topics: Topics) -> VelocityRows:
+def _rows(source: ActuatorBag) -> VelocityRows:
+    topics = source.topics
     kinds = {getattr(topics, name): (kind, getattr(TYPES, name)) for name, kind in _KINDS.items()}
     kinds[topics.configuration] = Kind.CONFIGURATION, CONFIGURATION_TYPE
     kinds.pop('', None)
@@ -51,7 +51,7 @@ def _rows(path: Path, topics: Topics) -> VelocityRows:
     newest = {name: np.full((count, 1), math.nan) for name, count in COLUMNS.items()}
     stamps: list[IntArray] = [np.zeros(0, np.int64)]
     columns: list[FloatArray] = [np.zeros((sum(COLUMNS.values()), 0))]
-    for block in read_in_bulk(path, kind_of):
+    for block in source.blocks(kind_of):
         for number in np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist():
             configuration = parse_snapshot(decode_text(block.message(number))).configuration
         found = {name: numbers_of(block, kind, layouts[getattr(TYPES, name)]) for name, kind in _KINDS.items()}

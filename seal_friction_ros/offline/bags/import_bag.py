@@ -28,16 +28,7 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.records import Position, Pressure, ServoReference
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import Machine, MachineActuator, MachineState
-from seal_friction_ros.offline.bags.bag import (
-    CONFIGURATION_TOPIC,
-    BagError,
-    BagMessage,
-    BagWriter,
-    TopicInfo,
-    bag_topics,
-    read_messages,
-)
-from seal_friction_ros.offline.bags.recording import (
+from seal_friction_ros.offline.bags.actuator_bag import (
     MappingFile,
     Translation,
     lacking,
@@ -46,6 +37,15 @@ from seal_friction_ros.offline.bags.recording import (
     no_velocity,
     read_mapping,
     sources_of,
+)
+from seal_friction_ros.offline.bags.bag import (
+    CONFIGURATION_TOPIC,
+    BagError,
+    BagMessage,
+    BagWriter,
+    TopicInfo,
+    bag_topics,
+    read_messages,
 )
 from seal_friction_ros.offline.work.progress import progress
 

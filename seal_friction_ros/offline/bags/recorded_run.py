@@ -19,8 +19,9 @@ from seal_friction_ros.core.foundation.documents import NotJsonError, parse_json
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum, one_correction
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
-from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, read_messages
-from seal_friction_ros.offline.bags.topics import RECORDED, Topics, find_topics
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage
+from seal_friction_ros.offline.bags.topics import RECORDED, Topics
 from seal_friction_ros.offline.work.progress import progress
 
 MAX_GAP = 0.5  # [s] samples further apart do not belong to one stretch of a recording (our choice)
@@ -73,33 +74,34 @@ class RecordedRun:
         return mean
 
 
-def read_run(bag: Path, namespace: str = '') -> RecordedRun:
+def read_run(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> RecordedRun:
     """Read a bag of inputs and estimates.
 
     The inputs of an estimate are those held when the velocity sample of the same stamp arrived.
 
     Args:
         bag: The bag.
-        namespace: Only topics below it count; for bags of several actuators.
+        namespace: As of `open_actuator`.
+        mapping: Likewise; then the estimates are made here.
 
     Raises:
         BagError: The bag cannot be read, or holds no estimates.
     """
-    topics = find_topics(bag, namespace)
+    source = open_actuator(bag, namespace, mapping)
+    topics = source.topics
     if not topics.estimate:
         raise BagError(f'{bag}: no estimates in it: add them with seal_friction replay {bag} --out BAG')
     collector = _RunCollector(topics)
-    infos = bag_topics(bag)
-    with progress(f'read {bag.name}', sum(info.message_count for info in infos.values())) as advance:
-        for count, message in enumerate(read_messages(bag), start=1):
+    with progress(f'read {bag.name}', source.total) as advance:
+        for count, message in enumerate(source.messages(with_answers=True), start=1):
             if message.topic in topics or message.topic == collector.acted:
                 collector.take(message)
             if count % 1000 == 0:
                 advance(1000)
     if not collector.stamps:
         raise BagError(f'{bag}: the index lists estimates, but the bag holds none')
-    counts = {topic: (info.type_name, info.message_count) for topic, info in infos.items()}
-    return collector.run(bag.resolve().name, counts)
+    counts = {topic: (info.type_name, info.message_count) for topic, info in source.infos.items()}
+    return collector.run(source.name, counts)
 
 
 class _RunCollector:

@@ -97,5 +97,8 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
         names.append(found[0] if found else '')
     result = Topics(*names)
     if not result.velocity:
-        raise BagError(f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from')
+        raise BagError(
+            f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from: a bag of another machine needs '
+            'its mapping file (--mapping, or seal_friction import bag)'
+        )
     return result

@@ -4,7 +4,6 @@ import math
 from array import array
 from collections.abc import Callable
 from itertools import chain
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +12,8 @@ from seal_friction_ros.core.estimation.configuration import Configuration, parse
 from seal_friction_ros.core.estimation.messages import LAYOUTS, decode, decode_text
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.compiled import has_compiler
-from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
-from seal_friction_ros.offline.bags.topics import TYPES, Topics
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
+from seal_friction_ros.offline.bags.topics import TYPES
 from seal_friction_ros.offline.work.progress import progress
 
 BULK_FROM = 300_000
@@ -36,31 +35,31 @@ class VelocityRows(NamedTuple):
     configuration: Configuration | None  # the last one
 
 
-def read_velocity_rows(path: Path, topics: Topics, *, bulk_from: int = BULK_FROM) -> VelocityRows:
+def read_velocity_rows(source: ActuatorBag, *, bulk_from: int = BULK_FROM) -> VelocityRows:
     """Read a bag; one of at least ``bulk_from`` messages in bulk, with the same result.
 
     Raises:
         BagError: The bag cannot be read.
         ValueError: A message is not of its type; names its topic and time.
     """
-    total = sum(info.message_count for info in bag_topics(path).values())
-    if total >= bulk_from and has_compiler():
+    if source.total >= bulk_from and has_compiler():
         from seal_friction_ros.offline.bags.bulk_velocity_rows import (  # noqa: PLC0415  loads the compiler
             rows_in_bulk,
         )
 
-        rows = rows_in_bulk(path, topics)
+        rows = rows_in_bulk(source)
         if rows is not None:
             return rows
-    with progress(f'read {path.name}', total) as advance:
-        return _one_by_one(path, topics, advance)
+    with progress(f'read {source.path.name}', source.total) as advance:
+        return _one_by_one(source, advance)
 
 
-def _one_by_one(path: Path, topics: Topics, advance: Callable[[int], None]) -> VelocityRows:
+def _one_by_one(source: ActuatorBag, advance: Callable[[int], None]) -> VelocityRows:
+    topics = source.topics
     rows, stamps = array('d'), array('q')  # numbers side by side: an hour at 1 kHz is 202 MB
     newest = {getattr(topics, name) or f'no {name}': (math.nan,) * count for name, count in COLUMNS.items()}
     configuration = None
-    for count, message in enumerate(read_messages(path), start=1):
+    for count, message in enumerate(source.messages(), start=1):
         try:
             if message.topic in newest:
                 stamp, *numbers = decode(message.type_name, message.data)
@@ -71,7 +70,7 @@ def _one_by_one(path: Path, topics: Topics, advance: Callable[[int], None]) -> V
             elif message.topic == topics.configuration:
                 configuration = parse_snapshot(decode_text(message.data)).configuration
         except ValueError as error:
-            raise ValueError(f'{path}: message on {message.topic} at {message.log_time} ns: {error}') from None
+            raise ValueError(f'{source.path}: message on {message.topic} at {message.log_time} ns: {error}') from None
         if count % 1000 == 0:
             advance(1000)
     columns = np.frombuffer(rows, dtype=np.float64).reshape(-1, sum(COLUMNS.values())).T.copy()

@@ -20,11 +20,10 @@ from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstim
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, MappingFile, open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.block_reader import read_in_bulk
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
-from seal_friction_ros.offline.bags.topics import find_topics
-from seal_friction_ros.offline.replay.bag_parts import try_bags
+from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations, kinds_of_topics
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
@@ -57,16 +56,18 @@ def bag_health(
     override: Configuration | None = None,
     learnt: AdaptationState | None = None,
     on_block: Callable[[Messages, Answers, Any], None] = lambda *_: None,
+    mapping: MappingFile | None = None,
 ) -> BagHealth:
     """Health from one bag.
 
     Args:
         bag: The bag.
-        namespace: Use only topics below it.
+        namespace: As of `open_actuator`.
         override: Configuration instead of the recorded one; its mode counts as observe.
         learnt: What was learnt from the bags before; None: nothing.
         on_block: Called with each block of messages, the answers to them, and the estimates among these as a structured
             array with the fields of `FrictionEstimate`.
+        mapping: As of `open_actuator`.
 
     Raises:
         BagError: The bag cannot be read, or not in blocks.
@@ -74,8 +75,9 @@ def bag_health(
     rows: list[FloatArray] = []
     starts: list[float] = []
     end, follower = learnt, _Starts()
+    source = open_actuator(bag, namespace, mapping)
     try:
-        for estimates, known in _observed(bag, namespace, override, learnt, on_block):
+        for estimates, known in _observed(source, override, learnt, on_block):
             end = known
             changed = np.flatnonzero(np.diff(estimates['adaptation_scale'], prepend=np.nan))
             changed = changed[estimates['adaptation_scale_std'][changed] > 0.0]
@@ -106,6 +108,7 @@ def health_of_bags(
     override: Configuration | None = None,
     workers: Workers = 1,
     kept: Kept = NOWHERE,
+    mapping: MappingFile | None = None,
 ) -> list[Outcome[BagHealth]]:
     """`bag_health` of bags without ``learnt``, ``workers`` of them at a time; outcomes in the order of the bags.
 
@@ -115,14 +118,14 @@ def health_of_bags(
         ValueError: The work folder or the cluster cannot be used.
     """
     outcomes = try_bags(
-        'health', bags, _NAMES, _values, (namespace, override), workers, kept,
-        lambda: compile_now(first_configurations(bags, namespace, override)),
+        'health', bags, _NAMES, _values, Chosen(namespace, mapping, override), workers, kept,
+        lambda: compile_now(first_configurations(bags, namespace, override, mapping)),
     )  # fmt: skip
     return [Outcome(BagHealth(**one.result) if one.result else None, one.error) for one in outcomes]
 
 
-def _values(bag: Path, namespace: str, override: Configuration | None) -> dict[str, Any]:
-    found = bag_health(bag, namespace, override)._asdict()
+def _values(bag: Path, chosen: Chosen) -> dict[str, Any]:
+    found = bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)._asdict()
     return {name: found[name] for name in _NAMES}
 
 
@@ -152,8 +155,7 @@ class _Starts:
 
 
 def _observed(
-    bag: Path,
-    namespace: str,
+    source: ActuatorBag,
     override: Configuration | None,
     learnt: AdaptationState | None,
     on_block: Callable[[Messages, Answers, Any], None],
@@ -164,7 +166,7 @@ def _observed(
     state = init(parameters)
     if learnt is not None:
         state = state._replace(estimator=state.estimator._replace(adaptation=learnt))
-    for block in read_in_bulk(bag, kinds_of_topics(find_topics(bag, namespace))):
+    for block in source.blocks(kinds_of_topics(source.topics)):
         changes = np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist()
         for first, end in zip([0, *changes], [*changes, len(block.kinds)], strict=True):
             if first == end:

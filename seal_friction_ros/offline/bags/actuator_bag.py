@@ -1,4 +1,4 @@
-"""One actuator of a recording, whatever recorded it: topics and messages in the layout of this project.
+"""One actuator of a bag, whatever recorded it: topics and messages in the layout of this project.
 
 A bag of ``friction_estimator`` is read as it is. A bag of ``machine_estimator`` holds its mapping; a bag of another
 machine takes a mapping file, which counts as the configuration that a ``machine_estimator`` would have recorded first.
@@ -38,7 +38,6 @@ from seal_friction_ros.core.machine.machine_snapshot import (
 from seal_friction_ros.core.machine.message_fields import short_name
 from seal_friction_ros.files import machine_configurations, read_machine, read_machine_document
 from seal_friction_ros.offline.bags.bag import (
-    CONFIGURATION_TOPIC,
     BagError,
     BagMessage,
     TopicInfo,
@@ -52,6 +51,7 @@ if TYPE_CHECKING:
     from seal_friction_ros.core.estimation.compiled_pipeline import Messages
     from seal_friction_ros.offline.bags.block_reader import KindOf
 
+MACHINE_CONFIGURATION = '/machine_estimator/configuration'
 LARGEST_CLOCK_STEP = 1_000_000_000  # [ns] stamps further from the log time are of another clock; our choice
 _LAST_PARTS = {**m.INPUTS, **m.OUTPUTS, 'watchdog_tick': m.TICK_TYPE, 'configuration': m.CONFIGURATION_TYPE}
 _NAMES = {kind: topic for topic, kind in _LAST_PARTS.items()}
@@ -118,20 +118,23 @@ def _clock_offset(machine: Machine, bag: Path) -> int:
     return 0
 
 
-def machine_messages(bag: Path, mapping: MappingFile, *, with_answers: bool) -> Iterator[BagMessage]:
-    """Messages of a bag as ``machine_estimator`` with this mapping would have recorded them.
+def machine_messages(bag: Path, mapping: MappingFile | None, *, with_answers: bool = True) -> Iterator[BagMessage]:
+    """Messages of a bag; with a mapping file as ``machine_estimator`` would have recorded them.
 
-    What an estimator of this project may have recorded in it is left out.
+    What an estimator of this project may have recorded in it is left out then.
 
     Args:
         bag: The bag.
-        mapping: Of its machine.
+        mapping: Of its machine; None: the bag as it is.
         with_answers: Whether to estimate, too.
 
     Raises:
         ValueError: As of `machine_in`.
         BagError: The bag cannot be read.
     """
+    if mapping is None:
+        yield from read_messages(bag)
+        return
     machine, state = machine_in(bag, mapping)
     answers: list[tuple[str, str, bytes]] = []
 
@@ -142,7 +145,7 @@ def machine_messages(bag: Path, mapping: MappingFile, *, with_answers: bool) -> 
     text = m.encode_text(machine_text(mapping.document, machine, state))
     for number, message in enumerate(read_messages(bag)):
         if number == 0:
-            yield BagMessage(CONFIGURATION_TOPIC, m.CONFIGURATION_TYPE, message.log_time, text)
+            yield BagMessage(MACHINE_CONFIGURATION, m.CONFIGURATION_TYPE, message.log_time, text)
         if message.topic in machine.plans:
             yield message._replace(publish_time=message.log_time)  # it does not tell when it was sent
             if with_answers:
@@ -208,7 +211,7 @@ class Translation:
         self._states = [known._replace(pipeline=known.pipeline._replace(clock_offset=offset)) for known in self._states]
 
 
-class Recording(NamedTuple):
+class ActuatorBag(NamedTuple):
     """One actuator of a bag."""
 
     path: Path
@@ -240,8 +243,6 @@ class Recording(NamedTuple):
         """
         if not self.actuator:
             return read_messages(self.path)
-        if self.mapping is None:
-            return _OfActuator(self).messages(read_messages(self.path))
         return _OfActuator(self).messages(machine_messages(self.path, self.mapping, with_answers=with_answers))
 
     def blocks(self, kind_of: 'KindOf') -> 'Iterator[Messages]':
@@ -253,7 +254,7 @@ class Recording(NamedTuple):
         return block_reader.gathered(self.messages(), kind_of)
 
 
-def open_recording(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> Recording:
+def open_actuator(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> ActuatorBag:
     """Find an actuator in a bag.
 
     Args:
@@ -266,29 +267,44 @@ def open_recording(bag: Path, namespace: str = '', mapping: MappingFile | None =
         ValueError: The mapping does not fit the bag.
     """
     infos = bag_topics(bag)
+    if not is_of_machine(bag, infos, mapping):
+        return ActuatorBag(bag, find_topics(bag, namespace, infos), infos)
     if mapping is not None:
         names = [one.name for one in mapping.file.actuators]
         mapping = mapping.only(_chosen(bag, names, namespace))
         machine, _ = machine_in(bag, mapping)
-    elif text := machine_text_in(bag, infos):
-        machine, _ = _machine_of(bag, text)
-        names = [one.name for one in machine.actuators]
     else:
-        return Recording(bag, find_topics(bag, namespace, infos), infos)
+        machine, _ = _machine_of(bag, _machine_text_in(bag, infos))
+        names = [one.name for one in machine.actuators]
     name = _chosen(bag, names, namespace)
     actuator = next(one for one in machine.actuators if one.name == name)
     topics = _topics_of(actuator, infos, has_mapping=mapping is not None)
     if not topics.velocity:
         raise BagError(no_velocity(bag, name))
-    return Recording(bag, topics, infos, name, len(names) > 1, mapping)
+    return ActuatorBag(bag, topics, infos, name, len(names) > 1, mapping)
 
 
-def machine_text_in(bag: Path, infos: Mapping[str, TopicInfo]) -> str:
-    """Text of the first configuration in a bag of ``machine_estimator``; empty for another bag.
+def is_of_machine(bag: Path, infos: Mapping[str, TopicInfo], mapping: MappingFile | None) -> bool:
+    """Whether a bag is read by a mapping, its own or that of the file.
+
+    A mapping file is for other bags if this one has none of its topics, but velocities of this project.
+
+    Args:
+        bag: The bag.
+        infos: Its topics.
+        mapping: Mapping file.
 
     Raises:
         BagError: The bag cannot be read.
     """
+    if mapping is None:
+        return bool(_machine_text_in(bag, infos))
+    has_own = any(info.type_name == m.VELOCITY_TYPE for info in infos.values())
+    return not has_own or not infos.keys().isdisjoint(mapping.file.topics)
+
+
+def _machine_text_in(bag: Path, infos: Mapping[str, TopicInfo]) -> str:
+    """Text of the first configuration in a bag of ``machine_estimator``; empty for another bag."""
     if not any(info.type_name == m.CONFIGURATION_TYPE and info.message_count for info in infos.values()):
         return ''
     texts = (message.data for message in read_messages(bag) if message.type_name == m.CONFIGURATION_TYPE)
@@ -361,13 +377,13 @@ class _OfActuator:
     """Messages of one actuator from those of its machine.
 
     Args:
-        recording: The actuator.
+        source: The actuator.
     """
 
-    def __init__(self, recording: Recording) -> None:
-        self._bag, self._name, self._topics = recording.path, recording.actuator, recording.topics
-        self._did_not_act = recording.mapping is not None or any(
-            _is_of(self._name, topic) and topic.endswith(RECORDED) for topic in recording.infos
+    def __init__(self, source: ActuatorBag) -> None:
+        self._bag, self._name, self._topics = source.path, source.actuator, source.topics
+        self._did_not_act = source.mapping is not None or any(
+            _is_of(self._name, topic) and topic.endswith(RECORDED) for topic in source.infos
         )
         self._translation: Translation | None = None
         self._missing: Counter[str] = Counter()
