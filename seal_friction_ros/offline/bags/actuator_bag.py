@@ -48,7 +48,7 @@ from seal_friction_ros.offline.bags.definitions import read_definitions
 from seal_friction_ros.offline.bags.topics import RECORDED, TYPES, Topics, find_topics
 
 if TYPE_CHECKING:
-    from seal_friction_ros.core.estimation.compiled_pipeline import Messages
+    from seal_friction_ros.core.estimation.message_blocks import Messages
     from seal_friction_ros.offline.bags.block_reader import KindOf
 
 MACHINE_CONFIGURATION = '/machine_estimator/configuration'

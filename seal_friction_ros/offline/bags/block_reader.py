@@ -15,7 +15,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from seal_friction_ros.core.estimation.compiled_pipeline import (
+from seal_friction_ros.core.estimation.message_blocks import (
     MOST_MESSAGES,
     Bytes,
     Integers,

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.compiled_pipeline import Kind, Messages, UnsuitedError
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
+from seal_friction_ros.core.estimation.message_blocks import Kind, Messages, UnsuitedError
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     LAYOUTS,

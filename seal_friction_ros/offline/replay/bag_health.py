@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
-from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, Messages, UnsuitedError, receive_all
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.message_blocks import Kind, Messages, UnsuitedError
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, LAYOUTS
 from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate

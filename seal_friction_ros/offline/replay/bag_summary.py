@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, Messages
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers
+from seal_friction_ros.core.estimation.message_blocks import Kind, Messages
 from seal_friction_ros.core.estimation.messages import LAYOUTS, PRESSURE_TYPE
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.foundation.arrays import FloatArray

@@ -9,16 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.compiled_pipeline import (
-    Answers,
-    Bytes,
-    Integers,
-    Kind,
-    Messages,
-    UnsuitedError,
-    receive_all,
-)
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot, snapshot_version
+from seal_friction_ros.core.estimation.message_blocks import Bytes, Integers, Kind, Messages, UnsuitedError
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     DECODERS,
