@@ -10,10 +10,11 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import messages as m
 from seal_friction_ros.core.estimation.configuration import Configuration, Recorded, parse_snapshot, snapshot_text
+from seal_friction_ros.core.estimation.message_blocks import Messages
 from seal_friction_ros.core.estimation.records import Clock
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine import (
@@ -45,11 +46,8 @@ from seal_friction_ros.offline.bags.bag import (
     read_messages,
 )
 from seal_friction_ros.offline.bags.definitions import read_definitions
+from seal_friction_ros.offline.bags.gathered import KindOf, gathered
 from seal_friction_ros.offline.bags.topics import RECORDED, TYPES, Topics, find_topics
-
-if TYPE_CHECKING:
-    from seal_friction_ros.core.estimation.message_blocks import Messages
-    from seal_friction_ros.offline.bags.block_reader import KindOf
 
 MACHINE_CONFIGURATION = '/machine_estimator/configuration'
 LARGEST_CLOCK_STEP = 1_000_000_000  # [ns] stamps further from the log time are of another clock; our choice
@@ -245,13 +243,23 @@ class ActuatorBag(NamedTuple):
             return read_messages(self.path)
         return _OfActuator(self).messages(machine_messages(self.path, self.mapping, with_answers=with_answers))
 
-    def blocks(self, kind_of: 'KindOf') -> 'Iterator[Messages]':
-        """Messages in blocks, as of `block_reader.read_in_bulk`."""
-        from seal_friction_ros.offline.bags import block_reader  # noqa: PLC0415  loads the compiler
+    def blocks(self, kind_of: KindOf, *, in_bulk: bool = True, with_answers: bool = False) -> Iterator[Messages]:
+        """Messages in blocks.
 
-        if not self.actuator:
-            return block_reader.read_in_bulk(self.path, kind_of)
-        return block_reader.gathered(self.messages(), kind_of)
+        Args:
+            kind_of: Kind of the messages on a topic.
+            in_bulk: Whether to load the compiler, which reads bags of this project many times faster.
+            with_answers: As of `messages`.
+
+        Raises:
+            UnsuitedError: As of `block_reader.read_in_bulk`.
+            BagError: The bag cannot be read.
+        """
+        if self.actuator or not in_bulk:
+            return gathered(self.messages(with_answers=with_answers), kind_of)
+        from seal_friction_ros.offline.bags.block_reader import read_in_bulk  # noqa: PLC0415  loads the compiler
+
+        return read_in_bulk(self.path, kind_of)
 
 
 def open_actuator(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> ActuatorBag:

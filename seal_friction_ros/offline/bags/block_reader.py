@@ -6,9 +6,8 @@ that overlap by much) are refused with `UnsuitedError`; the general reader reads
 
 import heapq
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -19,18 +18,15 @@ from seal_friction_ros.core.estimation.message_blocks import (
     MOST_MESSAGES,
     Bytes,
     Integers,
-    Kind,
     Messages,
     UnsuitedError,
 )
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.offline.bags import mcap_reader
-from seal_friction_ros.offline.bags.bag import BagMessage, read_messages, storage
+from seal_friction_ros.offline.bags.bag import read_messages, storage
+from seal_friction_ros.offline.bags.gathered import KindOf, gathered
 from seal_friction_ros.offline.bags.mcap_reader import Block, Layout
 from seal_friction_ros.offline.bags.mcap_records import Opcode
-
-KindOf = Callable[[str, str], Kind]
-"""Topic and message type -> kind of its messages."""
 
 
 class Stretch(NamedTuple):
@@ -112,18 +108,6 @@ def _kept_layout(name: str, *_changes: int) -> Layout:
 def compile_now() -> None:
     """Compile in this process, so that worker processes inherit the compiled code."""
     _walk(*_room_for(bytes(1), 0), 0, 0, 0, 0, 0, np.zeros(1, np.uint8))
-
-
-def gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
-    """Messages of the general reader in blocks."""
-    source = iter(messages)
-    while block := list(islice(source, MOST_MESSAGES // 4)):
-        kinds = np.array([kind_of(message.topic, message.type_name) for message in block], np.uint8)
-        sizes = np.array([len(message.data) for message in block], np.int64)
-        data = np.frombuffer(b''.join(message.data for message in block), np.uint8)
-        times = np.array([message.log_time for message in block], np.int64)
-        sent = [message.log_time if message.publish_time is None else message.publish_time for message in block]
-        yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, times, np.array(sent, np.int64))
 
 
 def _room_for(data: bytes, count: int) -> Messages:

@@ -28,8 +28,8 @@ from seal_friction_ros.core.identification.readings import ManualReadings, Prepa
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.columns import read_velocity_rows
 from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_samples
-from seal_friction_ros.offline.bags.velocity_rows import read_velocity_rows
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.identification.load_numbers import load_text
 from seal_friction_ros.offline.work.executor import Workers, run_all

@@ -15,14 +15,15 @@ from seal_friction_ros.core.estimation.adaptation import AdaptationState
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
 from seal_friction_ros.core.estimation.message_blocks import Kind, Messages, UnsuitedError
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, LAYOUTS
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
 from seal_friction_ros.core.estimation.pipeline import init
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate
+from seal_friction_ros.core.estimation.records import NO_ESTIMATE
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, MappingFile, open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.columns import numbers_of
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations, kinds_of_topics
@@ -192,35 +193,12 @@ def _observing(configuration: Configuration) -> Configuration:
 
 def _estimates(answers: Answers) -> Any:
     """The estimates of a block as a structured array with the fields of `FrictionEstimate`."""
-    sizes = answers.estimate_sizes
-    decode = DECODERS[ESTIMATE_TYPE]
+    places = np.flatnonzero(answers.estimate_sizes)
+    offsets, sizes = answers.estimate_offsets[places], answers.estimate_sizes[places]
+    made = Messages(answers.data, np.zeros(len(places), np.uint8), offsets, sizes, offsets, offsets)
+    _, stamps, numbers = numbers_of(made, 0, ESTIMATE_TYPE)
     kinds = [(name, '<i8' if isinstance(value, int) else '<f8') for name, value in NO_ESTIMATE._asdict().items()]
-    places = np.flatnonzero(sizes)
-    if not len(places):
-        return np.zeros(0, kinds)
-    offsets = answers.estimate_offsets[places]
-    data, size = answers.data, int(sizes[places[0]])
-    if (sizes[places] != size).any():  # frame names of several lengths
-        return np.array(
-            [tuple(decode(data[o : o + s].tobytes())) for o, s in zip(offsets, sizes[places], strict=True)], kinds
-        )
-    raw = data[offsets[:, None] + np.arange(size)]
-    first: FrictionEstimate = decode(raw[0].tobytes())
-    return _columns(raw, first, kinds)
-
-
-def _columns(raw: Any, first: FrictionEstimate, kinds: Any) -> Any:
-    """Fields of equally long messages; ``first`` is the first of them, to be sure of the layout."""
-    layout = next(one for one in LAYOUTS if one.message_type == ESTIMATE_TYPE)
-    made = np.zeros(len(raw), kinds)
-    seconds = np.ascontiguousarray(raw[:, 4:8]).view('<i4')[:, 0].astype(np.int64)
-    nanoseconds = np.ascontiguousarray(raw[:, 8:12]).view('<u4')[:, 0]
-    made['stamp'] = seconds * 1_000_000_000 + nanoseconds
-    begin = raw.shape[1] - layout.size
-    types = {'d': '<f8', 'I': '<u4', 'B': 'u1', 'b': 'i1'}
-    for name, code, offset in zip(layout.fields, layout.codes, layout.offsets, strict=True):
-        width = np.dtype(types[code]).itemsize
-        made[name] = np.ascontiguousarray(raw[:, begin + offset : begin + offset + width]).view(types[code])[:, 0]
-    if tuple(made[0].tolist()) != tuple(first):
-        raise UnsuitedError('an estimate of another layout')
-    return made
+    found = np.zeros(len(places), kinds)
+    for (name, _), column in zip(kinds, (stamps, *numbers), strict=True):
+        found[name] = column
+    return found

@@ -9,12 +9,12 @@ import numpy as np
 
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers
 from seal_friction_ros.core.estimation.message_blocks import Kind, Messages
-from seal_friction_ros.core.estimation.messages import LAYOUTS, PRESSURE_TYPE
+from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
-from seal_friction_ros.offline.bags.bulk_velocity_rows import numbers_of
+from seal_friction_ros.offline.bags.columns import numbers_of
 from seal_friction_ros.offline.replay.bag_health import bag_health
 from seal_friction_ros.offline.replay.bag_parts import AS_RECORDED, Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
@@ -172,8 +172,7 @@ class _Levels:
 
 def _pressures(messages: Messages) -> tuple[Any, FloatArray]:
     """Numbers of the pressure messages of a block, and the larger chamber pressure [Pa] of each."""
-    layout = next(one for one in LAYOUTS if one.message_type == PRESSURE_TYPE)
-    places, _, chambers = numbers_of(messages, Kind.PRESSURE, layout)
+    places, _, chambers = numbers_of(messages, Kind.PRESSURE, PRESSURE_TYPE)
     larger: FloatArray = np.maximum(*chambers)
     return places, larger
 

@@ -25,7 +25,8 @@ from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import block_reader
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
-from seal_friction_ros.offline.bags.block_reader import KindOf, read_in_bulk
+from seal_friction_ros.offline.bags.block_reader import read_in_bulk
+from seal_friction_ros.offline.bags.gathered import KindOf
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
 from seal_friction_ros.offline.bags.topics import TYPES, Topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
