@@ -157,22 +157,22 @@ def numbers_of(messages: Messages, kind: int, type_name: str, topic: str = '') -
     layout = _LAYOUTS[type_name]
     places = np.flatnonzero(messages.kinds == kind)
     offsets, sizes, data = messages.offsets[places], messages.sizes[places], messages.data
+    data = data if len(data) >= _HEAD else np.zeros(_HEAD, np.uint8)  # then every message is malformed
     stamps, numbers = np.zeros(len(places), np.int64), np.zeros((len(layout.codes), len(places)))
-    usual = np.flatnonzero(sizes >= _HEAD)
-    head = data[offsets[usual, np.newaxis] + np.arange(_HEAD)]
+    is_usual = sizes >= _HEAD
+    head = data[np.where(is_usual, offsets, 0)[:, np.newaxis] + np.arange(_HEAD)]
     words = head.view('<u4').astype(np.int64)
-    seconds, nanoseconds, length = head.view('<i4')[:, 1].astype(np.int64), words[:, 2], words[:, 3]
+    nanoseconds, length = words[:, 2], words[:, 3]
     begin = 4 + (12 + length + 7) // 8 * 8  # as `messages.head_size`
-    spare = sizes[usual] - begin - layout.size
-    good = (words[:, 0] & 0xFFFF == 0x0100) & (nanoseconds < SECOND) & (length <= LONGEST_FRAME)
-    good &= (spare >= 0) & (spare <= 3)
-    usual, starts = usual[good], offsets[usual[good]] + begin[good]
-    stamps[usual] = seconds[good] * SECOND + nanoseconds[good]
+    spare = sizes - begin - layout.size
+    is_usual &= (words[:, 0] & 0xFFFF == 0x0100) & (nanoseconds < SECOND) & (length <= LONGEST_FRAME)
+    is_usual &= (spare >= 0) & (spare <= 3)
+    usual = slice(None) if is_usual.all() else is_usual
+    stamps[usual] = (head.view('<i4')[:, 1].astype(np.int64) * SECOND + nanoseconds)[usual]
+    starts = (offsets + begin)[usual, np.newaxis]
     for row, code, at in zip(numbers, layout.codes, layout.offsets, strict=True):
         kept = _DTYPES[code]
-        row[usual] = data[(starts + at)[:, np.newaxis] + np.arange(kept.itemsize)].view(kept)[:, 0]
-    is_usual = np.zeros(len(places), bool)
-    is_usual[usual] = True
+        row[usual] = data[starts + (at + np.arange(kept.itemsize))].view(kept)[:, 0]
     if 'state' in layout.fields:
         is_usual &= np.isin(numbers[layout.fields.index('state')], list(FrictionState))
     for number in np.flatnonzero(~is_usual).tolist():  # of an older layout, or malformed
