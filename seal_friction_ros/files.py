@@ -241,15 +241,6 @@ def read_parameters(path: Path, node: str, groups: Iterable[ParameterGroup]) -> 
     return made
 
 
-def read_machine_document(name: str) -> Any:
-    """YAML document of the mapping file that `read_machine` reads.
-
-    Raises:
-        ValueError: It cannot be read.
-    """
-    return read_yaml(config_path('machines', name))
-
-
 def read_machine(name: str) -> MachineFile:
     """Mapping file of a machine: a path, or the name of one in ``config/machines``.
 
@@ -257,7 +248,7 @@ def read_machine(name: str) -> MachineFile:
         ValueError: It cannot be read or is invalid; one line that names file, actuator and key.
     """
     path = config_path('machines', name)
-    file = parse_machine(read_machine_document(name), str(path))
+    file = parse_machine(read_yaml(path), str(path))
     try:
         check_outputs(file)
     except ValueError as error:

@@ -21,7 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness import compiled_code  # noqa: F401  before anything is compiled
 from harness.compensation import compensating
 
-from seal_friction_ros.core.estimation.compiled_pipeline import MOST_MESSAGES, Kind, Messages, receive_all
+from seal_friction_ros.core.estimation.compiled_pipeline import receive_all
+from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Kind, Messages
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, decode, encode
 from seal_friction_ros.core.estimation.pipeline import PipelineParameters, init
 from seal_friction_ros.core.estimation.records import Force, Pressure, ServoReference, Velocity

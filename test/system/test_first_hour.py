@@ -92,8 +92,10 @@ def share_left(folder: Path, terminals: Terminals) -> float:
     """Share of the tracking error that is left, after a check that the mapping is short and recordings replay."""
     lines = (folder / 'build' / 'robot.yaml').read_text().splitlines()
     assert len([line for line in lines if not line.startswith('#')]) <= MOST_LINES
-    terminals.run('.venv/bin/seal_friction import bag build/with --mapping build/robot.yaml --out build/again')
-    without, compensated = (tracking_error(folder / 'build' / bag) for bag in ('run_without', 'again'))
+    for bag in ('without', 'with'):
+        command = f'import bag build/{bag} --mapping build/robot.yaml --out build/run_{bag}'
+        terminals.run(f'.venv/bin/seal_friction {command}')
+    without, compensated = (tracking_error(folder / 'build' / f'run_{bag}') for bag in ('without', 'with'))
     for bag in ('without', 'with'):
         result = replay(folder / 'build' / bag)
         assert result.identical, result.first_difference
@@ -142,13 +144,11 @@ def test_a_pneumatic_axis_without_force_sensor_and_velocity_tracks(checkout: Pat
     try:
         terminals.start_machine(f'{plant} {strokes} -p trapezoid.acceleration:=0.5')
         terminals.run_node(f'{node} {off} -p record_name:=strokes', 16.0)
-        terminals.run(f'{tool} import bag build/strokes --mapping build/robot.yaml --out build/run')
-        terminals.run(f'{tool} identify build/run --seal-chambers a,b --out build/seal.yaml')
+        terminals.run(f'{tool} identify build/strokes --seal-chambers a,b --out build/seal.yaml')
         terminals.run("sed -i 's|seals: .*|seals: [build/seal.yaml]|' build/robot.yaml")
         terminals.start_machine(plant)
         terminals.run_node(f'{node} {off} -p record_name:=without', SINE_SECONDS)
-        terminals.run(f'{tool} import bag build/without --mapping build/robot.yaml --out build/run_without')
-        terminals.run(f'{tool} tune --bag build/run_without --actuator axis --out build/feedforward.yaml')
+        terminals.run(f'{tool} tune --bag build/without --out build/feedforward.yaml')
         terminals.start_machine(plant, CLOSED_LOOP_PACE)
         terminals.run_node(
             f'{node} -p record_directory:=build --params-file build/feedforward.yaml -p record_name:=with', SINE_SECONDS
@@ -179,16 +179,14 @@ def test_a_bench_with_rod_and_piston_seals_of_different_kinds_tracks(checkout: P
             spring = f'-p load.spring_stiffness:={stiffness} -p load.spring_position:={position}'
             terminals.start_machine(f'{plant} {spring} -p valve.supply_pressure:={supply}')
             terminals.run_node(f'{node} {off} -p record_name:={name}', 14.0)
-            terminals.run(f'{tool} import bag build/{name} --mapping build/robot.yaml --out build/run_{name}')
-        runs = ' '.join(f'build/run_{name}' for name, *_ in SPRINGS)
+        runs = ' '.join(f'build/{name}' for name, *_ in SPRINGS)
         kinds = '--seal-kind rod=b,b --seal-kind piston=difference --largest-kind-error 0.5'
         terminals.run(f'{tool} identify {runs} {kinds} --out build/seal.yaml')
         assert 'use the seal files in this cylinder only' in terminals.said[-1]
         terminals.run("sed -i 's|seals: .*|seals: [build/seal_rod.yaml, build/seal_piston.yaml]|' build/robot.yaml")
         terminals.start_machine(f'{plant} {sine}')
         terminals.run_node(f'{node} {off} -p record_name:=without', SINE_SECONDS)
-        terminals.run(f'{tool} import bag build/without --mapping build/robot.yaml --out build/run_without')
-        terminals.run(f'{tool} tune --bag build/run_without --actuator boom --out build/feedforward.yaml')
+        terminals.run(f'{tool} tune --bag build/without --out build/feedforward.yaml')
         terminals.start_machine(f'{plant} {sine}', CLOSED_LOOP_PACE)
         terminals.run_node(f'{node} --params-file build/feedforward.yaml -p record_name:=with', SINE_SECONDS)
     finally:

@@ -9,16 +9,15 @@ refused (`UnsuitedError`); `pipeline.receive` then decides about them.
 """
 
 import struct
-from enum import IntEnum
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import literal_unroll
 from numba.extending import overload
 
 from seal_friction_ros.core.estimation.feedforward import FeedForward
+from seal_friction_ros.core.estimation.message_blocks import Bytes, Integers, Kind, Messages, UnsuitedError
 from seal_friction_ros.core.estimation.messages import (
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
@@ -57,30 +56,7 @@ from seal_friction_ros.core.estimation.records import (
 )
 from seal_friction_ros.core.foundation.compiled import INNER, compiled, for_compiler
 
-Bytes = npt.NDArray[np.uint8]
-Integers = npt.NDArray[np.int64]
-
-MOST_MESSAGES = 1 << 16  # in one call: enough to be fast, and memory is bounded
 LATEST = 1 << 61  # [ns] stamps up to here, as messages have them: differences fit into 64 bits
-
-
-class Kind(IntEnum):
-    """What a message is to the estimator."""
-
-    OTHER = 0
-    FORCE = 1
-    PRESSURE = 2
-    REFERENCE = 3
-    TEMPERATURE = 4
-    TICK = 5
-    VELOCITY = 6
-    ESTIMATE = 7
-    FEEDFORWARD = 8
-    CONFIGURATION = 9
-    OTHER_ESTIMATE = 10
-    """of another estimator"""
-    POSITION = 11
-
 
 _FORCE, _PRESSURE, _REFERENCE, _TEMPERATURE, _TICK, _VELOCITY = (
     int(kind) for kind in (Kind.FORCE, Kind.PRESSURE, Kind.REFERENCE, Kind.TEMPERATURE, Kind.TICK, Kind.VELOCITY)
@@ -102,36 +78,6 @@ _ANSWERS: dict[type, tuple[int, Layout]] = {
 }
 """Record of an answer -> its column in `_Outbox`, and its layout."""
 _BODY_SIZES = tuple((layout.size + 7) // 8 * 8 for _, layout in _ANSWERS.values())  # [bytes] padded to 8
-
-
-class UnsuitedError(Exception):
-    """Messages that compiled code cannot process: malformed, or with numbers beyond what it holds."""
-
-
-class Messages(NamedTuple):
-    """Serialised messages in order of receipt, n of them."""
-
-    data: Bytes  # all their bytes, and others between them
-    kinds: Bytes  # `Kind` of each, shape (n,)
-    offsets: Integers  # where each begins in ``data``, shape (n,)
-    sizes: Integers  # [bytes] shape (n,)
-    received: Integers  # [ns] log time of each, shape (n,)
-    sent: Integers  # [ns] publish time of each, shape (n,)
-
-    def taken(self, first: int, end: int) -> 'Messages':
-        """The messages from number ``first`` to before number ``end``."""
-        part = slice(first, end)
-        return self.in_order(part)
-
-    def in_order(self, order: slice | Integers) -> 'Messages':
-        """Some of the messages, or all in another order."""
-        data, kinds, *columns = self
-        return Messages(data, kinds[order], *(column[order] for column in columns))
-
-    def message(self, number: int) -> bytes:
-        """Bytes of one message."""
-        offset = self.offsets[number]
-        return self.data[offset : offset + self.sizes[number]].tobytes()
 
 
 class Answers(NamedTuple):

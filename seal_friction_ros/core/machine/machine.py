@@ -303,7 +303,7 @@ def receive(
         named = partial(emit, actuator.mapping.name)
         try:
             if taken:
-                stamp = message.stamp if message.stamp is not None else _stamp(actuator, known, received, sent)
+                stamp = message.stamp if message.stamp is not None else stamp_of(actuator, before, received, sent)
                 memory, records = records_of(actuator, memory, taken, message.numbers, stamp, message.frame_id)
             for record in records:
                 after = pipeline.receive(actuator.pipeline, after, record, received, named, sent)
@@ -315,10 +315,10 @@ def receive(
     return MachineState(tuple(states))
 
 
-def _stamp(actuator: MachineActuator, known: ActuatorState, received: int, sent: int | None) -> int:
+def stamp_of(actuator: MachineActuator, known: PipelineState, received: int, sent: int | None) -> int:
     """Stamp [ns] of a message that has none: when it was sent, if it came in time."""
     since = NEVER if sent is None else pipeline.acting_since(actuator.pipeline.feedforward, received, sent)
-    return (received if since == NEVER else since) + known.pipeline.clock_offset
+    return (received if since == NEVER else since) + known.clock_offset
 
 
 def due(state: MachineState, now: int) -> list[int]:

@@ -4,24 +4,21 @@ The library makes an object of each message, which takes a hundred times as long
 """
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from functools import lru_cache
 from io import BytesIO
-from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
 
-from seal_friction_ros.core.estimation.compiled_pipeline import MOST_MESSAGES, Bytes, Integers, Kind, Messages
+from seal_friction_ros.core.estimation.message_blocks import MOST_MESSAGES, Bytes, Integers, Messages
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.offline.bags import mcap_reader
 from seal_friction_ros.offline.bags.bag import read_messages, storage
-from seal_friction_ros.offline.bags.mcap_reader import HEAD, LAST_TIME, MESSAGE_HEAD, BagMessage, Block, Layout, Names
-
-KindOf = Callable[[str, str], Kind]
-"""Topic and message type -> kind of its messages."""
+from seal_friction_ros.offline.bags.gathered import KindOf, gathered
+from seal_friction_ros.offline.bags.mcap_reader import HEAD, LAST_TIME, MESSAGE_HEAD, Block, Layout, Names
 
 
 class Stretch(NamedTuple):
@@ -55,7 +52,7 @@ def read_in_bulk(path: Path, kind_of: KindOf, stretch: Stretch | None = None) ->
     """
     files = storage(path)
     if not files.is_plain_mcap:
-        yield from _gathered(read_messages(path), kind_of)
+        yield from gathered(read_messages(path), kind_of)
         return
     for number, file_path in enumerate(files.files):
         begin, end = (stretch or _WHOLE).in_file(number)
@@ -116,18 +113,6 @@ def _kept_layout(name: str, *_changes: int) -> Layout:
 def compile_now() -> None:
     """Compile in this process, so that worker processes inherit the compiled code."""
     _located(bytes(HEAD), Block(0, HEAD, 0, 0, HEAD, is_chunk=False), Names())
-
-
-def _gathered(messages: Iterable[BagMessage], kind_of: KindOf) -> Iterator[Messages]:
-    """Messages of the general reader in blocks."""
-    source = iter(messages)
-    while block := list(islice(source, MOST_MESSAGES // 4)):
-        kinds = np.array([kind_of(message.topic, message.type_name) for message in block], np.uint8)
-        sizes = np.array([len(message.data) for message in block], np.int64)
-        data = np.frombuffer(b''.join(message.data for message in block), np.uint8)
-        times = np.array([message.log_time for message in block], np.int64)
-        sent = [message.log_time if message.publish_time is None else message.publish_time for message in block]
-        yield Messages(data, kinds, np.cumsum(sizes) - sizes, sizes, times, np.array(sent, np.int64))
 
 
 def _located(data: bytes, block: Block, names: Names) -> Integers:

@@ -6,42 +6,49 @@ The records are those that the live node makes of the same messages (`core.machi
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation import pipeline
-from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, snapshot_text
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, INPUTS, Input, encode, encode_text, type_of
-from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
-from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
-from seal_friction_ros.core.machine.machine import (
-    QUANTITIES,
-    Machine,
-    MachineActuator,
-    TopicPlan,
-    first_memory,
-    make_machine,
-    records_of,
+from seal_friction_ros.core.estimation.configuration import Snapshot, snapshot_text
+from seal_friction_ros.core.estimation.messages import (
+    CONFIGURATION_TYPE,
+    FORCE_TYPE,
+    INPUTS,
+    PRESSURE_TYPE,
+    VELOCITY_TYPE,
+    Input,
+    encode,
+    encode_text,
+    type_of,
 )
-from seal_friction_ros.core.machine.machine_file import MachineFile
-from seal_friction_ros.core.machine.message_fields import Reading, short_name
-from seal_friction_ros.files import machine_configurations, read_machine
+from seal_friction_ros.core.estimation.records import Position, Pressure, ServoReference
+from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
+from seal_friction_ros.core.machine.machine import Machine, MachineActuator, MachineState
+from seal_friction_ros.offline.bags.actuator_bag import (
+    MappingFile,
+    Translation,
+    lacking,
+    machine_in,
+    named,
+    no_velocity,
+    read_mapping,
+    sources_of,
+)
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
     BagError,
     BagMessage,
     BagWriter,
+    TopicInfo,
     bag_topics,
     read_messages,
 )
-from seal_friction_ros.offline.bags.definitions import read_definitions
 from seal_friction_ros.offline.work.progress import progress
 
-LARGEST_CLOCK_STEP = 1_000_000_000  # [ns] stamps further from the log time are of another clock; our choice
 _TOPICS = {type_name: f'/{topic}' for topic, type_name in INPUTS.items()}
 
 
@@ -52,24 +59,6 @@ class ActuatorImport(NamedTuple):
     messages: dict[str, int]  # topic of this project -> number of messages
     tracking_rms: float | None  # [m] of reference minus position; None without one of them
     remarks: tuple[str, ...]  # what was missing or looks wrong
-
-
-class MappingFile(NamedTuple):
-    """A mapping file with the configurations of its actuators."""
-
-    name: str  # as given
-    file: MachineFile
-    configurations: dict[str, Configuration]
-
-
-def read_mapping(name: str) -> MappingFile:
-    """Mapping file: a path, or the name of one in ``config/machines``.
-
-    Raises:
-        ValueError: It, or a seal file in it, cannot be read or is invalid; one line that names file and actuator.
-    """
-    file = read_machine(name)
-    return MappingFile(name, file, machine_configurations(file, name))
 
 
 def import_bag(bag: Path, mapping: str, out: Path, also: Collection[str] = ()) -> dict[str, ActuatorImport]:
@@ -95,13 +84,10 @@ def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str
         ValueError: The mapping does not fit the bag; one line that names file, actuator or topic. Nothing is written.
         BagError: The bag cannot be read, or ``out`` exists or cannot be made.
     """
-    file = mapping.file
+    machine, state = machine_in(bag, mapping)
     topics = bag_topics(bag)
-    _check_types(file, {topic: info.type_name for topic, info in topics.items()}, mapping.name, bag)
     if absent := [topic for topic in also if topic not in topics]:
         raise ValueError(f'{bag}: {absent[0]} is not in it; it has {", ".join(sorted(topics))}')
-    definitions = read_definitions(bag, file.topics.values())
-    machine = make_machine(file, mapping.configurations, definitions)
     several = len(machine.actuators) > 1
     folders = {one.name: out / one.name if several else out for one in machine.actuators}
     if several and out.exists():
@@ -109,15 +95,10 @@ def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str
     try:
         with ExitStack() as stack:
             writers = [stack.enter_context(BagWriter(folder)) for folder in folders.values()]
-            total = sum(info.message_count for info in topics.values())
-            present = {topic for topic, info in topics.items() if info.message_count}
-            counts, missing, lowest, tracks = _write(
-                machine, bag, writers, _clock_offset(machine, bag), total, present, also
-            )
+            counts, missing, lowest, tracks = _write(machine, state, bag, writers, topics, also)
             for one, count in zip(machine.actuators, counts, strict=True):
                 if not count['/rod_velocity']:
-                    reason = '; '.join(missing) or 'its topic has no message'
-                    raise ValueError(f'{bag}: {one.name}: no velocity in it, so nothing to estimate from: {reason}')
+                    raise ValueError(no_velocity(bag, one.name, missing))
     except BaseException:
         if several and out.is_dir() and not any(out.iterdir()):
             out.rmdir()
@@ -125,7 +106,11 @@ def convert_bag(bag: Path, out: Path, mapping: MappingFile, also: Collection[str
     absent = [f'{topic} is not in the bag' for topic in machine.plans if topic not in topics]
     found = {}
     for one, count, low, track in zip(machine.actuators, counts, lowest, tracks, strict=True):
-        remarks = (*absent, *missing, *(f'{one.name}: {text}' for text in pressure_remarks(file, one.mapping, low)))
+        remarks = (
+            *absent,
+            *missing,
+            *(f'{one.name}: {text}' for text in pressure_remarks(mapping.file, one.mapping, low)),
+        )
         found[one.name] = ActuatorImport(folders[one.name], dict(count), track.rms, remarks)
     return found
 
@@ -155,35 +140,12 @@ class _Track:
         return float(np.sqrt(np.mean(error**2))) if len(error) else None
 
 
-def _check_types(file: MachineFile, types: dict[str, str], mapping: str, bag: Path) -> None:
-    for topic, kind in file.topics.items():
-        if topic in types and short_name(types[topic]) != kind:
-            raise ValueError(f'{mapping}: topics.{topic} is {kind}, but {bag} has {types[topic]} there')
-    if not any(topic in types for topic in file.topics):
-        raise ValueError(f'{bag}: none of the topics of {mapping}; it has {", ".join(sorted(types)) or "none"}')
-
-
-def _clock_offset(machine: Machine, bag: Path) -> int:
-    """What the clock of the stamps shows after the log time [ns], by the first stamp; 0 if it is the same clock.
-
-    Stamps of a simulation begin near 0, log times are those of the day.
-    """
-    for message in read_messages(bag):
-        plan = machine.plans.get(message.topic)
-        stamp = plan.read(message.data).stamp if plan is not None else None
-        if stamp is not None:
-            offset = stamp - message.log_time
-            return offset if abs(offset) > LARGEST_CLOCK_STEP else 0
-    return 0
-
-
 def _write(
     machine: Machine,
+    state: MachineState,
     bag: Path,
     writers: list[BagWriter],
-    offset: int,
-    total: int,
-    present: set[str],
+    topics: Mapping[str, TopicInfo],
     also: Collection[str],
 ) -> tuple[list[Counter[str]], list[str], list[Lowest], list[_Track]]:
     """Write what each actuator gets, its velocity from the first pressure and force sum on.
@@ -195,57 +157,39 @@ def _write(
     """
     lowest = [Lowest() for _ in machine.actuators]
     tracks = [_Track() for _ in machine.actuators]
+    present = {topic for topic, info in topics.items() if info.message_count}
     awaited = [_awaited(one, present) for one in machine.actuators]
-    memories = [first_memory(one) for one in machine.actuators]
     counts: list[Counter[str]] = [Counter() for _ in machine.actuators]
     missing: Counter[str] = Counter()
-    with progress(f'import {bag.name}', total) as advance:
+    translation = Translation(machine, state)
+    with progress(f'import {bag.name}', sum(info.message_count for info in topics.values())) as advance:
         for message in _messages_of(machine, bag, also, advance):
             if not writers[0].message_count:
-                _write_configurations(machine, writers, message.log_time, offset)
+                _write_configurations(machine, state, writers, message.log_time)
             if message.topic in also:
                 for writer in writers:
                     writer.write(*message)
             if message.topic not in machine.plans:
                 continue
-            plan = machine.plans[message.topic]
-            reading = _read(plan, message, bag)
-            missing.update(f'{message.topic}: {text}' for text in reading.missing)
-            stamp = reading.stamp if reading.stamp is not None else message.log_time + offset
-            for number, taken in plan.taken:
-                memories[number], records = records_of(
-                    machine.actuators[number], memories[number], taken, reading.numbers, stamp, reading.frame_id
-                )
-                for record in records:
-                    awaited[number].discard(type(record))
-                    if isinstance(record, Velocity) and awaited[number]:
-                        continue
+            with named(bag, message):
+                for number, record, frame_id in translation.records(message._replace(publish_time=None), missing):
                     kind = type_of(record)
-                    writers[number].write(_TOPICS[kind], kind, message.log_time, encode(record, reading.frame_id))
+                    awaited[number].discard(kind)
+                    if kind == VELOCITY_TYPE and awaited[number]:
+                        continue
+                    writers[number].write(_TOPICS[kind], kind, message.log_time, encode(record, frame_id))
                     counts[number][_TOPICS[kind]] += 1
                     tracks[number].take(record)
                     if isinstance(record, Pressure):
                         lowest[number] = lowest[number].after(record)
-    return counts, [f'{text} ({count} messages)' for text, count in missing.items()], lowest, tracks
+    return counts, lacking(missing), lowest, tracks
 
 
-def _read(plan: TopicPlan, message: BagMessage, bag: Path) -> Reading:
-    try:
-        reading: Reading = plan.read(message.data)
-    except ValueError as error:
-        raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
-    return reading
-
-
-def _awaited(actuator: MachineActuator, present: set[str]) -> set[type]:
-    """Records without which a velocity makes no good estimate, if the bag has all topics that they are made of."""
-    signals, wiring = actuator.mapping.signals(), actuator.wiring
-    parts = {Pressure: wiring.pressure, Force: wiring.force}
-    return {
-        kind
-        for kind, quantities in parts.items()
-        if quantities and all(signals[QUANTITIES[quantity]].topic in present for quantity in quantities)
-    }
+def _awaited(actuator: MachineActuator, present: Collection[str]) -> set[str]:
+    """Types of messages without which a velocity makes no good estimate, if the bag has all that they are made of."""
+    sources = sources_of(actuator)
+    kinds = {'pressure': PRESSURE_TYPE, 'force': FORCE_TYPE}
+    return {kind for name, kind in kinds.items() if name in sources and {*sources[name]} <= {*present}}
 
 
 def _messages_of(
@@ -259,8 +203,7 @@ def _messages_of(
             yield message
 
 
-def _write_configurations(machine: Machine, writers: list[BagWriter], log_time: int, offset: int) -> None:
-    for actuator, writer in zip(machine.actuators, writers, strict=True):
-        state = pipeline.init(actuator.pipeline)._replace(clock_offset=offset)
-        text = encode_text(snapshot_text(Snapshot(actuator.configuration, state)))
+def _write_configurations(machine: Machine, state: MachineState, writers: list[BagWriter], log_time: int) -> None:
+    for actuator, known, writer in zip(machine.actuators, state.actuators, writers, strict=True):
+        text = encode_text(snapshot_text(Snapshot(actuator.configuration, known.pipeline)))
         writer.write(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, log_time, text)

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, ESTIMATE_TYPE, decode, decode_text
-from seal_friction_ros.core.estimation.records import Status
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine_snapshot import parse_machine_text
-from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile, machine_messages, named
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics
 
 
 @dataclass(frozen=True)
@@ -35,29 +37,32 @@ class BagInfo:
         return '\n'.join([*lines, *(f'  {title}: {", ".join(values)}' for title, values in texts.items() if values)])
 
 
-def bag_info(bag: Path) -> BagInfo:
+def bag_info(bag: Path, mapping: MappingFile | None = None) -> BagInfo:
     """Read a bag and summarise it.
+
+    Args:
+        bag: The bag.
+        mapping: Of its machine, if the bag does not hold it; then the estimates are made here.
 
     Raises:
         BagError: It cannot be read, or holds no message.
+        ValueError: The mapping does not fit the bag.
     """
+    known = bag_topics(bag)
     times: list[int] = []
     states: Counter[str] = Counter()
     status: Counter[str] = Counter()
     seals: list[str] = []
     count = 0
-    for message in read_messages(bag):
-        count += 1
+    for message in machine_messages(bag, mapping):
+        count += message.topic in known
         times = [times[0] if times else message.log_time, message.log_time]
-        try:
-            if message.type_name == ESTIMATE_TYPE:
-                estimate = decode(ESTIMATE_TYPE, message.data)
+        with named(bag, message):
+            for estimate in _estimates(message):
                 states[FrictionState(estimate.state).name] += 1
                 status.update([str(bit.name) for bit in Status if estimate.status & bit] or ['all good'])
-            elif message.type_name == CONFIGURATION_TYPE:
+            if message.type_name == CONFIGURATION_TYPE:
                 seals = _seals(decode_text(message.data))
-        except ValueError as error:
-            raise BagError(f'{bag}: message on {message.topic} at {message.log_time} ns: {error}') from None
     if not count:
         raise BagError(f'{bag}: no message in it')
     duration = (times[-1] - times[0]) * 1e-9
@@ -67,9 +72,22 @@ def bag_info(bag: Path) -> BagInfo:
             'count': info.message_count,
             'rate_Hz': round((info.message_count - 1) / duration, 3) if duration and info.message_count > 1 else 0.0,
         }
-        for topic, info in sorted(bag_topics(bag).items())
+        for topic, info in sorted(known.items())
     }
     return BagInfo(str(bag), times[0], duration, count, topics, dict(states), dict(status), seals)
+
+
+def _estimates(message: BagMessage) -> list[FrictionEstimate]:
+    """Estimates in a message.
+
+    Raises:
+        ValueError: The message does not match its type.
+    """
+    if message.type_name == ESTIMATE_TYPE:
+        return [decode(ESTIMATE_TYPE, message.data)]
+    if message.type_name != MACHINE_TYPE:
+        return []
+    return [answer.record for answer in decode_together(message.data) if isinstance(answer.record, FrictionEstimate)]
 
 
 def _seals(text: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 import math
 from array import array
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,24 +12,37 @@ from typing import Any
 import numpy as np
 
 from seal_friction_ros.core.estimation.configuration import parse_snapshot
-from seal_friction_ros.core.estimation.messages import DECODERS
-from seal_friction_ros.core.estimation.records import FrictionEstimate, Status, Velocity
+from seal_friction_ros.core.estimation.message_blocks import Messages
+from seal_friction_ros.core.estimation.messages import FEEDFORWARD_TYPE
+from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
 from seal_friction_ros.core.foundation.documents import NotJsonError, parse_json
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum, one_correction
 from seal_friction_ros.core.friction.mounting import pressures_at_seals
-from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, read_messages
-from seal_friction_ros.offline.bags.topics import RECORDED, Topics, find_topics
-from seal_friction_ros.offline.work.progress import progress
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.columns import (
+    Block,
+    Held,
+    Numbers,
+    Wanted,
+    collected,
+    extend,
+    growing,
+    in_turn,
+    wanted_of,
+)
+from seal_friction_ros.offline.bags.topics import RECORDED
 
 MAX_GAP = 0.5  # [s] samples further apart do not belong to one stretch of a recording (our choice)
 LARGEST_INPUT = 1e15  # [SI] above any real pressure, force or speed; the comparison also drops NaN and infinity
 
 _MAX_PENDING = 10_000  # velocity samples that may wait for their estimate; older ones never got one
 _MAX_FRAMES = 10  # frame names that are kept
-_INPUTS = ('velocity', 'pressure_a', 'pressure_b', 'force_sum', 'position', 'reference')
-_COLUMNS = (*_INPUTS, *FrictionEstimate._fields[1:], 'replayed_force', 'feedforward_force')
+_INPUTS = {'velocity': 1, 'pressure': 2, 'force': 1, 'position': 1, 'reference': 1}
+_INPUT_COLUMNS = ('velocity', 'pressure_a', 'pressure_b', 'force_sum', 'position', 'reference')
+_COLUMNS = (*_INPUT_COLUMNS, *FrictionEstimate._fields[1:], 'replayed_force', 'feedforward_force')
 _INTEGERS = {'state', 'direction', 'status'}
 
 
@@ -73,95 +86,104 @@ class RecordedRun:
         return mean
 
 
-def read_run(bag: Path, namespace: str = '') -> RecordedRun:
+def read_run(bag: Path, namespace: str = '', mapping: MappingFile | None = None) -> RecordedRun:
     """Read a bag of inputs and estimates.
 
     The inputs of an estimate are those held when the velocity sample of the same stamp arrived.
 
     Args:
         bag: The bag.
-        namespace: Only topics below it count; for bags of several actuators.
+        namespace: As of `open_actuator`.
+        mapping: Likewise; then the estimates are made here.
 
     Raises:
         BagError: The bag cannot be read, or holds no estimates.
     """
-    topics = find_topics(bag, namespace)
+    source = open_actuator(bag, namespace, mapping)
+    topics = source.topics
     if not topics.estimate:
         raise BagError(f'{bag}: no estimates in it: add them with seal_friction replay {bag} --out BAG')
-    collector = _RunCollector(topics)
-    infos = bag_topics(bag)
-    with progress(f'read {bag.name}', sum(info.message_count for info in infos.values())) as advance:
-        for count, message in enumerate(read_messages(bag), start=1):
-            if message.topic in topics or message.topic == collector.acted:
-                collector.take(message)
-            if count % 1000 == 0:
-                advance(1000)
+    wanted = wanted_of(source, (*_INPUTS, 'estimate', 'feedforward', 'configuration'))
+    wanted['acted'] = Wanted(topics.feedforward + RECORDED, FEEDFORWARD_TYPE)
+    collector = collected(source, wanted, _RunCollector, with_answers=True)
     if not collector.stamps:
         raise BagError(f'{bag}: the index lists estimates, but the bag holds none')
-    counts = {topic: (info.type_name, info.message_count) for topic, info in infos.items()}
-    return collector.run(bag.resolve().name, counts)
+    counts = {topic: (info.type_name, info.message_count) for topic, info in source.infos.items()}
+    return collector.run(source.name, counts)
 
 
 class _RunCollector:
-    """Follows the messages of a bag and keeps one row per estimate."""
+    """Keeps one row per estimate."""
 
-    def __init__(self, topics: Topics) -> None:
+    def __init__(self) -> None:
         self.stamps = array('q')
-        self._topics = topics
-        self.acted = topics.feedforward + RECORDED
-        self._columns = [array('d') for _ in _COLUMNS]  # their memory is that of the run: an hour at 1 kHz is 0.6 GB
-        self._held = dict.fromkeys(_INPUTS, math.nan)
-        self._pending: dict[int, tuple[float, ...]] = {}
+        self._columns = growing(len(_COLUMNS))  # an hour at 1 kHz is 0.6 GB
+        self._held = Held(_INPUTS)
+        self._pending = (
+            np.zeros(0, np.int64),
+            np.zeros((sum(_INPUTS.values()), 0)),
+        )  # samples that wait for their estimate
         self._frames: dict[bytes, None] = {}
         self._configurations: list[tuple[int, int, str]] = []
 
-    def take(self, message: BagMessage) -> None:
-        """Add one message.
-
-        Raises:
-            BagError: The message is damaged; topic and time of the message are in the text.
-        """
-        try:
-            self._take(message)
-        except ValueError as error:
-            raise BagError(f'message on {message.topic} at {message.log_time} ns: {error}') from None
-
-    def _take(self, message: BagMessage) -> None:
-        topic, topics, held = message.topic, self._topics, self._held
-        record = DECODERS[message.type_name](message.data)
-        if topic == topics.configuration:
+    def add(self, block: Block) -> None:
+        """Take one block."""
+        found = {name: block.of(name) for name in _INPUTS}
+        estimates = block.of('estimate')
+        for place, log_time, text in block.texts('configuration'):
             with suppress(NotJsonError):  # such a text is shown as it is
-                parse_json(record, 'configuration')
-            self._configurations.append((message.log_time, len(self.stamps), record))
-        elif topic == topics.velocity:
-            self._take_velocity(record)
-        elif topic == topics.pressure:
-            held['pressure_a'], held['pressure_b'] = record.chamber_a, record.chamber_b
-        elif topic == topics.force:
-            held['force_sum'] = record.force
-        elif topic == topics.position:
-            held['position'] = record.position
-        elif topic == topics.reference:
-            held['reference'] = record.position
-        else:
-            self._take_answer(topic, record)
+                parse_json(text, 'configuration')
+            before = len(self.stamps) + int(np.searchsorted(estimates.places, place))
+            self._configurations.append((log_time, before, text))
+        self._add_frames(block.messages, found['velocity'].places)
+        inputs = self._inputs_of(estimates, found)
+        forces = np.full((2, len(estimates.places)), math.nan)
+        for row, name in enumerate(('feedforward', 'acted'), start=-2):
+            self._add_forces(block.of(name), estimates, forces[row], self._columns[row])
+        self.stamps.frombytes(estimates.stamps.tobytes())
+        extend(self._columns, np.concatenate([inputs, estimates.numbers, forces]))
 
-    def _take_answer(self, topic: str, record: Any) -> None:
-        if topic == self._topics.estimate:
-            self.stamps.append(record.stamp)
-            inputs = self._pending.pop(record.stamp, (math.nan,) * len(_INPUTS))
-            for column, number in zip(self._columns, (*inputs, *record[1:], math.nan, math.nan), strict=True):
-                column.append(number)
-        elif topic in (self._topics.feedforward, self.acted) and self.stamps and self.stamps[-1] == record.stamp:
-            self._columns[-1 if topic == self.acted else -2][-1] = record.force
+    def _inputs_of(self, estimates: Numbers, found: Mapping[str, Numbers]) -> FloatArray:
+        """Inputs of each estimate, shape (6, n); NaN where its sample is not in the bag."""
+        velocities = found['velocity']
+        earlier, columns = self._pending
+        samples = np.concatenate([earlier, velocities.stamps])
+        columns = np.concatenate([columns, self._held.at(velocities.places, found)], axis=1)
+        count = len(samples)
+        answers, used, waiting = in_turn(
+            np.concatenate([samples, estimates.stamps]),
+            np.concatenate([np.arange(-len(earlier), 0), velocities.places, estimates.places]),
+            np.arange(count + len(estimates.stamps)) >= count,
+        )
+        inputs = np.full((len(columns), len(estimates.stamps)), math.nan)
+        inputs[:, answers - count] = columns[:, used]
+        waiting = waiting[-_MAX_PENDING:]
+        self._pending = samples[waiting], columns[:, waiting]
+        return inputs
 
-    def _take_velocity(self, sample: Velocity) -> None:
-        self._held['velocity'] = sample.velocity
-        self._pending[sample.stamp] = tuple(self._held.values())
-        if len(self._pending) > _MAX_PENDING:
-            del self._pending[next(iter(self._pending))]
-        if len(self._frames) < _MAX_FRAMES:
-            self._frames[sample.frame_id] = None
+    def _add_forces(
+        self, feedforwards: Numbers, estimates: Numbers, forces: FloatArray, earlier: 'array[float]'
+    ) -> None:
+        """Set the force that was published with each estimate; ``earlier`` has those of the blocks before."""
+        before = np.searchsorted(estimates.places, feedforwards.places) - 1
+        for number in np.flatnonzero(before < 0).tolist():
+            if self.stamps and self.stamps[-1] == feedforwards.stamps[number]:
+                earlier[-1] = float(feedforwards.numbers[0, number])
+        places = before[before >= 0]
+        same = estimates.stamps[places] == feedforwards.stamps[before >= 0]
+        forces[places[same]] = feedforwards.numbers[0, before >= 0][same]
+
+    def _add_frames(self, messages: Messages, places: IntArray) -> None:
+        """Keep the frame names of velocity samples, up to `_MAX_FRAMES`."""
+        offsets = messages.offsets[places]
+        while len(offsets) and len(self._frames) < _MAX_FRAMES:
+            first = int(offsets[0])
+            length = int.from_bytes(messages.data[first + 12 : first + 16].tobytes(), 'little')
+            name = messages.data[first + 12 : first + 16 + length]
+            self._frames[name[4:-1].tobytes()] = None
+            inside = offsets + 16 + length <= len(messages.data)
+            offsets = offsets[inside]
+            offsets = offsets[(messages.data[offsets[:, np.newaxis] + 12 + np.arange(4 + length)] != name).any(axis=1)]
 
     def run(self, name: str, counts: dict[str, tuple[str, int]]) -> RecordedRun:
         """Arrays of all messages so far; an input that cannot be a measurement becomes NaN."""
@@ -169,7 +191,7 @@ class _RunCollector:
         columns = [np.frombuffer(column, dtype=np.float64) for column in self._columns]
         values: dict[str, Any] = dict(zip(_COLUMNS, columns, strict=True))
         values.update({name: values[name].astype(np.int64) for name in _INTEGERS})
-        for column in _INPUTS:
+        for column in _INPUT_COLUMNS:
             values[column][~(np.abs(values[column]) < LARGEST_INPUT)] = math.nan
         values['velocity'][(values['status'] & int(Status.VELOCITY_OUT_OF_RANGE)) != 0] = math.nan
         if not any(_is_replayed(text) for _, _, text in self._configurations[:1]):

@@ -86,7 +86,10 @@ def find_topics(bag: Path, namespace: str = '', known: Mapping[str, TopicInfo] |
     known = bag_topics(bag) if known is None else known
     result = Topics(*(find_topic(bag, wanted, namespace, known) for wanted in TYPES))
     if not result.velocity:
-        raise BagError(f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from')
+        raise BagError(
+            f'{bag}: no message of {TYPES.velocity} in it, so nothing to estimate from: a bag of another machine needs '
+            'its mapping file (--mapping, or seal_friction import bag)'
+        )
     return result
 
 

@@ -16,6 +16,7 @@ from seal_friction_ros.offline.work.targets import PAGE, Kind, checked_targets
 from seal_friction_ros.packages import needed
 
 if TYPE_CHECKING:
+    from seal_friction_ros.offline.bags.actuator_bag import MappingFile
     from seal_friction_ros.offline.work.executor import Workers
     from seal_friction_ros.offline.work.finished_parts import Kept
     from seal_friction_ros.offline.work.places import Place
@@ -141,8 +142,25 @@ def add_page(parser: argparse.ArgumentParser, option: str = '--out', *, required
 
 
 def add_namespace(parser: Any) -> None:
-    """Add the option that restricts a bag to one namespace."""
-    parser.add_argument('--namespace', default='', help='use only topics below it')
+    """Add the option that restricts a bag to one actuator."""
+    help_text = 'use only topics below it; of a machine the name of an actuator'
+    parser.add_argument('--namespace', default='', help=help_text)
+
+
+def add_mapping(parser: Any) -> None:
+    """Add the option for bags that tell nothing of their machine."""
+    add_file(parser, '--mapping', 'machines', 'mapping file of the machine, for a bag without configuration')
+
+
+def mapping_of(arguments: argparse.Namespace) -> 'MappingFile | None':
+    """Mapping file, if one is given.
+
+    Raises:
+        ValueError: It cannot be read or is invalid.
+    """
+    from seal_friction_ros.offline.bags.actuator_bag import read_mapping
+
+    return read_mapping(arguments.mapping) if arguments.mapping else None
 
 
 def add_configuration(parser: argparse.ArgumentParser) -> None:

@@ -20,20 +20,26 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('--topic', default='', help='default: the friction estimates of each bag')
     parser.add_argument('--atol', type=cli.non_negative, default=0.0, help='absolute tolerance, default 0')
     parser.add_argument('--rtol', type=cli.non_negative, default=0.0, help='relative tolerance, default 0')
+    cli.add_namespace(parser)
+    cli.add_mapping(parser)
     cli.add_page(parser, required=False)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare messages of equal stamp, or with a page the friction of two runs or seals."""
+    mapping = cli.mapping_of(arguments)
     if arguments.out:
         from seal_friction_ros.offline.reports.comparison_report import write_comparison
 
         for option in ('topic', 'atol', 'rtol'):
             if getattr(arguments, option):
                 raise ValueError(f'--{option} is for messages of equal stamp: leave it out, or leave out --out')
-        report = write_comparison(arguments.a, arguments.b, arguments.out)
+        report = write_comparison(arguments.a, arguments.b, arguments.out, arguments.namespace, mapping)
         return cli.print_result(arguments, report, report.numbers['verdict'])
     from seal_friction_ros.offline.replay.compare import compare
 
-    found = compare(arguments.a, arguments.b, arguments.topic, arguments.atol, arguments.rtol)
+    found = compare(
+        arguments.a, arguments.b, arguments.topic, arguments.atol, arguments.rtol,
+        namespace=arguments.namespace, mapping=mapping,
+    )  # fmt: skip
     return cli.print_result(arguments, found.numbers(), found.summary(), cli.SUCCESS if found.agree else cli.DIFFERENT)

@@ -22,6 +22,7 @@ def add_parser(commands: Any) -> None:
     cli.add_target(parser, '--parquet', TABLE, metavar='FILE.parquet', help=help_text)
     cli.add_configuration(parser)
     cli.add_namespace(parser)
+    cli.add_mapping(parser)
     cli.add_workers(parser, 'bags')
     cli.add_work(parser)
 
@@ -29,6 +30,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Summarise every bag; write page and table."""
     from seal_friction_ros.offline.bags.find_bags import find_bags
+    from seal_friction_ros.offline.replay.bag_parts import Chosen
     from seal_friction_ros.offline.replay.bag_summary import DIFFERENT, summaries
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.fleet_report import judged, write_fleet_report
@@ -38,9 +40,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.parquet:
         needed('pyarrow')
     override = chosen_configuration(arguments.params, arguments.seal)
+    chosen = Chosen(arguments.namespace, cli.mapping_of(arguments), override)
     workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
     paths = find_bags(arguments.where)
-    outcomes = summaries(paths, arguments.namespace, override, workers, kept)
+    outcomes = summaries(paths, chosen, workers, kept)
     bags = [judged(path, outcome) for path, outcome in zip(paths, outcomes, strict=True)]
     report = write_fleet_report(bags, arguments.where, arguments.out)
     if arguments.parquet:

@@ -15,6 +15,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument('bags', type=cli.place, nargs='+', metavar='BAG', help='path, or URL of fsspec')
     cli.add_configuration(parser)
     cli.add_namespace(parser)
+    cli.add_mapping(parser)
     cli.add_page(parser, required=False)
     cli.add_workers(parser, 'bags')
     cli.add_work(parser)
@@ -33,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     override = chosen_configuration(arguments.params, arguments.seal)
     workers, kept = cli.workers_of(arguments), cli.kept_in(arguments)
-    outcomes = health_of_bags(arguments.bags, arguments.namespace, override, workers, kept)
+    outcomes = health_of_bags(arguments.bags, arguments.namespace, override, workers, kept, cli.mapping_of(arguments))
     errors = [outcome.error for outcome in outcomes if outcome.error]
     seen = [(outcome.result, bag) for outcome, bag in zip(outcomes, arguments.bags, strict=True) if outcome.result]
     seen.sort(key=lambda pair: pair[0].time[0] if len(pair[0].time) else 0.0)

@@ -33,6 +33,7 @@ def add_parser(commands: Any) -> None:
     cli.add_file(parser, '--rig', 'rigs', 'rig file of the logs')
     _add_what_is_known(parser)
     cli.add_namespace(parser)
+    cli.add_mapping(parser)
     cli.add_workers(parser, 'sources, and groups of readings that are left out,')
     cli.add_work(parser, has_failures=False)
 
@@ -131,7 +132,7 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
     targets = [(path, SEAL_FILE) for path in files.values()]
     paths = [one for one in arguments.sources if isinstance(one, Path)]
     with checked_targets('identify', targets, paths, force=arguments.force):
-        options = SourceOptions(**cli.options_from(arguments, SourceOptions))
+        options = SourceOptions(**_of_sources(arguments))
         each = [SealKind(*kind) for kind in arguments.kinds]
         name = arguments.name or arguments.out.stem
         error = arguments.largest_kind_error
@@ -153,6 +154,13 @@ def _run_kinds(arguments: argparse.Namespace) -> int:
     return cli.print_result(arguments, numbers, f'{kinds.kinds_summary(result)}\n{names_written}: written')
 
 
+def _of_sources(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Options of the sources."""
+    from seal_friction_ros.offline.identification.sources import SourceOptions
+
+    return {**cli.options_from(arguments, SourceOptions), 'mapping': cli.mapping_of(arguments)}
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Identify, and write seal file, page and data sheet."""
     if arguments.kinds:
@@ -168,7 +176,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.next and arguments.report and arguments.next.with_suffix('.html') == arguments.report:
         raise ValueError(f'{arguments.report}: --next writes its page there: choose another name for one of them')
-    source_options = SourceOptions(**cli.options_from(arguments, SourceOptions))
+    source_options = SourceOptions(**_of_sources(arguments))
     options = IdentifyOptions(**{**cli.options_from(arguments, IdentifyOptions), 'sources': source_options})
     workers = cli.workers_of(arguments)
     found = identify(arguments.sources, options, arguments.out.stem, workers, arguments.work)

@@ -21,6 +21,7 @@ def add_parser(commands: Any) -> None:
         'monitor bags/pull_test',
     )  # fmt: skip
     parser.add_argument('bag', type=Path, nargs='?', metavar='BAG', help='bag to show; without: the running estimators')
+    cli.add_mapping(parser)
     parser.add_argument(
         '--allow-changes', action='store_true', help='let the page set scale, lead time and limit, and switch off'
     )
@@ -39,6 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.allow_changes:
             raise ValueError('--allow-changes is for running estimators: a bag cannot be changed')
         return _show_bag(arguments)
+    if arguments.mapping is not None:
+        raise ValueError('--mapping is for a BAG: running estimators have their own')
     if find_spec('rclpy') is None:
         raise ValueError('monitor without a bag needs ROS 2: run make setup, or source a distribution')
     options = [option for option, given in _OPTIONS.items() if getattr(arguments, given)]
@@ -57,7 +60,7 @@ def _show_bag(arguments: argparse.Namespace) -> int:
     from seal_friction_ros.offline.monitor.token_file import kept_token
 
     token = kept_token(arguments.token_file) if arguments.token_file else ''
-    server = MonitorServer(RecordedView(arguments.bag), arguments.port, token)
+    server = MonitorServer(RecordedView(arguments.bag, cli.mapping_of(arguments)), arguments.port, token)
     print(server.told(as_json=arguments.json), flush=True)
     try:
         server.serve_forever(poll_interval=0.2)

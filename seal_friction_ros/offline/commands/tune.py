@@ -34,7 +34,8 @@ def add_parser(commands: Any) -> None:
     cli.add_target(parser, '--out', PARAMETER_FILE, required=True, metavar='FILE.yaml', help=help_text)
     cli.add_configuration(parser)
     cli.add_namespace(recorded)
-    help_text = 'write the parameters of this actuator of machine_estimator, instead of those of friction_estimator'
+    cli.add_mapping(recorded)
+    help_text = 'write the parameters of this actuator of machine_estimator; default: that of the bag, if it has any'
     parser.add_argument('--actuator', default='', metavar='NAME', help=help_text)
     for name, meaning in _settings().items():
         unit = f' [{meaning.unit}]' if meaning.unit else ''
@@ -66,19 +67,19 @@ def run(arguments: argparse.Namespace) -> int:
 
     given = _given(arguments)
     configuration = chosen_configuration(arguments.params, arguments.seal)
-    gain = None
+    gain, actuator = None, arguments.actuator
     if arguments.bag:
+        known, one = RecordedAxisSettings(**given), (arguments.namespace, cli.mapping_of(arguments))
         if arguments.command_topic:
-            gain = read_output_gain(
-                arguments.bag, arguments.command_topic, RecordedAxisSettings(**given), arguments.namespace
-            )
-        tuning: Any = tune_bag(arguments.bag, RecordedAxisSettings(**given), configuration, arguments.namespace)
+            gain = read_output_gain(arguments.bag, arguments.command_topic, known, *one)
+        tuning: Any = tune_bag(arguments.bag, known, configuration, *one)
+        actuator = actuator or tuning.actuator
     else:
         machine = load_machine(arguments.machine) if arguments.machine else DEFAULT_MACHINE
         tuning = tune_simulator(TuningSettings(**given), configuration, machine)
     page = page_of(arguments.out)
     numbers = {**tuning.numbers, 'file': arguments.out, 'page': page, 'figures': write_tuning_page(tuning, page)}
-    write_parameters(arguments.out, tuning, arguments.actuator)
+    write_parameters(arguments.out, tuning, actuator)
     text = told(tuning)
     if gain is not None:
         numbers['output_gain'], numbers['output_gain_standard_error'] = gain.gain, gain.standard_error
@@ -101,6 +102,7 @@ def _given(arguments: argparse.Namespace) -> dict[str, Any]:
     foreign = [name for name in given if name in meanings(other) and name not in meanings(kind)]
     foreign += ['machine'] if arguments.machine and arguments.bag else []
     foreign += ['namespace'] if arguments.namespace and not arguments.bag else []
+    foreign += ['mapping'] if arguments.mapping and not arguments.bag else []
     foreign += ['command_topic'] if arguments.command_topic and not arguments.bag else []
     if foreign:
         name = foreign[0].replace('_', '-')

@@ -27,9 +27,9 @@ from seal_friction_ros.core.identification.prepare_readings import prepare_logs,
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
 from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
 from seal_friction_ros.files import config_path, share_directory
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.columns import read_velocity_rows
 from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_samples
-from seal_friction_ros.offline.bags.topics import find_topics
-from seal_friction_ros.offline.bags.velocity_rows import read_velocity_rows
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.identification.load_numbers import load_text
 from seal_friction_ros.offline.work.executor import Workers, run_all
@@ -50,7 +50,8 @@ class SourceOptions:
 
     rig: str | None = None  # rig file of the logs: a path, or the name of one in config/rigs
     chambers: tuple[str, ...] | None = None  # chamber of each seal
-    namespace: str = ''  # of a bag: use only topics below it
+    namespace: str = ''  # of a bag: use only topics below it; of a machine the name of the actuator
+    mapping: MappingFile | None = None  # of the machine, for bags without configuration
     slowest: float | None = None  # [m/s] see `Sliding`
     largest_acceleration: float | None = None  # [m/s^2] see `Sliding`
 
@@ -179,7 +180,7 @@ def _read_place(place: Place, options: SourceOptions) -> Source:
 
 
 def _read(path: Path, options: SourceOptions) -> Source:
-    if path.is_dir() or path.suffix == '.mcap':
+    if path.is_dir() or path.suffix in ('.mcap', '.db3'):
         return _read_bag(path, options)
     try:
         with path.open(encoding='utf-8-sig') as file:
@@ -297,11 +298,12 @@ def _recognised(path: Path) -> tuple[Rig, tuple[str, ...]]:
 
 def _read_bag(path: Path, options: SourceOptions) -> Source:
     """Signals of a bag: one row for each velocity message, with what came newest before it."""
-    topics = find_topics(path, options.namespace)
+    bag = open_actuator(path, options.namespace, options.mapping)
+    topics = bag.topics
     missing = [name for name in ('pressure', 'force') if not getattr(topics, name)]
     if missing:
         raise ValueError(f'{path}: no {" and no ".join(missing)} messages: they are needed to identify friction')
-    stamp, columns, configuration = read_velocity_rows(path, topics)
+    stamp, columns, configuration = read_velocity_rows(bag)
     chambers, document, holds_load, has_placeholder = None, None, False, False
     if configuration is not None:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
@@ -312,7 +314,7 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns[:4]).taken(kept)
     temperature = _from_the_first(columns[5] + ZEROS['degC'])[kept] if topics.temperature else None
     position = columns[4][kept] if topics.position else None
-    log = RecordedLog(path.resolve().name, signals, _sliding(Sliding(), options), temperature, position)
+    log = RecordedLog(bag.name, signals, _sliding(Sliding(), options), temperature, position)
     places = position if holds_load else None
     return Source(
         _data_file(path), chambers, log, seal_document=document, has_placeholder=has_placeholder, load_position=places

@@ -8,6 +8,7 @@ from typing import Any
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE
+from seal_friction_ros.offline.bags.actuator_bag import MACHINE_CONFIGURATION, MappingFile, machine_messages
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, TopicInfo, bag_topics, read_messages
 from seal_friction_ros.offline.bags.definitions import read_definitions
 from seal_friction_ros.offline.bags.topics import RECORDED
@@ -103,34 +104,40 @@ class RecordedView:
 
     Args:
         bag: The bag.
+        mapping: Of its machine, if the bag does not hold it; then the estimates are made here.
 
     Raises:
         BagError: The bag cannot be read, or has no estimates.
+        ValueError: The mapping does not fit the bag.
     """
 
-    def __init__(self, bag: Path) -> None:
+    def __init__(self, bag: Path, mapping: MappingFile | None = None) -> None:
         self._name = bag.resolve().name
         known = bag_topics(bag)
         types = {topic: info.type_name for topic, info in known.items() if info.message_count}
         answers = (ESTIMATE_TYPE, MACHINE_TYPE)
-        if not any(kind in answers for kind in types.values()):
+        if mapping is not None:
+            types = {topic: kind for topic, kind in types.items() if topic in mapping.file.topics}
+            types[MACHINE_CONFIGURATION] = CONFIGURATION_TYPE
+        elif not any(kind in answers for kind in types.values()):
             raise BagError(f'{bag}: no estimates in it: add them with seal_friction replay {bag} --out BAG')
         self._nodes = _nodes(bag, types)
         self._tracks: dict[str, _Track] = {}
         total = sum(info.message_count for info in known.values())
         first, last = _span(bag)
+        messages = machine_messages(bag, mapping)
         self._first, self._duration = first, max((last - first) * 1e-9, 0.0)
         self._period = max(1.0 / RATE, self._duration / MOST_ROWS)
-        self._fill(bag, known, total)
+        self._fill(messages, known, total)
         if not self._tracks:
             reason = next((view.refused for view, _ in self._nodes if view.refused), 'there is none')
             raise BagError(f'{bag}: the configuration of the estimator in it cannot be read: {reason}')
 
-    def _fill(self, bag: Path, known: dict[str, TopicInfo], total: int) -> None:
+    def _fill(self, messages: Iterable[BagMessage], known: dict[str, TopicInfo], total: int) -> None:
         step = round(self._period * 1e9)
         due, acted = self._first + step, {topic for topic in known if topic.endswith(RECORDED)}
-        with progress(f'read {bag.name}', total) as advance:
-            for count, message in enumerate(read_messages(bag), start=1):
+        with progress(f'read {self._name}', total) as advance:
+            for count, message in enumerate(messages, start=1):
                 while message.log_time > due:
                     self._sample(due)
                     due += step

@@ -12,20 +12,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
-from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, Messages, UnsuitedError, receive_all
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
-from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE, LAYOUTS
+from seal_friction_ros.core.estimation.message_blocks import Kind, Messages, UnsuitedError
+from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
 from seal_friction_ros.core.estimation.pipeline import init
 from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, MappingFile, open_actuator
 from seal_friction_ros.offline.bags.bag import BagError
-from seal_friction_ros.offline.bags.block_reader import read_in_bulk
+from seal_friction_ros.offline.bags.columns import numbers_of
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
-from seal_friction_ros.offline.bags.topics import find_topics
-from seal_friction_ros.offline.replay.bag_parts import try_bags
+from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations, kinds_of_topics
 from seal_friction_ros.offline.work.executor import Workers
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
@@ -55,16 +56,18 @@ def bag_health(
     override: Configuration | None = None,
     learnt: AdaptationState | None = None,
     on_block: Callable[[Messages, Answers, Any], None] = lambda *_: None,
+    mapping: MappingFile | None = None,
 ) -> BagHealth:
     """Health from one bag.
 
     Args:
         bag: The bag.
-        namespace: Use only topics below it.
+        namespace: As of `open_actuator`.
         override: Configuration instead of the recorded one; its mode counts as observe.
         learnt: What was learnt from the bags before; None: nothing.
         on_block: Called with each block of messages, the answers to them, and the estimates among these as a structured
             array with the fields of `FrictionEstimate`.
+        mapping: As of `open_actuator`.
 
     Raises:
         BagError: The bag cannot be read, or not in blocks.
@@ -72,8 +75,9 @@ def bag_health(
     rows: list[FloatArray] = []
     starts: list[float] = []
     end, follower = learnt, Starts()
+    source = open_actuator(bag, namespace, mapping)
     try:
-        for estimates, known in _observed(bag, namespace, override, learnt, on_block):
+        for estimates, known in _observed(source, override, learnt, on_block):
             end = known
             changed = np.flatnonzero(np.diff(estimates['adaptation_scale'], prepend=np.nan))
             changed = changed[estimates['adaptation_scale_std'][changed] > 0.0]
@@ -105,6 +109,7 @@ def health_of_bags(
     override: Configuration | None = None,
     workers: Workers = 1,
     kept: Kept = NOWHERE,
+    mapping: MappingFile | None = None,
 ) -> list[Outcome[BagHealth]]:
     """`bag_health` of bags without ``learnt``, ``workers`` of them at a time; outcomes in the order of the bags.
 
@@ -114,14 +119,14 @@ def health_of_bags(
         ValueError: The work folder or the cluster cannot be used.
     """
     outcomes = try_bags(
-        'health', bags, _NAMES, _values, (namespace, override), workers, kept,
-        lambda: compile_now(first_configurations(bags, namespace, override)),
+        'health', bags, _NAMES, _values, Chosen(namespace, mapping, override), workers, kept,
+        lambda: compile_now(first_configurations(bags, namespace, override, mapping)),
     )  # fmt: skip
     return [Outcome(BagHealth(**one.result) if one.result else None, one.error) for one in outcomes]
 
 
-def _values(bag: Path, namespace: str, override: Configuration | None) -> dict[str, Any]:
-    found = bag_health(bag, namespace, override)._asdict()
+def _values(bag: Path, chosen: Chosen) -> dict[str, Any]:
+    found = bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)._asdict()
     return {name: found[name] for name in _NAMES}
 
 
@@ -143,8 +148,7 @@ def _with_block(starts: Starts, estimates: Any) -> tuple[Starts, list[float]]:
 
 
 def _observed(
-    bag: Path,
-    namespace: str,
+    source: ActuatorBag,
     override: Configuration | None,
     learnt: AdaptationState | None,
     on_block: Callable[[Messages, Answers, Any], None],
@@ -155,7 +159,7 @@ def _observed(
     state = init(parameters)
     if learnt is not None:
         state = state._replace(estimator=state.estimator._replace(adaptation=learnt))
-    for block in read_in_bulk(bag, kinds_of_topics(find_topics(bag, namespace))):
+    for block in source.blocks(kinds_of_topics(source.topics)):
         changes = np.flatnonzero(block.kinds == Kind.CONFIGURATION).tolist()
         for first, end in zip([0, *changes], [*changes, len(block.kinds)], strict=True):
             if first == end:
@@ -180,35 +184,12 @@ def _observing(configuration: Configuration) -> Configuration:
 
 def _estimates(answers: Answers) -> Any:
     """The estimates of a block as a structured array with the fields of `FrictionEstimate`."""
-    sizes = answers.estimate_sizes
-    decode = DECODERS[ESTIMATE_TYPE]
+    places = np.flatnonzero(answers.estimate_sizes)
+    offsets, sizes = answers.estimate_offsets[places], answers.estimate_sizes[places]
+    made = Messages(answers.data, np.zeros(len(places), np.uint8), offsets, sizes, offsets, offsets)
+    _, stamps, numbers = numbers_of(made, 0, ESTIMATE_TYPE)
     kinds = [(name, '<i8' if isinstance(value, int) else '<f8') for name, value in NO_ESTIMATE._asdict().items()]
-    places = np.flatnonzero(sizes)
-    if not len(places):
-        return np.zeros(0, kinds)
-    offsets = answers.estimate_offsets[places]
-    data, size = answers.data, int(sizes[places[0]])
-    if (sizes[places] != size).any():  # frame names of several lengths
-        return np.array(
-            [tuple(decode(data[o : o + s].tobytes())) for o, s in zip(offsets, sizes[places], strict=True)], kinds
-        )
-    raw = data[offsets[:, None] + np.arange(size)]
-    first: FrictionEstimate = decode(raw[0].tobytes())
-    return _columns(raw, first, kinds)
-
-
-def _columns(raw: Any, first: FrictionEstimate, kinds: Any) -> Any:
-    """Fields of equally long messages; ``first`` is the first of them, to be sure of the layout."""
-    layout = next(one for one in LAYOUTS if one.message_type == ESTIMATE_TYPE)
-    made = np.zeros(len(raw), kinds)
-    seconds = np.ascontiguousarray(raw[:, 4:8]).view('<i4')[:, 0].astype(np.int64)
-    nanoseconds = np.ascontiguousarray(raw[:, 8:12]).view('<u4')[:, 0]
-    made['stamp'] = seconds * 1_000_000_000 + nanoseconds
-    begin = raw.shape[1] - layout.size
-    types = {'d': '<f8', 'I': '<u4', 'B': 'u1', 'b': 'i1'}
-    for name, code, offset in zip(layout.fields, layout.codes, layout.offsets, strict=True):
-        width = np.dtype(types[code]).itemsize
-        made[name] = np.ascontiguousarray(raw[:, begin + offset : begin + offset + width]).view(types[code])[:, 0]
-    if tuple(made[0].tolist()) != tuple(first):
-        raise UnsuitedError('an estimate of another layout')
-    return made
+    found = np.zeros(len(places), kinds)
+    for (name, _), column in zip(kinds, (stamps, *numbers), strict=True):
+        found[name] = column
+    return found

@@ -3,21 +3,41 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile
 from seal_friction_ros.offline.work.executor import Workers, nothing
-from seal_friction_ros.offline.work.finished_parts import Kept, Part, Values, input_digests, part_key, try_parts
+from seal_friction_ros.offline.work.finished_parts import (
+    Kept,
+    Part,
+    Values,
+    content_of,
+    input_digests,
+    part_key,
+    try_parts,
+)
 from seal_friction_ros.offline.work.outcome import Outcome
 from seal_friction_ros.offline.work.places import Place, as_path
+
+
+class Chosen(NamedTuple):
+    """What of a bag is used, and how."""
+
+    namespace: str = ''  # as of `open_actuator`
+    mapping: MappingFile | None = None  # likewise
+    override: Configuration | None = None  # instead of the recorded configuration
+
+
+AS_RECORDED = Chosen()
 
 
 def try_bags(
     kind: str,
     bags: Sequence[Place],
     names: tuple[str, ...],
-    call: Callable[[Path, str, Configuration | None], Any],
-    settings: tuple[str, Configuration | None],
+    call: Callable[[Path, Chosen], Any],
+    chosen: Chosen,
     workers: Workers,
     kept: Kept,
     prepare: Callable[[], None] = nothing,
@@ -28,8 +48,8 @@ def try_bags(
         kind: What is computed, also the label of the progress bar.
         bags: The bags: paths, or URLs that are copied where they are computed.
         names: Of the values in a result.
-        call: Picklable function of a bag, a namespace and a configuration, with a result as of `Part`.
-        settings: Namespace and configuration.
+        call: Picklable function of a bag and ``chosen``, with a result as of `Part`.
+        chosen: What of each bag is used, and how.
         workers: Bags at a time, or a cluster.
         kept: Where outcomes are kept, by content and path of a bag and by the settings.
         prepare: As of `try_all`.
@@ -37,25 +57,24 @@ def try_bags(
     Raises:
         ValueError: The work folder or the cluster cannot be used.
     """
-    namespace, override = settings
-    chosen = [namespace, snapshot_text(first_snapshot(override)) if override else '']
+    override, mapping = chosen.override, chosen.mapping
+    known = [chosen.namespace, snapshot_text(first_snapshot(override)) if override else '']
+    known += [content_of(mapping)] if mapping else []
     keys = [f'{number}' for number in range(len(bags))]
     if kept.folder is not None:
         digests = input_digests(bags, workers)
         keys = [
-            part_key(kind, [str(bag), one.result or one.error, *chosen]) for bag, one in zip(bags, digests, strict=True)
+            part_key(kind, [str(bag), one.result or one.error, *known]) for bag, one in zip(bags, digests, strict=True)
         ]
-    calls = [partial(_computed, bag, call, namespace, override) for bag in bags]
+    calls = [partial(_computed, bag, call, chosen) for bag in bags]
     parts = [Part(key, names, one) for key, one in zip(keys, calls, strict=True)]
     outcomes = try_parts(f'{kind} of {len(bags)} bags', parts, workers, kept, prepare)
     return [o._replace(error=_naming(bag, o.error)) if o.error else o for bag, o in zip(bags, outcomes, strict=True)]
 
 
-def _computed(
-    bag: Place, call: Callable[[Path, str, Configuration | None], Any], namespace: str, override: Configuration | None
-) -> Any:
+def _computed(bag: Place, call: Callable[[Path, Chosen], Any], chosen: Chosen) -> Any:
     with as_path(bag) as path:
-        return call(path, namespace, override)
+        return call(path, chosen)
 
 
 def _naming(bag: Place, error: str) -> str:

@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.compiled_pipeline import Answers, Kind, Messages
-from seal_friction_ros.core.estimation.configuration import Configuration
-from seal_friction_ros.core.estimation.messages import LAYOUTS, PRESSURE_TYPE
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers
+from seal_friction_ros.core.estimation.message_blocks import Kind, Messages
+from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
-from seal_friction_ros.offline.bags.bulk_velocity_rows import numbers_of
+from seal_friction_ros.offline.bags.columns import numbers_of
 from seal_friction_ros.offline.replay.bag_health import bag_health
-from seal_friction_ros.offline.replay.bag_parts import try_bags
+from seal_friction_ros.offline.replay.bag_parts import AS_RECORDED, Chosen, try_bags
 from seal_friction_ros.offline.replay.compiled_replay import compile_now, first_configurations
 from seal_friction_ros.offline.replay.health_indicators import Limits, alarms_of, day_of
 from seal_friction_ros.offline.replay.parallel_replay import verify
@@ -55,22 +55,20 @@ class BagSummary(NamedTuple):
     levels: FloatArray  # shape (n, len(LEVEL_COLUMNS)): a row a pressure level
 
 
-def bag_summary(bag: Path, namespace: str = '', override: Configuration | None = None) -> BagSummary:
+def bag_summary(bag: Path, chosen: Chosen = AS_RECORDED) -> BagSummary:
     """Replay a bag and follow its seals.
 
     Args:
         bag: The bag.
-        namespace: Use only topics below it.
-        override: Configuration instead of the recorded one.
+        chosen: What of it is used, and how.
 
     Raises:
         BagError: The bag cannot be read.
     """
-    result = verify(bag, override, namespace, bulk_from=0)  # the health takes the compiled estimator, too
-    replayed = IDENTICAL if result.identical else DIFFERENT if result.recorded_estimates else NOTHING_RECORDED
+    replayed, difference = _replayed(bag, chosen)
     levels, why = _Levels(), ''
     try:
-        seen = bag_health(bag, namespace, override, on_block=levels.add)
+        seen = bag_health(bag, chosen.namespace, chosen.override, on_block=levels.add, mapping=chosen.mapping)
     except BagError as error:
         seen, why = None, str(error)
     day = None if seen is None else day_of(str(bag), seen)
@@ -81,7 +79,7 @@ def bag_summary(bag: Path, namespace: str = '', override: Configuration | None =
         (levels.last - levels.first) * 1e-9,
         sum(topic.message_count for topic in bag_topics(bag).values()),
         replayed,
-        result.first_difference if replayed == DIFFERENT else '',
+        difference,
         day.reversals if day else 0,
         scale.value if scale else math.nan,
         scale.std if scale else math.nan,
@@ -94,6 +92,16 @@ def bag_summary(bag: Path, namespace: str = '', override: Configuration | None =
         why,
         table,
     )
+
+
+def _replayed(bag: Path, chosen: Chosen) -> tuple[str, str]:
+    """Whether the bag replays, and the first difference; a bag with a mapping file holds no estimates."""
+    if chosen.mapping is not None:
+        return NOTHING_RECORDED, ''
+    result = verify(bag, chosen.override, chosen.namespace, bulk_from=0)  # the health takes the compiled estimator, too
+    if result.identical:
+        return IDENTICAL, ''
+    return (DIFFERENT, result.first_difference) if result.recorded_estimates else (NOTHING_RECORDED, '')
 
 
 def _column(table: FloatArray, name: str) -> FloatArray:
@@ -164,8 +172,7 @@ class _Levels:
 
 def _pressures(messages: Messages) -> tuple[Any, FloatArray]:
     """Numbers of the pressure messages of a block, and the larger chamber pressure [Pa] of each."""
-    layout = next(one for one in LAYOUTS if one.message_type == PRESSURE_TYPE)
-    places, _, chambers = numbers_of(messages, Kind.PRESSURE, layout)
+    places, _, chambers = numbers_of(messages, Kind.PRESSURE, PRESSURE_TYPE)
     larger: FloatArray = np.maximum(*chambers)
     return places, larger
 
@@ -173,9 +180,7 @@ def _pressures(messages: Messages) -> tuple[Any, FloatArray]:
 _COMPILED_BAGS = 20  # bags whose laws are compiled before the work (our choice); another law compiles with its bag
 
 
-def summaries(
-    bags: Sequence[Place], namespace: str, override: Configuration | None, workers: Workers, kept: Kept
-) -> list[Outcome[BagSummary]]:
+def summaries(bags: Sequence[Place], chosen: Chosen, workers: Workers, kept: Kept) -> list[Outcome[BagSummary]]:
     """`bag_summary` of each bag, in their order; arguments as of `try_bags`.
 
     Raises:
@@ -183,8 +188,8 @@ def summaries(
     """
     first = bags[:_COMPILED_BAGS]
     outcomes = try_bags(
-        'fleet', bags, BagSummary._fields, bag_summary, (namespace, override), workers, kept,
-        lambda: compile_now(first_configurations(first, namespace, override)),
+        'fleet', bags, BagSummary._fields, bag_summary, chosen, workers, kept,
+        lambda: compile_now(first_configurations(first, chosen.namespace, chosen.override, chosen.mapping)),
     )  # fmt: skip
     return [Outcome(_of_values(one.result) if one.result else None, one.error) for one in outcomes]
 

@@ -1,16 +1,18 @@
 """Comparison of one topic of two bags, paired by stamp: first, largest and root mean square difference."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, astuple, dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from seal_friction_ros.core.estimation.messages import DECODERS, ESTIMATE_TYPE
-from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics, read_messages
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile, is_of_machine, open_actuator
+from seal_friction_ros.offline.bags.bag import BagError, BagMessage, TopicInfo, bag_topics, read_messages
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,20 @@ class FieldDifference:
 
 _Numbers = npt.NDArray[np.int64]
 _Decoded = tuple[bytes, dict[str, Any]]  # bytes and fields of a message
+
+
+class _Topic(NamedTuple):
+    """A topic of a bag."""
+
+    bag: Path
+    name: str
+    read: Callable[[], Iterator[BagMessage]]
+
+    def messages(self) -> Iterator[BagMessage]:
+        """Its messages."""
+        return (message for message in self.read() if message.topic == self.name)
+
+
 _NO_DIFFERENCE = FieldDifference(0.0, 0.0, 0)
 
 
@@ -63,7 +79,16 @@ class BagComparison:
         )
 
 
-def compare(bag_a: Path, bag_b: Path, topic: str = '', atol: float = 0.0, rtol: float = 0.0) -> BagComparison:
+def compare(
+    bag_a: Path,
+    bag_b: Path,
+    topic: str = '',
+    atol: float = 0.0,
+    rtol: float = 0.0,
+    *,
+    namespace: str = '',
+    mapping: MappingFile | None = None,
+) -> BagComparison:
     """Compare a topic of two bags, each message with the one of the same stamp.
 
     Messages of equal stamp in one bag are paired in order, the last with the last, since recordings of one run mostly
@@ -76,28 +101,30 @@ def compare(bag_a: Path, bag_b: Path, topic: str = '', atol: float = 0.0, rtol: 
         topic: Topic; by default that of the friction estimates, which may have another name in each bag.
         atol: Absolute tolerance, in the unit of each field.
         rtol: Relative tolerance [-].
+        namespace: As of `open_actuator`.
+        mapping: Likewise; then the estimates are made here.
 
     Raises:
         BagError: A bag cannot be read or has no such topic, a message on it is of an unknown type, or no stamp is in
             both bags.
     """
-    topic_a, topic_b = (topic or _estimate_topic(bag) for bag in (bag_a, bag_b))
-    stamps_a, stamps_b = _stamps(bag_a, topic_a), _stamps(bag_b, topic_b)
+    a, b = (_topic_of(bag, topic, namespace, mapping) for bag in (bag_a, bag_b))
+    stamps_a, stamps_b = _stamps(a), _stamps(b)
     numbers_a, numbers_b = _pairs(stamps_a, stamps_b)
-    topics = topic_a if topic_a == topic_b else f'{topic_a} and {topic_b}'
+    topics = a.name if a.name == b.name else f'{a.name} and {b.name}'
     if not len(numbers_a):
         raise BagError(f'{bag_a} and {bag_b}: no stamp on {topics} is in both')
     identical, first = True, ''
     totals: dict[str, FieldDifference] = {}  # with the sum of squares instead of the RMS
-    for number, a, b in _decoded_pairs((bag_a, topic_a, numbers_a), (bag_b, topic_b, numbers_b)):
-        identical = identical and a[0] == b[0]
-        for name, value in a[1].items():
-            other = b[1].get(name)
-            difference, within = _difference(value, other, atol, rtol)
+    for number, one, other in _decoded_pairs((a, numbers_a), (b, numbers_b)):
+        identical = identical and one[0] == other[0]
+        for name, value in one[1].items():
+            then = other[1].get(name)
+            difference, within = _difference(value, then, atol, rtol)
             largest, squares, outside = astuple(totals.get(name, _NO_DIFFERENCE))
             totals[name] = FieldDifference(max(largest, difference), squares + difference**2, outside + (not within))
             if not within and not first:
-                first = f'message {number} at {a[1].get("stamp")} ns: {name} {value!r} -> {other!r}'
+                first = f'message {number} at {one[1].get("stamp")} ns: {name} {value!r} -> {then!r}'
     pairs, counts = len(numbers_a), (len(stamps_a), len(stamps_b))
     fields = {name: replace(total, rms=math.sqrt(total.rms / pairs)) for name, total in totals.items()}
     if max(counts) > pairs:
@@ -133,44 +160,51 @@ def _first_without_partner(stamps_a: _Numbers, stamps_b: _Numbers, numbers_a: _N
 
 
 def _decoded_pairs(
-    first: tuple[Path, str, _Numbers], second: tuple[Path, str, _Numbers]
+    first: tuple[_Topic, _Numbers], second: tuple[_Topic, _Numbers]
 ) -> Iterator[tuple[int, _Decoded, _Decoded]]:
     """Number in the first bag, and both messages, of each pair; memory is that of messages in another order."""
     messages_a, messages_b = _chosen(*first), _chosen(*second)
     waiting: dict[int, _Decoded] = {}
-    for number_a, number_b in zip(first[2].tolist(), second[2].tolist(), strict=True):
+    for number_a, number_b in zip(first[1].tolist(), second[1].tolist(), strict=True):
         _, a = next(messages_a)
         while number_b not in waiting:
             found, waiting[found] = next(messages_b)
         yield number_a + 1, a, waiting.pop(number_b)
 
 
-def _chosen(bag: Path, topic: str, numbers: _Numbers) -> Iterator[tuple[int, _Decoded]]:
+def _chosen(topic: _Topic, numbers: _Numbers) -> Iterator[tuple[int, _Decoded]]:
     """The messages on a topic with these numbers."""
     wanted = np.sort(numbers).tolist()
     place = 0
-    for number, message in enumerate(_of_topic(bag, topic)):
+    for number, message in enumerate(topic.messages()):
         if place < len(wanted) and number == wanted[place]:
             place += 1
-            yield number, (message.data, _fields(bag, message))
+            yield number, (message.data, _fields(topic.bag, message))
 
 
-def _stamps(bag: Path, topic: str) -> _Numbers:
+def _stamps(topic: _Topic) -> _Numbers:
     """Stamp of each message on a topic [ns]; 0 if its type has none."""
-    found = np.fromiter((_fields(bag, message).get('stamp', 0) for message in _of_topic(bag, topic)), np.int64)
+    found = np.fromiter((_fields(topic.bag, message).get('stamp', 0) for message in topic.messages()), np.int64)
     if not len(found):
-        raise BagError(f'{bag}: no message on {topic}')
+        raise BagError(f'{topic.bag}: no message on {topic.name}')
     return found
 
 
-def _of_topic(bag: Path, topic: str) -> Iterator[BagMessage]:
-    return (message for message in read_messages(bag) if message.topic == topic)
+def _topic_of(bag: Path, name: str, namespace: str, mapping: MappingFile | None) -> _Topic:
+    """Topic to compare: ``name``, else that of the estimates; of a machine one of those of an actuator."""
+    known = bag_topics(bag)
+    if name not in known and is_of_machine(bag, known, mapping):
+        actuator = open_actuator(bag, namespace, mapping)
+        return _Topic(bag, name or actuator.topics.estimate, partial(actuator.messages, with_answers=True))
+    return _Topic(bag, name or _estimate_topic(bag, known, namespace), partial(read_messages, bag))
 
 
-def _estimate_topic(bag: Path) -> str:
-    found = [topic for topic, info in bag_topics(bag).items() if info.type_name == ESTIMATE_TYPE]
+def _estimate_topic(bag: Path, known: Mapping[str, TopicInfo], namespace: str) -> str:
+    found = [topic for topic, info in known.items() if info.type_name == ESTIMATE_TYPE]
+    if len(found) > 1 and namespace:
+        found = [topic for topic in found if topic.startswith(f'/{namespace.strip("/")}/')]
     if len(found) != 1:
-        raise BagError(f'{bag}: {len(found)} topics of {ESTIMATE_TYPE}: choose one with --topic')
+        raise BagError(f'{bag}: {len(found)} topics of {ESTIMATE_TYPE}: choose one with --topic or --namespace')
     return found[0]
 
 

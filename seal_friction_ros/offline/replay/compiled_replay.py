@@ -9,16 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.compiled_pipeline import (
-    Answers,
-    Bytes,
-    Integers,
-    Kind,
-    Messages,
-    UnsuitedError,
-    receive_all,
-)
+from seal_friction_ros.core.estimation.compiled_pipeline import Answers, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, Snapshot, parse_snapshot
+from seal_friction_ros.core.estimation.message_blocks import Bytes, Integers, Kind, Messages, UnsuitedError
 from seal_friction_ros.core.estimation.messages import (
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,
@@ -29,10 +22,11 @@ from seal_friction_ros.core.estimation.pipeline import PipelineState, init
 from seal_friction_ros.core.foundation.compiled import compiled
 from seal_friction_ros.files import default_configuration
 from seal_friction_ros.offline.bags import block_reader
-from seal_friction_ros.offline.bags.bag import read_messages
-from seal_friction_ros.offline.bags.block_reader import KindOf, read_in_bulk
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.block_reader import read_in_bulk
+from seal_friction_ros.offline.bags.gathered import KindOf
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS
-from seal_friction_ros.offline.bags.topics import TYPES, Topics, find_topics
+from seal_friction_ros.offline.bags.topics import TYPES, Topics
 from seal_friction_ros.offline.replay.answer_comparison import AnswerStream, ReplayResult, replay_result
 from seal_friction_ros.offline.work.places import Place
 
@@ -161,7 +155,9 @@ def compile_now(configurations: Iterable[Configuration] = ()) -> None:
     block_reader.compile_now()
 
 
-def first_configurations(bags: Sequence[Place], namespace: str, override: Configuration | None) -> list[Configuration]:
+def first_configurations(
+    bags: Sequence[Place], namespace: str, override: Configuration | None, mapping: MappingFile | None = None
+) -> list[Configuration]:
     """What each bag is replayed with at its beginning; the default where a bag has no configuration or is unreadable.
 
     Only for `compile_now`: the replay itself reports what is wrong with a bag.
@@ -170,16 +166,18 @@ def first_configurations(bags: Sequence[Place], namespace: str, override: Config
         bags: The bags; a URL is not read.
         namespace: Use only topics below it.
         override: Configuration instead of the recorded ones.
+        mapping: As of `open_actuator`.
     """
     paths = [bag for bag in bags if isinstance(bag, Path)]
-    return [override] if override else [_first_configuration(bag, namespace) for bag in paths]
+    return [override] if override else [_first_configuration(bag, namespace, mapping) for bag in paths]
 
 
-def _first_configuration(bag: Path, namespace: str) -> Configuration:
+def _first_configuration(bag: Path, namespace: str, mapping: MappingFile | None) -> Configuration:
     try:
-        topic = find_topics(bag, namespace).configuration
+        source = open_actuator(bag, namespace, mapping)
+        topic = source.topics.configuration
         if topic:
-            first = next(message.data for message in read_messages(bag) if message.topic == topic)
+            first = next(message.data for message in source.messages() if message.topic == topic)
             return parse_snapshot(decode_text(first)).configuration
     except (StopIteration, ValueError, OSError, *ERRORS):
         pass

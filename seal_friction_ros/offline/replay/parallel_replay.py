@@ -12,7 +12,7 @@ from seal_friction_ros.core.foundation.compiled import has_compiler
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
 from seal_friction_ros.offline.bags.topics import Topics, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
-from seal_friction_ros.offline.replay.bag_parts import try_bags
+from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
 from seal_friction_ros.offline.replay.replay import count_messages, replay
 from seal_friction_ros.offline.work.executor import Workers, nothing
 from seal_friction_ros.offline.work.finished_parts import NOWHERE, Kept
@@ -101,15 +101,15 @@ def replay_many(
     if sum(map(_size, bags)) > _INPUT_SIZE * BULK_FROM and has_compiler():
         bulk_from, prepare = 0, partial(_compile, bags, namespace, override)
     call = partial(_verified, bulk_from=bulk_from)
-    outcomes = try_bags('replay', bags, _NAMES, call, (namespace, override), workers, kept, prepare)
+    outcomes = try_bags('replay', bags, _NAMES, call, Chosen(namespace, override=override), workers, kept, prepare)
     return [Outcome(ReplayResult(**one.result) if one.result else None, one.error) for one in outcomes]
 
 
 _NAMES = tuple(field.name for field in fields(ReplayResult))
 
 
-def _verified(bag: Path, namespace: str, override: Configuration | None, *, bulk_from: int) -> dict[str, Any]:
-    return asdict(verify(bag, override, namespace, bulk_from=bulk_from))
+def _verified(bag: Path, chosen: Chosen, *, bulk_from: int) -> dict[str, Any]:
+    return asdict(verify(bag, chosen.override, chosen.namespace, bulk_from=bulk_from))
 
 
 def _compile(bags: Sequence[Place], namespace: str, override: Configuration | None) -> None:

@@ -1,6 +1,7 @@
 """Replay of a bag through the estimator, without ROS graph or clock: byte for byte the answers of the live node."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,6 +36,7 @@ from seal_friction_ros.core.machine.machine_snapshot import (
 from seal_friction_ros.core.machine.message_fields import full_name
 from seal_friction_ros.core.machine.outputs import due_commands
 from seal_friction_ros.files import default_configuration, load_configuration, load_parameter_file, with_seal
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, is_of_machine, open_actuator
 from seal_friction_ros.offline.bags.bag import (
     CONFIGURATION_TOPIC,
     STATE_NAME,
@@ -94,16 +96,16 @@ class Replay:
     configuration in the bag. A bag without configuration is replayed by the default one, with the built-in mapping.
 
     Args:
-        bag: The bag.
+        bag: The bag, or one actuator of it.
         override: Configuration of each actuator instead of the recorded one.
-        namespace: Use only topics below it.
+        namespace: Use only topics below it; the name of an actuator of a machine: that actuator alone.
 
     Raises:
         BagError: The bag cannot be read, or has not what the estimator needs.
     """
 
-    def __init__(self, bag: Path, override: Configuration | None = None, namespace: str = '') -> None:
-        self.topics: Mapping[str, TopicInfo] = bag_topics(bag)
+    def __init__(self, bag: Path | ActuatorBag, override: Configuration | None = None, namespace: str = '') -> None:
+        self._bag, self.topics, self._read, self._namespace = _source(bag, namespace)
         """topics of the bag"""
         self.answers: dict[str, str] = {}
         """topic -> message type of all that the machine makes, in the order in which it makes them"""
@@ -115,8 +117,8 @@ class Replay:
         """made so far"""
         self.versions: set[int] = set()
         """of the algorithm that made the recorded configurations used"""
-        self._bag, self._override, self._namespace = bag, override, namespace
-        self._configuration = find_topic(bag, CONFIGURATION_TYPE, namespace, self.topics)
+        self._override = override
+        self._configuration = find_topic(self._bag, CONFIGURATION_TYPE, self._namespace, self.topics)
         self._state_topic = f'{(self._configuration or CONFIGURATION_TOPIC).rpartition("/")[0]}/{STATE_NAME}'
         self.kept: Collection[str] = {*self.topics, self._state_topic}
         """topics that the bag of a replay keeps, besides the answers"""
@@ -146,7 +148,7 @@ class Replay:
             text = machine_text(first_of_replay(self._override or default_configuration()))
             yield Step(BagMessage(CONFIGURATION_TOPIC, CONFIGURATION_TYPE, 0, encode_text(text)), ())
         newest, due = NEVER, NEVER  # [ns] log time of the message before, and of the next state
-        for message in read_messages(self._bag):
+        for message in self._read():
             if message.topic == self._state_topic:
                 continue
             if due <= message.log_time > newest:  # of messages of one time none is before a state and another after it
@@ -175,7 +177,7 @@ class Replay:
         return BagError(f'{self._bag}: message on {message.topic} at {message.log_time} ns: {error}')
 
     def _first_snapshot(self) -> MachineSnapshot | None:
-        found = (message for message in read_messages(self._bag) if message.topic == self._configuration)
+        found = (message for message in self._read() if message.topic == self._configuration)
         first = next(found, None)
         return None if first is None else self._parsed(first)
 
@@ -281,6 +283,25 @@ class Replay:
         return answers + [Answer(command.topic, full_name(command.type_name), command.data) for command in commands]
 
 
+class _Source(NamedTuple):
+    """Where the messages come from."""
+
+    path: Path
+    topics: Mapping[str, TopicInfo]
+    read: Callable[[], Iterable[BagMessage]]
+    namespace: str  # of the topics that are used
+
+
+def _source(bag: Path | ActuatorBag, namespace: str) -> _Source:
+    if isinstance(bag, Path):
+        topics = bag_topics(bag)
+        names_node = not namespace or find_topic(bag, CONFIGURATION_TYPE, namespace, topics)
+        if names_node or not is_of_machine(bag, topics, None):
+            return _Source(bag, topics, partial(read_messages, bag), namespace)
+        bag = open_actuator(bag, namespace)
+    return _Source(bag.path, bag.used, bag.messages, '')
+
+
 def replay(
     bag: Path, override: Configuration | None = None, out: Path | None = None, namespace: str = ''
 ) -> ReplayResult:
@@ -292,7 +313,7 @@ def replay(
         bag: The bag, of any machine.
         override: Configuration instead of the recorded one, of every actuator.
         out: Bag to write.
-        namespace: Use only topics below it.
+        namespace: As of `Replay`.
 
     Raises:
         BagError: The bag cannot be read, or ``out`` exists already; then nothing is left at ``out``.

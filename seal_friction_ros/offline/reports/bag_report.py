@@ -13,6 +13,7 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.parameters import Meaning, meanings
 from seal_friction_ros.core.foundation.units import BAR, MM, MS, UM
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation, verdicts
 from seal_friction_ros.offline.reports.bag_evaluation import BagEvaluation, PressureLevel
@@ -38,13 +39,14 @@ _SHOWN_CONFIGURATIONS = 2  # so many of the first and of the last, in a bag with
 
 
 @house_style()
-def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
+def write_report(bag: Path, out: Path, namespace: str = '', mapping: MappingFile | None = None) -> ReportSummary:
     """Write the report of a bag of inputs and estimates; see `write_page`.
 
     Args:
         bag: The bag.
         out: HTML file.
-        namespace: Only topics below it count; for bags of several actuators.
+        namespace: As of `open_actuator`.
+        mapping: Likewise; then the estimates are made here.
 
     Returns:
         Files, and as numbers `evaluation_numbers`, ``placeholder_seals`` and ``tracking``, a list of `TrackingStretch`.
@@ -53,7 +55,7 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         BagError: The bag cannot be read, or holds no estimates.
         ValueError: The report cannot be written.
     """
-    run = read_run(bag, namespace)
+    run = read_run(bag, namespace, mapping)
     evaluation, tracking = bag_evaluation.evaluate_run(run), tracking_evaluation.evaluate_tracking(run)
     stretches = tracking.stretches if tracking else ()
     snapshots = (snapshot for _, _, snapshot in tracking_evaluation.configuration_stretches(run))
@@ -63,7 +65,7 @@ def write_report(bag: Path, out: Path, namespace: str = '') -> ReportSummary:
         'bag',
         run_figures(run, evaluation) + (tracking_plots(run, tracking) if tracking else []),
         verdict=verdicts.of_bag(_verdict_numbers(bag, run, evaluation, tracking, has_placeholder)),
-        head=head_of(f'report {bag}', bag.name, data_date(evaluation.start), seals_text(mounted_seals(run))),
+        head=head_of(f'report {bag}', run.name, data_date(evaluation.start), seals_text(mounted_seals(run))),
         warnings=[
             *([_sentence(PLACEHOLDER_WARNING)] if has_placeholder else []),
             *evaluation.friction.notes,

@@ -13,6 +13,7 @@ from seal_friction_ros.core.foundation.units import BAR, MM
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_path, read_yaml
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile
 from seal_friction_ros.offline.bags.recorded_run import RecordedRun, read_run
 from seal_friction_ros.offline.reports import bag_evaluation, tracking_evaluation, verdicts
 from seal_friction_ros.offline.reports import figure_style as style
@@ -59,28 +60,32 @@ def is_seal(path: Path) -> bool:
 
 
 @house_style()
-def write_comparison(a: Path, b: Path, out: Path) -> ReportSummary:
+def write_comparison(
+    a: Path, b: Path, out: Path, namespace: str = '', mapping: MappingFile | None = None
+) -> ReportSummary:
     """Write the page of two bags or of two seal files; see `write_page`.
 
     Args:
         a: The first one, which changes are relative to.
         b: The second one.
         out: HTML file.
+        namespace: Of bags, as of `open_actuator`.
+        mapping: Likewise.
 
     Raises:
         ValueError: One is a bag and the other a seal file, or one of them cannot be read.
     """
     if is_seal(a) != is_seal(b):
         raise ValueError(f'{a}, {b}: one is a bag and the other a seal file: give two of a kind')
-    return _compare_seals(a, b, out) if is_seal(a) else _compare_runs(a, b, out)
+    return _compare_seals(a, b, out) if is_seal(a) else _compare_runs(a, b, out, namespace, mapping)
 
 
 # -- two runs ---------------------------------------------------------------------------------------------------------
 
 
-def _compare_runs(a: Path, b: Path, out: Path) -> ReportSummary:
+def _compare_runs(a: Path, b: Path, out: Path, namespace: str, mapping: MappingFile | None) -> ReportSummary:
     names = (a.name, b.name) if a.name != b.name else (str(a), str(b))
-    runs = tuple(_read(path, name) for path, name in zip((a, b), names, strict=True))
+    runs = tuple(_read(path, name, namespace, mapping) for path, name in zip((a, b), names, strict=True))
     changes = common_changes(runs[0].levels, runs[1].levels)
     starts = common_changes(runs[0].breakaway, runs[1].breakaway)
     told = [mean_change('sliding friction', changes), mean_change('breakaway force', starts)]
@@ -94,8 +99,8 @@ def _compare_runs(a: Path, b: Path, out: Path) -> ReportSummary:
     return _write(out, f'compare {a} {b}', names, facts, plots, known, {'sliding': changes, 'breakaway': starts})
 
 
-def _read(path: Path, name: str) -> _Run:
-    run = read_run(path)
+def _read(path: Path, name: str, namespace: str, mapping: MappingFile | None) -> _Run:
+    run = read_run(path, namespace, mapping)
     friction = bag_evaluation.evaluate_run(run).friction
     return _Run(name, run, friction.sliding, friction.breakaway, tracking_evaluation.evaluate_tracking(run))
 

@@ -11,8 +11,8 @@ from seal_friction_ros.core.estimation import messages
 from seal_friction_ros.core.estimation.records import Position, Pressure, Velocity
 from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
-from seal_friction_ros.offline.bags.bag import BagError, bag_topics, read_messages
-from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
+from seal_friction_ros.offline.bags.bag import BagError
 
 NUMBER, NUMBERS = 'std_msgs/msg/Float64', 'std_msgs/msg/Float64MultiArray'
 _HEADER = b'\x00\x01'  # CDR, little endian
@@ -37,7 +37,13 @@ def first_number(type_name: str, data: bytes) -> float:
         raise ValueError(f'malformed: {error}') from None
 
 
-def read_output_gain(bag: Path, topic: str, known: RecordedAxisSettings, namespace: str = '') -> OutputGain:
+def read_output_gain(
+    bag: Path,
+    topic: str,
+    known: RecordedAxisSettings,
+    namespace: str = '',
+    mapping: MappingFile | None = None,
+) -> OutputGain:
     """Gain from force to the command on a topic.
 
     Each velocity sample takes the newest command, pressures and position.
@@ -46,27 +52,28 @@ def read_output_gain(bag: Path, topic: str, known: RecordedAxisSettings, namespa
         bag: Command, pressures, velocity and, if measured, position.
         topic: Topic of the command, a `std_msgs/Float64` or `Float64MultiArray`.
         known: Areas of both chambers.
-        namespace: As of `find_topics`.
+        namespace: As of `open_actuator`.
+        mapping: Likewise.
 
     Raises:
         BagError: The bag lacks something, or cannot tell the gain.
     """
     if not (known.area_a and known.area_b):
         raise BagError(f'{topic}: give --area-a and --area-b [m2]: the gain needs the force of the pressures')
-    found = bag_topics(bag).get(topic)
+    source = open_actuator(bag, namespace, mapping)
+    found = source.infos.get(topic)
     if found is None or found.type_name not in (NUMBER, NUMBERS):
         what = 'is not in it' if found is None else f'is {found.type_name}'
         raise BagError(f'{bag}: the command {topic} {what}: it has to be {NUMBER} or {NUMBERS}')
-    topics = find_topics(bag, namespace)
     held: dict[str, Any] = {}
     command, rows = math.nan, []
-    for message in read_messages(bag):
+    for message in source.messages():
         if message.topic == topic:
             try:
                 command = first_number(message.type_name, message.data)
             except ValueError as error:
                 raise BagError(f'{bag}: {topic}: {error}') from None
-        elif message.topic in topics:
+        elif message.topic in source.topics:
             sample = messages.DECODERS[message.type_name](message.data)
             held[type(sample).__name__] = sample
             pressure: Pressure | None = held.get('Pressure')

@@ -52,8 +52,8 @@ from seal_friction_ros.core.tuning.settings import (
 )
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration, read_parameters
-from seal_friction_ros.offline.bags.bag import BagError, bag_topics
-from seal_friction_ros.offline.bags.topics import find_topics
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, MappingFile, open_actuator
+from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.replay.replay import Replay
 from seal_friction_ros.offline.work.atomic_file import write_whole
 from seal_friction_ros.offline.work.progress import progress
@@ -176,6 +176,7 @@ class BagTuning:
     track: RecordedTrack
     known: RecordedAxisSettings
     found: RecordedTuning
+    actuator: str = ''  # of a machine
 
     @property
     def result(self) -> str:
@@ -289,7 +290,11 @@ def tune_simulator(
 
 
 def tune_bag(
-    bag: Path, known: RecordedAxisSettings, configuration: Configuration | None = None, namespace: str = ''
+    bag: Path,
+    known: RecordedAxisSettings,
+    configuration: Configuration | None = None,
+    namespace: str = '',
+    mapping: MappingFile | None = None,
 ) -> BagTuning:
     """Find the feed-forward that matches the friction in a bag of a real axis.
 
@@ -297,23 +302,25 @@ def tune_bag(
         bag: Pressure, velocity, force sum and reference; the estimates are computed anew.
         known: Known properties of the axis.
         configuration: Seals, estimator and feed-forward instead of those in the bag.
-        namespace: Only topics below it count.
+        namespace: As of `open_actuator`.
+        mapping: Likewise.
 
     Raises:
         BagError: The bag cannot be read, or an input is missing in it.
     """
-    recording, track, recorded = read_recording(bag, configuration, namespace)
+    actuator = open_actuator(bag, namespace, mapping)
+    recording, track, recorded = read_recording(actuator, configuration)
     try:
         found = tune_recorded_axis(recording, recorded.feedforward, known)
     except ValueError as error:
         raise BagError(f'{bag}: {error}') from None
     tuned = tuple(parameter for parameter, is_identified in found.identified.items() if is_identified)
     motion = f'{len(recording.estimates)} samples, {recording.time[-1]:.3f} s'
-    name = bag.resolve().name
+    name = actuator.name
     task = TuningTask(
         f'bag {name}', motion, _seals_text(recorded), recorded.feedforward, tuned, recorded.has_placeholder
     )
-    return BagTuning(name, task, recording, track, known, found)
+    return BagTuning(name, task, recording, track, known, found, actuator.actuator)
 
 
 def sensor_noise(settings: TuningSettings) -> FloatArray:
@@ -328,7 +335,7 @@ def _seals_text(configuration: Configuration) -> str:
 
 
 def read_recording(
-    bag: Path, override: Configuration | None = None, namespace: str = ''
+    actuator: ActuatorBag, override: Configuration | None = None
 ) -> tuple[Recording, RecordedTrack, Configuration]:
     """Recording of an axis from the first reference on, its track, and the last configuration in the bag.
 
@@ -338,7 +345,7 @@ def read_recording(
     Raises:
         BagError: The bag cannot be read, or an input is missing in it.
     """
-    topics = find_topics(bag, namespace)
+    topics, bag = actuator.topics, actuator.path
     needed = {
         messages.REFERENCE_TYPE: (topics.reference, 'the feed-forward is computed from the reference'),
         messages.FORCE_TYPE: (topics.force, 'the friction is computed from the force sum'),
@@ -353,9 +360,8 @@ def read_recording(
     estimates: list[FrictionEstimate] = []
     conditioned = NO_REFERENCE
     motions, rows = [], []
-    total = sum(info.message_count for info in bag_topics(bag).values())
-    with progress(f'read {bag.name}', total) as advance:
-        for count, step in enumerate(Replay(bag, override, namespace).steps(), start=1):
+    with progress(f'read {bag.name}', actuator.total) as advance:
+        for count, step in enumerate(Replay(actuator, override).steps(), start=1):
             if count % 1000 == 0:
                 advance(1000)
             message = step.message

@@ -18,9 +18,10 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.compiled_pipeline import Kind, Messages, UnsuitedError, receive_all
+from seal_friction_ros.core.estimation.compiled_pipeline import receive_all
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters
 from seal_friction_ros.core.estimation.feedforward import FADED_IN
+from seal_friction_ros.core.estimation.message_blocks import Kind, Messages, UnsuitedError
 from seal_friction_ros.core.estimation.messages import (
     ESTIMATE_TYPE,
     FEEDFORWARD_TYPE,

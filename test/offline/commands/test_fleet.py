@@ -56,10 +56,10 @@ def test_finished_bags_are_not_computed_again_and_failed_ones_only_when_asked(fl
     assert len(list((tmp_path / 'work').iterdir())) == 5
     computed = tmp_path / 'computed'
 
-    def noted(bag, namespace='', override=None):
+    def noted(bag, chosen):
         with computed.open('a') as file:
             file.write(f'{bag.name}\n')
-        return summary(bag, namespace, override)
+        return summary(bag, chosen)
 
     summary = module.bag_summary
     monkeypatch.setattr(module, 'bag_summary', noted)

@@ -15,6 +15,7 @@ from seal_friction_ros.core.friction.mounting import CHAMBERS
 from seal_friction_ros.core.friction.seal_file import mount_seals
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.replay.bag_parts import Chosen
 from seal_friction_ros.offline.replay.bag_summary import (
     IDENTICAL,
     LEVEL_COLUMNS,
@@ -30,7 +31,7 @@ FRICTION = actuator_friction(SEALS, 3e6, 3e6).coulomb_friction
 
 def test_scale_drift_and_residual_of_a_day_are_those_of_its_machine(tmp_path):
     worn = replace(Day(FRICTION), scale=lambda time: 1.0 + 0.4 * time / 80.0)
-    found = bag_summary(write_day(tmp_path / 'bag', worn, 80.0), '', chosen_configuration(None, SEAL))
+    found = bag_summary(write_day(tmp_path / 'bag', worn, 80.0), Chosen(override=chosen_configuration(None, SEAL)))
     assert found.replay == NOTHING_RECORDED
     assert found.duration == pytest.approx(80.0, abs=0.1)
     assert found.messages == 3 * 8000
@@ -54,7 +55,7 @@ def test_levels_are_by_the_larger_pressure_of_the_time_and_no_nonsense_makes_one
         return message._replace(data=encode(Pressure(message.log_time, 1.0e6, high), b'rod'))
 
     bag = rewrite(source, tmp_path / 'bag', changed)
-    levels = bag_summary(bag, '', chosen_configuration(None, SEAL)).levels
+    levels = bag_summary(bag, Chosen(override=chosen_configuration(None, SEAL))).levels
     table = dict(zip(LEVEL_COLUMNS, levels.T, strict=True))
     np.testing.assert_array_equal(table['pressure'], [2.5e6, 7.5e6])
     assert table['samples'][0] == pytest.approx(2.0 * table['samples'][1], rel=0.2)

@@ -20,9 +20,9 @@ from mcap.records import Channel, DataEnd, Footer, Header, Message, Schema
 from mcap.writer import CompressionType, Writer
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.compiled_pipeline import Kind, UnsuitedError
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.estimation.estimator import EstimatorSettings
+from seal_friction_ros.core.estimation.message_blocks import Kind, UnsuitedError
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     ESTIMATE_TYPE,

@@ -23,10 +23,11 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.core.machine import machine as m
 from seal_friction_ros.core.machine.machine_snapshot import machine_text, snapshot_of
+from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.bags.bag import BagMessage, BagWriter, read_messages
 from seal_friction_ros.offline.bags.topics import find_topics
 from seal_friction_ros.offline.replay.compiled_replay import replay_in_bulk
-from seal_friction_ros.offline.replay.replay import replay
+from seal_friction_ros.offline.replay.replay import Replay, replay
 
 MS = 1_000_000  # [ns]
 FIRST, LAST = 0.2, 0.45  # [s] while inputs come late
@@ -182,5 +183,8 @@ def test_a_machine_with_late_inputs_replays_to_the_byte(tmp_path: Path):
     assert marked == 3 * 300
     forces = [one.force for one in of(tmp_path / 'replayed', FEEDFORWARD_TYPE)]
     assert 0.0 in forces[1200:]
+    alone = open_actuator(tmp_path / 'replayed', 'arm')
+    replayed = [answer.data for step in Replay(alone).steps() for answer in step.answers]
+    assert replayed == [one.data for one in read_messages(tmp_path / 'replayed') if one.topic.startswith('/arm/')]
     in_time = rewrite(tmp_path / 'replayed', tmp_path / 'in_time', lambda _, one: one._replace(publish_time=None))
     assert not replay(in_time).identical

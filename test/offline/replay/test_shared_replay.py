@@ -12,7 +12,7 @@ from harness.example_bags import as_recorded, rewrite, write_inputs
 from mcap.writer import Writer
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
-from seal_friction_ros.core.estimation.compiled_pipeline import Kind
+from seal_friction_ros.core.estimation.message_blocks import Kind
 from seal_friction_ros.core.estimation.messages import (
     ESTIMATE_TYPE,
     FORCE_TYPE,

@@ -31,6 +31,7 @@ from seal_friction_ros.core.tuning.settings import TuningSettings
 from seal_friction_ros.core.tuning.simulated_axis import force_limit
 from seal_friction_ros.files import load_configuration, load_parameter_file
 from seal_friction_ros.offline.bags import bag as b
+from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.reports.formatting import number
 from seal_friction_ros.offline.tuning.tune import MADE_BY, read_recording, sensor_noise, tune_simulator
@@ -243,7 +244,7 @@ def test_given_mass_and_delay_are_used(axis: Path, tmp_path: Path, capsys):
 
 
 def test_recording_has_the_inputs_of_the_pipeline(axis: Path):
-    recording, track, configuration = read_recording(axis)
+    recording, track, configuration = read_recording(open_actuator(axis))
     assert len(recording.estimates) == len(track.position) == 2000
     assert recording.motions[50].reference_velocity == Sine().at(0.05).velocity
     assert np.isfinite(recording.force_sum).all()

@@ -14,18 +14,15 @@ from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import PRESSURE_TYPE, VELOCITY_TYPE, encode
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, Temperature, Velocity
 from seal_friction_ros.offline.bags import bag as b
-from seal_friction_ros.offline.bags.bulk_velocity_rows import rows_in_bulk
-from seal_friction_ros.offline.bags.topics import find_topics
-from seal_friction_ros.offline.bags.velocity_rows import VelocityRows, read_velocity_rows
+from seal_friction_ros.offline.bags.actuator_bag import open_actuator
+from seal_friction_ros.offline.bags.columns import VelocityRows, read_velocity_rows
 
 TEMPERATURE = 'sensor_msgs/msg/Temperature'
 
 
 def both(bag: Path) -> VelocityRows:
     """Rows read one by one, which are those in bulk to the bit."""
-    topics = find_topics(bag)
-    rows, bulk = read_velocity_rows(bag, topics, bulk_from=10**9), rows_in_bulk(bag, topics)
-    assert bulk is not None
+    rows, bulk = (read_velocity_rows(open_actuator(bag), bulk_from=count) for count in (10**9, 0))
     assert np.array_equal(rows.stamps, bulk.stamps)
     assert rows.columns.tobytes() == bulk.columns.tobytes()
     assert rows.configuration == bulk.configuration
@@ -87,6 +84,6 @@ def test_a_malformed_message_is_named_whoever_reads(tmp_path: Path, damage):
     bag = rewrite(ROOT / 'bags' / 'pull_test', tmp_path / 'bag', change)
     bad = list(b.read_messages(bag))[501]
     assert bad.type_name in TOPICS
-    assert rows_in_bulk(bag, find_topics(bag)) is None
-    with pytest.raises(ValueError, match=f'message on {bad.topic} at {bad.log_time} ns'):
-        read_velocity_rows(bag, find_topics(bag), bulk_from=0)
+    for bulk_from in (0, 10**9):
+        with pytest.raises(ValueError, match=f'message on {bad.topic} at {bad.log_time} ns'):
+            read_velocity_rows(open_actuator(bag), bulk_from=bulk_from)

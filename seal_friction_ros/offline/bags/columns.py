@@ -1,0 +1,291 @@
+"""A bag as columns, once: the numbers of its messages as arrays, block by block, and what was newest at each sample.
+
+Every reader of a bag that wants numbers and not messages takes them from here: no Python object for each message, and
+memory for what is kept alone. Long bags of this project are read in bulk, others message by message: the same blocks.
+"""
+
+import math
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.message_blocks import Messages, UnsuitedError
+from seal_friction_ros.core.estimation.messages import LAYOUTS, LONGEST_FRAME, SECOND, decode, decode_text
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.compiled import has_compiler
+from seal_friction_ros.core.friction.states import FrictionState
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
+from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.mcap_reader import ERRORS
+from seal_friction_ros.offline.bags.topics import TYPES
+from seal_friction_ros.offline.work.progress import progress
+
+BULK_FROM = 300_000
+"""Bags of at least so many messages are read in bulk: loading the compiler takes as long as reading them one by one."""
+
+_LAYOUTS = {layout.message_type: layout for layout in LAYOUTS}
+_DTYPES: dict[str, np.dtype[Any]] = dict(zip('dIBb', map(np.dtype, ('<f8', '<u4', 'u1', 'i1')), strict=True))
+_HEAD = 16  # [bytes] encapsulation, stamp, length of the frame name
+
+
+class Wanted(NamedTuple):
+    """A topic whose messages are wanted; an empty name: the bag has none."""
+
+    topic: str
+    type_name: str
+
+
+class Numbers(NamedTuple):
+    """The messages of one kind in a block, n of them."""
+
+    places: IntArray  # numbers in the block
+    stamps: IntArray  # [ns]
+    numbers: FloatArray  # shape (fields, n)
+
+
+class Block:
+    """Messages of a bag in a block, by name.
+
+    Args:
+        messages: All of them.
+        wanted: Name -> topic and type; the kind of a message is the place of its name, from 1 on.
+    """
+
+    def __init__(self, messages: Messages, wanted: Mapping[str, Wanted]) -> None:
+        self.messages = messages
+        self._kinds = {name: kind for kind, name in enumerate(wanted, start=1)}
+        self._wanted = wanted
+
+    def of(self, name: str) -> Numbers:
+        """Numbers of the messages of a name.
+
+        Raises:
+            ValueError: One is malformed; names its topic and time.
+        """
+        topic, type_name = self._wanted[name]
+        return numbers_of(self.messages, self._kinds[name], type_name, topic)
+
+    def texts(self, name: str) -> Iterator[tuple[int, int, str]]:
+        """Place, log time [ns] and text of each message of a name.
+
+        Raises:
+            ValueError: One is malformed; names its topic and time.
+        """
+        for place in np.flatnonzero(self.messages.kinds == self._kinds[name]).tolist():
+            time = int(self.messages.received[place])
+            try:
+                text = decode_text(self.messages.message(place))
+            except ValueError as error:
+                raise ValueError(f'message on {self._wanted[name].topic} at {time} ns: {error}') from None
+            yield place, time, text
+
+
+class Collector(Protocol):
+    """Takes the blocks of a bag in order."""
+
+    def add(self, block: Block) -> None:
+        """Take one block."""
+
+
+_Collector = TypeVar('_Collector', bound=Collector)
+
+
+def collected(
+    bag: ActuatorBag,
+    wanted: Mapping[str, Wanted],
+    make: Callable[[], _Collector],
+    *,
+    with_answers: bool = False,
+    bulk_from: int = BULK_FROM,
+) -> _Collector:
+    """A new collector with all blocks of a bag.
+
+    Args:
+        bag: The bag.
+        wanted: Name -> topic and type of the messages that the collector takes.
+        make: Makes an empty collector; an unusual bag takes a second one.
+        with_answers: As of `ActuatorBag.messages`.
+        bulk_from: Smallest number of messages to read in bulk.
+
+    Raises:
+        BagError: The bag cannot be read, or a message is not of its type; names its topic and time.
+    """
+    kinds = {one.topic: (kind, one.type_name) for kind, one in enumerate(wanted.values(), start=1) if one.topic}
+
+    def kind_of(topic: str, type_name: str) -> int:
+        """Kind of the messages on a topic."""
+        kind, known = kinds.get(topic, (0, type_name))
+        if type_name != known:
+            raise UnsuitedError(f'{topic} has messages of {known} and of {type_name}')
+        return kind
+
+    def fill(blocks: Iterable[Messages]) -> _Collector:
+        collector = make()
+        with progress(f'read {bag.path.name}', bag.total) as advance:
+            for block in blocks:
+                collector.add(Block(block, wanted))
+                advance(len(block.kinds))
+        return collector
+
+    if not bag.actuator and bag.total >= bulk_from and has_compiler():
+        with suppress(UnsuitedError, OSError, *ERRORS):  # the general reader reads it, or says what is wrong
+            return fill(bag.blocks(kind_of))
+    try:
+        return fill(bag.blocks(kind_of, in_bulk=False, with_answers=with_answers))
+    except BagError:
+        raise
+    except (UnsuitedError, ValueError) as error:
+        raise BagError(f'{bag.path}: {error}') from None
+
+
+def numbers_of(messages: Messages, kind: int, type_name: str, topic: str = '') -> Numbers:
+    """Numbers of all messages of a kind.
+
+    Args:
+        messages: Of several kinds.
+        kind: Of those that are wanted.
+        type_name: Their type, one of `LAYOUTS`.
+        topic: For errors.
+
+    Raises:
+        ValueError: One is malformed; names its topic and time.
+    """
+    layout = _LAYOUTS[type_name]
+    places = np.flatnonzero(messages.kinds == kind)
+    offsets, sizes, data = messages.offsets[places], messages.sizes[places], messages.data
+    data = data if len(data) >= _HEAD else np.zeros(_HEAD, np.uint8)  # then every message is malformed
+    stamps, numbers = np.zeros(len(places), np.int64), np.zeros((len(layout.codes), len(places)))
+    is_usual = sizes >= _HEAD
+    head = data[np.where(is_usual, offsets, 0)[:, np.newaxis] + np.arange(_HEAD)]
+    words = head.view('<u4').astype(np.int64)
+    nanoseconds, length = words[:, 2], words[:, 3]
+    begin = 4 + (12 + length + 7) // 8 * 8  # as `messages.head_size`
+    spare = sizes - begin - layout.size
+    is_usual &= (words[:, 0] & 0xFFFF == 0x0100) & (nanoseconds < SECOND) & (length <= LONGEST_FRAME)
+    is_usual &= (spare >= 0) & (spare <= 3)
+    usual = slice(None) if is_usual.all() else is_usual
+    stamps[usual] = (head.view('<i4')[:, 1].astype(np.int64) * SECOND + nanoseconds)[usual]
+    starts = (offsets + begin)[usual, np.newaxis]
+    for row, code, at in zip(numbers, layout.codes, layout.offsets, strict=True):
+        kept = _DTYPES[code]
+        row[usual] = data[starts + (at + np.arange(kept.itemsize))].view(kept)[:, 0]
+    if 'state' in layout.fields:
+        is_usual &= np.isin(numbers[layout.fields.index('state')], list(FrictionState))
+    for number in np.flatnonzero(~is_usual).tolist():  # of an older layout, or malformed
+        place = int(places[number])
+        try:
+            stamps[number], *values = decode(type_name, messages.message(place))
+        except ValueError as error:
+            raise ValueError(f'message on {topic} at {messages.received[place]} ns: {error}') from None
+        numbers[:, number] = values[: len(numbers)]
+    return Numbers(places, stamps, numbers)
+
+
+class Held:
+    """The newest numbers of some inputs, across blocks.
+
+    Args:
+        counts: Name of each input -> how many of its numbers, from the first on.
+    """
+
+    def __init__(self, counts: Mapping[str, int]) -> None:
+        self._newest = {name: np.full((count, 1), math.nan) for name, count in counts.items()}
+
+    def at(self, places: IntArray, found: Mapping[str, Numbers]) -> FloatArray:
+        """Numbers at some places of the next block, those there included; NaN before the first; shape (numbers, n)."""
+        parts = []
+        for name, newest in self._newest.items():
+            known = np.concatenate([newest, found[name].numbers[: len(newest)]], axis=1)
+            parts.append(known[:, np.searchsorted(found[name].places, places, side='right')])
+            self._newest[name] = known[:, -1:].copy()
+        return np.concatenate(parts)
+
+
+# -- one row a velocity sample ----------------------------------------------------------------------------------------
+
+INPUTS = {'velocity': 1, 'pressure': 2, 'force': 1, 'position': 1, 'temperature': 2}
+"""Input, as a field of `Topics`, -> how many columns it has."""
+
+
+class VelocityRows(NamedTuple):
+    """n velocity samples in the order of the bag."""
+
+    stamps: IntArray  # [ns] shape (n,)
+    columns: FloatArray
+    """shape (7, n), in the units of the messages: velocity, both pressures, force sum, position, temperature and its
+    variance; NaN before the first message"""
+    configuration: Configuration | None  # the last one
+
+
+def wanted_of(bag: ActuatorBag, names: Iterable[str]) -> dict[str, Wanted]:
+    """Topic and type of some fields of `Topics`."""
+    return {name: Wanted(getattr(bag.topics, name), getattr(TYPES, name)) for name in names}
+
+
+def read_velocity_rows(bag: ActuatorBag, *, bulk_from: int = BULK_FROM) -> VelocityRows:
+    """Each velocity sample with what came newest of the other inputs before it.
+
+    Raises:
+        BagError: As of `collected`.
+    """
+    wanted = wanted_of(bag, (*INPUTS, 'configuration'))
+    return collected(bag, wanted, _VelocityCollector, bulk_from=bulk_from).rows()
+
+
+class _VelocityCollector:
+    """Rows of the blocks so far."""
+
+    def __init__(self) -> None:
+        self._held = Held(INPUTS)
+        self._stamps = array('q')
+        self._columns = growing(sum(INPUTS.values()))
+        self._configuration: Configuration | None = None
+
+    def add(self, block: Block) -> None:
+        """Take one block."""
+        for _, _, text in block.texts('configuration'):
+            self._configuration = parse_snapshot(text).configuration
+        found = {name: block.of(name) for name in INPUTS}
+        self._stamps.frombytes(found['velocity'].stamps.tobytes())
+        extend(self._columns, self._held.at(found['velocity'].places, found))
+
+    def rows(self) -> VelocityRows:
+        """All rows."""
+        columns = np.array([np.frombuffer(column) for column in self._columns])
+        return VelocityRows(np.frombuffer(self._stamps, np.int64), columns, self._configuration)
+
+
+def growing(count: int) -> list['array[float]']:
+    """Empty columns that grow in place: their memory is that of the numbers."""
+    return [array('d') for _ in range(count)]
+
+
+def extend(columns: list['array[float]'], rows: FloatArray) -> None:
+    """Append numbers, shape (columns, n)."""
+    for column, values in zip(columns, rows, strict=True):
+        column.frombytes(np.ascontiguousarray(values).tobytes())
+
+
+def in_turn(stamps: IntArray, places: IntArray, is_answer: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Pairs of samples and answers of one stamp.
+
+    An answer belongs to the newest sample of its stamp, unless another answer is between them.
+
+    Args:
+        stamps: Of samples and answers [ns], shape (n,).
+        places: In the bag, shape (n,).
+        is_answer: Which are answers, shape (n,).
+
+    Returns:
+        Numbers of the answers that have a sample, of these samples, and of the samples that still wait for an answer.
+    """
+    order = np.lexsort((places, stamps))
+    same = np.diff(stamps[order]) == 0
+    first, second = order[:-1], order[1:]
+    has_both = same & ~is_answer[first] & is_answer[second]
+    is_last = np.append(~same, True)[: len(order)]
+    return second[has_both], first[has_both], np.sort(order[is_last & ~is_answer[order]])
