@@ -1,5 +1,6 @@
 """One estimator as a view sees it: its configuration, its actuators, and the newest of every message."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -9,10 +10,12 @@ from seal_friction_ros.core.estimation.messages import (
     decode_text,
 )
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
-from seal_friction_ros.core.machine.machine import Machine, Memory, first_memory, records_of
+from seal_friction_ros.core.machine.machine import Machine, init
 from seal_friction_ros.core.machine.machine_snapshot import machine_of, parse_machine_text
 from seal_friction_ros.core.machine.message_fields import Definition
 from seal_friction_ros.core.machine.newest_messages import decode_newest
+from seal_friction_ros.offline.bags.actuator_bag import Translation
+from seal_friction_ros.offline.bags.bag import BagMessage
 from seal_friction_ros.offline.monitor.actuator_view import (
     NOTHING_HELD,
     NOTHING_SAID,
@@ -55,7 +58,7 @@ class NodeView:
         self.presence = Presence()
         self._definitions_of = definitions_of
         self._machine: Machine | None = None
-        self._memories: list[Memory] = []
+        self._translation: Translation | None = None
 
     @property
     def machine(self) -> Machine | None:
@@ -93,10 +96,10 @@ class NodeView:
         if snapshot.file.document is not None:
             machine, _ = machine_of(snapshot, self._definitions_of(snapshot.file.topics.values()))
             if self._machine is None or machine.file != self._machine.file:
-                self._memories = [first_memory(actuator) for actuator in machine.actuators]
+                self._translation = Translation(machine, init(machine))
             self._machine = machine
         else:
-            self._machine = None
+            self._machine = self._translation = None
         self.held = {name: self.held.get(name, NOTHING_HELD) for name in self.known}
         self.refused = ''
 
@@ -143,24 +146,13 @@ class NodeView:
         elif type_name == MACHINE_TYPE:
             for answer in decode_together(data):
                 self._hold(answer.actuator, answer.record, received)
-        elif self._machine is not None and topic in self._machine.plans:
-            self._take_of_machine(self._machine, topic, data, received)
+        elif self._machine is not None and self._translation is not None and topic in self._translation.topics:
+            message = BagMessage(topic, type_name, received, data)
+            for number, record, _ in self._translation.records(message, Counter()):
+                self._hold(self._machine.actuators[number].name, record, received)
         elif type_name in DECODERS:
             actuator = topic.split('/')[-2] if self._machine is not None else ''
             self._hold(actuator, DECODERS[type_name](data), received)
-
-    def _take_of_machine(self, machine: Machine, topic: str, data: bytes, received: int) -> None:
-        """Records that a message of a machine makes, as its estimator makes them."""
-        plan = machine.plans[topic]
-        reading = plan.read(data)
-        stamp = received if reading.stamp is None else reading.stamp
-        for number, taken in plan.taken:
-            actuator = machine.actuators[number]
-            memory = self._memories[number]
-            memory, records = records_of(actuator, memory, taken, reading.numbers, stamp, reading.frame_id)
-            self._memories[number] = memory
-            for record in records:
-                self._hold(actuator.name, record, received)
 
     def _hold(self, actuator: str, record: Any, received: int) -> None:
         if actuator in self.held:
