@@ -24,7 +24,7 @@ from seal_friction_ros.offline.bags import bag as b
 from seal_friction_ros.offline.replay.replay import replay
 
 START = 1_700_000_000_000_000_000  # [ns]
-PERIOD = 0.01  # [s]
+PERIOD = 0.02  # [s]
 STROKE, RAMP = 1.0, 0.1  # [s]
 SPEEDS, PRESSURES = (0.02, 0.05), (1e6, 2e6, 3e6, 4e6)  # [m/s], [Pa]
 SAMPLES = round(len(SPEEDS) * len(PRESSURES) * 4 * STROKE / PERIOD)
