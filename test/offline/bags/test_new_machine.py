@@ -49,7 +49,7 @@ def test_the_commands_of_the_docs_run(tmp_path, source, monkeypatch):
     monkeypatch.chdir(tmp_path)
     block = (ROOT / 'docs' / 'machines.md').read_text().split('```')[1]
     commands = [line.partition('#')[0].split()[1:] for line in block.strip().splitlines()]
-    assert [words[0] for words in commands] == ['new', 'import', 'tune']
+    assert [words[0] for words in commands] == ['new', 'report', 'tune']
     for words in commands:
         assert main(words) in ((0, 1) if words[0] == 'tune' else (0,))
 

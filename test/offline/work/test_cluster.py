@@ -378,7 +378,7 @@ def test_a_path_that_only_the_client_has_is_one_line(cluster, tmp_path):
     expression = f"run_all('', [partial(calls.size, {opened})], workers)"
     code, out, errors = done(*program(expression, cluster.address, tmp_path))
     assert (code, out) == (1, '')
-    assert '/proc/self/fd/77 is on the machine of the command, and not where worker tcp://127.0' in last_line(errors)
+    assert '/proc/self/fd/77 is on the computer of the command, and not where worker tcp://127.0' in last_line(errors)
 
 
 @pytest.mark.long
