@@ -164,11 +164,11 @@ class EstimatorDiagnostics:
         self._estimate = self._newest[FrictionEstimate] = estimate
         self._status |= estimate.status
 
-    def on_adaptation(self, parameters: EstimatorParameters, turn: Turn | None) -> None:
+    def on_adaptation(self, turn: Turn | None) -> None:
         """Follow what is learnt from the newest sample, whose estimate `on_estimate` has counted."""
         self._starts = with_sample(self._starts, self._estimate)
         if turn is not None:
-            self._health = followed(self._health, parameters, *turn)
+            self._health = followed(self._health, *turn)
 
     def on_reset(self) -> None:
         """Forget the reversals: the adaptation has."""

@@ -391,7 +391,7 @@ class EstimatorNode(ManagedNode):
             parameters = actuator.pipeline.estimator
             if parameters.adapts:
                 turn = newest.pipeline.turn_since(known.pipeline)
-                self._statistics[actuator.name].on_adaptation(parameters, turn)
+                self._statistics[actuator.name].on_adaptation(turn)
 
     def on_watchdog(self) -> bool:
         """Renew each feed-forward that no velocity sample renews, so that it fades out."""

@@ -67,7 +67,8 @@ def test_list_names_type_publisher_and_subscriber_of_each_topic(tool):
         code, said = tool('list', '--json')
         listed = json.loads(said)
         assert code == 0
-        if '/servo_simulator' in listed.get('/rod_velocity', {}).get('publishers', []):
+        seen = listed.get('/rod_velocity', {})
+        if '/servo_simulator' in seen.get('publishers', []) and '/friction_estimator' in seen.get('subscribers', []):
             break
     assert listed['/rod_velocity'] == {
         'type': 'seal_friction_msgs/msg/RodVelocity',

@@ -23,7 +23,7 @@ from harness.simulated_day import Day, samples
 from paths import ROOT
 
 from seal_friction_ros.core.estimation import estimator
-from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings, learnt
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, step
 from seal_friction_ros.core.estimation.seal_health import SealHealth, followed
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
@@ -62,16 +62,16 @@ def day_of(kind: str, seed: int) -> Day:
 
 def scales(day: Day, seconds: float, seed: int) -> tuple[np.ndarray, list[int]]:
     """Scale after each sample from `BEGIN` on, and the reversals after which a change was found."""
-    state, health, found, learnt = estimator.init(PARAMETERS), SealHealth(), [], []
+    state, health, found, shown = estimator.init(PARAMETERS), SealHealth(), [], []
     for sample in samples(day, seconds, seed):
         before = state
         state, _ = step(PARAMETERS, state, sample)
         known = health.change.changes
-        health = followed(health, PARAMETERS, before, state)
+        health = followed(health, before, state)
         if health.change.changes > known:
             found.append(health.learnt)
-        learnt.append(state.adaptation.learnt.scale)
-    return np.array(learnt[round(BEGIN / day.period) :]), found
+        shown.append(learnt(PARAMETERS.adaptation, state.adaptation).scale)
+    return np.array(shown[round(BEGIN / day.period) :]), found
 
 
 def simulated(kind: str, seconds: float, seed: int) -> dict[str, Any]:
@@ -80,15 +80,15 @@ def simulated(kind: str, seconds: float, seed: int) -> dict[str, Any]:
     The error is against the truth of a drift, else against the mean scale of the same machine without the disturbance.
     """
     day = day_of(kind, seed)
-    learnt, found = scales(day, seconds, seed)
+    shown, found = scales(day, seconds, seed)
     if kind == 'drift':
-        times = BEGIN + day.period * np.arange(len(learnt))
+        times = BEGIN + day.period * np.arange(len(shown))
         reference = np.array([day.scale(time) for time in times])
     elif kind == 'undisturbed':
-        reference = learnt.mean()
+        reference = shown.mean()
     else:
         reference = scales(day_of('undisturbed', seed), seconds, seed)[0].mean()
-    return {'worst': float(np.abs(learnt / reference - 1.0).max()), 'found': found}
+    return {'worst': float(np.abs(shown / reference - 1.0).max()), 'found': found}
 
 
 def campaign(seeds: int, hours: float, workers: int) -> dict[str, Any]:

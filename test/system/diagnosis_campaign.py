@@ -78,7 +78,7 @@ def told(seals: tuple[MountedSeal, ...], given: Iterable[RodSample], fault: str)
     for right in given:
         before = state
         state, estimate = step(parameters, state, change(right))
-        health = followed(health, parameters, before, state)
+        health = followed(health, before, state)
         if abs(right.velocity) > 2e-3:
             moved += min((right.stamp - last) * 1e-9, 0.1)
         last = right.stamp

@@ -241,7 +241,7 @@ SIGNAL_ROWS: tuple[Row, ...] = (
     Row(
         'pressure jumps to another level',
         with_value('cylinder_pressure', 1.5e7),
-        'PRESSURE_LEAP OUTSIDE_IDENTIFIED_RANGE',
+        'PRESSURE_LEAP OUTSIDE_IDENTIFIED_RANGE MODEL_DISAGREES',
         feedforward='dips',
         estimate='one sample with the pressure before, then the new one is believed',
         recovery='a jump back costs one sample, too',
@@ -251,8 +251,8 @@ SIGNAL_ROWS: tuple[Row, ...] = (
     Row(
         'denormal numbers',
         with_value('cylinder_pressure', 5e-324),
-        level='OK',
-        estimate='as usual: they are numbers',
+        'MODEL_DISAGREES',
+        estimate='as usual: they are numbers; the friction of the rod is not that of no pressure',
     ),
     Row(
         'everything at once: NaN, infinite, 1e308', everything, 'any', UNKNOWN, feedforward='fades', estimate='UNKNOWN'

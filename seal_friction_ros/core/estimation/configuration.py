@@ -11,13 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, get_type_hints
 
-from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION, EstimatorParameters, EstimatorSettings
-from seal_friction_ros.core.estimation.feedforward import FADED_OUT, FeedForwardSettings
-from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, ReceiptTimes, init
-from seal_friction_ros.core.estimation.records import NEVER, NO_TEMPERATURE, Force, Pressure
-from seal_friction_ros.core.estimation.sheared_seals import NOT_FOLLOWED
-from seal_friction_ros.core.estimation.swings import NO_SWING
+from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
+from seal_friction_ros.core.estimation.pipeline import PipelineParameters, PipelineState, init
+from seal_friction_ros.core.estimation.records import Force, Pressure
 from seal_friction_ros.core.foundation.documents import parse_json
 from seal_friction_ros.core.foundation.parameters import check, from_mapping, meanings, parameter
 from seal_friction_ros.core.friction.actuator import MountedSeal
@@ -178,10 +176,11 @@ class Configuration:
         return PipelineParameters(EstimatorParameters(self.settings, seals, self.adaptation), self.feedforward)
 
 
-ALGORITHM_VERSION = 2
+ALGORITHM_VERSION = 3
 """Version of estimator and feed-forward: it changes when the same messages give other bytes.
 
-1: until the feed-forward had one gain, and time was the stamps of the messages.
+1: until the feed-forward had one gain, and time was the stamps of the messages. 2: until one filter learnt the
+friction.
 """
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1
@@ -311,15 +310,7 @@ def _state(configuration: Configuration, document: Any, version: int) -> Pipelin
         return init(configuration.parameters())._replace(
             pressure=pressure, force=force, refused=bool(document['refused'])
         )
-    # Older bags are without adaptation, temperature, sheared seals, a field of these, swings, elements of the
-    # feed-forward and simulated time.
-    later = {'adaptation': _encoded_record(NOT_ADAPTED), 'swing': _encoded_record(NO_SWING)}
-    estimator = later | document['estimator']
-    estimator['shear'] = _encoded_record(NOT_FOLLOWED) | estimator.get('shear', {})
-    guided = _encoded_record(FADED_OUT) | document['feedforward']
-    document = {'temperature': _encoded_record(NO_TEMPERATURE), 'clock': NEVER} | document
-    document['receipt'] = _encoded_record(ReceiptTimes()) | document['receipt']
-    state: PipelineState = _parsed(PipelineState, document | {'estimator': estimator, 'feedforward': guided})
+    state: PipelineState = _parsed(PipelineState, document)
     computed = state.estimator, state.feedforward, state.friction, state.reference, state.temperature
     if not all(map(_is_finite, computed)):
         raise ValueError('configuration: a number in the state is not finite')

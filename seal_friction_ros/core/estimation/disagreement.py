@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.estimation.adaptation import FEWEST_REVERSALS, Learnt
+from seal_friction_ros.core.estimation.adaptation import Stroke, can_be_compared, ratio_of
 from seal_friction_ros.core.foundation.units import UNITS
 from seal_friction_ros.core.friction.actuator import SealNumbers, friction_of_seals
 from seal_friction_ros.core.friction.mounting import pressure_at_seal
@@ -24,6 +24,7 @@ EXPLAINED = 1.3  # [-] a unit explains the friction up to this factor: one day d
 BEYOND = 1.5  # [-] of the highest identified pressure, up to which one below the lowest may be in another unit
 HALF = 0.06  # [-] how near to a half or twice the friction counts as such, if the seal file states less
 HALVED = 0.7  # [-] a ratio above it is nearer to 1 than to a half
+FEWEST_REVERSALS = 3  # that tell a fault
 LAST = 12  # reversals that tell the ratio; older ones tell an area
 FEWEST_STROKES = 6  # for a line of the offset over the pressure
 STRAIGHT = 0.95  # [-] least correlation of that line
@@ -40,32 +41,13 @@ class Reversal(NamedTuple):
     pressure_b: float  # [Pa, gauge]
 
 
-def last_reversal(learnt: Learnt) -> Reversal:
-    """The reversal that was learnt from last."""
-    level, ratio = learnt.before, learnt.ratios.first
-    offset = level.reading - level.direction * ratio * level.friction
-    return Reversal(level.stamp, ratio, level.friction, offset, level.pressure_a, level.pressure_b)
-
-
-class Stroke(NamedTuple):
-    """What a stroke shows at its end, learnt from or not."""
-
-    stamp: int  # [ns]
-    direction: int  # -1 or 1
-    reading: float  # [N] force sum less inertia, mean over the last half second
-    friction: float  # [N] of the law
-    pressure_a: float  # [Pa, gauge]
-    pressure_b: float  # [Pa, gauge]
-
-
-def reversal_between(before: Stroke, after: Stroke) -> Reversal | None:
-    """The reversal between two strokes that nothing is learnt from; None if they do not show friction."""
-    law = before.friction + after.friction
-    if before.direction * after.direction >= 0 or law <= 0.0:
+def reversal_between(before: Stroke, after: Stroke, pressure_a: float, pressure_b: float) -> Reversal | None:
+    """The reversal between two strokes, the later one at these pressures [Pa]; None if they do not show friction."""
+    if not can_be_compared(before, after) or before.friction + after.friction <= 0.0:
         return None
-    ratio = after.direction * (after.reading - before.reading) / law
-    offset = 0.5 * (before.reading + after.reading)
-    return Reversal(after.stamp, ratio, 0.5 * law, offset, after.pressure_a, after.pressure_b)
+    ratio = ratio_of(before, after)
+    offset = after.reading - after.direction * ratio * after.friction
+    return Reversal(after.stamp, ratio, after.friction, offset, pressure_a, pressure_b)
 
 
 def likely_reason(seals: tuple[SealNumbers, ...], reversals: Sequence[Reversal]) -> str:

@@ -5,8 +5,9 @@
 Time is the stamp of the samples: the same samples give the same estimates, live or replayed.
 """
 
+import dataclasses
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple
 
 from seal_friction_ros.core.estimation.adaptation import (
@@ -16,10 +17,12 @@ from seal_friction_ros.core.estimation.adaptation import (
     AdaptationState,
     Slide,
     adapt,
+    adapted_friction,
     disagrees,
+    innovation,
+    is_consistent,
     is_due,
-    residual,
-    with_scale,
+    learnt_scale,
 )
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
@@ -27,6 +30,8 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     ConditionedVelocity,
     condition_velocity,
 )
+from seal_friction_ros.core.estimation.friction_filter import friction_magnitude
+from seal_friction_ros.core.estimation.hidden_motion import NO_HIDDEN_MOTION, Apparent, HiddenMotion, with_sample
 from seal_friction_ros.core.estimation.records import (
     EXTRAPOLATED,
     NEVER,
@@ -50,7 +55,7 @@ from seal_friction_ros.core.estimation.sheared_seals import (
     slide_on,
 )
 from seal_friction_ros.core.estimation.swings import LONGEST_SWING, NO_SWING, Swing, swing_on
-from seal_friction_ros.core.foundation.compiled import compilable
+from seal_friction_ros.core.foundation.compiled import compilable, replace
 from seal_friction_ros.core.foundation.parameters import check, parameter
 from seal_friction_ros.core.friction.actuator import (
     ActuatorFriction,
@@ -70,6 +75,7 @@ from seal_friction_ros.core.friction.force_sum_correction import (
 from seal_friction_ros.core.friction.identified_motion import ANY_MOTION, MotionLimits, motion_limits
 from seal_friction_ros.core.friction.presliding import PreslidingNumbers, presliding_numbers
 from seal_friction_ros.core.friction.states import (
+    BREAKAWAY,
     UNKNOWN,
     StateFriction,
     is_at_rest,
@@ -271,7 +277,9 @@ def _unlike_yield(seals: tuple[MountedSeal, ...], pressure_max: float) -> float:
 
     def alone(mounted: MountedSeal, pressure: float) -> float:
         """Friction of one seal [N] that sees this pressure."""
-        return friction_of_seals((replace(mounted, chamber='a').numbers,), pressure, 0.0, 0.0).coulomb_friction
+        return friction_of_seals(
+            (dataclasses.replace(mounted, chamber='a').numbers,), pressure, 0.0, 0.0
+        ).coulomb_friction
 
     if len({mounted.chamber for mounted in seals}) < 2:
         return 1.0
@@ -311,28 +319,7 @@ class EstimatorState(NamedTuple):
     adaptation: AdaptationState = NOT_ADAPTED
     shear: FollowedShear = NOT_FOLLOWED
     swing: Swing = NO_SWING
-
-
-@compilable
-def _with_learnt(
-    state: EstimatorState, adaptation: AdaptationState, shear: FollowedShear, swing: Swing
-) -> EstimatorState:
-    """State with what is learnt from the motion; compiled code has no ``_replace``."""
-    last, at_rest, pressure, force, speed, leapt_pressure, leapt_force, leapt_velocity, motion, _, _, _ = state
-    return EstimatorState(
-        last,
-        at_rest,
-        pressure,
-        force,
-        speed,
-        leapt_pressure,
-        leapt_force,
-        leapt_velocity,
-        motion,
-        adaptation,
-        shear,
-        swing,
-    )
+    hidden: HiddenMotion = NO_HIDDEN_MOTION
 
 
 class Observation(NamedTuple):
@@ -453,8 +440,10 @@ def estimate_at(
     state, estimate = _with_sheared_seals(
         parameters.adaptation, parameters.followed_elasticity, state, seen, adapted, estimate
     )
+    elapsed = (seen.stamp - last_stamp) * 1e-9
+    state, estimate = _with_hidden_motion(parameters.settings, state, seen, elapsed, friction, estimate)
     if seen.velocity != 0.0:
-        state, estimate = _with_swing(state, seen, last_stamp, estimate)
+        state, estimate = _with_swing(state, seen, elapsed, estimate)
     return state, estimate, seen, friction
 
 
@@ -485,12 +474,11 @@ def learn_from(
         force_sum,
         friction.coulomb_friction + friction.velocity_friction,
         friction.coulomb_friction_std,
-        state.pressure.chamber_a,
-        state.pressure.chamber_b,
+        estimate.state == BREAKAWAY,
         not status & ~_EXTRAPOLATED,
         status == 0,
     )
-    return _with_learnt(state, adapt(parameters.adaptation, state.adaptation, slide), state.shear, state.swing)
+    return replace(state, adaptation=adapt(parameters.adaptation, state.adaptation, slide))
 
 
 @compilable
@@ -527,42 +515,64 @@ def _estimate_with_learnt(
     parameters: EstimatorParameters, known: AdaptationState, seen: Observation, friction: ActuatorFriction
 ) -> tuple[ActuatorFriction, FrictionEstimate]:
     """Friction and estimate by what was learnt before this sample."""
-    settings, uses_scale, learnt = parameters.adaptation, parameters.uses_scale, known.learnt
+    settings, uses = parameters.adaptation, parameters.uses_scale
     stamp, velocity, force_sum, status, input_age = seen
-    adapted = with_scale(friction, learnt, stamp, uses_scale)
-    if disagrees(settings, learnt, friction, uses_scale, velocity == 0.0):
-        seen = Observation(stamp, velocity, force_sum, status | _MODEL_DISAGREES, input_age)
+    adapted, taken_off = adapted_friction(settings, known, friction, stamp, velocity, force_sum, uses)
     law = friction.coulomb_friction + friction.velocity_friction
-    scale_std = learnt.scale_std
-    if scale_std < 0.0:
-        scale_std = friction.coulomb_friction_std / law if law > 0.0 else 0.0
+    if disagrees(settings, known, friction, velocity, uses):
+        status |= _MODEL_DISAGREES
     left = 0.0
+    terms = known.filter.terms
     if velocity != 0.0 and not status & (_NO_STATE | _NO_FORCE_SUM):
-        left = residual(settings, known, velocity, force_sum, law)
-        if not uses_scale:
-            left += (learnt.scale - 1.0) * law * (1.0 if velocity > 0.0 else -1.0)
-    return adapted, estimate_of(parameters, seen, adapted, learnt.scale, scale_std, learnt.offset, left)
+        left = innovation(settings, known, velocity, force_sum, law)
+        if not is_consistent(settings, known, left):
+            status |= _MODEL_DISAGREES
+        found = friction_magnitude(terms, 1.0 if velocity > 0.0 else -1.0, abs(velocity), law)
+        published = adapted.coulomb_friction + adapted.velocity_friction
+        left += (found - published) * (1.0 if velocity > 0.0 else -1.0)
+    scale, offset = learnt_scale(settings, known.filter), terms.offset + terms.remainder
+    scale_std = friction.coulomb_friction_std / law if law > 0.0 else 0.0
+    if known.filter.stamp != NEVER:
+        scale_std = known.filter.friction_std / known.filter.friction
+    seen = Observation(stamp, velocity, force_sum - taken_off, status, input_age)
+    return adapted, estimate_of(parameters, seen, adapted, scale, scale_std, offset, left)
+
+
+@compilable
+def _with_hidden_motion(
+    settings: EstimatorSettings,
+    state: EstimatorState,
+    seen: Observation,
+    elapsed: float,
+    friction: ActuatorFriction,
+    estimate: FrictionEstimate,
+) -> tuple[EstimatorState, FrictionEstimate]:
+    """Estimate, marked as uncertain if what counts as ripple of the velocity is a motion."""
+    known, measured = state.hidden, state.velocity.velocity
+    is_denied = measured * seen.velocity <= 0.0 or known.speed > 0.0 or known.doubt > 0.0
+    if not is_denied or estimate.status & (_NO_STATE | _NO_FORCE_SUM):
+        return state, estimate
+    moment = Apparent(elapsed, measured, seen.velocity, seen.force_sum, friction.coulomb_friction)
+    known = with_sample(known, moment, settings.slip_velocity)
+    if known.doubt > 0.0:
+        estimate = replace(estimate, status=estimate.status | _MOTION_UNCERTAIN)
+    return replace(state, hidden=known), estimate
 
 
 @compilable
 def _with_swing(
-    state: EstimatorState, seen: Observation, last_stamp: int, estimate: FrictionEstimate
+    state: EstimatorState, seen: Observation, elapsed: float, estimate: FrictionEstimate
 ) -> tuple[EstimatorState, FrictionEstimate]:
     """Estimate of a sliding rod, marked as uncertain if the force sum does not show its swings."""
-    stamp, velocity, force_sum, _, _ = seen
-    way, _, _, _, _, doubted = state.swing
-    if doubted == 0.0 and abs(way) > LONGEST_SWING and (velocity > 0.0) == (way > 0.0):  # most samples of a motion
-        return state, estimate
+    known, velocity = state.swing, seen.velocity
+    if known.doubted == 0.0 and abs(known.way) > LONGEST_SWING and (velocity > 0.0) == (known.way > 0.0):
+        return state, estimate  # most samples of a motion
     if estimate.status & (_NO_STATE | _NO_FORCE_SUM):
         return state, estimate
-    swing = swing_on(state.swing, (stamp - last_stamp) * 1e-9, velocity, force_sum, estimate.friction_force)
-    if swing.doubted > 0.0:
-        _, coulomb, std, breakaway, friction, acting, direction, status, age, scale, scale_std, offset, left = estimate
-        status |= _MOTION_UNCERTAIN
-        estimate = FrictionEstimate(
-            stamp, coulomb, std, breakaway, friction, acting, direction, status, age, scale, scale_std, offset, left
-        )
-    return _with_learnt(state, state.adaptation, state.shear, swing), estimate
+    known = swing_on(known, elapsed, velocity, seen.force_sum, estimate.friction_force)
+    if known.doubted > 0.0:
+        estimate = replace(estimate, status=estimate.status | _MOTION_UNCERTAIN)
+    return replace(state, swing=known), estimate
 
 
 @compilable
@@ -624,7 +634,7 @@ def _with_sheared_seals(
         estimate = FrictionEstimate(
             stamp, coulomb, std, breakaway, force, acting, direction, status, age, scale, scale_std, offset, left
         )
-    return _with_learnt(state, known, shear, state.swing), estimate
+    return replace(state, shear=shear), estimate
 
 
 @compilable
@@ -638,7 +648,9 @@ def assess_inputs(
     """
     # One unpacking takes a quarter of the time of an attribute each.
     stamp, given, newest_pressure, newest_force, refused, stamp_age, _, is_late = sample
-    last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, _, _, _ = state
+    last_stamp, at_rest, pressure, force, velocity, leapt_pressure, leapt_force, leapt_velocity, motion, _, _, _, _ = (
+        state
+    )
     settings = parameters.settings
     status = _INPUT_REFUSED if refused else 0
     if last_stamp != NEVER and stamp <= last_stamp:
@@ -676,19 +688,17 @@ def assess_inputs(
         drives = motion.velocity * force_sum < 0.0 and not parameters.force_sum_correction.contains_load
         if not at_rest or (uncertain and drives):
             sliding_velocity = motion.velocity
-    state = EstimatorState(
-        stamp,
-        at_rest,
-        pressure,
-        force,
-        velocity,
-        leapt_pressure,
-        leapt_force,
-        leapt_velocity,
-        motion,
-        state.adaptation,
-        state.shear,
-        state.swing,
+    state = replace(
+        state,
+        stamp=stamp,
+        at_rest=at_rest,
+        pressure=pressure,
+        force=force,
+        velocity=velocity,
+        leapt_pressure=leapt_pressure,
+        leapt_force=leapt_force,
+        leapt_velocity=leapt_velocity,
+        motion=motion,
     )
     return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
 

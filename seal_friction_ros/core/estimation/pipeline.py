@@ -25,6 +25,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation import estimator
+from seal_friction_ros.core.estimation.adaptation import bounded_friction, is_proven
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
     SETTLING,
@@ -72,8 +73,8 @@ from seal_friction_ros.core.estimation.records import (
 from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.units import ZEROS
-from seal_friction_ros.core.friction.actuator import friction_of_seals
-from seal_friction_ros.core.friction.temperature import COLDEST, HOTTEST, scale_at
+from seal_friction_ros.core.friction.actuator import at_temperature, friction_of_seals
+from seal_friction_ros.core.friction.temperature import COLDEST, HOTTEST
 
 ACCELERATION_SMOOTHING = 4.0  # [-] of the time constant of the velocity; our choice
 ZERO_CELSIUS = ZEROS['degC']  # [K]
@@ -116,7 +117,6 @@ class Turn(NamedTuple):
 
     before: EstimatorState
     after: EstimatorState
-    temperature: SealTemperature
 
 
 class PipelineState(NamedTuple):
@@ -136,10 +136,10 @@ class PipelineState(NamedTuple):
 
     def turn_since(self, before: 'PipelineState') -> Turn | None:
         """The end of a stroke between the state before a message and this one, if the adaptation learns from it."""
-        last, learnt = before.estimator.adaptation.learnt, self.estimator.adaptation.learnt
-        if learnt.direction == last.direction and learnt.reversals == last.reversals:
+        last, learnt = before.estimator.adaptation, self.estimator.adaptation
+        if learnt.stroke.direction == last.stroke.direction and learnt.reversals == last.reversals:
             return None
-        return Turn(before.estimator, self.estimator, self.temperature)
+        return Turn(before.estimator, self.estimator)
 
 
 def init(parameters: PipelineParameters) -> PipelineState:
@@ -398,22 +398,35 @@ def _feed_forward(
         ground = -1.0
     if turns and not is_wanted:  # a reference that came late: the force fades on its side
         ground = -1.0
-    if ground >= 0.0 and parameters.estimator.depends_on_velocity and not math.isnan(velocity):
-        seals, used = parameters.estimator.seal_numbers, known.pressure
-        added = friction_of_seals(seals, used.chamber_a, used.chamber_b, velocity).velocity_friction
-        if parameters.estimator.has_temperature_scale:
-            law = parameters.estimator.temperature_scale
-            added *= scale_at(law, temperature_in_use(law, temperature))
-        if parameters.estimator.uses_scale:
-            added *= known.adaptation.learnt.scale
-        ground += added
-        ground = max(ground, 0.0)
+    if ground >= 0.0 and not math.isnan(velocity):
+        ground = _friction_at(parameters.estimator, known, temperature, ground, velocity)
     elasticity = parameters.estimator.elasticity
     guided, compensation = elastic_step(settings, elasticity, guided, stamp, received, ground, velocity, present, led)
     send(emit, compensation, frame_id)
     return PipelineState(
         known, guided, friction, pressure, force, reference, receipt, refused, offset, temperature, clock
     )
+
+
+@compilable
+def _friction_at(
+    parameters: Any, known: EstimatorState, temperature: SealTemperature, coulomb: float, velocity: float
+) -> float:
+    """Friction at a wanted velocity [N], >= 0, from the Coulomb friction of the newest estimate [N]."""
+    learns = parameters.uses_scale and is_proven(known.adaptation.filter)
+    if not (learns or parameters.depends_on_velocity):
+        return coulomb
+    used = known.pressure
+    law = friction_of_seals(parameters.seal_numbers, used.chamber_a, used.chamber_b, velocity)
+    if parameters.has_temperature_scale:
+        scale = parameters.temperature_scale
+        law = at_temperature(law, scale, temperature_in_use(scale, temperature))
+    if not learns:
+        friction = coulomb + law.velocity_friction
+        return friction if friction > 0.0 else 0.0
+    direction = (1.0 if velocity > 0.0 else -1.0) if velocity != 0.0 else 0.0
+    sliding = law.coulomb_friction + law.velocity_friction
+    return bounded_friction(parameters.adaptation, known.adaptation.filter, direction, abs(velocity), sliding)
 
 
 @compilable

@@ -3,25 +3,11 @@
 import math
 from typing import NamedTuple
 
-from seal_friction_ros.core.estimation.adaptation import FEWEST_SAMPLES, AdaptationState
-from seal_friction_ros.core.estimation.disagreement import (
-    Reversal,
-    Stroke,
-    input_fault,
-    last_reversal,
-    likely_reason,
-    reversal_between,
-)
-from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState, temperature_in_use
+from seal_friction_ros.core.estimation.adaptation import AdaptationState, learnt
+from seal_friction_ros.core.estimation.disagreement import Reversal, input_fault, likely_reason, reversal_between
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorState
 from seal_friction_ros.core.estimation.friction_change import REFERENCE_REVERSALS, FrictionChange, watch
-from seal_friction_ros.core.estimation.records import (
-    NEVER,
-    NO_TEMPERATURE,
-    FrictionEstimate,
-    SealTemperature,
-    Status,
-)
-from seal_friction_ros.core.friction.actuator import at_temperature, friction_of_seals
+from seal_friction_ros.core.estimation.records import NEVER, FrictionEstimate, Status
 from seal_friction_ros.core.friction.states import SLIDING
 
 KEPT_REVERSALS = 60  # for the likely reason
@@ -78,63 +64,35 @@ class SealHealth(NamedTuple):
     reversals: tuple[Reversal, ...] = ()  # the last ones
     change: FrictionChange = FrictionChange()
     first: float = 0.0  # [-] mean ratio of the first `REFERENCE_REVERSALS`; NaN if they were not followed
-    stroke: Stroke | None = None  # the last one, if the scale was not learnt from it
 
 
 def followed(
     known: SealHealth,
-    parameters: EstimatorParameters,
     before: EstimatorState,
     state: EstimatorState,
-    temperature: SealTemperature = NO_TEMPERATURE,
 ) -> SealHealth:
     """Health after a sample; nothing is done but at a reversal.
 
     Args:
         known: Before the sample.
-        parameters: Of the estimator.
         before: State before the sample.
         state: State after it.
-        temperature: Of the seals.
     """
-    last, learnt = before.adaptation.learnt, state.adaptation.learnt
-    if learnt.direction == last.direction and learnt.reversals == known.learnt:
+    last, now = before.adaptation, state.adaptation
+    if now.stroke.direction == last.stroke.direction and now.reversals == known.learnt:
         return known
-    if learnt.reversals < known.learnt:  # the adaptation was reset
-        return SealHealth(learnt.reversals)
-    if learnt.reversals == known.learnt:
-        return _with_stroke(known, parameters, before, temperature)
-    newest = last_reversal(learnt)
-    number = learnt.reversals
-    first = known.first + (newest.ratio - known.first) / number if number <= REFERENCE_REVERSALS else known.first
+    if now.reversals < known.learnt:  # the adaptation was reset
+        return SealHealth(now.reversals)
+    pressure = before.pressure
+    newest = reversal_between(last.before, now.before, pressure.chamber_a, pressure.chamber_b)
+    reversals = known.reversals if newest is None else (*known.reversals[1 - KEPT_REVERSALS :], newest)
+    if now.reversals == known.learnt:  # outside the identified range
+        return known._replace(reversals=reversals)
+    number = now.reversals
+    first = known.first + (now.ratio - known.first) / number if number <= REFERENCE_REVERSALS else known.first
     if number != known.learnt + 1:  # learnt before this node began
         first = math.nan
-    return SealHealth(
-        learnt.reversals,
-        (*known.reversals[1 - KEPT_REVERSALS :], newest),
-        watch(known.change, newest.stamp, newest.ratio),
-        first,
-    )
-
-
-def _with_stroke(
-    known: SealHealth, parameters: EstimatorParameters, before: EstimatorState, temperature: SealTemperature
-) -> SealHealth:
-    """Health after a stroke that the scale was not learnt from: outside the identified range its level is empty."""
-    learnt, pressure = before.adaptation.learnt, before.pressure
-    if learnt.direction == 0 or learnt.level.samples or learnt.samples < FEWEST_SAMPLES:
-        return known._replace(stroke=None)
-    law = friction_of_seals(parameters.seal_numbers, pressure.chamber_a, pressure.chamber_b, before.velocity.velocity)
-    if parameters.has_temperature_scale:
-        scale = parameters.temperature_scale
-        law = at_temperature(law, scale, temperature_in_use(scale, temperature))
-    friction = law.coulomb_friction + law.velocity_friction
-    reading = learnt.scale * friction * learnt.direction + learnt.offset
-    stroke = Stroke(before.stamp, learnt.direction, reading, friction, pressure.chamber_a, pressure.chamber_b)
-    reversal = None if known.stroke is None else reversal_between(known.stroke, stroke)
-    if reversal is None:
-        return known._replace(stroke=stroke)
-    return known._replace(stroke=stroke, reversals=(*known.reversals[1 - KEPT_REVERSALS :], reversal))
+    return SealHealth(number, reversals, watch(known.change, now.before.stamp, now.ratio), first)
 
 
 def health_values(
@@ -145,24 +103,24 @@ def health_values(
     Friction that differs in the two directions cannot be told from a constant load: both are the offset. So the offset
     is given over the friction.
     """
-    learnt, change = state.learnt, health.change
+    known, change = learnt(parameters.adaptation, state), health.change
     age = 'never' if state.learnt_stamp == NEVER else f'{(state.stamp - state.learnt_stamp) * 1e-9:.1f}'
-    of_stroke = learnt.scale * learnt.level.friction if learnt.level.samples else 0.0
-    first = health.first if learnt.reversals >= REFERENCE_REVERSALS else 0.0
+    friction = known.scale * known.friction
+    first = health.first if known.reversals >= REFERENCE_REVERSALS else 0.0
     return {
         'adaptation mode': parameters.adaptation.mode,
-        'adaptation scale': f'{learnt.scale:.4f}',
-        'adaptation scale std': 'not learnt' if learnt.scale_std < 0.0 else f'{learnt.scale_std:.4f}',
-        'adaptation offset [N]': f'{learnt.offset:.4g}',
-        'adaptation residual std [N]': 'not learnt' if learnt.noise < 0.0 else f'{learnt.noise:.4g}',
-        'friction of this stroke [N]': f'{of_stroke:.4g}' if of_stroke else 'none',
-        'offset over friction': f'{learnt.offset / of_stroke:.3f}' if of_stroke else 'none',
-        'residual std over friction': f'{learnt.noise / of_stroke:.3f}' if of_stroke else 'none',
-        'scale over that of the first reversals': f'{learnt.scale / first:.4f}' if first > 0.0 else 'none',
+        'adaptation scale': f'{known.scale:.4f}',
+        'adaptation scale std': 'not learnt' if known.scale_std < 0.0 else f'{known.scale_std:.4f}',
+        'adaptation offset [N]': f'{known.offset:.4g}',
+        'adaptation residual std [N]': 'not learnt' if known.noise < 0.0 else f'{known.noise:.4g}',
+        'friction of this stroke [N]': f'{friction:.4g}' if friction else 'none',
+        'offset over friction': f'{known.offset / friction:.3f}' if friction else 'none',
+        'residual std over friction': f'{known.noise / friction:.3f}' if friction else 'none',
+        'scale over that of the first reversals': f'{known.scale / first:.4f}' if first > 0.0 else 'none',
         'starts after a rest': str(starts.number),
         'start over Coulomb friction': f'{starts.mean:.3f}' if starts.number else 'none',
         'start over Coulomb friction std': f'{starts.std:.3f}' if starts.number > 1 else 'none',
-        'reversals learnt from': str(learnt.reversals),
+        'reversals learnt from': str(known.reversals),
         'last learnt [s ago]': age,
         'changes of the friction': str(change.changes),
         'last change began [ns]': 'none' if change.changed_at == NEVER else str(change.changed_at),

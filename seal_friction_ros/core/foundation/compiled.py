@@ -28,6 +28,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 from seal_friction_ros.core.foundation.compiler_hooks import hooks
 
 Function = TypeVar('Function', bound=Callable[..., Any])
+Record = TypeVar('Record')
 
 INNER: Any = {'error_model': 'numpy', 'no_cpython_wrapper': True, 'no_cfunc_wrapper': True}
 """How a function is compiled that compiled code alone calls: without the ways in for Python and C, a fifth faster."""
@@ -103,6 +104,12 @@ def make_known() -> None:
 def unrolled(records: Any) -> Any:
     """Loop over ``records``, each of a type of its own: compiled code repeats the body of the loop for each of them."""
     return records
+
+
+def replace(record: Record, **changes: Any) -> Record:
+    """A named tuple with other values in some of its fields."""
+    changed: Record = record._replace(**changes)  # type: ignore[attr-defined]
+    return changed
 
 
 # -- functions with bound parameters ----------------------------------------------------------------------------------
@@ -296,9 +303,17 @@ def _stand_in(function: Callable[..., Any], known: Callable[..., Any]) -> None:
 
 @cache
 def _teach_the_compiler() -> None:
-    """Once: what `evaluate` and `bisect_right` are in compiled code."""
+    """Once: what `replace`, `evaluate` and `bisect_right` are in compiled code."""
     import numpy as np
     from numba.extending import overload
+
+    @overload(replace, strict=False, jit_options=INNER)
+    def _replace(record: Any, **changes: Any) -> Callable[..., Any]:
+        # Every field is an argument: the compiler tells two calls apart by the places and types of their arguments.
+        given = ', '.join(record.fields)
+        values = ', '.join(name if name in changes else f'record.{name}' for name in record.fields)
+        code = compile(f'lambda record, {given}: kind({values})', '<replace>', 'eval').co_consts[0]
+        return FunctionType(code, {'kind': record.instance_class}, 'replace', (None,) * len(record.fields))
 
     @overload(evaluate, jit_options=INNER)
     def _evaluate(function: Any, first: Any, second: Any) -> Callable[..., Any]:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, learnt
+from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import config_path, read_yaml
 from seal_friction_ros.offline.replay.bag_health import bag_health
@@ -30,15 +32,15 @@ def write_adapted_seal(bags: Sequence[Path], seal: Path, out: Path, namespace: s
         ValueError: A bag or the seal file cannot be used, or the last bag has too few reversals to learn from.
     """
     override = chosen_configuration(None, seal)
-    learnt = None
+    state = None
     for bag in bags:
-        learnt = bag_health(bag, namespace, override, learnt).learnt or learnt
-    if learnt is None or learnt.learnt.scale_std < 0.0:
+        state = bag_health(bag, namespace, override, state).learnt or state
+    found = learnt(DEFAULT_ADAPTATION, state or NOT_ADAPTED)
+    if found.scale_std < 0.0:
         raise ValueError(
             f'{bags[-1]}: too few reversals at even speed to learn a scale: move the rod to and fro at least four '
             'times, or give adaptation.moving_mass'
         )
-    found = learnt.learnt
     document = dict(read_yaml(config_path('seals', str(seal))))
     before = parse_seal(document).friction_scale
     document['friction_scale'] = rounded(before * found.scale, 6)

@@ -12,12 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationState
+from seal_friction_ros.core.estimation.adaptation import learnt as learnt_of
 from seal_friction_ros.core.estimation.compiled_pipeline import Answers, receive_all
 from seal_friction_ros.core.estimation.configuration import Configuration, parse_snapshot
+from seal_friction_ros.core.estimation.estimator import DEFAULT_ADAPTATION
+from seal_friction_ros.core.estimation.friction_filter import PROVEN
 from seal_friction_ros.core.estimation.message_blocks import Kind, Messages, UnsuitedError
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, DECODERS, ESTIMATE_TYPE
 from seal_friction_ros.core.estimation.pipeline import init
-from seal_friction_ros.core.estimation.records import NO_ESTIMATE, FrictionEstimate
+from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, FrictionEstimate
 from seal_friction_ros.core.estimation.seal_health import START, Starts, with_sample
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.friction.states import SLIDING
@@ -74,31 +77,19 @@ def bag_health(
     """
     rows: list[FloatArray] = []
     starts: list[float] = []
-    end, follower = learnt, Starts()
+    end, follower, strokes = learnt, Starts(), _Strokes()
     source = open_actuator(bag, namespace, mapping)
     try:
         for estimates, known in _observed(source, override, learnt, on_block):
             end = known
-            changed = np.flatnonzero(np.diff(estimates['adaptation_scale'], prepend=np.nan))
-            changed = changed[estimates['adaptation_scale_std'][changed] > 0.0]
-            first = not rows
-            rows.append(
-                np.array(
-                    [
-                        estimates['stamp'][changed] * 1e-9,
-                        *(estimates[name][changed] for name in ('adaptation_scale', 'adaptation_scale_std')),
-                        estimates['adaptation_offset'][changed],
-                        estimates['coulomb_friction'][changed],
-                    ]
-                )[:, int(first and changed.size > 0 and changed[0] == 0) :]
-            )
+            rows.append(strokes.ends(estimates))
             follower, found = _with_block(follower, estimates)
             starts += found
     except (UnsuitedError, OSError, *ERRORS) as error:
         raise BagError(f'{bag}: {error}: `seal_friction replay` tells more') from None
     table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
-    table = table[:, np.append(True, np.diff(table[1]) != 0.0)] if table.shape[1] else table  # ends of blocks
-    noise = end.learnt.noise if end is not None and end.learnt.noise >= 0.0 else float('nan')
+    table = table[:, np.append(True, np.diff(table[1]) != 0.0)] if table.shape[1] else table  # nothing learnt between
+    noise = learnt_of(DEFAULT_ADAPTATION, end).noise if end is not None and end.filter.stamp != NEVER else float('nan')
     time, scale, scale_std, offset, friction = table
     return BagHealth(time, scale, scale_std, offset, friction, noise, np.array(starts), end)
 
@@ -128,6 +119,27 @@ def health_of_bags(
 def _values(bag: Path, chosen: Chosen) -> dict[str, Any]:
     found = bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)._asdict()
     return {name: found[name] for name in _NAMES}
+
+
+class _Strokes:
+    """Estimates at the ends of strokes, across blocks of estimates."""
+
+    def __init__(self) -> None:
+        self._last: Any = None
+
+    def ends(self, estimates: Any) -> FloatArray:
+        """Stamp [s], scale, its deviation, offset and Coulomb friction at each reversal, of shape (5, n)."""
+        sliding = estimates[estimates['state'] == SLIDING]
+        if self._last is not None:
+            sliding = np.concatenate([self._last, sliding])
+        if not len(sliding):
+            return np.zeros((5, 0))
+        self._last = sliding[-1:]
+        ends = sliding[:-1][np.diff(sliding['direction']) != 0]
+        scale_std = ends['adaptation_scale_std']
+        ends = ends[(scale_std > 0.0) & (scale_std <= PROVEN)]
+        names = ('adaptation_scale', 'adaptation_scale_std', 'adaptation_offset', 'coulomb_friction')
+        return np.array([ends['stamp'] * 1e-9, *(ends[name] for name in names)])
 
 
 def _with_block(starts: Starts, estimates: Any) -> tuple[Starts, list[float]]:

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 from paths import ROOT
 
-from seal_friction_ros.core.estimation.adaptation import NO_LEVEL, NOTHING_LEARNT
+from seal_friction_ros.core.estimation.adaptation import NO_STROKE, Stroke
 from seal_friction_ros.core.estimation.disagreement import (
     Reversal,
-    Stroke,
     input_fault,
-    last_reversal,
     likely_reason,
     reversal_between,
 )
@@ -45,10 +43,17 @@ def shown(*ratios, friction=40.0, pressure_a=3e6, pressure_b=0.0, offset=0.0):
 # --- what a reversal shows ---
 
 
-def test_two_strokes_show_the_half_difference_as_friction_and_the_mean_as_offset():
-    out, back = Stroke(3, 1, 66.0, 38.0, 1e6, 2e6), Stroke(8, -1, -36.0, 42.0, 3e6, 4e6)
-    assert reversal_between(out, back) == Reversal(8, 102.0 / 80.0, 40.0, 15.0, 3e6, 4e6)
-    assert reversal_between(back, out) == Reversal(3, 102.0 / 80.0, 40.0, 15.0, 1e6, 2e6)
+def stroke(stamp, direction, reading, friction):
+    return Stroke(direction, stamp, reading, friction, samples=9, is_identified=True)
+
+
+def test_two_strokes_show_the_half_difference_as_friction_and_what_it_leaves_as_offset():
+    out, back = stroke(3, 1, 66.0, 38.0), stroke(8, -1, -36.0, 42.0)
+    ratio = 102.0 / 80.0
+    found = reversal_between(out, back, 3e6, 4e6)
+    assert found == Reversal(8, ratio, 42.0, pytest.approx(-36.0 + ratio * 42.0), 3e6, 4e6)
+    found = reversal_between(back, out, 1e6, 2e6)
+    assert found == Reversal(3, ratio, 38.0, pytest.approx(66.0 - ratio * 38.0), 1e6, 2e6)
 
 
 @pytest.mark.parametrize(
@@ -56,19 +61,17 @@ def test_two_strokes_show_the_half_difference_as_friction_and_the_mean_as_offset
     [((1, 1), (40.0, 40.0)), ((-1, -1), (40.0, 40.0)), ((1, 0), (40.0, 40.0)), ((1, -1), (0.0, 0.0))],
 )
 def test_strokes_of_one_direction_or_without_a_friction_of_the_law_show_none(directions, frictions):
-    before, after = (Stroke(i, d, 30.0 * d, f, 0.0, 0.0) for i, d, f in zip((1, 2), directions, frictions, strict=True))
-    assert reversal_between(before, after) is None
+    before, after = (stroke(i, d, 30.0 * d, f) for i, d, f in zip((1, 2), directions, frictions, strict=True))
+    assert reversal_between(before, after, 0.0, 0.0) is None
+
+
+def test_the_first_stroke_is_no_reversal():
+    assert reversal_between(NO_STROKE, stroke(8, -1, -36.0, 42.0), 0.0, 0.0) is None
 
 
 def test_strokes_show_the_weakest_friction_too():
-    out, back = Stroke(1, 1, 0.3, 0.2, 0.0, 0.0), Stroke(2, -1, -0.3, 0.2, 0.0, 0.0)
-    assert reversal_between(out, back).ratio == pytest.approx(1.5)
-
-
-def test_the_last_reversal_learnt_from_has_the_offset_that_the_ratio_leaves_of_the_reading():
-    stroke = NO_LEVEL._replace(direction=-1, stamp=7, reading=-35.0, friction=40.0, pressure_a=1e6, pressure_b=2e6)
-    learnt = NOTHING_LEARNT._replace(before=stroke, ratios=NOTHING_LEARNT.ratios._replace(first=1.25))
-    assert last_reversal(learnt) == Reversal(7, 1.25, 40.0, 15.0, 1e6, 2e6)
+    out, back = stroke(1, 1, 0.3, 0.2), stroke(2, -1, -0.3, 0.2)
+    assert reversal_between(out, back, 0.0, 0.0).ratio == pytest.approx(1.5)
 
 
 # --- an input that no seal explains ---

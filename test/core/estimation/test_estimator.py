@@ -12,6 +12,7 @@ from seal_friction_ros.core.estimation import estimator
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState, step
+from seal_friction_ros.core.estimation.friction_filter import NOT_BEGUN
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, decode, encode
 from seal_friction_ros.core.estimation.records import (
     NO_FORCE,
@@ -224,7 +225,7 @@ def test_more_pressure_in_either_chamber_is_never_less_friction(parameters, one,
 @given(good)
 def test_coulomb_friction_and_its_std_are_those_of_the_actuator(one):
     expected = actuator_friction(BOTH, one.pressure.chamber_a, one.pressure.chamber_b)
-    estimate = only(one)
+    estimate = only(one, replace(PARAMETERS, adaptation=AdaptationSettings('off')))
     assert estimate.coulomb_friction == expected.coulomb_friction
     assert estimate.coulomb_friction_std == expected.coulomb_friction_std
     assert estimate.breakaway_force == expected.coulomb_friction + expected.stiction
@@ -462,8 +463,9 @@ def test_a_sliding_rod_needs_no_force_sum(change):
 
 
 def test_with_an_unknown_state_the_coulomb_friction_is_still_told():
-    estimate = only(sample(velocity=math.nan))
-    assert estimate[1:4] == only(sample())[1:4]
+    unknown, known = only(sample(velocity=math.nan)), only(sample())
+    assert unknown.coulomb_friction == known.coulomb_friction
+    assert unknown.breakaway_force == known.breakaway_force
 
 
 def test_all_forces_are_zero_while_there_was_no_pressure():
@@ -777,27 +779,24 @@ def test_a_stamp_is_too_old_beyond_its_largest_age_either_way_or_never_with_0(ag
 # --- what adaptation takes of a sample ---
 
 
-def adapted_step(one: RodSample, mode='observe', before=None, **learnt):
-    """State and estimate after a sample of an adapting estimator that has learnt something."""
+def adapted_step(one: RodSample, mode='observe', before=None):
+    """State and estimate after a sample of an adapting estimator."""
     known = replace(PARAMETERS, adaptation=AdaptationSettings(mode))
-    state = before or init(known)
-    known_learnt = state.adaptation.learnt._replace(**learnt)
-    return step(known, state._replace(adaptation=state.adaptation._replace(learnt=known_learnt)), one)
+    return step(known, before or init(known), one)
 
 
-def slid(count=20, pressure=3e6, **learnt):
+def slid(count=20, pressure=3e6):
     """State after even sliding at 100 Hz."""
     state = None
     for i in range(count):
-        state, _ = adapted_step(sample(START + 10 * i * MS, pressure=pressure), before=state, **learnt)
+        state, _ = adapted_step(sample(START + 10 * i * MS, pressure=pressure), before=state)
     return state
 
 
-def test_until_a_scale_is_learnt_its_deviation_is_that_of_the_seal_file():
-    estimate = adapted_step(sample())[1]
-    assert estimate.adaptation_scale_std == estimate.coulomb_friction_std / estimate.coulomb_friction
-    assert adapted_step(sample(), scale_std=0.0)[1].adaptation_scale_std == 0.0
-    assert adapted_step(sample(), scale_std=0.25)[1].adaptation_scale_std == 0.25
+def test_before_anything_is_learnt_the_deviation_of_the_scale_is_that_of_the_seal_file():
+    off = replace(PARAMETERS, adaptation=AdaptationSettings('off'))
+    estimate, by_file = adapted_step(sample())[1], step(off, estimator.init(off), sample())[1]
+    assert estimate.adaptation_scale_std == by_file.coulomb_friction_std / by_file.coulomb_friction
     assert adapted_step(sample(pressure=None))[1].adaptation_scale_std == 0.0  # no friction to compare with
 
 
@@ -810,19 +809,24 @@ def test_a_sample_is_learnt_from_every_4_ms_and_no_more_often():
 
 def test_a_law_that_disagrees_is_learnt_from_on():
     before = slid()
-    after, estimate = adapted_step(sample(before.stamp + 10 * MS), before=before, scale_std=0.0, median=9.0)
+    learnt = before.adaptation.filter
+    learnt = learnt._replace(terms=learnt.terms._replace(scale=2.5), friction_std=1.0)
+    before = before._replace(adaptation=before.adaptation._replace(filter=learnt))
+    after, estimate = adapted_step(sample(before.stamp + 10 * MS), before=before)
     assert estimate.status == Status.MODEL_DISAGREES
-    assert after.adaptation.learnt.samples == before.adaptation.learnt.samples + 1
-    assert after.adaptation.learnt.level.samples == before.adaptation.learnt.level.samples + 1
+    assert after.adaptation.filter.stamp == after.stamp
+    assert after.adaptation.stroke.samples == before.adaptation.stroke.samples + 1
 
 
-def test_outside_the_identified_range_the_offset_is_learnt_and_with_a_bad_input_nothing():
-    outside = slid(pressure=8e6).adaptation.learnt
-    assert outside.samples > 10
-    assert outside.level.samples == 0
+def test_outside_the_identified_range_strokes_are_followed_and_with_a_bad_input_nothing_is_learnt():
+    outside = slid(pressure=8e6).adaptation
+    assert outside.stroke.samples > 10
+    assert outside.filter == NOT_BEGUN
     before = slid()
+    assert before.adaptation.filter != NOT_BEGUN
     stale, _ = adapted_step(sample(before.stamp + 10 * MS, force_age=101), before=before)
-    assert stale.adaptation.learnt == before.adaptation.learnt
+    assert stale.adaptation.filter == before.adaptation.filter
+    assert stale.adaptation.stroke == before.adaptation.stroke
 
 
 # --- swings ---

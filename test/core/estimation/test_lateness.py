@@ -108,10 +108,13 @@ class Player:
 
 
 def moment(at: int, speed: float = 0.05, *, late: int = 0, acceleration: float = 0.0) -> Iterator[Taken]:
-    """The messages that were sent at a moment [ns], in the order a servo sends them, and come ``late`` [ns]."""
+    """The messages that were sent at a moment [ns], in the order a servo sends them, and come ``late`` [ns].
+
+    The force sum is the friction, so it turns with the rod.
+    """
     for message in (
         Pressure(at, 3e6, 3e6),
-        Force(at, 60.0),
+        Force(at, math.copysign(40.0, speed)),
         ServoReference(at, 0.0, speed, acceleration),
         Velocity(at, speed, b'rod'),
     ):

@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seal_friction_ros.core.estimation import adaptation, estimator
-from seal_friction_ros.core.estimation.adaptation import NOTHING_LEARNT, AdaptationSettings
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.conditioned_velocity import NOT_CONDITIONED, SETTLING
 from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings, Limited
+from seal_friction_ros.core.estimation.friction_filter import NOT_BEGUN, Reading, begun
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, encode, type_of
 from seal_friction_ros.core.estimation.pipeline import (
     NO_REFERENCE,
@@ -494,14 +495,31 @@ def test_the_feed_forward_has_the_scale_that_is_learnt_on_all_of_its_friction(mo
     viscous = mounted(velocity_terms=VelocityTerms(viscous_friction=200.0))
     known = PARAMETERS._replace(estimator=replace(viscous, adaptation=AdaptationSettings(mode)))
     state = init_running(known)
-    learnt = NOTHING_LEARNT._replace(scale=1.5, scale_std=0.0, median=1.5)
-    adaptation = state.estimator.adaptation._replace(learnt=learnt)
+    learnt = begun(Reading(0, 60.0, 1, 0.05, 40.0, 3.0))
+    learnt = learnt._replace(terms=learnt.terms._replace(scale=1.5), covariance=NOT_BEGUN.covariance)
+    learnt = learnt._replace(innovation_std=4.0, friction=40.0, friction_std=4.0)
+    adaptation = state.estimator.adaptation._replace(filter=learnt)
     state = state._replace(estimator=state.estimator._replace(adaptation=adaptation))
     for message in ticks(0, 5):
         state, answer = receive_one(known, state, message)
     both = actuator_friction(viscous.seals, 3e6, 3e6, 0.05)
     assert both.velocity_friction > 10.0
-    assert answer.feedforward.force == pytest.approx(0.9 * scale * (both.coulomb_friction + both.velocity_friction))
+    assert answer.feedforward.force == pytest.approx(
+        0.9 * scale * (both.coulomb_friction + both.velocity_friction), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize('mode', ['observe', 'on'])
+@pytest.mark.parametrize('actuator', [SINGLE, TERMS, MAP])  # MAP falls with speed
+def test_before_anything_is_learnt_the_feed_forward_is_that_of_the_law_in_any_mode(actuator, mode):
+    forces = []
+    for each in ('off', mode):
+        known = PARAMETERS._replace(estimator=replace(actuator, adaptation=AdaptationSettings(each)))
+        state = init_running(known)
+        for message in ticks(0, 3):  # the first reading is of 4 ms
+            state, answer = receive_one(known, state, message)
+        forces.append(answer.feedforward.force)
+    assert forces[1] == pytest.approx(forces[0])
 
 
 def test_a_law_without_friction_leaves_no_force():

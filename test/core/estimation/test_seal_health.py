@@ -9,30 +9,12 @@ from harness.simulated_day import Day, samples
 from paths import ROOT
 
 from seal_friction_ros.core.estimation import estimator
-from seal_friction_ros.core.estimation.adaptation import (
-    NO_LEVEL,
-    NOT_ADAPTED,
-    NOTHING_LEARNT,
-    AdaptationSettings,
-    Learnt,
-)
-from seal_friction_ros.core.estimation.disagreement import Reversal, Stroke
-from seal_friction_ros.core.estimation.estimator import (
-    EstimatorParameters,
-    EstimatorSettings,
-    EstimatorState,
-    Speed,
-    step,
-)
+from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings, Stroke
+from seal_friction_ros.core.estimation.disagreement import Reversal
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState, step
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
-from seal_friction_ros.core.estimation.records import (
-    NEVER,
-    NO_ESTIMATE,
-    NO_TEMPERATURE,
-    Pressure,
-    SealTemperature,
-    Status,
-)
+from seal_friction_ros.core.estimation.friction_filter import NOT_BEGUN, FrictionFilter, Terms
+from seal_friction_ros.core.estimation.records import NEVER, NO_ESTIMATE, Pressure, Status
 from seal_friction_ros.core.estimation.seal_health import (
     SealHealth,
     Starts,
@@ -42,10 +24,8 @@ from seal_friction_ros.core.estimation.seal_health import (
     with_sample,
 )
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
-from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.friction.states import BREAKAWAY, SLIDING, STUCK, UNKNOWN
-from seal_friction_ros.core.friction.temperature import TemperatureScale, scale_at
 from seal_friction_ros.files import read_yaml
 
 SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))
@@ -88,7 +68,7 @@ def health_after(day, seconds, parameters=PARAMETERS):
     for sample in samples(day, seconds, 0):
         before = state
         state, _ = step(parameters, state, sample)
-        health = followed(health, parameters, before, state)
+        health = followed(health, before, state)
     return state, health
 
 
@@ -111,7 +91,7 @@ def test_a_friction_that_rises_after_the_first_reversals_is_told_as_a_ratio_to_t
 def test_beyond_the_identified_pressures_nothing_is_learnt_but_reversals_are_seen():
     beyond = tuple(replace(mounted, seal=replace(mounted.seal, pressure_max=1e6)) for mounted in SEALS)
     state, health = health_after(replace(Day(FRICTION), scale=lambda _: 1.3), 12.0, replace(PARAMETERS, seals=beyond))
-    assert state.adaptation.learnt.reversals == 0
+    assert state.adaptation.reversals == 0
     assert len(health.reversals) > 5
     assert median(reversal.ratio for reversal in health.reversals) == pytest.approx(1.3, rel=0.05)
 
@@ -138,7 +118,7 @@ def taken(known: Starts, stamp: int, state: int, force: float = 0.0, coulomb: fl
 
 def test_before_the_first_sample_nothing_is_known():
     assert Starts() == (NEVER, NEVER, 0.0, 0, 0.0, 0.0)
-    assert SealHealth() == (0, (), FrictionChange(), 0.0, None)
+    assert SealHealth() == (0, (), FrictionChange(), 0.0)
 
 
 @pytest.mark.parametrize('state', [STUCK, BREAKAWAY, UNKNOWN])
@@ -173,39 +153,51 @@ def test_a_start_without_coulomb_friction_has_no_ratio():
 
 # --- reversals that are followed ---
 
-
-def state_with(learnt: Learnt, **changes) -> EstimatorState:
-    adaptation = NOT_ADAPTED._replace(learnt=learnt)
-    return estimator.init(PARAMETERS)._replace(adaptation=adaptation, **changes)
-
-
-def after_reversal(number: int, ratio: float) -> EstimatorState:
-    """State after one more reversal was learnt from."""
-    stroke = NO_LEVEL._replace(direction=1, stamp=number, reading=40.0 * ratio, friction=40.0)
-    ratios = NOTHING_LEARNT.ratios._replace(first=ratio)
-    return state_with(NOTHING_LEARNT._replace(direction=(-1) ** number, before=stroke, ratios=ratios, reversals=number))
-
-
 RATIOS = [1.0 + 0.01 * ((7 * number) % 11) + 0.001 * number for number in range(70)]
+
+
+def stroke(number: int, offset: float = 5.0, is_identified: bool = True) -> Stroke:
+    """Even strokes extend, odd ones retract."""
+    direction = -1 if number % 2 else 1
+    return Stroke(direction, number, direction * 40.0 * RATIOS[number] + offset, 40.0, 9, is_identified)
+
+
+def state_after(number: int, reversals: int | None = None, ratio: float = 1.0) -> EstimatorState:
+    """State in the first sample of a stroke, after `reversals` that were learnt from."""
+    adaptation = NOT_ADAPTED._replace(
+        before=stroke(number - 1) if number else NOT_ADAPTED.before,
+        stroke=stroke(number)._replace(samples=1),
+        reversals=number if reversals is None else reversals,
+        ratio=ratio,
+    )
+    return estimator.init(PARAMETERS)._replace(adaptation=adaptation, pressure=Pressure(6, 3e6, 2e6))
 
 
 def followed_reversals(numbers, known=SealHealth()):  # noqa: B008  immutable
     """Health after each of the reversals with these numbers, from 1 on."""
     found = []
     for number in numbers:
-        known = followed(known, PARAMETERS, after_reversal(number - 1, 1.0), after_reversal(number, RATIOS[number - 1]))
+        known = followed(known, state_after(number - 1), state_after(number, ratio=RATIOS[number - 1]))
         found.append(known)
     return found
 
 
-def test_the_last_60_reversals_are_kept_and_the_mean_of_the_first_20():
-    found, change = followed_reversals(range(1, 71)), FrictionChange()
-    for number, ratio in enumerate(RATIOS, start=1):
-        change = watch(change, number, ratio)
+def test_the_ratios_and_the_mean_of_the_first_20_are_followed():
+    found, change = followed_reversals(range(1, 70)), FrictionChange()
+    for number, ratio in enumerate(RATIOS[:69], start=1):
+        change = watch(change, number - 1, ratio)
         health = found[number - 1]
         assert (health.learnt, health.change) == (number, change)
         assert health.first == pytest.approx(fmean(RATIOS[: min(number, 20)]))
-        assert [reversal.ratio for reversal in health.reversals] == RATIOS[max(number - 60, 0) : number]
+
+
+def test_the_last_60_reversals_are_kept_with_friction_offset_and_pressures():
+    for number, health in enumerate(followed_reversals(range(1, 70)), start=1):
+        assert len(health.reversals) == min(number - 1, 60)  # the first one has no stroke before
+    newest = health.reversals[-1]
+    assert newest.ratio == pytest.approx(fmean(RATIOS[67:69]))
+    assert (newest.stamp, newest.friction, newest.pressure_a, newest.pressure_b) == (68, 40.0, 3e6, 2e6)
+    assert newest.offset == pytest.approx(5.0, abs=40.0 * 0.06)
 
 
 def test_where_reversals_were_missed_there_is_no_mean_of_the_first():
@@ -216,66 +208,23 @@ def test_where_reversals_were_missed_there_is_no_mean_of_the_first():
 
 def test_between_reversals_nothing_changes_and_after_a_reset_nothing_is_known():
     *_, known = followed_reversals([1, 2, 3])
-    assert followed(known, PARAMETERS, after_reversal(3, 1.0), after_reversal(3, 1.0)) is known
-    reset = state_with(NOTHING_LEARNT)
-    assert followed(known, PARAMETERS, after_reversal(3, 1.0), reset) == SealHealth()
-    turned = state_with(NOTHING_LEARNT._replace(direction=-1, reversals=1))
-    assert followed(known, PARAMETERS, after_reversal(3, 1.0), turned) == SealHealth(1)
+    assert followed(known, state_after(3), state_after(3)) is known
+    assert followed(known, state_after(3), estimator.init(PARAMETERS)) == SealHealth()
+    assert followed(known, state_after(3), state_after(4, reversals=1)) == SealHealth(1)
 
 
-# --- strokes that the scale is not learnt from ---
-
-VISCOUS = replace(
-    PARAMETERS,
-    seals=tuple(replace(m, seal=replace(m.seal, velocity_terms=VelocityTerms(300.0))) for m in SEALS),
-)
-WARM_SCALE = TemperatureScale(reference=300.0, coefficient=0.01, coefficient_std=0.0, lowest=250.0, highest=350.0)
-WARM = replace(VISCOUS, seals=tuple(replace(m, seal=replace(m.seal, temperature=WARM_SCALE)) for m in VISCOUS.seals))
-
-
-def stroke_of(direction=1, known=None, parameters=VISCOUS, temperature=NO_TEMPERATURE, **learnt) -> SealHealth:
-    """Health after a stroke at 3 and 2 MPa with 0.05 m/s, outside the identified range."""
-    values = {'scale': 1.2, 'offset': 5.0, 'samples': 4} | learnt
-    end = NOTHING_LEARNT._replace(direction=direction, **values)
-    before = state_with(end, stamp=7, pressure=Pressure(6, 3e6, 2e6), velocity=Speed(7, 0.05 * direction))
-    turned = state_with(end._replace(direction=-direction if direction else 1))
-    return followed(known or SealHealth(), parameters, before, turned, temperature)
-
-
-def test_a_stroke_that_is_not_learnt_from_has_the_friction_of_the_law_at_its_end():
-    law = actuator_friction(VISCOUS.seals, 3e6, 2e6, 0.05)
-    friction = law.coulomb_friction + law.velocity_friction
-    assert law.velocity_friction == pytest.approx(2 * 300.0 * 0.05)
-    out = stroke_of().stroke
-    assert out == Stroke(7, 1, pytest.approx(1.2 * friction + 5.0), pytest.approx(friction), 3e6, 2e6)
-    assert stroke_of(-1).stroke.reading == pytest.approx(-1.2 * friction + 5.0)
-    hot = stroke_of(parameters=WARM, temperature=SealTemperature(7, 320.0)).stroke
-    assert hot.friction == pytest.approx(scale_at(WARM_SCALE, 320.0) * friction)
-
-
-def test_a_stroke_of_three_samples_or_one_that_is_learnt_from_or_none_is_no_stroke():
-    known = stroke_of()
-    for changes in ({'samples': 3}, {'level': NO_LEVEL._replace(samples=1)}, {'direction': 0}):
-        assert stroke_of(known=known, **changes).stroke is None
-
-
-def test_two_strokes_that_are_not_learnt_from_make_a_reversal_of_which_60_are_kept():
-    known = stroke_of()
-    assert known.reversals == ()
-    assert stroke_of(known=known).reversals == ()  # the same direction again
-    for number in range(1, 70):
-        known = stroke_of(direction=(-1) ** number, known=known)
-        assert len(known.reversals) == min(number, 60)
-    assert known.reversals[-1].ratio == pytest.approx(1.2)
-    assert known.reversals[-1].offset == pytest.approx(5.0)
-    assert (known.learnt, known.change) == (0, FrictionChange())
+def test_a_reversal_that_is_not_learnt_from_is_kept_and_neither_counted_nor_watched():
+    *_, known = followed_reversals([1, 2, 3])
+    after = followed(known, state_after(3), state_after(4, reversals=3))
+    assert after == known._replace(reversals=after.reversals)
+    assert len(after.reversals) == len(known.reversals) + 1
 
 
 # --- in words ---
 
 
-def values(learnt=NOTHING_LEARNT, health=SealHealth(), starts=Starts(), **state):  # noqa: B008  immutable
-    return health_values(PARAMETERS, NOT_ADAPTED._replace(learnt=learnt, **state), health, starts)
+def values(known=NOT_BEGUN, health=SealHealth(), starts=Starts(), **state):  # noqa: B008  immutable
+    return health_values(PARAMETERS, NOT_ADAPTED._replace(filter=known, **state), health, starts)
 
 
 def test_what_is_not_known_is_said_to_be_unknown():
@@ -292,25 +241,26 @@ def test_what_is_not_known_is_said_to_be_unknown():
 
 
 def test_what_is_known_is_told_in_its_unit():
-    learnt = NOTHING_LEARNT._replace(
-        scale=1.25,
-        scale_std=0.0,
-        noise=0.0,
-        offset=-5.0,
-        reversals=20,
-        level=NO_LEVEL._replace(samples=1, friction=40.0),
+    known: FrictionFilter = NOT_BEGUN._replace(
+        stamp=3_000 * MS,
+        terms=Terms(1.0, 8.0, 40.0, 0.0, -5.0, 0.7),
+        friction=40.0,
+        friction_std=2.0,
+        speed=0.05,
+        unexplained=NOT_BEGUN.unexplained._replace(square=9.0),
     )
     health = SealHealth(change=FrictionChange(changes=2, changed_at=123), first=0.5)
-    told = values(learnt, health, Starts(number=2, mean=1.5, squares=0.08), stamp=4_500 * MS, learnt_stamp=3_000 * MS)
+    starts = Starts(number=2, mean=1.5, squares=0.08)
+    told = values(known, health, starts, stamp=4_500 * MS, learnt_stamp=3_000 * MS, reversals=20)
     assert told == {
         'adaptation mode': 'observe',
         'adaptation scale': '1.2500',
-        'adaptation scale std': '0.0000',
+        'adaptation scale std': '0.0500',
         'adaptation offset [N]': '-5',
-        'adaptation residual std [N]': '0',
+        'adaptation residual std [N]': '3',
         'friction of this stroke [N]': '50',
         'offset over friction': '-0.100',
-        'residual std over friction': '0.000',
+        'residual std over friction': '0.060',
         'scale over that of the first reversals': '2.5000',
         'starts after a rest': '2',
         'start over Coulomb friction': '1.500',
@@ -326,7 +276,7 @@ def test_what_is_known_is_told_in_its_unit():
     ('reversals', 'first', 'told'), [(19, 1.0, 'none'), (20, 1.0, '1.0000'), (20, math.nan, 'none'), (20, -0.5, 'none')]
 )
 def test_the_first_twenty_reversals_are_compared_with_once_they_are_known(reversals, first, told):
-    found = values(NOTHING_LEARNT._replace(reversals=reversals), SealHealth(first=first))
+    found = values(health=SealHealth(first=first), reversals=reversals)
     assert found['scale over that of the first reversals'] == told
 
 

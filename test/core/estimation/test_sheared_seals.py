@@ -36,7 +36,6 @@ from seal_friction_ros.core.estimation.sheared_seals import (
     shear_on,
     slide_on,
 )
-from seal_friction_ros.core.estimation.swings import NO_SWING
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.laws.constant_coulomb import ConstantCoulomb
 from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
@@ -407,15 +406,11 @@ def test_nothing_is_learnt_while_the_seals_shear():
     assert not [e for e in rigid[1000:] if e.status == 0 and e.state == FrictionState.SLIDING]
 
 
-def test_a_snapshot_of_an_older_bag_has_rigid_seals():
+def test_a_configuration_of_an_older_bag_has_rigid_seals():
     text = snapshot_text(first_snapshot(load_configuration(SealSelection(), EstimatorSettings())))
-    document = json.loads(text)
+    document = json.loads(text) | {'version': 2}
     del document['settings']['use_presliding']
-    del document['state']['estimator']['shear'], document['state']['estimator']['swing']
-    older = parse_snapshot(json.dumps(document))
-    assert older.state.estimator.shear == NOT_FOLLOWED
-    assert older.state.estimator.swing == NO_SWING
-    assert not older.configuration.settings.use_presliding
+    assert not parse_snapshot(json.dumps(document)).configuration.settings.use_presliding
     assert parse_snapshot(text).configuration.settings.use_presliding
 
 
@@ -894,8 +889,9 @@ def test_the_force_sum_of_a_rod_that_stopped_counts_if_its_inertia_is_at_most_ha
         sample = RodSample(stamp, 0.01, Pressure(stamp, PRESSURE, PRESSURE), Force(stamp, 30.0))
         state, estimate = step(known, state, sample)
     acceleration = inertia * estimate.coulomb_friction / mass
-    learnt = state.adaptation.learnt._replace(offset=3.0)
-    state = state._replace(adaptation=state.adaptation._replace(acceleration=acceleration, learnt=learnt))
+    known_filter = state.adaptation.filter
+    learnt = known_filter._replace(terms=known_filter.terms._replace(offset=3.0, remainder=0.0))
+    state = state._replace(adaptation=state.adaptation._replace(acceleration=acceleration, filter=learnt))
     at = stamp + MS
     _, stopped = step(known, state, RodSample(at, 0.0, Pressure(at, PRESSURE, PRESSURE), Force(at, -5.0)))
     expected = -5.0 - 3.0 - mass * acceleration

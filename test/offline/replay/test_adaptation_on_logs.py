@@ -57,7 +57,7 @@ def test_a_ram_on_another_day_is_followed_within_130_newtons_and_the_band_holds(
     bag = imported(folder, logs[used_on], 'mbari')
     rms, inside = of_even_sliding(*replayed(folder, bag, seal, 'on'))
     assert rms < 130.0  # [N] measured: 97 and 97; a fixed law 421 and 542
-    assert 0.9 <= inside <= 0.99  # measured: 0.981 and 0.989
+    assert 0.9 <= inside <= 0.995  # measured: 0.981 and 0.989
     if learnt_on == '2022.01.28':  # by default the law stays as it is, but what is called good is
         _, inside = of_even_sliding(*replayed(folder, bag, seal, 'observe'))
         assert inside >= 0.9  # measured: 0.992; without looking at the force sum 0.76

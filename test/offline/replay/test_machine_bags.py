@@ -8,6 +8,7 @@ import pytest
 from harness.example_bags import rewrite
 from harness.machines import BENCH, EXCAVATOR, made, message
 
+from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
 from seal_friction_ros.core.estimation.messages import (
     CONFIGURATION_TYPE,
     FEEDFORWARD_TYPE,
@@ -118,7 +119,7 @@ def test_the_version_of_a_bag_is_that_of_its_oldest_actuator(bag: Path, tmp_path
         document['actuators']['arm']['snapshot']['version'] = 1
         return one._replace(data=encode_text(json.dumps(document)))
 
-    assert replay(bag).recorded_version == 2
+    assert replay(bag).recorded_version == ALGORITHM_VERSION
     assert replay(rewrite(bag, tmp_path / 'older', older)).recorded_version == 1
 
 

@@ -12,6 +12,7 @@ from harness.example_bags import as_recorded, rewrite, write_inputs
 from mcap.writer import Writer
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
+from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION
 from seal_friction_ros.core.estimation.message_blocks import Kind
 from seal_friction_ros.core.estimation.messages import (
     ESTIMATE_TYPE,
@@ -90,7 +91,7 @@ def test_stretches_give_the_result_of_one_go_whatever_the_number_of_workers(reco
 
 def test_each_stretch_begins_in_what_was_learnt_before_it(recorded: Path):
     texts = [decode_text(message.data) for message in read_messages(recorded) if message.topic == STATE]
-    learnt = [json.loads(text)['state']['estimator']['adaptation']['learnt']['reversals'] for text in texts]
+    learnt = [json.loads(text)['state']['estimator']['adaptation']['reversals'] for text in texts]
     assert learnt == sorted(learnt)
     assert learnt[-1] > learnt[0]
 
@@ -104,12 +105,12 @@ def other_byte(message: BagMessage) -> BagMessage:
 def other_learnt(message: BagMessage) -> BagMessage:
     """The state of a seal that has learnt another offset."""
     document = json.loads(decode_text(message.data))
-    document['state']['estimator']['adaptation']['learnt']['offset'] = (3.5).hex()
+    document['state']['estimator']['adaptation']['filter']['terms']['offset'] = (3.5).hex()
     return message._replace(data=encode_text(json.dumps(document, sort_keys=True)))
 
 
 def older(message: BagMessage) -> BagMessage:
-    text = decode_text(message.data).replace('"version": 2', '"version": 1')
+    text = decode_text(message.data).replace(f'"version": {ALGORITHM_VERSION}', '"version": 1')
     assert '"version": 1' in text
     return message._replace(data=encode_text(text))
 

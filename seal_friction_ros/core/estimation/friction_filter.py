@@ -1,0 +1,375 @@
+r"""One Bayesian filter: what the friction is on this machine today, and how well that is known.
+
+While the rod slides, the force sum less inertia is a reading of the friction and of what is not friction:
+
+.. math:: y = \Sigma F - m a = d\,(s f + c) + k v + a f + b + n + e
+
+with f the friction of the law of the seal files at the pressure and speed in use, d = +-1 the direction, v the
+velocity, and the state of the filter:
+
+====  =============================================================================================
+s     scale of the law
+c     share of Coulomb friction that does not follow the law [N]
+k     viscous friction that the law does not have [N s/m]
+a     asymmetry: part of the friction that has another size in the two directions
+b     offset of the force sum: load, area or sensor zero that nobody took off [N]
+n     remainder: what none of these explains and what passes within `REMAINDER_TIME` [N]
+====  =============================================================================================
+
+All but n are random walks, n is a first-order Gauss-Markov process and e is white. Friction is all but b and n, and its
+variance is that of the posterior: what cannot be told apart, as asymmetry from offset in one pressure, stays in the
+band. Terms that a motion does not excite keep their prior.
+
+The remainder makes the filter what it is: a friction that wavers over a stroke would else drag offset and scale along
+from one side of their band to the other. Samples that are too far away count less, as with noise of heavy tails; if
+they begin suddenly and go on, they are a step of the load. The noise of e follows the innovations.
+
+Source: [Kalman1960]_; random walks, noise from the innovations and consistency as in [BarShalom2001]_ chapters 5 and
+11; coloured noise as one more state as in [Jazwinski1970]_; weights of outliers after [Agamennoni2012]_. Model, prior
+and the numbers are our choice.
+"""
+
+import math
+from typing import NamedTuple
+
+from seal_friction_ros.core.estimation.records import NEVER
+from seal_friction_ros.core.foundation.compiled import compilable, replace
+from seal_friction_ros.core.foundation.limits import between
+
+# Prior: one standard deviation. A share is one of the friction by the law at the first sample.
+SCALE_PRIOR = 0.3  # [-] of another day, beside the deviation of the seal file
+COULOMB_PRIOR = 0.3  # [-] share
+VISCOUS_PRIOR = 1.0  # [s/m] share per speed
+ASYMMETRY_PRIOR = 0.07  # [-]
+OFFSET_PRIOR = 10.0  # [-] share
+# Random walks: one standard deviation after one second.
+SCALE_WALK = 0.005  # [-]
+COULOMB_WALK = 0.005  # [-] share
+VISCOUS_WALK = 0.02  # [s/m] share per speed
+ASYMMETRY_WALK = 0.001  # [-]
+OFFSET_WALK = 0.002  # [-] share
+REMAINDER_TIME = 0.4  # [s] time constant of n
+REMAINDER = 0.05  # [-] share: standard deviation of n
+LEAST_NOISE = 0.1  # [-] share: standard deviation of e at first and at least, since readings in a row miss alike
+NOISE_TIME = 5.0  # [s] in which the noise follows the innovations
+OUTLIER = 2.5  # [-] innovations over their standard deviation count less beyond this
+LEAP = 3.0  # [-] innovations over their deviation within two readings, or at the turn, that may begin a step
+STEP_READINGS = 10  # outliers in a row to one side that make it one,
+FEWEST_OUTLIERS = 3  # or these before the rod turns
+STEP_OF_FRICTION = 0.5  # [-] standard deviation of the scale over that of the offset after a step, both as forces
+PROVEN = 0.25  # [-] share: standard deviation of the friction below which the motion has told it
+DRIFT_TIME = 0.1  # [s] over which white noise averages out of what is not explained
+DRIFT_MEMORY = 10.0  # [s] over which the size of the rest is known
+LONGEST_STEP = 0.1  # [s] of motion that one sample stands for
+
+
+class Terms(NamedTuple):
+    """The state of the filter, its coefficients in a reading, or a row of its covariance."""
+
+    scale: float  # s
+    coulomb: float  # c
+    viscous: float  # k
+    asymmetry: float  # a
+    offset: float  # b
+    remainder: float  # n
+
+
+class Covariance(NamedTuple):
+    """Of the state: one row a term."""
+
+    scale: Terms
+    coulomb: Terms
+    viscous: Terms
+    asymmetry: Terms
+    offset: Terms
+    remainder: Terms
+
+
+class Unexplained(NamedTuple):
+    """What neither friction nor offset explains: n + e."""
+
+    noise: float = 0.0  # [-] standard deviation of e over the friction of the law
+    drift: float = 0.0  # [N] mean over `DRIFT_TIME`
+    drift_square: float = 0.0  # [N^2] mean square of the drift over `DRIFT_MEMORY`
+    square: float = 0.0  # [N^2] mean square over `DRIFT_MEMORY`
+
+
+class Outliers(NamedTuple):
+    """Readings in a row that were too far away after a sudden beginning."""
+
+    number: int  # with the sign of their innovations
+    last: float  # [N] last innovation
+    second: float  # [N] the one before, in the same direction
+    settled: Terms  # before the first of them
+    is_stepped: bool  # whether there was a step that no reversal has explained
+
+
+class FrictionFilter(NamedTuple):
+    """What one reading leaves for the next."""
+
+    stamp: int  # [ns] of the last reading; `NEVER` before the first
+    direction: int  # -1 or 1 then; 0: none
+    speed: float  # [m/s] then
+    friction: float  # [N] by the law then
+    friction_std: float  # [N] of the friction then
+    innovation_std: float  # [N] of its innovation
+    terms: Terms
+    covariance: Covariance
+    unexplained: Unexplained
+    outliers: Outliers
+
+
+NO_TERMS = Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NOT_BEGUN = FrictionFilter(
+    stamp=NEVER,
+    direction=0,
+    speed=0.0,
+    friction=0.0,
+    friction_std=0.0,
+    innovation_std=0.0,
+    terms=Terms(1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    covariance=Covariance(NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS),
+    unexplained=Unexplained(),
+    outliers=Outliers(0, 0.0, 0.0, NO_TERMS, False),
+)
+"""State before the first reading."""
+
+
+class Reading(NamedTuple):
+    """One reading of the friction."""
+
+    stamp: int  # [ns]
+    force: float  # [N] y
+    direction: int  # d
+    velocity: float  # [m/s] v
+    friction: float  # [N] f of the law, > 0
+    friction_std: float  # [N] of a new reading, by the seal file
+
+
+@compilable
+def coefficients(direction: float, velocity: float, friction: float) -> Terms:
+    """How the terms enter a reading."""
+    return Terms(direction * friction, direction, velocity, friction, 1.0, 1.0)
+
+
+@compilable
+def friction_magnitude(terms: Terms, direction: float, speed: float, friction: float) -> float:
+    """Friction of a rod that slides [N], never negative; at a ``direction`` of 0 the mean of both."""
+    magnitude = terms.scale * friction + terms.coulomb + terms.viscous * speed
+    magnitude += direction * terms.asymmetry * friction
+    return magnitude if magnitude > 0.0 else 0.0
+
+
+@compilable
+def product(row: Terms, by: Terms) -> float:
+    """Scalar product."""
+    a, b, c, d, e, f = row
+    p, q, r, s, t, u = by
+    total: float = a * p + b * q + c * r + d * s + e * t + f * u
+    return total
+
+
+@compilable
+def _products(covariance: Covariance, by: Terms) -> Terms:
+    """Product of the covariance and a column."""
+    p, q, r, s, t, u = covariance
+    return Terms(product(p, by), product(q, by), product(r, by), product(s, by), product(t, by), product(u, by))
+
+
+@compilable
+def _less(row: Terms, share: float, by: Terms) -> Terms:
+    """Row less a share of another."""
+    a, b, c, d, e, f = row
+    p, q, r, s, t, u = by
+    return Terms(a - share * p, b - share * q, c - share * r, d - share * s, e - share * t, f - share * u)
+
+
+@compilable
+def begun(reading: Reading) -> FrictionFilter:
+    """Filter with its prior, at the first reading."""
+    force = reading.friction
+    scale = math.hypot(SCALE_PRIOR, reading.friction_std / force)
+    std = Terms(
+        scale,
+        COULOMB_PRIOR * force,
+        VISCOUS_PRIOR * force,
+        ASYMMETRY_PRIOR,
+        OFFSET_PRIOR * force,
+        REMAINDER * force,
+    )
+    diagonal = Covariance(
+        Terms(std.scale * std.scale, 0.0, 0.0, 0.0, 0.0, 0.0),
+        Terms(0.0, std.coulomb * std.coulomb, 0.0, 0.0, 0.0, 0.0),
+        Terms(0.0, 0.0, std.viscous * std.viscous, 0.0, 0.0, 0.0),
+        Terms(0.0, 0.0, 0.0, std.asymmetry * std.asymmetry, 0.0, 0.0),
+        Terms(0.0, 0.0, 0.0, 0.0, std.offset * std.offset, 0.0),
+        Terms(0.0, 0.0, 0.0, 0.0, 0.0, std.remainder * std.remainder),
+    )
+    return replace(
+        NOT_BEGUN, stamp=reading.stamp, covariance=diagonal, unexplained=Unexplained(LEAST_NOISE, 0.0, 0.0, 0.0)
+    )
+
+
+@compilable
+def _walked(covariance: Covariance, friction: float, moved: float, elapsed: float) -> Covariance:
+    """Covariance before the next reading: random walks over ``moved`` [s] of motion, offset and n over ``elapsed``."""
+    kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
+    coulomb, viscous = COULOMB_WALK * friction, VISCOUS_WALK * friction
+    offset, remainder = OFFSET_WALK * friction, REMAINDER * friction
+    s, c, k = covariance.scale, covariance.coulomb, covariance.viscous
+    a, b, n = covariance.asymmetry, covariance.offset, covariance.remainder
+    return Covariance(
+        replace(s, scale=s.scale + moved * SCALE_WALK * SCALE_WALK, remainder=kept * s.remainder),
+        replace(c, coulomb=c.coulomb + moved * coulomb * coulomb, remainder=kept * c.remainder),
+        replace(k, viscous=k.viscous + moved * viscous * viscous, remainder=kept * k.remainder),
+        replace(a, asymmetry=a.asymmetry + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, remainder=kept * a.remainder),
+        replace(b, offset=b.offset + elapsed * offset * offset, remainder=kept * b.remainder),
+        Terms(
+            kept * n.scale,
+            kept * n.coulomb,
+            kept * n.viscous,
+            kept * n.asymmetry,
+            kept * n.offset,
+            kept * kept * n.remainder + (1.0 - kept * kept) * remainder * remainder,
+        ),
+    )
+
+
+@compilable
+def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
+    """Filter after one more reading: predict, look for a step, correct, and follow what is left."""
+    if known.stamp == NEVER:
+        known = begun(reading)
+    elapsed = between(0.0, (reading.stamp - known.stamp) * 1e-9, 3600.0)
+    moved = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
+    column = coefficients(reading.direction, reading.velocity, reading.friction)
+    kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
+    terms = replace(known.terms, remainder=kept * known.terms.remainder)
+    covariance = _walked(known.covariance, reading.friction, moved, elapsed)
+    innovation = reading.force - product(terms, column)
+    noise = known.unexplained.noise * reading.friction
+    variance = product(_products(covariance, column), column) + noise * noise
+
+    outliers, steps = _outliers(known, reading.direction, terms, innovation, variance)
+    unexplained = _followed(known, innovation + terms.remainder, innovation * innovation / variance, moved)
+    if steps:
+        terms = outliers.settled
+        innovation = reading.force - product(terms, column)
+        covariance = _freed(covariance, innovation, reading.direction * reading.friction)
+    terms, covariance = _corrected(terms, covariance, column, innovation, noise)
+
+    std = friction_std(covariance, unexplained.drift_square, reading)
+    is_stepped = outliers.is_stepped and std > PROVEN * reading.friction
+    if outliers.number == 0:
+        outliers = Outliers(0, outliers.last, outliers.second, terms, is_stepped)
+    return FrictionFilter(
+        reading.stamp,
+        reading.direction,
+        abs(reading.velocity),
+        reading.friction,
+        std,
+        math.sqrt(variance),
+        terms,
+        covariance,
+        unexplained,
+        outliers,
+    )
+
+
+@compilable
+def _corrected(
+    terms: Terms, covariance: Covariance, column: Terms, innovation: float, noise: float
+) -> tuple[Terms, Covariance]:
+    """Mean and covariance after an innovation [N]; an outlier counts less, as with noise of heavy tails."""
+    gains = _products(covariance, column)
+    spread = product(gains, column)
+    variance = spread + noise * noise
+    distance = abs(innovation) / math.sqrt(variance)
+    if distance > OUTLIER:
+        variance = spread + noise * noise * (distance / OUTLIER) * (distance / OUTLIER)
+    return _less(terms, -innovation / variance, gains), Covariance(
+        _less(covariance.scale, gains.scale / variance, gains),
+        _less(covariance.coulomb, gains.coulomb / variance, gains),
+        _less(covariance.viscous, gains.viscous / variance, gains),
+        _less(covariance.asymmetry, gains.asymmetry / variance, gains),
+        _less(covariance.offset, gains.offset / variance, gains),
+        _less(covariance.remainder, gains.remainder / variance, gains),
+    )
+
+
+@compilable
+def _outliers(
+    known: FrictionFilter, direction: int, terms: Terms, innovation: float, variance: float
+) -> tuple[Outliers, bool]:
+    """Outliers after an innovation [N], and whether they are a step of the load, or of the friction."""
+    before, turns = known.outliers, direction != known.direction
+    side = 0
+    if innovation * innovation > OUTLIER * OUTLIER * variance:
+        side = 1 if innovation > 0.0 else -1
+    goes_on = before.number * side > 0
+    leap = innovation if turns else innovation - before.second
+    if not goes_on and leap * leap < LEAP * LEAP * variance:
+        side = 0
+    count = before.number + side if goes_on else side
+    steps = abs(count) >= STEP_READINGS or (turns and abs(before.number) >= FEWEST_OUTLIERS)
+    settled = before.settled if before.number != 0 else terms
+    second = innovation if turns else before.last
+    return Outliers(0 if steps else count, innovation, second, settled, before.is_stepped or steps), steps
+
+
+@compilable
+def _followed(known: FrictionFilter, unexplained: float, excess: float, moved: float) -> Unexplained:
+    """What is not explained after ``unexplained`` [N] more; ``excess`` is the squared innovation over its variance."""
+    before = known.unexplained
+    excess = excess if excess < OUTLIER * OUTLIER else OUTLIER * OUTLIER
+    variance = before.noise * before.noise * (1.0 + moved / (moved + NOISE_TIME) * (excess - 1.0))
+    noise = between(LEAST_NOISE, math.sqrt(variance), 1.0)
+    if known.direction == 0:
+        unexplained = 0.0  # all of it may be offset
+    drift = before.drift + moved / (moved + DRIFT_TIME) * (unexplained - before.drift)
+    share = moved / (moved + DRIFT_MEMORY)
+    return Unexplained(
+        noise,
+        drift,
+        before.drift_square + share * (drift * drift - before.drift_square),
+        before.square + share * (unexplained * unexplained - before.square),
+    )
+
+
+@compilable
+def _freed(covariance: Covariance, innovation: float, force: float) -> Covariance:
+    """Covariance after a step that one direction does not explain: it counts as load, but it may be of the friction.
+
+    So the offset is freed, and a scale that the offset makes up for: the sum of both does not move the scale until the
+    next reversal tells them apart.
+
+    Args:
+        covariance: Before the step.
+        innovation: [N]
+        force: Friction of the law with the sign of the direction [N].
+    """
+    scale_variance = (STEP_OF_FRICTION * innovation / force) * (STEP_OF_FRICTION * innovation / force)
+    s, b = covariance.scale, covariance.offset
+    shared = -force * scale_variance
+    freed = innovation * innovation + force * force * scale_variance
+    return replace(
+        covariance,
+        scale=replace(s, scale=s.scale + scale_variance, offset=s.offset + shared),
+        offset=replace(b, scale=b.scale + shared, offset=b.offset + freed),
+    )
+
+
+@compilable
+def friction_std(covariance: Covariance, drift_square: float, reading: Reading) -> float:
+    """Standard deviation of the friction of a rod that slides [N]: of its terms, and of a drift that may be friction.
+
+    Args:
+        covariance: Of the state.
+        drift_square: Mean square of what drifts unexplained [N^2].
+        reading: That the friction is asked for.
+    """
+    law = reading.friction
+    column = Terms(reading.direction * law, reading.direction, reading.velocity, law, 0.0, 0.0)
+    least = REMAINDER * law * REMAINDER * law
+    variance = product(_products(covariance, column), column) + (drift_square if drift_square > least else least)
+    return math.sqrt(variance) if variance > 0.0 else 0.0

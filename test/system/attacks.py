@@ -1,0 +1,220 @@
+"""Status 0 under attack: a rod on strokes and rests with exact rigid friction, and what sensors and loads do to it.
+
+``python test/system/attacks.py``. Wrong is a sample with status 0 whose friction force is outside the 95 % band; the
+first 2 s do not count. Exit code 1 if more than 0.5 % of the samples with status 0 of an attack are wrong, or fewer
+than 80 % of the samples of a clean machine have status 0.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from paths import ROOT
+
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
+from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, init, step
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
+from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
+from seal_friction_ros.core.friction.seal_file import parse_seal
+from seal_friction_ros.files import read_yaml
+
+SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))
+SEALS = (MountedSeal(SEAL, 'a'), MountedSeal(SEAL, 'b'))
+PRESSURE = 3e6  # [Pa]
+COULOMB = actuator_friction(SEALS, PRESSURE, PRESSURE).coulomb_friction  # [N]
+MASS = 5.0  # [kg]
+PERIOD = 1e-3  # [s]
+SKIPPED = 2.0  # [s]
+
+
+@dataclass(frozen=True)
+class Rod:
+    """Signals of shape (n,)."""
+
+    position: np.ndarray  # [m]
+    velocity: np.ndarray  # [m/s] as measured
+    force_sum: np.ndarray  # [N] as measured
+    friction: np.ndarray  # [N] true
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time [s]."""
+        return PERIOD * np.arange(len(self.position))
+
+
+def strokes(seconds: float, seed: int = 5, slowest: float = 0.01, fastest: float = 0.15) -> Rod:
+    """Smooth strokes of 2 to 60 mm, half of them after a rest under a force that the seals hold."""
+    rng, position, friction, place, before = np.random.default_rng(seed), [0.0], [0.0], 0.0, 0.0
+    while len(position) * PERIOD < seconds:
+        way = float(rng.choice([-1.0, 1.0]) * rng.uniform(2e-3, 0.06))
+        way = -way if abs(place + way) > 0.09 else way
+        rest = int(rng.choice([0, 300, 1000]))
+        moment = np.arange(rest)
+        held = float(rng.uniform(-0.8, 0.8)) * COULOMB
+        held = 0.9 * before * np.exp(-moment / 60.0) + held * (1.0 - np.exp(-moment / 60.0))
+        start = np.clip((moment - rest + 50) / 50.0, 0.0, 1.0)
+        position += [place] * rest
+        friction += list((1.0 - start) * held + start * 0.95 * COULOMB * np.sign(way))
+        speed = 10.0 ** float(rng.uniform(np.log10(slowest), np.log10(fastest)))
+        share = np.linspace(0.0, 1.0, int(max(1.5 * abs(way) / speed, 0.05) / PERIOD) + 1)[1:]
+        position += list(place + way * (3.0 * share**2 - 2.0 * share**3))
+        before = float(np.copysign(COULOMB, way))
+        friction += [before] * len(share)
+        place += way
+    count = round(seconds / PERIOD)
+    x, force = np.array(position[:count]), np.array(friction[:count])
+    velocity = np.gradient(x, PERIOD)
+    return Rod(x, velocity, force + MASS * np.gradient(velocity, PERIOD), force)
+
+
+def with_load(rod: Rod, load: np.ndarray | float) -> Rod:
+    """A load in the force sum that nobody takes off."""
+    return replace(rod, force_sum=rod.force_sum + load)
+
+
+def with_friction(rod: Rod, friction: np.ndarray) -> Rod:
+    """Another friction."""
+    return replace(rod, force_sum=rod.force_sum - rod.friction + friction, friction=friction)
+
+
+def late(signal: np.ndarray, milliseconds: int) -> np.ndarray:
+    """A signal that comes late."""
+    return np.concatenate([np.full(milliseconds, signal[0]), signal[:-milliseconds]])
+
+
+def counted(rod: Rod, count: float) -> Rod:
+    """The velocity of an encoder with this count [m]."""
+    return replace(rod, velocity=np.diff(np.round(rod.position / count) * count, prepend=0.0) / PERIOD)
+
+
+def noisy(rod: Rod, share: float, seed: int = 1) -> Rod:
+    """White noise in the force sum, as a share of the friction."""
+    return with_load(rod, share * COULOMB * np.random.default_rng(seed).standard_normal(len(rod.position)))
+
+
+def held(
+    velocity: Callable[[np.ndarray], np.ndarray], force: Callable[[np.ndarray], np.ndarray]
+) -> Callable[[Rod], Rod]:
+    """A rod that is held, with a velocity that is not its own."""
+
+    def made(rod: Rod) -> Rod:
+        friction = force(rod.time)
+        return Rod(np.zeros_like(rod.time), velocity(rod.time), friction, friction)
+
+    return made
+
+
+def vibrating(frequency: float, amplitude: float) -> Callable[[Rod], Rod]:
+    """A rod of 20 kg that vibrates with ``amplitude`` [m]."""
+
+    def made(rod: Rod) -> Rod:
+        rate = 2.0 * np.pi * frequency
+        velocity = amplitude * rate * np.cos(rate * rod.time + 0.3)
+        friction = COULOMB * np.sign(velocity)
+        inertia = -20.0 * amplitude * rate**2 * np.sin(rate * rod.time + 0.3)
+        return Rod(rod.position, velocity, friction + inertia, friction)
+
+    return made
+
+
+def _slides(rod: Rod) -> np.ndarray:
+    return (rod.velocity != 0.0).astype(float)
+
+
+CLEAN: dict[str, Callable[[Rod], Rod]] = {
+    'nothing': lambda rod: rod,
+    'encoder of 1 um, force noise of 2 %': lambda rod: noisy(counted(rod, 1e-6), 0.02),
+}
+ATTACKS: dict[str, Callable[[Rod], Rod]] = {
+    'offset of 0.2 of the friction': lambda rod: with_load(rod, 0.2 * COULOMB),
+    'offset of the friction': lambda rod: with_load(rod, COULOMB),
+    'payload of 60 N on and off every 7 s': lambda rod: with_load(rod, 60.0 * (rod.time // 7.0 % 2)),
+    **{f'friction times {f}': (lambda rod, f=f: with_friction(rod, f * rod.friction)) for f in (0.6, 0.8, 1.25, 1.6)},
+    **{
+        f'direction: {q:.0%} more, {q:.0%} less': (
+            lambda rod, q=q: with_friction(rod, rod.friction + q * np.abs(rod.friction) * _slides(rod))
+        )
+        for q in (0.05, 0.1, 0.15)
+    },
+    'viscous friction that the file has not': lambda rod: with_friction(
+        rod, rod.friction + 0.5 * COULOMB * rod.velocity / 0.15
+    ),
+    'Stribeck friction that the file has not': lambda rod: with_friction(
+        rod, rod.friction * (1.0 + 0.4 * _slides(rod) * np.exp(-((rod.velocity / 0.02) ** 2)))
+    ),
+    'velocity 10 ms late': lambda rod: replace(rod, velocity=late(rod.velocity, 10)),
+    'force sum 20 ms late': lambda rod: replace(rod, force_sum=late(rod.force_sum, 20)),
+    'encoder of 5 um': lambda rod: counted(rod, 5e-6),
+    'encoder of 50 um': lambda rod: counted(rod, 5e-5),
+    'force noise of 30 %': lambda rod: noisy(rod, 0.3),
+    'hum of 20 mm/s at 3 Hz on a held rod': held(
+        lambda t: 0.02 * np.sin(6.0 * np.pi * t), lambda t: np.full_like(t, 0.4 * COULOMB)
+    ),
+    'vibration of 50 um at 300 Hz': vibrating(300.0, 5e-5),
+    'vibration of 0.2 mm at 205 Hz': vibrating(205.0, 2e-4),
+}
+
+
+class Found(NamedTuple):
+    """Shares of samples [-]."""
+
+    good: float  # with status 0
+    wrong: float  # of these, outside the band
+
+
+def attacked(name: str, mode: str, seconds: float) -> Found:
+    """Run one attack."""
+    rod = (CLEAN | ATTACKS)[name](strokes(seconds))
+    parameters = EstimatorParameters(EstimatorSettings(), SEALS, AdaptationSettings(mode, moving_mass=MASS))
+    state, rows = init(parameters), []
+    for i, (velocity, force) in enumerate(zip(rod.velocity.tolist(), rod.force_sum.tolist(), strict=True)):
+        stamp = 10**12 + i * round(PERIOD * 1e9)
+        sample = RodSample(stamp, velocity, Pressure(stamp, PRESSURE, PRESSURE), Force(stamp, force))
+        state, estimate = step(parameters, state, sample)
+        rows.append((estimate.status, estimate.friction_force, estimate.coulomb_friction_std))
+    first = round(SKIPPED / PERIOD)
+    status, friction, std = np.array(rows)[first:].T
+    good = status == 0
+    outside = np.abs(friction - rod.friction[first:]) > BAND_95 * std + 1e-9
+    return Found(float(good.mean()), float((good & outside).sum() / max(good.sum(), 1)))
+
+
+def main() -> int:
+    """Run all; print the table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--seconds', type=float, default=40.0)
+    parser.add_argument('--workers', type=int, default=2)
+    parser.add_argument('--json', action='store_true')
+    arguments = parser.parse_args()
+    cases = [(name, mode) for name in CLEAN | ATTACKS for mode in ('observe', 'on')]
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        found = dict(zip(cases, pool.map(partial(_attacked, arguments.seconds), cases), strict=True))
+    if arguments.json:
+        print(json.dumps([{'case': name, 'mode': mode, **one._asdict()} for (name, mode), one in found.items()]))
+    else:
+        table = Table('attack', 'mode', 'status 0', 'of these wrong')
+        for (name, mode), one in found.items():
+            table.add_row(name, mode, f'{one.good:.1%}', f'{one.wrong:.2%}')
+        Console().print(table)
+    wrong = any(one.wrong > 0.005 for one in found.values())
+    return int(wrong or any(one.good < 0.8 for (name, _), one in found.items() if name in CLEAN))
+
+
+def _attacked(seconds: float, case: tuple[str, str]) -> Found:
+    return attacked(*case, seconds)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

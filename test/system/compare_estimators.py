@@ -1,0 +1,234 @@
+"""The estimator beside simpler ones, on logs of a ram: what was known before, and what was seen then.
+
+``python test/system/compare_estimators.py FOLDER`` with logs of the mbari rig in FOLDER. Each estimator is given what
+one log shows (seal file, least squares) and runs over another, causal. Where |v| > 10 mm/s and |a| < 0.05 m/s2, in N:
+
+- ``1 step``, ``0.5 s``, ``2 s``: RMS of the force sum less what was known that long before;
+- ``reversal``: the same in the first 0.3 s of a stroke, known at the end of the stroke before;
+- ``friction``: RMS of the force sum less the friction known one sample before, and less one offset for the whole log.
+"""
+
+import argparse
+import itertools
+import json
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
+from seal_friction_ros.core.estimation.estimator import init, step
+from seal_friction_ros.core.estimation.messages import DECODERS
+from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample, Velocity
+from seal_friction_ros.core.foundation.normal_distribution import BAND_95
+from seal_friction_ros.core.friction.actuator import friction_of_seals
+from seal_friction_ros.core.friction.force_sum_correction import corrected_force_sum
+from seal_friction_ros.offline.bags.bag import read_messages
+from seal_friction_ros.offline.commands.main import main as command
+from seal_friction_ros.offline.replay.replay import chosen_configuration
+
+SLOWEST, LARGEST_ACCELERATION = 0.01, 0.05  # [m/s], [m/s^2]
+COLUMNS = ('1 step', '0.5 s', '2 s', 'reversal', 'friction')
+
+
+class Log(NamedTuple):
+    """Signals of a log, of shape (n,)."""
+
+    time: np.ndarray  # [s]
+    velocity: np.ndarray  # [m/s]
+    pressure_a: np.ndarray  # [Pa]
+    pressure_b: np.ndarray  # [Pa]
+    force: np.ndarray  # [N]
+
+    @property
+    def is_even(self) -> np.ndarray:
+        """Where the rod slides evenly."""
+        acceleration = np.gradient(self.velocity, self.time)
+        return (np.abs(self.velocity) > SLOWEST) & (np.abs(acceleration) < LARGEST_ACCELERATION)
+
+
+class Known(NamedTuple):
+    """A linear model: the force sum is terms times values known after each sample; the last term is no friction."""
+
+    terms: np.ndarray  # (n, k)
+    values: np.ndarray  # (n, k) after each sample
+
+
+def read_log(bag: Path) -> Log:
+    """Samples of a bag, with the newest pressure and force sum of each velocity."""
+    rows, pressure, force = [], None, None
+    for message in read_messages(bag):
+        record = DECODERS[message.type_name](message.data) if message.type_name in DECODERS else None
+        if isinstance(record, Pressure):
+            pressure = record
+        elif isinstance(record, Force):
+            force = record
+        elif isinstance(record, Velocity) and pressure and force:
+            rows.append((record.stamp * 1e-9, record.velocity, pressure.chamber_a, pressure.chamber_b, force.force))
+    return Log(*np.array(rows).T)
+
+
+def simple_terms(log: Log) -> np.ndarray:
+    """Coulomb friction, viscous friction, Coulomb friction by the pressure difference, offset."""
+    sign = np.sign(log.velocity)
+    difference = np.abs(log.pressure_a - log.pressure_b) * 1e-5
+    return np.c_[sign, log.velocity, sign * difference, np.ones_like(sign)]
+
+
+def least_squares(log: Log) -> tuple[np.ndarray, np.ndarray, float]:
+    """Values, their covariance and the RMS of the misfit."""
+    terms, force = simple_terms(log)[log.is_even], log.force[log.is_even]
+    values = np.linalg.lstsq(terms, force, rcond=None)[0]
+    noise = float(np.std(force - terms @ values))
+    return values, np.linalg.inv(terms.T @ terms) * noise**2, noise
+
+
+def fixed(learnt_on: Log, log: Log) -> Known:
+    """Least squares of the other log, and an offset that forgets in half a second."""
+    values, terms = least_squares(learnt_on)[0].copy(), simple_terms(log)
+    known, share = [], float(np.median(np.diff(log.time))) / 0.5
+    for row, force, learns in zip(terms, log.force, log.is_even, strict=True):
+        if learns:
+            values[3] += share * (force - row @ values)
+        known.append(values.copy())
+    return Known(terms, np.array(known))
+
+
+def tuned_recursive(learnt_on: Log, log: Log) -> Known:
+    """Recursive least squares with the forgetting that is best one step ahead on the first log."""
+    memory = min(
+        (2.0, 5.0, 10.0, 20.0), key=lambda each: errors(learnt_on, recursive(learnt_on, learnt_on, each))['1 step']
+    )
+    return recursive(learnt_on, log, memory)
+
+
+def recursive(learnt_on: Log, log: Log, memory: float) -> Known:
+    """Recursive least squares with forgetting, ``memory`` in [s]."""
+    values, covariance, noise = least_squares(learnt_on)
+    covariance, terms = covariance * 100.0 / noise**2, simple_terms(log)
+    kept, known = float(np.exp(-np.median(np.diff(log.time)) / memory)), []
+    for row, force, learns in zip(terms, log.force, log.is_even, strict=True):
+        if learns:
+            gain = covariance @ row / (kept + row @ covariance @ row)
+            values = values + gain * (force - row @ values)
+            covariance = (covariance - np.outer(gain, row @ covariance)) / kept
+        known.append(values.copy())
+    return Known(terms, np.array(known))
+
+
+def plain_kalman(learnt_on: Log, log: Log) -> Known:
+    """A Kalman filter of the same four terms, random walks, noise of the misfit."""
+    values, covariance, noise = least_squares(learnt_on)
+    covariance, terms = covariance * 100.0, simple_terms(log)
+    walk = np.square([0.01, 0.02, 0.001, 0.02]) * np.square([noise, noise, noise, noise])
+    walk, known = walk * float(np.median(np.diff(log.time))), []
+    for row, force, learns in zip(terms, log.force, log.is_even, strict=True):
+        if learns:
+            covariance = covariance + np.diag(walk)
+            gain = covariance @ row / (row @ covariance @ row + noise**2)
+            values = values + gain * (force - row @ values)
+            covariance = covariance - np.outer(gain, row @ covariance)
+        known.append(values.copy())
+    return Known(terms, np.array(known))
+
+
+def package(seal: Path, log: Log) -> dict[str, float]:
+    """Errors of the package, by the state of its filter; shares of good samples, and of those in their band.
+
+    The force sum is that of the seal file, which corrects the areas.
+    """
+    given = chosen_configuration(None, seal).parameters().estimator
+    parameters = replace(given, adaptation=AdaptationSettings('on'))
+    state, terms, values, seen, corrected = init(parameters), [], [], [], []
+    for time, velocity, a, b, force in zip(*(signal.tolist() for signal in log), strict=True):
+        stamp = round(time * 1e9)
+        sample = RodSample(stamp, velocity, Pressure(stamp, a, b), Force(stamp, force))
+        state, estimate = step(parameters, state, sample)
+        friction = friction_of_seals(parameters.seal_numbers, a, b, velocity)
+        law, sign = friction.coulomb_friction + friction.velocity_friction, float(np.sign(velocity))
+        terms.append((sign * law, sign, velocity, law, 1.0))
+        corrected.append(corrected_force_sum(parameters.force_sum_correction, force, a, b))
+        found = state.adaptation.filter.terms
+        values.append((*found[:4], found.offset + found.remainder))
+        seen.append((estimate.status, estimate.residual, estimate.coulomb_friction_std))
+    status, residual, std = np.array(seen)[log.is_even].T
+    good = status == 0
+    quality = {'good': float(good.mean()), 'in_band': float(np.mean(np.abs(residual[good]) < BAND_95 * std[good]))}
+    return errors(log._replace(force=np.array(corrected)), Known(np.array(terms), np.array(values))) | quality
+
+
+def errors(log: Log, known: Known) -> dict[str, float]:
+    """The columns of the table [N]."""
+    even, interval = np.flatnonzero(log.is_even), float(np.median(np.diff(log.time)))
+
+    def missed(before: np.ndarray, now: np.ndarray) -> np.ndarray:
+        return log.force[now] - np.einsum('ij,ij->i', known.terms[now], known.values[before])
+
+    def rms(values: np.ndarray) -> float:
+        return float(np.sqrt(np.mean(np.square(values))))
+
+    found = {}
+    for name, lag in (('1 step', 1), ('0.5 s', round(0.5 / interval)), ('2 s', round(2.0 / interval))):
+        now = even[even >= lag]
+        found[name] = rms(missed(now - lag, now))
+    strokes = [list(group) for _, group in itertools.groupby(even, key=lambda i: log.velocity[i] > 0.0)]
+    pairs = [
+        (before[-1], i)
+        for before, after in itertools.pairwise(strokes)
+        for i in after
+        if log.time[i] - log.time[after[0]] <= 0.3
+    ]
+    found['reversal'] = rms(missed(*np.array(pairs).T))
+    now = even[even >= 1]
+    friction = np.einsum('ij,ij->i', known.terms[now, :-1], known.values[now - 1, :-1])
+    found['friction'] = float(np.std(log.force[now] - friction))
+    return found
+
+
+def compared(folder: Path, work: Path) -> dict[str, dict[str, dict[str, float]]]:
+    """Errors of every estimator for every ordered pair of logs."""
+    logs = {}
+    for path in sorted(folder.glob('*.exp')):
+        bag, seal = work / path.stem, work / f'{path.stem}.yaml'
+        _run('import', 'log', path, '--rig', 'mbari', '--out', bag)
+        _run('identify', path, '--rig', 'mbari', '--out', seal)
+        logs[path.stem] = read_log(bag), seal
+    table: dict[str, dict[str, dict[str, float]]] = {}
+    for (one, (learnt_on, seal)), (other, (log, _)) in itertools.permutations(logs.items(), 2):
+        table[f'{one} -> {other}'] = {
+            'least squares, offset of 0.5 s': errors(log, fixed(learnt_on, log)),
+            'recursive least squares': errors(log, tuned_recursive(learnt_on, log)),
+            'plain Kalman filter': errors(log, plain_kalman(learnt_on, log)),
+            'this package': package(seal, log),
+        }
+    return table
+
+
+def _run(*arguments: object) -> None:
+    if command([str(argument) for argument in arguments]) != 0:
+        raise SystemExit(f'seal_friction {" ".join(map(str, arguments))} failed')
+
+
+def main() -> int:
+    """Run and print; exit code 1 if recursive least squares is better anywhere."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('folder', type=Path)
+    parser.add_argument('--json', action='store_true')
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as work:
+        table = compared(arguments.folder, Path(work))
+    if arguments.json:
+        print(json.dumps(table))
+    for pair, rows in table.items():
+        if not arguments.json:
+            print(pair)
+            for name, row in rows.items():
+                print(f'  {name:32}', *(f'{column} {value:7.3g}' for column, value in row.items()))
+    return int(any(r['this package'][c] > r['recursive least squares'][c] for r in table.values() for c in COLUMNS))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,26 @@
+"""A short form of `attacks`: what is called good is right, whatever is done to the signals."""
+
+import pytest
+from attacks import ATTACKS, CLEAN, attacked
+
+QUICK = (
+    'offset of the friction',
+    'friction times 1.6',
+    'direction: 15% more, 15% less',
+    'vibration of 50 um at 300 Hz',
+)
+
+
+@pytest.mark.parametrize('mode', ['observe', 'on'])
+@pytest.mark.parametrize(
+    'name', [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in ATTACKS]
+)
+def test_at_most_one_good_sample_in_200_is_wrong(name, mode):
+    assert attacked(name, mode, 12.0 if name in QUICK else 40.0).wrong <= 0.005
+
+
+@pytest.mark.parametrize('name', CLEAN)
+def test_a_clean_machine_is_called_good(name):
+    found = attacked(name, 'observe', 12.0)
+    assert found.good > 0.9
+    assert found.wrong <= 0.001
