@@ -68,6 +68,7 @@ def test_a_machine_with_the_live_node_alone_gets_no_numerics_but_numpy(database:
     assert everything - live == {*FOR_COMMANDS, 'rosbags'}
 
 
+@pytest.mark.long
 def test_an_unknown_key_is_noticed(database: Path, tmp_path: Path):
     text = (ROOT / 'package.xml').read_text().replace('python3-numba', 'python3-mcap-pip')
     (tmp_path / 'package.xml').write_text(text)

@@ -443,6 +443,7 @@ def test_off_stays_off_whoever_sets_a_scale_and_whoever_comes_back_with_one_unti
         assert running.ask('/view')['off'] is None
 
 
+@pytest.mark.long
 def test_off_of_a_machine_holds_each_actuator_in_every_window(tmp_path: Path):
     domain = free_domain()
     with machine(tmp_path, domain, 200.0), monitor(domain, '--allow-changes') as running:
@@ -661,6 +662,7 @@ def test_no_configuration_of_a_peer_ends_the_view_or_off(tmp_path: Path):
 
 
 @NO_BROWSER
+@pytest.mark.long
 def test_a_monitor_starts_again_on_its_port_and_the_open_page_goes_on_with_the_same_token(axis: int, tmp_path: Path):
     token = tmp_path / 'token'
     with browser(tmp_path) as page:

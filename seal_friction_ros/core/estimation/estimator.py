@@ -688,17 +688,20 @@ def assess_inputs(
         drives = motion.velocity * force_sum < 0.0 and not parameters.force_sum_correction.contains_load
         if not at_rest or (uncertain and drives):
             sliding_velocity = motion.velocity
-    state = replace(
-        state,
-        stamp=stamp,
-        at_rest=at_rest,
-        pressure=pressure,
-        force=force,
-        velocity=velocity,
-        leapt_pressure=leapt_pressure,
-        leapt_force=leapt_force,
-        leapt_velocity=leapt_velocity,
-        motion=motion,
+    state = EstimatorState(  # `replace` of nine fields costs 3 us a sample
+        stamp,
+        at_rest,
+        pressure,
+        force,
+        velocity,
+        leapt_pressure,
+        leapt_force,
+        leapt_velocity,
+        motion,
+        state.adaptation,
+        state.shear,
+        state.swing,
+        state.hidden,
     )
     return state, Observation(stamp, sliding_velocity, force_sum, status, input_age)
 

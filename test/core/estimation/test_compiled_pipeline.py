@@ -277,7 +277,7 @@ changes = st.fixed_dictionaries(
 lateness = st.lists(st.sampled_from([0, 0, MS, 30 * MS, 30 * MS + 1, 400 * MS, -MS, -31 * MS]), min_size=1)
 
 
-@hypothesis_settings(max_examples=120)
+@hypothesis_settings(max_examples=60)
 @given(runs(), lateness, st.sampled_from(sorted(ACTUATORS)), changes, st.booleans(), st.integers(0, 30))
 def test_any_run_of_messages_gives_the_same_bytes_and_the_same_state(pieces, late, actuator, changed, refused, cut):
     parameters = with_seals(ACTUATORS[actuator], **changed)

@@ -224,7 +224,7 @@ AIR_AXIS = {
 }
 
 
-@pytest.mark.parametrize('parts', [OIL_AXIS, AIR_AXIS], ids=['oil', 'air'])
+@pytest.mark.parametrize('parts', [OIL_AXIS, pytest.param(AIR_AXIS, marks=pytest.mark.long)], ids=['oil', 'air'])
 @pytest.mark.parametrize('held', [False, True], ids=['free', 'held'])
 def test_small_motions_of_the_servo_are_those_of_its_transition_matrix(parts, held):
     servo = ServoParameters(**parts, seals=LOCK if held else ())
