@@ -18,15 +18,17 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from seal_friction_ros.core.estimation.friction_filter import (
+    COULOMB_PRIOR,
     NOT_BEGUN,
     PROVEN,
+    SCALE_PRIOR,
     FrictionFilter,
     Reading,
     friction_magnitude,
     updated,
 )
 from seal_friction_ros.core.estimation.records import NEVER
-from seal_friction_ros.core.foundation.compiled import compilable, replace
+from seal_friction_ros.core.foundation.compiled import compilable
 from seal_friction_ros.core.foundation.limits import between
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.foundation.parameters import check, parameter
@@ -40,21 +42,22 @@ LEAST_FRICTION = 1e-3  # [N] of the law, below which there is nothing to learn
 SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached after a reversal
 LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
-LEARNING_INTERVAL = 4_000_000  # [ns] least time between two samples that are learnt from: what it costs at 1 kHz
+LEARNING_INTERVAL = 8_000_000  # [ns] least time between two samples that are learnt from: what it costs at 1 kHz
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
 WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
 LASTING = 2.5  # [-] mean of it over `SHORT_TIME`
 SHORT_TIME = 0.1  # [s]
-STRIBECK = 0.15  # [-] of the friction: standard deviation of what it is more when slow,
+STRIBECK = 0.2  # [-] of the friction: standard deviation of what it is more when slow,
 STRIBECK_SPEED = 0.01  # [m/s] as from this speed
-NEW_RUN = 0.4  # [-] of the friction: standard deviation of another day
+NEW_RUN = math.hypot(SCALE_PRIOR, COULOMB_PRIOR)  # [-] of the friction: standard deviation of another day
 REST = 0.1  # [s] after a motion in which the force sum may be that of the motion still
 LEAP_AT_REST = 0.3  # [-] sudden change of the force sum at rest over the friction, from which on it may be a load
 AT_ONCE = 2.0  # [-] on the noise of the force sum at rest, which nothing averages
 LONGEST_PRESS = 0.1  # [s] for which a rod may rest under the breakaway force
 WAVERING = 0.25  # [-] of the friction: root mean square of a drift that nothing explains,
-LASTING_DRIFT = 0.4  # [-] and that drift just now
+LASTING_DRIFT = 0.4  # [-] and that drift just now,
+UNPROVEN_DRIFT = 0.2  # [-] or this before the motion has told the friction
 FEWEST_SAMPLES = 4  # in each of two strokes that are compared
 LONGEST_PAUSE = 60.0  # [s] between them
 
@@ -113,6 +116,27 @@ class Stroke(NamedTuple):
     is_identified: bool  # whether the law was identified at every pressure and speed in it
 
 
+NO_STROKE = Stroke(0, NEVER, 0.0, 0.0, 0, True)
+
+
+class Strokes(NamedTuple):
+    """The last two strokes and what they show by themselves, for the diagnosis."""
+
+    present: Stroke = NO_STROKE
+    before: Stroke = NO_STROKE
+    ratio: float = 1.0  # [-] friction over that of the law, by the last two strokes that could be compared
+    reversals: int = 0  # between strokes that could be compared
+
+
+class Rest(NamedTuple):
+    """What the force sum does while the rod rests."""
+
+    slid: int = NEVER  # [ns] stamp of the last sample of a sliding rod
+    ripple: float = 0.0  # [N^2] mean square of the force sum against its lagging value, over `SHORT_TIME`
+    pressed: float = 0.0  # [s] of this rest under the breakaway force, in all
+    leapt: float = 0.0  # [N^2] square of the largest sudden change of the force sum in this rest
+
+
 class AdaptationState(NamedTuple):
     """What one sample leaves for the next."""
 
@@ -120,23 +144,22 @@ class AdaptationState(NamedTuple):
     once: Lagging
     twice: Lagging
     acceleration: float  # [m/s^2] of the velocity after two lags
-    learnt_stamp: int  # [ns] of the last sample that was learnt from
-    filter: FrictionFilter
     bias: float  # [-] mean of the normalised innovations over `SHORT_TIME`
-    stroke: Stroke  # the present one
-    before: Stroke  # the one before
-    ratio: float  # [-] friction over that of the law, by the last two strokes alone
-    reversals: int  # between strokes that could be compared
-    slid: int  # [ns] stamp of the last sample of a sliding rod
-    ripple: float  # [N^2] mean square of the force sum against its lagging value, over `SHORT_TIME`
-    pressed: float  # [s] for which the rod has rested under more than the breakaway force
-    leapt: float  # [N^2] square of the largest sudden change of the force sum in this rest
+    filter: FrictionFilter
+    strokes: Strokes
+    rest: Rest
 
 
-NO_STROKE = Stroke(0, NEVER, 0.0, 0.0, 0, True)
 NO_SIGNALS = Lagging(0.0, 0.0, 0.0)
 NOT_ADAPTED = AdaptationState(
-    NEVER, NO_SIGNALS, NO_SIGNALS, 0.0, NEVER, NOT_BEGUN, 0.0, NO_STROKE, NO_STROKE, 1.0, 0, NEVER, 0.0, 0.0, 0.0
+    stamp=NEVER,
+    once=NO_SIGNALS,
+    twice=NO_SIGNALS,
+    acceleration=0.0,
+    bias=0.0,
+    filter=NOT_BEGUN,
+    strokes=Strokes(),
+    rest=Rest(),
 )
 """State before the first sample."""
 
@@ -161,27 +184,6 @@ def is_due(state: AdaptationState, stamp: int) -> bool:
 
 
 @compilable
-def innovation(
-    settings: AdaptationSettings, state: AdaptationState, velocity: float, force_sum: float, friction: float
-) -> float:
-    """What a sample shows more than was expected [N]; 0.0 at rest.
-
-    Args:
-        settings: With the moving mass.
-        state: Before this sample is learnt from, its acceleration that of the last sample taken.
-        velocity: [m/s] 0.0 at rest.
-        force_sum: [N]
-        friction: Of the law [N], >= 0.
-    """
-    if velocity == 0.0:
-        return 0.0
-    terms = state.filter.terms
-    direction = 1.0 if velocity > 0.0 else -1.0
-    left = force_sum - settings.moving_mass * state.acceleration - terms.offset - terms.remainder
-    return left - direction * friction_magnitude(terms, direction, abs(velocity), friction)
-
-
-@compilable
 def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) -> AdaptationState:
     """Learn from one sample.
 
@@ -193,66 +195,73 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     Returns:
         The next state.
     """
-    stamp, velocity, force_sum, friction, file_std, is_pressed, learns, is_identified = slide
-    last, once, twice, _, learnt_stamp, known, bias, stroke, before, ratio, reversals, slid, ripple, pressed, leapt = (
-        state
-    )
+    velocity, friction = slide.velocity, slide.friction
     direction = (1 if velocity > 0.0 else -1) if velocity != 0.0 else 0
-    elapsed = (stamp - last) * 1e-9 if last != NEVER else 0.0
+    newest = Lagging(velocity, slide.force_sum, friction * direction)
+    elapsed = (slide.stamp - state.stamp) * 1e-9 if state.stamp != NEVER else 0.0
     if not 0.0 < elapsed <= LONGEST_STEP:
-        once = Lagging(velocity, force_sum, friction * direction)
-        return AdaptationState(
-            stamp,
-            once,
-            once,
-            0.0,
-            learnt_stamp,
-            known,
-            0.0,
-            NO_STROKE,
-            NO_STROKE,
-            ratio,
-            reversals,
-            stamp,
-            0.0,
-            0.0,
-            0.0,
-        )
+        return _interrupted(state, slide.stamp, newest)
     share = elapsed / (elapsed + LAG)
-    newest = (velocity - once.velocity) / (elapsed + LAG)
-    acceleration = (once.velocity + share * (velocity - once.velocity) - twice.velocity) / (elapsed + LAG)
-    inertia = settings.moving_mass * acceleration
-    jump = force_sum - twice.force_sum
-    ripple += elapsed / (elapsed + SHORT_TIME) * (jump * jump - ripple)
-    leap = (force_sum - once.force_sum) * (force_sum - once.force_sum)
-    if leap > leapt and leap > LEAP_AT_REST * friction * LEAP_AT_REST * friction:
-        leapt = leap
-    once = _lagging(once, Lagging(velocity, force_sum, friction * direction), share)
-    twice = _lagging(twice, once, share)
-    is_even = learns and direction != 0 and _is_even(settings, acceleration, newest, friction)
-    if is_even and is_identified and known.stamp != NEVER:
-        missed = innovation(settings, state, velocity, force_sum, friction) / known.innovation_std
-        bias += elapsed / (elapsed + SHORT_TIME) * (between(-IMPLAUSIBLE, missed, IMPLAUSIBLE) - bias)
-    if is_even and twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
-        reading = Reading(
-            stamp, twice.force_sum - inertia, direction, twice.velocity, twice.friction * direction, file_std
-        )
-        if is_identified:
-            known, learnt_stamp = updated(known, reading), stamp
-        if direction != stroke.direction:
-            if before.is_identified and stroke.is_identified and can_be_compared(before, stroke):
-                ratio = ratio_of(before, stroke)
-                reversals += 1
-            before, stroke = stroke, NO_STROKE
-        stroke = _averaged(stroke, reading, is_identified)
+    once = _lagging(state.once, newest, share)
+    twice = _lagging(state.twice, once, share)
+    at_first = (velocity - state.once.velocity) / (elapsed + LAG)
+    acceleration = (once.velocity - state.twice.velocity) / (elapsed + LAG)
+    rest = _rested(state, slide, direction, elapsed)
+    bias, known, strokes = state.bias, state.filter, state.strokes
+    if slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction):
+        if slide.is_identified and known.stamp != NEVER:
+            missed = _missed(settings, state, newest, abs(velocity)) / known.innovation_std
+            bias += elapsed / (elapsed + SHORT_TIME) * (between(-IMPLAUSIBLE, missed, IMPLAUSIBLE) - bias)
+        if twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
+            force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
+            reading = Reading(slide.stamp, force, direction, twice.velocity, law, slide.friction_std)
+            strokes = _with_reading(strokes, reading, slide.is_identified)
+            if slide.is_identified:
+                known = updated(known, reading)
+    return AdaptationState(slide.stamp, once, twice, acceleration, bias, known, strokes, rest)
+
+
+@compilable
+def _interrupted(state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
+    """State after a gap: signals and strokes begin anew."""
+    strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
+    return AdaptationState(stamp, newest, newest, 0.0, 0.0, state.filter, strokes, Rest(stamp, 0.0, 0.0, 0.0))
+
+
+@compilable
+def _rested(state: AdaptationState, slide: Slide, direction: int, elapsed: float) -> Rest:
+    """What the force sum has done in this rest, after one more sample."""
+    before = state.rest
+    change, leap = slide.force_sum - state.twice.force_sum, slide.force_sum - state.once.force_sum
+    ripple = before.ripple + elapsed / (elapsed + SHORT_TIME) * (change * change - before.ripple)
     if direction != 0:
-        slid, pressed, leapt = stamp, 0.0, 0.0
-    elif is_pressed:
-        pressed += elapsed
-    return AdaptationState(
-        stamp, once, twice, acceleration, learnt_stamp, known, bias, stroke, before, ratio, reversals,
-        slid, ripple, pressed, leapt,
-    )  # fmt: skip
+        return Rest(slide.stamp, ripple, 0.0, 0.0)
+    pressed = before.pressed + elapsed if slide.is_pressed else before.pressed
+    leapt = before.leapt
+    if abs(leap) > LEAP_AT_REST * slide.friction and leap * leap > leapt:
+        leapt = leap * leap
+    return Rest(before.slid, ripple, pressed, leapt)
+
+
+@compilable
+def _with_reading(strokes: Strokes, reading: Reading, is_identified: bool) -> Strokes:
+    """Strokes after one more reading."""
+    present, before, ratio, reversals = strokes
+    if reading.direction != present.direction:
+        if before.is_identified and present.is_identified and can_be_compared(before, present):
+            ratio = ratio_of(before, present)
+            reversals += 1
+        before, present = present, NO_STROKE
+    samples = present.samples + 1
+    present = Stroke(
+        reading.direction,
+        reading.stamp,
+        present.reading + (reading.force - present.reading) / samples,
+        present.friction + (reading.friction - present.friction) / samples,
+        samples,
+        present.is_identified and is_identified,
+    )
+    return Strokes(present, before, ratio, reversals)
 
 
 @compilable
@@ -263,20 +272,6 @@ def _lagging(before: Lagging, newest: Lagging, share: float) -> Lagging:
         velocity + share * (newest.velocity - velocity),
         force_sum + share * (newest.force_sum - force_sum),
         friction + share * (newest.friction - friction),
-    )
-
-
-@compilable
-def _averaged(stroke: Stroke, reading: Reading, is_identified: bool) -> Stroke:
-    """Stroke after one more reading."""
-    samples = stroke.samples + 1
-    return Stroke(
-        reading.direction,
-        reading.stamp,
-        stroke.reading + (reading.force - stroke.reading) / samples,
-        stroke.friction + (reading.friction - stroke.friction) / samples,
-        samples,
-        stroke.is_identified and is_identified,
     )
 
 
@@ -311,14 +306,51 @@ def _is_even(settings: AdaptationSettings, acceleration: float, newest: float, f
 
 
 @compilable
+def left_over(settings: AdaptationSettings, state: AdaptationState, force_sum: float) -> float:
+    """Force sum less inertia, offset and remainder [N]: friction, as far as the filter knows.
+
+    Args:
+        settings: With the moving mass.
+        state: Before the sample is learnt from, its acceleration that of the last sample taken.
+        force_sum: [N]
+    """
+    terms = state.filter.terms
+    return force_sum - settings.moving_mass * state.acceleration - terms.offset - terms.remainder
+
+
+@compilable
+def _missed(settings: AdaptationSettings, state: AdaptationState, newest: Lagging, speed: float) -> float:
+    """What a sample of a sliding rod shows more than was expected [N]."""
+    direction = 1.0 if newest.velocity > 0.0 else -1.0
+    found = friction_magnitude(state.filter.terms, direction, speed, newest.friction * direction)
+    return left_over(settings, state, newest.force_sum) - direction * found
+
+
+class Moment(NamedTuple):
+    """One sample, and what the filter says of its friction."""
+
+    stamp: int  # [ns]
+    direction: float  # -1.0 or 1.0; 0.0 at rest
+    speed: float  # [m/s] 0.0 at rest
+    force_sum: float  # [N]
+    law: float  # [N] friction of the seal files at this speed
+    found: float  # [N] friction by the filter, without bounds
+
+
+@compilable
+def moment_of(
+    state: AdaptationState, friction: ActuatorFriction, stamp: int, velocity: float, force_sum: float
+) -> Moment:
+    """A sample with the friction that the filter finds for it."""
+    direction = (1.0 if velocity > 0.0 else -1.0) if velocity != 0.0 else 0.0
+    law = friction.coulomb_friction + friction.velocity_friction
+    found = friction_magnitude(state.filter.terms, direction, abs(velocity), law)
+    return Moment(stamp, direction, abs(velocity), force_sum, law, found)
+
+
+@compilable
 def adapted_friction(
-    settings: AdaptationSettings,
-    state: AdaptationState,
-    friction: ActuatorFriction,
-    stamp: int,
-    velocity: float,
-    force_sum: float,
-    uses: bool,
+    settings: AdaptationSettings, state: AdaptationState, friction: ActuatorFriction, moment: Moment, uses: bool
 ) -> tuple[ActuatorFriction, float]:
     r"""Friction by what is learnt, with its standard deviation, and the offset to take off the force sum at rest [N].
 
@@ -327,32 +359,25 @@ def adapted_friction(
     distribution about m is :math:`(|m| + 1.64 \sigma) / 1.96` where that is wider. At rest the same is said of the
     force sum and its offset: the deviation is at most the breakaway force, since friction at rest is no larger.
     """
-    known = state.filter
-    direction = (1.0 if velocity > 0.0 else -1.0) if velocity != 0.0 else 0.0
-    coulomb, law = friction.coulomb_friction, friction.coulomb_friction + friction.velocity_friction
-    sliding = bounded_friction(settings, known, direction, abs(velocity), law)
-    at_no_speed = bounded_friction(settings, known, direction, 0.0, coulomb)
-    scale = sliding / law if law > 0.0 else 1.0
-    if direction == 0.0:
-        most = scale * (coulomb + friction.stiction)
-        std, missed = _std_at_rest(state, stamp, force_sum, most), abs(known.terms.offset)
+    known, law = state.filter, moment.law
+    sliding = between(settings.scale_min * law, moment.found, settings.scale_max * law)
+    if moment.direction == 0.0:
+        scale = sliding / law if law > 0.0 else 1.0
+        std = _std_at_rest(state, moment, scale * (friction.coulomb_friction + friction.stiction))
+        missed = abs(known.terms.offset)
     else:
-        std = _std_of_sliding(known, law, friction.coulomb_friction_std, abs(velocity))
+        std = _std_of_sliding(known, moment, friction.coulomb_friction_std)
         missed = abs(sliding - law)
     std = std if std > LEAST_STD * law else LEAST_STD * law
     if not uses or not is_proven(known):
         wider = (missed + ONE_SIDED_95 * std) / BAND_95
-        return replace(friction, coulomb_friction_std=std if std > wider else wider), 0.0
-    return (
-        replace(
-            friction,
-            coulomb_friction=at_no_speed,
-            coulomb_friction_std=std,
-            stiction=scale * friction.stiction,
-            velocity_friction=sliding - at_no_speed,
-        ),
-        known.terms.offset if direction == 0.0 else 0.0,
-    )
+        coulomb, _, stiction, in_identified_range, added = friction
+        return ActuatorFriction(coulomb, std if std > wider else wider, stiction, in_identified_range, added), 0.0
+    at_no_speed = bounded_friction(settings, known, moment.direction, 0.0, friction.coulomb_friction)
+    stiction = friction.stiction * (sliding / law if law > 0.0 else 1.0)
+    taken_off = known.terms.offset if moment.direction == 0.0 else 0.0
+    adapted = ActuatorFriction(at_no_speed, std, stiction, friction.in_identified_range, sliding - at_no_speed)
+    return adapted, taken_off
 
 
 @compilable
@@ -371,61 +396,58 @@ def bounded_friction(
 
 
 @compilable
-def _std_of_sliding(known: FrictionFilter, law: float, file_std: float, speed: float) -> float:
+def _std_of_sliding(known: FrictionFilter, moment: Moment, file_std: float) -> float:
     """Standard deviation of the friction of a rod that slides [N].
 
     Slow friction that nobody has seen may be Stribeck's.
     """
-    stribeck = STRIBECK * law * STRIBECK_SPEED / (STRIBECK_SPEED + speed)
+    law = moment.law
     if known.stamp == NEVER:
         return math.sqrt(NEW_RUN * law * NEW_RUN * law + file_std * file_std)
+    stribeck = STRIBECK * law * STRIBECK_SPEED / (STRIBECK_SPEED + moment.speed)
     std = known.friction_std * (law / known.friction if law > known.friction else 1.0)
     return math.sqrt(std * std + stribeck * stribeck)
 
 
 @compilable
-def _std_at_rest(state: AdaptationState, stamp: int, force_sum: float, most: float) -> float:
+def _std_at_rest(state: AdaptationState, moment: Moment, most: float) -> float:
     """Standard deviation of the friction of a rod at rest [N], which is the force sum less its offset.
 
     It is at most the breakaway force ``most`` [N], since friction at rest is no larger.
     """
-    known = state.filter
-    if known.stamp == NEVER or (stamp - state.slid) * 1e-9 < REST:
+    known, rest = state.filter, state.rest
+    if known.stamp == NEVER or (moment.stamp - rest.slid) * 1e-9 < REST:
         return most
-    jump = force_sum - state.twice.force_sum
-    noise = jump * jump if jump * jump > state.ripple else state.ripple
-    variance = known.covariance.offset.offset + state.leapt + AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
+    change = moment.force_sum - state.twice.force_sum
+    noise = change * change if change * change > rest.ripple else rest.ripple
+    variance = known.covariance.offset.offset + rest.leapt + AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
     std = math.sqrt(variance) if variance > 0.0 else 0.0
     return std if std < most else most
 
 
 @compilable
 def disagrees(
-    settings: AdaptationSettings, state: AdaptationState, friction: ActuatorFriction, velocity: float, uses: bool
+    settings: AdaptationSettings, state: AdaptationState, friction: ActuatorFriction, moment: Moment, uses: bool
 ) -> bool:
-    """Whether what is learnt contradicts the law: by more than twice what its seal file and the filter allow.
+    """Whether what is learnt, or what this rest shows, contradicts the estimate.
 
-    With ``uses`` whether it is out of its bounds. At rest, where nothing is taken off, whether the force sum has an
-    offset of more than half the breakaway force, since the state at rest stands on the force sum (our choice).
+    That is: a step that no reversal has explained, a drift of the force sum that nothing explains, a rest under the
+    breakaway force; with ``uses`` a friction out of its bounds, without one that is further from the law than twice
+    both deviations, or an offset of more than half the breakaway force at rest, where nothing takes it off.
     """
-    known = state.filter
-    law = friction.coulomb_friction + friction.velocity_friction
-    if velocity == 0.0 and state.pressed > LONGEST_PRESS:
+    known, is_at_rest = state.filter, moment.direction == 0.0
+    if is_at_rest and state.rest.pressed > LONGEST_PRESS:
         return True
-    if (
-        known.outliers.is_stepped
-        or known.unexplained.drift_square > WAVERING * WAVERING * known.friction * known.friction
-    ):
+    drift = WAVERING * known.friction
+    if known.outliers.is_stepped or known.unexplained.drift_square > drift * drift:
         return True
-    if not is_proven(known) or law <= 0.0:
+    if not is_proven(known) or moment.law <= 0.0:
         return False
-    direction = (1.0 if velocity > 0.0 else -1.0) if velocity != 0.0 else 0.0
-    found = friction_magnitude(known.terms, direction, abs(velocity), law)
     if uses:
-        return not settings.scale_min * law <= found <= settings.scale_max * law
-    if direction == 0.0 and abs(known.terms.offset) > 0.5 * (friction.coulomb_friction + friction.stiction):
+        return not settings.scale_min * moment.law <= moment.found <= settings.scale_max * moment.law
+    if is_at_rest and abs(known.terms.offset) > 0.5 * (friction.coulomb_friction + friction.stiction):
         return True
-    return abs(found - law) > 2.0 * math.hypot(friction.coulomb_friction_std, known.friction_std)
+    return abs(moment.found - moment.law) > 2.0 * math.hypot(friction.coulomb_friction_std, known.friction_std)
 
 
 @compilable
@@ -434,7 +456,8 @@ def is_consistent(settings: AdaptationSettings, state: AdaptationState, missed: 
     known = state.filter
     if known.stamp == NEVER:
         return True
-    if abs(state.bias) > LASTING or abs(known.unexplained.drift) > LASTING_DRIFT * known.friction:
+    lasting = LASTING_DRIFT if is_proven(known) else UNPROVEN_DRIFT
+    if abs(state.bias) > LASTING or abs(known.unexplained.drift) > lasting * known.friction:
         return False
     most = IMPLAUSIBLE * known.innovation_std
     if settings.moving_mass == 0.0 and abs(state.acceleration) > settings.acceleration_max:
@@ -458,11 +481,11 @@ def learnt(settings: AdaptationSettings, state: AdaptationState) -> Learnt:
     """What is learnt so far."""
     known = state.filter
     if known.stamp == NEVER:
-        return Learnt(1.0, -1.0, 0.0, -1.0, 0.0, state.reversals)
+        return Learnt(1.0, -1.0, 0.0, -1.0, 0.0, state.strokes.reversals)
     noise = math.sqrt(known.unexplained.square)
     scale = learnt_scale(settings, known)
     std = known.friction_std / known.friction if is_proven(known) else -1.0
-    return Learnt(scale, std, known.terms.offset, noise, known.friction, state.reversals)
+    return Learnt(scale, std, known.terms.offset, noise, known.friction, state.strokes.reversals)
 
 
 @compilable

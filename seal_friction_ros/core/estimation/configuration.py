@@ -176,11 +176,11 @@ class Configuration:
         return PipelineParameters(EstimatorParameters(self.settings, seals, self.adaptation), self.feedforward)
 
 
-ALGORITHM_VERSION = 3
+ALGORITHM_VERSION = 4
 """Version of estimator and feed-forward: it changes when the same messages give other bytes.
 
 1: until the feed-forward had one gain, and time was the stamps of the messages. 2: until one filter learnt the
-friction.
+friction. 3: until its noise was a share of the usual friction.
 """
 
 _RENAMED = {'coulomb_scale': 'scale'}  # settings of version 1

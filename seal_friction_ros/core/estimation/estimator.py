@@ -19,10 +19,11 @@ from seal_friction_ros.core.estimation.adaptation import (
     adapt,
     adapted_friction,
     disagrees,
-    innovation,
     is_consistent,
     is_due,
     learnt_scale,
+    left_over,
+    moment_of,
 )
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
@@ -30,7 +31,6 @@ from seal_friction_ros.core.estimation.conditioned_velocity import (
     ConditionedVelocity,
     condition_velocity,
 )
-from seal_friction_ros.core.estimation.friction_filter import friction_magnitude
 from seal_friction_ros.core.estimation.hidden_motion import NO_HIDDEN_MOTION, Apparent, HiddenMotion, with_sample
 from seal_friction_ros.core.estimation.records import (
     EXTRAPOLATED,
@@ -517,25 +517,22 @@ def _estimate_with_learnt(
     """Friction and estimate by what was learnt before this sample."""
     settings, uses = parameters.adaptation, parameters.uses_scale
     stamp, velocity, force_sum, status, input_age = seen
-    adapted, taken_off = adapted_friction(settings, known, friction, stamp, velocity, force_sum, uses)
-    law = friction.coulomb_friction + friction.velocity_friction
-    if disagrees(settings, known, friction, velocity, uses):
+    moment = moment_of(known, friction, stamp, velocity, force_sum)
+    adapted, taken_off = adapted_friction(settings, known, friction, moment, uses)
+    if disagrees(settings, known, friction, moment, uses):
         status |= _MODEL_DISAGREES
     left = 0.0
-    terms = known.filter.terms
     if velocity != 0.0 and not status & (_NO_STATE | _NO_FORCE_SUM):
-        left = innovation(settings, known, velocity, force_sum, law)
-        if not is_consistent(settings, known, left):
+        left = left_over(settings, known, force_sum)
+        if not is_consistent(settings, known, left - moment.direction * moment.found):
             status |= _MODEL_DISAGREES
-        found = friction_magnitude(terms, 1.0 if velocity > 0.0 else -1.0, abs(velocity), law)
-        published = adapted.coulomb_friction + adapted.velocity_friction
-        left += (found - published) * (1.0 if velocity > 0.0 else -1.0)
-    scale, offset = learnt_scale(settings, known.filter), terms.offset + terms.remainder
-    scale_std = friction.coulomb_friction_std / law if law > 0.0 else 0.0
+        left -= moment.direction * (adapted.coulomb_friction + adapted.velocity_friction)
+    terms, scale = known.filter.terms, learnt_scale(settings, known.filter)
+    scale_std = friction.coulomb_friction_std / moment.law if moment.law > 0.0 else 0.0
     if known.filter.stamp != NEVER:
         scale_std = known.filter.friction_std / known.filter.friction
     seen = Observation(stamp, velocity, force_sum - taken_off, status, input_age)
-    return adapted, estimate_of(parameters, seen, adapted, scale, scale_std, offset, left)
+    return adapted, estimate_of(parameters, seen, adapted, scale, scale_std, terms.offset + terms.remainder, left)
 
 
 @compilable

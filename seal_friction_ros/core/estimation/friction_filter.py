@@ -40,7 +40,7 @@ from seal_friction_ros.core.foundation.limits import between
 SCALE_PRIOR = 0.3  # [-] of another day, beside the deviation of the seal file
 COULOMB_PRIOR = 0.3  # [-] share
 VISCOUS_PRIOR = 1.0  # [s/m] share per speed
-ASYMMETRY_PRIOR = 0.07  # [-]
+ASYMMETRY_PRIOR = 0.08  # [-]
 OFFSET_PRIOR = 10.0  # [-] share
 # Random walks: one standard deviation after one second.
 SCALE_WALK = 0.005  # [-]
@@ -51,6 +51,7 @@ OFFSET_WALK = 0.002  # [-] share
 REMAINDER_TIME = 0.4  # [s] time constant of n
 REMAINDER = 0.05  # [-] share: standard deviation of n
 LEAST_NOISE = 0.1  # [-] share: standard deviation of e at first and at least, since readings in a row miss alike
+USUAL_TIME = 60.0  # [s] over which the friction of the law is the usual one: a law misses low friction by no less
 NOISE_TIME = 5.0  # [s] in which the noise follows the innovations
 OUTLIER = 2.5  # [-] innovations over their standard deviation count less beyond this
 LEAP = 3.0  # [-] innovations over their deviation within two readings, or at the turn, that may begin a step
@@ -88,7 +89,8 @@ class Covariance(NamedTuple):
 class Unexplained(NamedTuple):
     """What neither friction nor offset explains: n + e."""
 
-    noise: float = 0.0  # [-] standard deviation of e over the friction of the law
+    noise: float = 0.0  # [-] standard deviation of e over the usual friction of the law, or the present if larger
+    usual: float = 0.0  # [N] friction of the law, mean over `USUAL_TIME`
     drift: float = 0.0  # [N] mean over `DRIFT_TIME`
     drift_square: float = 0.0  # [N^2] mean square of the drift over `DRIFT_MEMORY`
     square: float = 0.0  # [N^2] mean square over `DRIFT_MEMORY`
@@ -206,7 +208,7 @@ def begun(reading: Reading) -> FrictionFilter:
         Terms(0.0, 0.0, 0.0, 0.0, 0.0, std.remainder * std.remainder),
     )
     return replace(
-        NOT_BEGUN, stamp=reading.stamp, covariance=diagonal, unexplained=Unexplained(LEAST_NOISE, 0.0, 0.0, 0.0)
+        NOT_BEGUN, stamp=reading.stamp, covariance=diagonal, unexplained=Unexplained(LEAST_NOISE, force, 0.0, 0.0, 0.0)
     )
 
 
@@ -216,21 +218,20 @@ def _walked(covariance: Covariance, friction: float, moved: float, elapsed: floa
     kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
     coulomb, viscous = COULOMB_WALK * friction, VISCOUS_WALK * friction
     offset, remainder = OFFSET_WALK * friction, REMAINDER * friction
-    s, c, k = covariance.scale, covariance.coulomb, covariance.viscous
-    a, b, n = covariance.asymmetry, covariance.offset, covariance.remainder
+    s, c, k, a, b, n = covariance  # one unpacking takes a quarter of the time of an attribute each
     return Covariance(
-        replace(s, scale=s.scale + moved * SCALE_WALK * SCALE_WALK, remainder=kept * s.remainder),
-        replace(c, coulomb=c.coulomb + moved * coulomb * coulomb, remainder=kept * c.remainder),
-        replace(k, viscous=k.viscous + moved * viscous * viscous, remainder=kept * k.remainder),
-        replace(a, asymmetry=a.asymmetry + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, remainder=kept * a.remainder),
-        replace(b, offset=b.offset + elapsed * offset * offset, remainder=kept * b.remainder),
+        Terms(s[0] + moved * SCALE_WALK * SCALE_WALK, s[1], s[2], s[3], s[4], kept * s[5]),
+        Terms(c[0], c[1] + moved * coulomb * coulomb, c[2], c[3], c[4], kept * c[5]),
+        Terms(k[0], k[1], k[2] + moved * viscous * viscous, k[3], k[4], kept * k[5]),
+        Terms(a[0], a[1], a[2], a[3] + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, a[4], kept * a[5]),
+        Terms(b[0], b[1], b[2], b[3], b[4] + elapsed * offset * offset, kept * b[5]),
         Terms(
-            kept * n.scale,
-            kept * n.coulomb,
-            kept * n.viscous,
-            kept * n.asymmetry,
-            kept * n.offset,
-            kept * kept * n.remainder + (1.0 - kept * kept) * remainder * remainder,
+            kept * n[0],
+            kept * n[1],
+            kept * n[2],
+            kept * n[3],
+            kept * n[4],
+            kept * kept * n[5] + (1.0 - kept * kept) * remainder * remainder,
         ),
     )
 
@@ -247,16 +248,21 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     terms = replace(known.terms, remainder=kept * known.terms.remainder)
     covariance = _walked(known.covariance, reading.friction, moved, elapsed)
     innovation = reading.force - product(terms, column)
-    noise = known.unexplained.noise * reading.friction
-    variance = product(_products(covariance, column), column) + noise * noise
+    usual = known.unexplained.usual
+    noise = known.unexplained.noise * (reading.friction if reading.friction > usual else usual)
+    gains = _products(covariance, column)
+    variance = product(gains, column) + noise * noise
 
     outliers, steps = _outliers(known, reading.direction, terms, innovation, variance)
-    unexplained = _followed(known, innovation + terms.remainder, innovation * innovation / variance, moved)
+    unexplained = _followed(
+        known, reading.friction, innovation + terms.remainder, innovation * innovation / variance, moved
+    )
     if steps:
         terms = outliers.settled
         innovation = reading.force - product(terms, column)
         covariance = _freed(covariance, innovation, reading.direction * reading.friction)
-    terms, covariance = _corrected(terms, covariance, column, innovation, noise)
+        gains = _products(covariance, column)
+    terms, covariance = _corrected(terms, covariance, gains, product(gains, column), innovation, noise)
 
     std = friction_std(covariance, unexplained.drift_square, reading)
     is_stepped = outliers.is_stepped and std > PROVEN * reading.friction
@@ -278,11 +284,18 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
 
 @compilable
 def _corrected(
-    terms: Terms, covariance: Covariance, column: Terms, innovation: float, noise: float
+    terms: Terms, covariance: Covariance, gains: Terms, spread: float, innovation: float, noise: float
 ) -> tuple[Terms, Covariance]:
-    """Mean and covariance after an innovation [N]; an outlier counts less, as with noise of heavy tails."""
-    gains = _products(covariance, column)
-    spread = product(gains, column)
+    """Mean and covariance after an innovation [N]; an outlier counts less, as with noise of heavy tails.
+
+    Args:
+        terms: Before.
+        covariance: Before.
+        gains: Covariance times the coefficients of the reading.
+        spread: Variance of what was expected [N^2].
+        innovation: [N]
+        noise: Standard deviation of the reading [N].
+    """
     variance = spread + noise * noise
     distance = abs(innovation) / math.sqrt(variance)
     if distance > OUTLIER:
@@ -318,7 +331,7 @@ def _outliers(
 
 
 @compilable
-def _followed(known: FrictionFilter, unexplained: float, excess: float, moved: float) -> Unexplained:
+def _followed(known: FrictionFilter, friction: float, unexplained: float, excess: float, moved: float) -> Unexplained:
     """What is not explained after ``unexplained`` [N] more; ``excess`` is the squared innovation over its variance."""
     before = known.unexplained
     excess = excess if excess < OUTLIER * OUTLIER else OUTLIER * OUTLIER
@@ -330,6 +343,7 @@ def _followed(known: FrictionFilter, unexplained: float, excess: float, moved: f
     share = moved / (moved + DRIFT_MEMORY)
     return Unexplained(
         noise,
+        before.usual + moved / (moved + USUAL_TIME) * (friction - before.usual),
         drift,
         before.drift_square + share * (drift * drift - before.drift_square),
         before.square + share * (unexplained * unexplained - before.square),

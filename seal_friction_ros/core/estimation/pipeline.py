@@ -136,8 +136,8 @@ class PipelineState(NamedTuple):
 
     def turn_since(self, before: 'PipelineState') -> Turn | None:
         """The end of a stroke between the state before a message and this one, if the adaptation learns from it."""
-        last, learnt = before.estimator.adaptation, self.estimator.adaptation
-        if learnt.stroke.direction == last.stroke.direction and learnt.reversals == last.reversals:
+        last, learnt = before.estimator.adaptation.strokes, self.estimator.adaptation.strokes
+        if learnt.present.direction == last.present.direction and learnt.reversals == last.reversals:
             return None
         return Turn(before.estimator, self.estimator)
 

@@ -78,8 +78,8 @@ def followed(
         before: State before the sample.
         state: State after it.
     """
-    last, now = before.adaptation, state.adaptation
-    if now.stroke.direction == last.stroke.direction and now.reversals == known.learnt:
+    last, now = before.adaptation.strokes, state.adaptation.strokes
+    if now.present.direction == last.present.direction and now.reversals == known.learnt:
         return known
     if now.reversals < known.learnt:  # the adaptation was reset
         return SealHealth(now.reversals)
@@ -104,7 +104,7 @@ def health_values(
     is given over the friction.
     """
     known, change = learnt(parameters.adaptation, state), health.change
-    age = 'never' if state.learnt_stamp == NEVER else f'{(state.stamp - state.learnt_stamp) * 1e-9:.1f}'
+    age = 'never' if state.filter.stamp == NEVER else f'{(state.stamp - state.filter.stamp) * 1e-9:.1f}'
     friction = known.scale * known.friction
     first = health.first if known.reversals >= REFERENCE_REVERSALS else 0.0
     return {

@@ -30,6 +30,7 @@ from seal_friction_ros.core.estimation.friction_filter import (
     SCALE_WALK,
     STEP_OF_FRICTION,
     STEP_READINGS,
+    USUAL_TIME,
     VISCOUS_PRIOR,
     VISCOUS_WALK,
     FrictionFilter,
@@ -111,7 +112,7 @@ class Textbook:
         scale = math.hypot(SCALE_PRIOR, first.friction_std / force)
         shares = (COULOMB_PRIOR, VISCOUS_PRIOR)
         prior = [scale, *(share * force for share in shares), ASYMMETRY_PRIOR, OFFSET_PRIOR * force, REMAINDER * force]
-        self.stamp, self.noise, self.number = first.stamp, LEAST_NOISE, 0
+        self.stamp, self.noise, self.usual, self.number = first.stamp, LEAST_NOISE, force, 0
         self.direction, self.last, self.second = 0, 0.0, 0.0
         self.mean = self.settled = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         self.covariance = np.diag(np.square(prior))
@@ -133,7 +134,9 @@ class Textbook:
         self.predict(law, elapsed, moved)
         row = np.array([direction * law, direction, velocity, law, 1.0, 1.0])
         missed = force - row @ self.mean
-        expected = row @ self.covariance @ row + (self.noise * law) ** 2
+        spread = self.noise * max(law, self.usual)
+        self.usual += moved / (moved + USUAL_TIME) * (law - self.usual)
+        expected = row @ self.covariance @ row + spread**2
         follow = moved / (moved + NOISE_TIME) * (min(missed**2 / expected, OUTLIER**2) - 1.0)
         noise = min(max(math.sqrt(self.noise**2 * (1.0 + follow)), LEAST_NOISE), 1.0)
         if self.is_step(direction, missed, expected):
@@ -142,7 +145,7 @@ class Textbook:
             made_up = np.array([1.0, 0.0, 0.0, 0.0, -direction * law, 0.0])  # scale that the offset makes up for
             self.covariance += (STEP_OF_FRICTION * missed / law) ** 2 * np.outer(made_up, made_up)
             self.covariance[4, 4] += missed**2
-        gain = self.covariance @ row / self.weighted(row, missed, self.noise * law)
+        gain = self.covariance @ row / self.weighted(row, missed, spread)
         self.mean = self.mean + gain * missed
         self.covariance = (np.eye(6) - np.outer(gain, row)) @ self.covariance
         self.noise = noise

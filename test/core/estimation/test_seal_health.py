@@ -9,7 +9,7 @@ from harness.simulated_day import Day, samples
 from paths import ROOT
 
 from seal_friction_ros.core.estimation import estimator
-from seal_friction_ros.core.estimation.adaptation import NOT_ADAPTED, AdaptationSettings, Stroke
+from seal_friction_ros.core.estimation.adaptation import NO_STROKE, NOT_ADAPTED, AdaptationSettings, Stroke, Strokes
 from seal_friction_ros.core.estimation.disagreement import Reversal
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings, EstimatorState, step
 from seal_friction_ros.core.estimation.friction_change import FrictionChange, watch
@@ -91,7 +91,7 @@ def test_a_friction_that_rises_after_the_first_reversals_is_told_as_a_ratio_to_t
 def test_beyond_the_identified_pressures_nothing_is_learnt_but_reversals_are_seen():
     beyond = tuple(replace(mounted, seal=replace(mounted.seal, pressure_max=1e6)) for mounted in SEALS)
     state, health = health_after(replace(Day(FRICTION), scale=lambda _: 1.3), 12.0, replace(PARAMETERS, seals=beyond))
-    assert state.adaptation.reversals == 0
+    assert state.adaptation.strokes.reversals == 0
     assert len(health.reversals) > 5
     assert median(reversal.ratio for reversal in health.reversals) == pytest.approx(1.3, rel=0.05)
 
@@ -164,12 +164,13 @@ def stroke(number: int, offset: float = 5.0, is_identified: bool = True) -> Stro
 
 def state_after(number: int, reversals: int | None = None, ratio: float = 1.0) -> EstimatorState:
     """State in the first sample of a stroke, after `reversals` that were learnt from."""
-    adaptation = NOT_ADAPTED._replace(
-        before=stroke(number - 1) if number else NOT_ADAPTED.before,
-        stroke=stroke(number)._replace(samples=1),
-        reversals=number if reversals is None else reversals,
+    strokes = Strokes(
+        present=stroke(number)._replace(samples=1),
+        before=stroke(number - 1) if number else NO_STROKE,
         ratio=ratio,
+        reversals=number if reversals is None else reversals,
     )
+    adaptation = NOT_ADAPTED._replace(strokes=strokes)
     return estimator.init(PARAMETERS)._replace(adaptation=adaptation, pressure=Pressure(6, 3e6, 2e6))
 
 
@@ -251,7 +252,7 @@ def test_what_is_known_is_told_in_its_unit():
     )
     health = SealHealth(change=FrictionChange(changes=2, changed_at=123), first=0.5)
     starts = Starts(number=2, mean=1.5, squares=0.08)
-    told = values(known, health, starts, stamp=4_500 * MS, learnt_stamp=3_000 * MS, reversals=20)
+    told = values(known, health, starts, stamp=4_500 * MS, strokes=Strokes(reversals=20))
     assert told == {
         'adaptation mode': 'observe',
         'adaptation scale': '1.2500',
@@ -276,7 +277,7 @@ def test_what_is_known_is_told_in_its_unit():
     ('reversals', 'first', 'told'), [(19, 1.0, 'none'), (20, 1.0, '1.0000'), (20, math.nan, 'none'), (20, -0.5, 'none')]
 )
 def test_the_first_twenty_reversals_are_compared_with_once_they_are_known(reversals, first, told):
-    found = values(health=SealHealth(first=first), reversals=reversals)
+    found = values(health=SealHealth(first=first), strokes=Strokes(reversals=reversals))
     assert found['scale over that of the first reversals'] == told
 
 

@@ -91,7 +91,7 @@ def test_stretches_give_the_result_of_one_go_whatever_the_number_of_workers(reco
 
 def test_each_stretch_begins_in_what_was_learnt_before_it(recorded: Path):
     texts = [decode_text(message.data) for message in read_messages(recorded) if message.topic == STATE]
-    learnt = [json.loads(text)['state']['estimator']['adaptation']['reversals'] for text in texts]
+    learnt = [json.loads(text)['state']['estimator']['adaptation']['strokes']['reversals'] for text in texts]
     assert learnt == sorted(learnt)
     assert learnt[-1] > learnt[0]
 
