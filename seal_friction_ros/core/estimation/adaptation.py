@@ -42,7 +42,7 @@ LEAST_FRICTION = 1e-3  # [N] of the law, below which there is nothing to learn
 SETTLED = 0.99  # [-] of the friction, which its lagging value must have reached after a reversal
 LARGEST_INERTIA = 0.5  # [-] of the friction, in a reading with a known mass: the mass may be wrong
 LONGEST_STEP = 0.1  # [s] after a longer gap the acceleration starts anew
-LEARNING_INTERVAL = 8_000_000  # [ns] least time between two samples that are learnt from: what it costs at 1 kHz
+LEARNING_INTERVAL = 16_000_000  # [ns] least time between two samples that are learnt from: what it costs at 1 kHz
 LEAST_STD = 0.01  # [-] of the friction, below which no standard deviation is believed
 IMPLAUSIBLE = 5.0  # [-] innovation over its standard deviation that is a fault of its own
 WRONG_DIRECTION = 1.5  # [-] of the friction that a sample misses whose direction is wrong: it misses twice the friction
@@ -144,6 +144,7 @@ class AdaptationState(NamedTuple):
     once: Lagging
     twice: Lagging
     acceleration: float  # [m/s^2] of the velocity after two lags
+    way: float  # [m] since the last reading of the filter
     bias: float  # [-] mean of the normalised innovations over `SHORT_TIME`
     filter: FrictionFilter
     strokes: Strokes
@@ -156,6 +157,7 @@ NOT_ADAPTED = AdaptationState(
     once=NO_SIGNALS,
     twice=NO_SIGNALS,
     acceleration=0.0,
+    way=0.0,
     bias=0.0,
     filter=NOT_BEGUN,
     strokes=Strokes(),
@@ -208,24 +210,27 @@ def adapt(settings: AdaptationSettings, state: AdaptationState, slide: Slide) ->
     acceleration = (once.velocity - state.twice.velocity) / (elapsed + LAG)
     rest = _rested(state, slide, direction, elapsed)
     bias, known, strokes = state.bias, state.filter, state.strokes
+    way = state.way + 0.5 * elapsed * (state.twice.velocity + twice.velocity)
     if slide.is_usable and direction != 0 and _is_even(settings, acceleration, at_first, friction):
         if slide.is_identified and known.stamp != NEVER:
             missed = _missed(settings, state, newest, abs(velocity)) / known.innovation_std
             bias += elapsed / (elapsed + SHORT_TIME) * (between(-IMPLAUSIBLE, missed, IMPLAUSIBLE) - bias)
         if twice.friction * direction >= SETTLED * friction >= LEAST_FRICTION:
             force, law = twice.force_sum - settings.moving_mass * acceleration, twice.friction * direction
-            reading = Reading(slide.stamp, force, direction, twice.velocity, law, slide.friction_std)
+            reading = Reading(slide.stamp, force, direction, twice.velocity, way, law, slide.friction_std)
             strokes = _with_reading(strokes, reading, slide.is_identified)
             if slide.is_identified:
-                known = updated(known, reading)
-    return AdaptationState(slide.stamp, once, twice, acceleration, bias, known, strokes, rest)
+                known, way = updated(known, reading), 0.0
+    return AdaptationState(slide.stamp, once, twice, acceleration, way, bias, known, strokes, rest)
 
 
 @compilable
 def _interrupted(state: AdaptationState, stamp: int, newest: Lagging) -> AdaptationState:
     """State after a gap: signals and strokes begin anew."""
     strokes = Strokes(NO_STROKE, NO_STROKE, state.strokes.ratio, state.strokes.reversals)
-    return AdaptationState(stamp, newest, newest, 0.0, 0.0, state.filter, strokes, Rest(stamp, 0.0, 0.0, 0.0))
+    return AdaptationState(
+        stamp, newest, newest, 0.0, state.way, 0.0, state.filter, strokes, Rest(stamp, 0.0, 0.0, 0.0)
+    )
 
 
 @compilable
@@ -314,8 +319,13 @@ def left_over(settings: AdaptationSettings, state: AdaptationState, force_sum: f
         state: Before the sample is learnt from, its acceleration that of the last sample taken.
         force_sum: [N]
     """
-    terms = state.filter.terms
-    return force_sum - settings.moving_mass * state.acceleration - terms.offset - terms.remainder
+    return force_sum - settings.moving_mass * state.acceleration - offset_here(state) - state.filter.terms.remainder
+
+
+@compilable
+def offset_here(state: AdaptationState) -> float:
+    """Offset of the force sum where the rod is [N]: its gradient goes on since the last reading."""
+    return state.filter.terms.offset + state.way * state.filter.terms.gradient
 
 
 @compilable
@@ -364,7 +374,7 @@ def adapted_friction(
     if moment.direction == 0.0:
         scale = sliding / law if law > 0.0 else 1.0
         std = _std_at_rest(state, moment, scale * (friction.coulomb_friction + friction.stiction))
-        missed = abs(known.terms.offset)
+        missed = abs(offset_here(state))
     else:
         std = _std_of_sliding(known, moment, friction.coulomb_friction_std)
         missed = abs(sliding - law)
@@ -375,7 +385,7 @@ def adapted_friction(
         return ActuatorFriction(coulomb, std if std > wider else wider, stiction, in_identified_range, added), 0.0
     at_no_speed = bounded_friction(settings, known, moment.direction, 0.0, friction.coulomb_friction)
     stiction = friction.stiction * (sliding / law if law > 0.0 else 1.0)
-    taken_off = known.terms.offset if moment.direction == 0.0 else 0.0
+    taken_off = offset_here(state) if moment.direction == 0.0 else 0.0
     adapted = ActuatorFriction(at_no_speed, std, stiction, friction.in_identified_range, sliding - at_no_speed)
     return adapted, taken_off
 
@@ -420,7 +430,10 @@ def _std_at_rest(state: AdaptationState, moment: Moment, most: float) -> float:
         return most
     change = moment.force_sum - state.twice.force_sum
     noise = change * change if change * change > rest.ripple else rest.ripple
-    variance = known.covariance.offset.offset + rest.leapt + AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
+    row, way = known.covariance.offset, state.way
+    offset = row.offset + way * (2.0 * row.gradient + way * known.covariance.gradient.gradient)
+    remainder = known.terms.remainder  # at rest nothing tells it from the offset
+    variance = offset + remainder * remainder + rest.leapt + AT_ONCE * AT_ONCE * (known.unexplained.square + noise)
     std = math.sqrt(variance) if variance > 0.0 else 0.0
     return std if std < most else most
 
@@ -445,7 +458,7 @@ def disagrees(
         return False
     if uses:
         return not settings.scale_min * moment.law <= moment.found <= settings.scale_max * moment.law
-    if is_at_rest and abs(known.terms.offset) > 0.5 * (friction.coulomb_friction + friction.stiction):
+    if is_at_rest and abs(offset_here(state)) > 0.5 * (friction.coulomb_friction + friction.stiction):
         return True
     return abs(moment.found - moment.law) > 2.0 * math.hypot(friction.coulomb_friction_std, known.friction_std)
 

@@ -24,6 +24,7 @@ from seal_friction_ros.core.estimation.adaptation import (
     learnt_scale,
     left_over,
     moment_of,
+    offset_here,
 )
 from seal_friction_ros.core.estimation.conditioned_velocity import (
     NOT_CONDITIONED,
@@ -527,12 +528,13 @@ def _estimate_with_learnt(
         if not is_consistent(settings, known, left - moment.direction * moment.found):
             status |= _MODEL_DISAGREES
         left -= moment.direction * (adapted.coulomb_friction + adapted.velocity_friction)
-    terms, scale = known.filter.terms, learnt_scale(settings, known.filter)
+    scale = learnt_scale(settings, known.filter)
     scale_std = friction.coulomb_friction_std / moment.law if moment.law > 0.0 else 0.0
     if known.filter.stamp != NEVER:
         scale_std = known.filter.friction_std / known.filter.friction
     seen = Observation(stamp, velocity, force_sum - taken_off, status, input_age)
-    return adapted, estimate_of(parameters, seen, adapted, scale, scale_std, terms.offset + terms.remainder, left)
+    offset = offset_here(known) + known.filter.terms.remainder
+    return adapted, estimate_of(parameters, seen, adapted, scale, scale_std, offset, left)
 
 
 @compilable

@@ -12,13 +12,16 @@ s     scale of the law
 c     share of Coulomb friction that does not follow the law [N]
 k     viscous friction that the law does not have [N s/m]
 a     asymmetry: part of the friction that has another size in the two directions
-b     offset of the force sum: load, area or sensor zero that nobody took off [N]
+b     offset of the force sum where the rod is now: load, area or sensor zero that nobody took off [N]
+g     gradient of the offset over the way: load over position, as of a boom or a gas spring [N/m]
 n     remainder: what none of these explains and what passes within `REMAINDER_TIME` [N]
 ====  =============================================================================================
 
-All but n are random walks, n is a first-order Gauss-Markov process and e is white. Friction is all but b and n, and its
+The offset goes on with the way x of the rod, :math:`b_{i+1} = b_i + g\,\Delta x`; beside that all but n are random
+walks, n is a first-order Gauss-Markov process and e is white. Friction is all but b, g and n, and its
 variance is that of the posterior: what cannot be told apart, as asymmetry from offset in one pressure, stays in the
-band. Terms that a motion does not excite keep their prior.
+band, and so does a gradient beyond the longest stroke that the rod came back from. Terms that a motion does not excite
+keep their prior.
 
 The remainder makes the filter what it is: a friction that wavers over a stroke would else drag offset and scale along
 from one side of their band to the other. Samples that are too far away count less, as with noise of heavy tails; if
@@ -42,12 +45,17 @@ COULOMB_PRIOR = 0.3  # [-] share
 VISCOUS_PRIOR = 1.0  # [s/m] share per speed
 ASYMMETRY_PRIOR = 0.08  # [-]
 OFFSET_PRIOR = 10.0  # [-] share
+GRADIENT_PRIOR = 100.0  # [1/m] share over the way
 # Random walks: one standard deviation after one second.
 SCALE_WALK = 0.005  # [-]
 COULOMB_WALK = 0.005  # [-] share
 VISCOUS_WALK = 0.02  # [s/m] share per speed
 ASYMMETRY_WALK = 0.001  # [-]
 OFFSET_WALK = 0.002  # [-] share
+# The gradient walks with the way: share over the longest stroke, after such a stroke.
+GRADIENT_WALK = 1.0  # [-]
+CURVED = 0.2  # [-] share: root mean square of an unexplained drift from which on the load may be curved over the way
+SHORTEST_STROKE = 1e-4  # [m]
 REMAINDER_TIME = 0.4  # [s] time constant of n
 REMAINDER = 0.05  # [-] share: standard deviation of n
 LEAST_NOISE = 0.1  # [-] share: standard deviation of e at first and at least, since readings in a row miss alike
@@ -72,6 +80,7 @@ class Terms(NamedTuple):
     viscous: float  # k
     asymmetry: float  # a
     offset: float  # b
+    gradient: float  # g
     remainder: float  # n
 
 
@@ -83,6 +92,7 @@ class Covariance(NamedTuple):
     viscous: Terms
     asymmetry: Terms
     offset: Terms
+    gradient: Terms
     remainder: Terms
 
 
@@ -112,6 +122,8 @@ class FrictionFilter(NamedTuple):
     stamp: int  # [ns] of the last reading; `NEVER` before the first
     direction: int  # -1 or 1 then; 0: none
     speed: float  # [m/s] then
+    stroke: float  # [m] way in this direction so far
+    longest: float  # [m] way in one direction before
     friction: float  # [N] by the law then
     friction_std: float  # [N] of the friction then
     innovation_std: float  # [N] of its innovation
@@ -121,16 +133,18 @@ class FrictionFilter(NamedTuple):
     outliers: Outliers
 
 
-NO_TERMS = Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_TERMS = Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 NOT_BEGUN = FrictionFilter(
     stamp=NEVER,
     direction=0,
     speed=0.0,
+    stroke=0.0,
+    longest=SHORTEST_STROKE,
     friction=0.0,
     friction_std=0.0,
     innovation_std=0.0,
-    terms=Terms(1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    covariance=Covariance(NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS),
+    terms=Terms(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    covariance=Covariance(NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS, NO_TERMS),
     unexplained=Unexplained(),
     outliers=Outliers(0, 0.0, 0.0, NO_TERMS, False),
 )
@@ -144,6 +158,7 @@ class Reading(NamedTuple):
     force: float  # [N] y
     direction: int  # d
     velocity: float  # [m/s] v
+    way: float  # [m] from the reading before to this one
     friction: float  # [N] f of the law, > 0
     friction_std: float  # [N] of a new reading, by the seal file
 
@@ -151,7 +166,7 @@ class Reading(NamedTuple):
 @compilable
 def coefficients(direction: float, velocity: float, friction: float) -> Terms:
     """How the terms enter a reading."""
-    return Terms(direction * friction, direction, velocity, friction, 1.0, 1.0)
+    return Terms(direction * friction, direction, velocity, friction, 1.0, 0.0, 1.0)
 
 
 @compilable
@@ -165,25 +180,29 @@ def friction_magnitude(terms: Terms, direction: float, speed: float, friction: f
 @compilable
 def product(row: Terms, by: Terms) -> float:
     """Scalar product."""
-    a, b, c, d, e, f = row
-    p, q, r, s, t, u = by
-    total: float = a * p + b * q + c * r + d * s + e * t + f * u
+    a, b, c, d, e, f, g = row
+    p, q, r, s, t, u, v = by
+    total: float = a * p + b * q + c * r + d * s + e * t + f * u + g * v
     return total
 
 
 @compilable
 def _products(covariance: Covariance, by: Terms) -> Terms:
     """Product of the covariance and a column."""
-    p, q, r, s, t, u = covariance
-    return Terms(product(p, by), product(q, by), product(r, by), product(s, by), product(t, by), product(u, by))
+    s, c, k, a, b, g, n = covariance
+    return Terms(
+        product(s, by), product(c, by), product(k, by), product(a, by), product(b, by), product(g, by), product(n, by)
+    )
 
 
 @compilable
 def _less(row: Terms, share: float, by: Terms) -> Terms:
     """Row less a share of another."""
-    a, b, c, d, e, f = row
-    p, q, r, s, t, u = by
-    return Terms(a - share * p, b - share * q, c - share * r, d - share * s, e - share * t, f - share * u)
+    a, b, c, d, e, f, g = row
+    p, q, r, s, t, u, v = by
+    return Terms(
+        a - share * p, b - share * q, c - share * r, d - share * s, e - share * t, f - share * u, g - share * v
+    )
 
 
 @compilable
@@ -197,15 +216,17 @@ def begun(reading: Reading) -> FrictionFilter:
         VISCOUS_PRIOR * force,
         ASYMMETRY_PRIOR,
         OFFSET_PRIOR * force,
+        GRADIENT_PRIOR * force,
         REMAINDER * force,
     )
     diagonal = Covariance(
-        Terms(std.scale * std.scale, 0.0, 0.0, 0.0, 0.0, 0.0),
-        Terms(0.0, std.coulomb * std.coulomb, 0.0, 0.0, 0.0, 0.0),
-        Terms(0.0, 0.0, std.viscous * std.viscous, 0.0, 0.0, 0.0),
-        Terms(0.0, 0.0, 0.0, std.asymmetry * std.asymmetry, 0.0, 0.0),
-        Terms(0.0, 0.0, 0.0, 0.0, std.offset * std.offset, 0.0),
-        Terms(0.0, 0.0, 0.0, 0.0, 0.0, std.remainder * std.remainder),
+        Terms(std.scale * std.scale, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        Terms(0.0, std.coulomb * std.coulomb, 0.0, 0.0, 0.0, 0.0, 0.0),
+        Terms(0.0, 0.0, std.viscous * std.viscous, 0.0, 0.0, 0.0, 0.0),
+        Terms(0.0, 0.0, 0.0, std.asymmetry * std.asymmetry, 0.0, 0.0, 0.0),
+        Terms(0.0, 0.0, 0.0, 0.0, std.offset * std.offset, 0.0, 0.0),
+        Terms(0.0, 0.0, 0.0, 0.0, 0.0, std.gradient * std.gradient, 0.0),
+        Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, std.remainder * std.remainder),
     )
     return replace(
         NOT_BEGUN, stamp=reading.stamp, covariance=diagonal, unexplained=Unexplained(LEAST_NOISE, force, 0.0, 0.0, 0.0)
@@ -213,25 +234,45 @@ def begun(reading: Reading) -> FrictionFilter:
 
 
 @compilable
-def _walked(covariance: Covariance, friction: float, moved: float, elapsed: float) -> Covariance:
-    """Covariance before the next reading: random walks over ``moved`` [s] of motion, offset and n over ``elapsed``."""
+def _predicted(known: FrictionFilter, reading: Reading, elapsed: float, moved: float, longest: float) -> Covariance:
+    """Covariance before the next reading: the offset takes its gradient along, n fades, the others walk.
+
+    Args:
+        known: Before the reading.
+        reading: With the way to it.
+        elapsed: [s] since the reading before: offset and n change at rest, too.
+        moved: [s] of it in motion.
+        longest: Stroke [m].
+    """
+    way, law, drift = reading.way, reading.friction, CURVED * reading.friction
     kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
-    coulomb, viscous = COULOMB_WALK * friction, VISCOUS_WALK * friction
-    offset, remainder = OFFSET_WALK * friction, REMAINDER * friction
-    s, c, k, a, b, n = covariance  # one unpacking takes a quarter of the time of an attribute each
+    coulomb, viscous, offset = COULOMB_WALK * law, VISCOUS_WALK * law, OFFSET_WALK * law
+    gradient, remainder = GRADIENT_WALK * law / longest, REMAINDER * law
+    curved = abs(way) / longest if known.unexplained.drift_square > drift * drift else 0.0
+    s, c, k, a, b, g, n = known.covariance  # one unpacking takes a quarter of the time of an attribute each
     return Covariance(
-        Terms(s[0] + moved * SCALE_WALK * SCALE_WALK, s[1], s[2], s[3], s[4], kept * s[5]),
-        Terms(c[0], c[1] + moved * coulomb * coulomb, c[2], c[3], c[4], kept * c[5]),
-        Terms(k[0], k[1], k[2] + moved * viscous * viscous, k[3], k[4], kept * k[5]),
-        Terms(a[0], a[1], a[2], a[3] + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, a[4], kept * a[5]),
-        Terms(b[0], b[1], b[2], b[3], b[4] + elapsed * offset * offset, kept * b[5]),
+        Terms(s[0] + moved * SCALE_WALK * SCALE_WALK, s[1], s[2], s[3], s[4] + way * s[5], s[5], kept * s[6]),
+        Terms(c[0], c[1] + moved * coulomb * coulomb, c[2], c[3], c[4] + way * c[5], c[5], kept * c[6]),
+        Terms(k[0], k[1], k[2] + moved * viscous * viscous, k[3], k[4] + way * k[5], k[5], kept * k[6]),
+        Terms(a[0], a[1], a[2], a[3] + moved * ASYMMETRY_WALK * ASYMMETRY_WALK, a[4] + way * a[5], a[5], kept * a[6]),
+        Terms(
+            b[0] + way * g[0],
+            b[1] + way * g[1],
+            b[2] + way * g[2],
+            b[3] + way * g[3],
+            b[4] + way * (b[5] + g[4] + way * g[5]) + elapsed * offset * offset,
+            b[5] + way * g[5],
+            kept * (b[6] + way * g[6]),
+        ),
+        Terms(g[0], g[1], g[2], g[3], g[4] + way * g[5], g[5] + curved * gradient * gradient, kept * g[6]),
         Terms(
             kept * n[0],
             kept * n[1],
             kept * n[2],
             kept * n[3],
-            kept * n[4],
-            kept * kept * n[5] + (1.0 - kept * kept) * remainder * remainder,
+            kept * (n[4] + way * n[5]),
+            kept * n[5],
+            kept * kept * n[6] + (1.0 - kept * kept) * remainder * remainder,
         ),
     )
 
@@ -245,8 +286,14 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
     moved = elapsed if elapsed < LONGEST_STEP else LONGEST_STEP
     column = coefficients(reading.direction, reading.velocity, reading.friction)
     kept = REMAINDER_TIME / (REMAINDER_TIME + elapsed)
-    terms = replace(known.terms, remainder=kept * known.terms.remainder)
-    covariance = _walked(known.covariance, reading.friction, moved, elapsed)
+    stroke, longest = abs(reading.way), known.longest
+    if reading.direction == known.direction:
+        stroke += known.stroke
+    elif known.stroke > longest:
+        longest = known.stroke
+    s, c, k, a, b, g, n = known.terms
+    terms = Terms(s, c, k, a, b + reading.way * g, g, kept * n)
+    covariance = _predicted(known, reading, elapsed, moved, stroke if stroke > longest else longest)
     innovation = reading.force - product(terms, column)
     usual = known.unexplained.usual
     noise = known.unexplained.noise * (reading.friction if reading.friction > usual else usual)
@@ -264,7 +311,8 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         gains = _products(covariance, column)
     terms, covariance = _corrected(terms, covariance, gains, product(gains, column), innovation, noise)
 
-    std = friction_std(covariance, unexplained.drift_square, reading)
+    untold = terms.gradient * (stroke - longest) if stroke > longest else 0.0
+    std = friction_std(covariance, unexplained.drift_square + untold * untold, reading)
     is_stepped = outliers.is_stepped and std > PROVEN * reading.friction
     if outliers.number == 0:
         outliers = Outliers(0, outliers.last, outliers.second, terms, is_stepped)
@@ -272,6 +320,8 @@ def updated(known: FrictionFilter, reading: Reading) -> FrictionFilter:
         reading.stamp,
         reading.direction,
         abs(reading.velocity),
+        stroke,
+        longest,
         reading.friction,
         std,
         math.sqrt(variance),
@@ -306,6 +356,7 @@ def _corrected(
         _less(covariance.viscous, gains.viscous / variance, gains),
         _less(covariance.asymmetry, gains.asymmetry / variance, gains),
         _less(covariance.offset, gains.offset / variance, gains),
+        _less(covariance.gradient, gains.gradient / variance, gains),
         _less(covariance.remainder, gains.remainder / variance, gains),
     )
 
@@ -379,11 +430,11 @@ def friction_std(covariance: Covariance, drift_square: float, reading: Reading) 
 
     Args:
         covariance: Of the state.
-        drift_square: Mean square of what drifts unexplained [N^2].
+        drift_square: Mean square of what drifts and may be friction [N^2].
         reading: That the friction is asked for.
     """
     law = reading.friction
-    column = Terms(reading.direction * law, reading.direction, reading.velocity, law, 0.0, 0.0)
+    column = Terms(reading.direction * law, reading.direction, reading.velocity, law, 0.0, 0.0, 0.0)
     least = REMAINDER * law * REMAINDER * law
     variance = product(_products(covariance, column), column) + (drift_square if drift_square > least else least)
     return math.sqrt(variance) if variance > 0.0 else 0.0

@@ -495,7 +495,7 @@ def test_the_feed_forward_has_the_scale_that_is_learnt_on_all_of_its_friction(mo
     viscous = mounted(velocity_terms=VelocityTerms(viscous_friction=200.0))
     known = PARAMETERS._replace(estimator=replace(viscous, adaptation=AdaptationSettings(mode)))
     state = init_running(known)
-    learnt = begun(Reading(0, 60.0, 1, 0.05, 40.0, 3.0))
+    learnt = begun(Reading(0, 60.0, 1, 0.05, 0.0, 40.0, 3.0))
     learnt = learnt._replace(terms=learnt.terms._replace(scale=1.5), covariance=NOT_BEGUN.covariance)
     learnt = learnt._replace(innovation_std=4.0, friction=40.0, friction_std=4.0)
     adaptation = state.estimator.adaptation._replace(filter=learnt)
