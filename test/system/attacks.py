@@ -140,6 +140,12 @@ CLEAN: dict[str, Callable[[Rod], Rod]] = {
 ATTACKS: dict[str, Callable[[Rod], Rod]] = {
     'offset of 0.2 of the friction': lambda rod: with_load(rod, 0.2 * COULOMB),
     'offset of the friction': lambda rod: with_load(rod, COULOMB),
+    'load over the position, 5 times the friction': lambda rod: with_load(
+        rod, 5.0 * COULOMB * rod.position / np.ptp(rod.position)
+    ),
+    'boom: load over the position that bends': lambda rod: with_load(
+        rod, 2.0 * COULOMB * np.sin(2.2 * (rod.position - rod.position.min()) / np.ptp(rod.position) + 0.3)
+    ),
     'payload of 60 N on and off every 7 s': lambda rod: with_load(rod, 60.0 * (rod.time // 7.0 % 2)),
     **{f'friction times {f}': (lambda rod, f=f: with_friction(rod, f * rod.friction)) for f in (0.6, 0.8, 1.25, 1.6)},
     **{

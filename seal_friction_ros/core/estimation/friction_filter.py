@@ -45,7 +45,7 @@ COULOMB_PRIOR = 0.3  # [-] share
 VISCOUS_PRIOR = 1.0  # [s/m] share per speed
 ASYMMETRY_PRIOR = 0.08  # [-]
 OFFSET_PRIOR = 10.0  # [-] share
-GRADIENT_PRIOR = 100.0  # [1/m] share over the way
+GRADIENT_PRIOR = 30.0  # [1/m] share over the way
 # Random walks: one standard deviation after one second.
 SCALE_WALK = 0.005  # [-]
 COULOMB_WALK = 0.005  # [-] share
