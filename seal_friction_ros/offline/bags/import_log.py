@@ -47,7 +47,7 @@ from seal_friction_ros.core.estimation.messages import (
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import CheckedParameters, from_mapping, parameter
-from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, unit_size
+from seal_friction_ros.core.foundation.units import QUANTITIES, QUANTITY_OF, ZEROS, unit_size
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding, slope
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.bags.bag import (
@@ -74,7 +74,6 @@ _REFERENCES = {
 """Optional columns of the wanted motion -> their quantity."""
 _LOADS = ('auto', 'none', 'position')
 _HEADERS = ('none', 'row', 'comment')
-_QUANTITY_OF = {unit: quantity for quantity, units in QUANTITIES.items() for unit in units}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,8 +98,8 @@ class Term(CheckedParameters):
                 'give one of them, the number (0 or more) or the name'
             )
         for name in ('unit', 'gain_unit'):
-            if getattr(self, name) not in _QUANTITY_OF:
-                raise ValueError(f'Term.{name} = {getattr(self, name)!r} is not one of {", ".join(_QUANTITY_OF)}')
+            if getattr(self, name) not in QUANTITY_OF:
+                raise ValueError(f'Term.{name} = {getattr(self, name)!r} is not one of {", ".join(QUANTITY_OF)}')
 
     @property
     def size(self) -> float:
@@ -109,7 +108,7 @@ class Term(CheckedParameters):
 
     def is_a(self, quantity: str) -> bool:
         """Whether column times gain is a ``quantity`` (a key of the table of quantities above)."""
-        factors = {_QUANTITY_OF[self.unit], _QUANTITY_OF[self.gain_unit]}
+        factors = {QUANTITY_OF[self.unit], QUANTITY_OF[self.gain_unit]}
         return factors == {quantity, 'number'} or (quantity == 'force' and factors == {'pressure', 'area'})
 
 
