@@ -67,13 +67,12 @@ def in_si(value: Any, unit: str, where: str, *, is_difference: bool = False) -> 
         ValueError: It is no number, is too large for one, or has a unit of another quantity.
     """
     others = QUANTITIES[QUANTITY_OF[unit]] if unit in QUANTITY_OF else (unit,)
-    matched = _TEXT.fullmatch(value.strip()) if isinstance(value, str) else None
-    if matched is not None and (matched[2] or matched[3]):
-        name = (matched[3] or unit).strip()
+    if isinstance(value, str) and (found := number_and_unit(value)) is not None:
+        number, name = found[0], found[1] or unit
         if name != unit and name not in others:
             raise ValueError(f'{where}: unit {name!r} is none of a {QUANTITY_OF.get(unit, unit)}: {", ".join(others)}')
-        zero = 0.0 if is_difference or not matched[3] else ZEROS.get(name, 0.0)
-        return zero + float(matched[1]) * UNITS.get(name, 1.0)
+        zero = 0.0 if is_difference or not found[1] else ZEROS.get(name, 0.0)
+        return zero + number * UNITS.get(name, 1.0)
     if isinstance(value, bool) or not isinstance(value, int | float):
         shown = value if not isinstance(value, str) or value.isprintable() else repr(value)
         hint = f' [{others[0]}] or text such as 1.0 {others[-1]}' if unit not in ('', '1') else ''
@@ -82,6 +81,14 @@ def in_si(value: Any, unit: str, where: str, *, is_difference: bool = False) -> 
         return float(value)
     except OverflowError:
         raise ValueError(f'{where} is too large for a floating-point number') from None
+
+
+def number_and_unit(text: str) -> tuple[float, str] | None:
+    """Number and unit of a text such as ``40 mm`` or ``4e-2``, whose unit is empty; None for any other text."""
+    matched = _TEXT.fullmatch(text.strip())
+    return (
+        None if matched is None or not (matched[2] or matched[3]) else (float(matched[1]), (matched[3] or '').strip())
+    )
 
 
 def unit_meant(value: float, unit: str, upper: float) -> str:

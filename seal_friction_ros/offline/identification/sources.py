@@ -29,7 +29,8 @@ from seal_friction_ros.core.identification.signal_preparation import Signals, Sl
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
 from seal_friction_ros.offline.bags.columns import read_velocity_rows
-from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_samples
+from seal_friction_ros.offline.bags.import_log import read_samples
+from seal_friction_ros.offline.bags.rig_file import Rig, read_rig
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.identification.load_numbers import load_text
 from seal_friction_ros.offline.work.executor import Workers, run_all
@@ -253,6 +254,7 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
     recorded = RecordedLog(path.name, signals, sliding, log.temperature, log.position)
+    remarks = (*remarks, *(f'{path.name}: {text}' for text in log.remarks))
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
     if log.position is None or rig.load == 'none':
         return source
