@@ -26,6 +26,8 @@ LEVEL_GAP_MIN = 1e4  # [Pa] smallest such step: near zero a regulator differs be
 SAME_LEVEL = 0.2  # of the pressure: two directions of one log that differ less are one level (our choice)
 AMBIENT = 1.0e5  # [Pa] of the air, absolute
 AMBIENT_WIDTH = 1.2e4  # [Pa] from it, by weather, altitude and sensor (our choice)
+HELD_COUNTS = 5.0  # steps of the sensor: a signal that ranges no further is held, by whatever dithers (our choice)
+LONGEST_BRIDGE = 2  # samples in a row without a value that are interpolated (our choice)
 LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp and is divided into equal parts
 
 
@@ -91,6 +93,28 @@ class OffsetLine(NamedTuple):
     constant: float  # [N] of the load cell
     area_error: float  # [m^2] error of the area in the pressure force
     rms: float  # [N] of the residuals
+
+
+def bridged(signals: Signals) -> tuple[Signals, dict[str, int]]:
+    """Signals with short holes filled in, straight between their neighbours, and the number of values by signal.
+
+    A hole is up to `LONGEST_BRIDGE` values that are not finite, between two that are and not further apart than
+    `LONGEST_GAP`.
+    """
+    filled, counts = signals, {}
+    for name, column in zip(signals._fields[1:], signals[1:], strict=True):
+        known = np.flatnonzero(np.isfinite(column))
+        lacking = np.setdiff1d(np.arange(len(column)), known)
+        after = np.searchsorted(known, lacking)
+        inside = lacking[(after > 0) & (after < len(known))]
+        left, right = (known[np.searchsorted(known, inside) + side] for side in (-1, 0))
+        is_short = (right - left <= LONGEST_BRIDGE + 1) & (signals.time[right] - signals.time[left] <= LONGEST_GAP)
+        holes = inside[is_short]
+        if len(holes):
+            whole = column.copy()
+            whole[holes] = np.interp(signals.time[holes], signals.time[known], column[known])
+            filled, counts[name] = filled._replace(**{name: whole}), len(holes)
+    return filled, counts
 
 
 def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArray:
@@ -307,11 +331,12 @@ def clipped_share(values: FloatArray, *, low_is_real: bool = False) -> float:
     """Share of the samples at which the sensor is saturated (clipped); 0.0 if it is not.
 
     A sensor is saturated if its signal changes with nearly every sample but stays for five or more samples at its
-    highest or lowest value. Signals that also stay constant elsewhere (coarse or held signals) are not assessed, and
-    less than 1 % of the samples is ignored (our choice). With ``low_is_real`` only the highest value is looked at.
+    highest or lowest value. Signals that also stay constant elsewhere (coarse or held signals) are not assessed, nor
+    are signals within `HELD_COUNTS` of their smallest step, which are held or vented, and less than 1 % of the samples is
+    ignored (our choice). With ``low_is_real`` only the highest value is looked at.
     """
     finite = values[np.isfinite(values)]
-    if len(finite) < 100 or np.ptp(finite) == 0.0:
+    if len(finite) < 100 or np.ptp(finite) <= HELD_COUNTS * np.diff(np.unique(finite)).min(initial=np.inf):
         return 0.0
     still = np.diff(finite, prepend=np.nan) == 0.0
     share = 0.0

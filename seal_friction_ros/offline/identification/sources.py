@@ -25,7 +25,7 @@ from seal_friction_ros.core.identification.load_over_position import (
 )
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
-from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
+from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding, bridged
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
 from seal_friction_ros.offline.bags.columns import read_velocity_rows
@@ -253,6 +253,8 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
             check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
+    signals, texts = _bridged(path.name, signals)
+    remarks = (*remarks, *texts)
     recorded = RecordedLog(path.name, signals, sliding, log.temperature, log.position)
     remarks = (*remarks, *(f'{path.name}: {text}' for text in log.remarks))
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
@@ -316,11 +318,27 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns[:4]).taken(kept)
     temperature = _from_the_first(columns[5] + ZEROS['degC'])[kept] if topics.temperature else None
     position = columns[4][kept] if topics.position else None
+    signals, texts = _bridged(bag.name, signals)
     log = RecordedLog(bag.name, signals, _sliding(Sliding(), options), temperature, position)
     places = position if holds_load else None
     return Source(
-        _data_file(path), chambers, log, seal_document=document, has_placeholder=has_placeholder, load_position=places
+        _data_file(path),
+        chambers,
+        log,
+        seal_document=document,
+        has_placeholder=has_placeholder,
+        load_position=places,
+        remarks=texts,
     )
+
+
+def _bridged(name: str, signals: Signals) -> tuple[Signals, tuple[str, ...]]:
+    """Signals without single missing values, and what was filled in."""
+    filled, counts = bridged(signals)
+    said = ', '.join(f'{count} of {what.replace("_", " ")}' for what, count in counts.items())
+    return filled, (
+        f'{name}: of {len(signals.time)} samples single missing values interpolated: {said}',
+    ) if said else ()
 
 
 def _from_the_first(temperature: FloatArray) -> FloatArray:
