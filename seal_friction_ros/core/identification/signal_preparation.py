@@ -332,8 +332,8 @@ def clipped_share(values: FloatArray, *, low_is_real: bool = False) -> float:
 
     A sensor is saturated if its signal changes with nearly every sample but stays for five or more samples at its
     highest or lowest value. Signals that also stay constant elsewhere (coarse or held signals) are not assessed, nor
-    are signals within `HELD_COUNTS` of their smallest step, which are held or vented, and less than 1 % of the samples is
-    ignored (our choice). With ``low_is_real`` only the highest value is looked at.
+    are signals within `HELD_COUNTS` of their smallest step, which are held or vented, and less than 1 % of the samples
+    is ignored (our choice). With ``low_is_real`` only the highest value is looked at.
     """
     finite = values[np.isfinite(values)]
     if len(finite) < 100 or np.ptp(finite) <= HELD_COUNTS * np.diff(np.unique(finite)).min(initial=np.inf):
