@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.stamps import repaired_stamps
 from seal_friction_ros.core.foundation.units import UNITS, ZEROS
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.load_over_position import (
@@ -307,7 +308,8 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     missing = [name for name in ('pressure', 'force') if not getattr(topics, name)]
     if missing:
         raise ValueError(f'{path}: no {" and no ".join(missing)} messages: they are needed to identify friction')
-    stamp, columns, configuration = read_velocity_rows(bag)
+    stamp, received, columns, configuration = read_velocity_rows(bag)
+    stamp, repair = repaired_stamps(stamp, received)
     chambers, document, holds_load, has_placeholder = None, None, False, False
     if configuration is not None:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
@@ -319,6 +321,10 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     temperature = _from_the_first(columns[5] + ZEROS['degC'])[kept] if topics.temperature else None
     position = columns[4][kept] if topics.position else None
     signals, texts = _bridged(bag.name, signals)
+    texts = (
+        *(f'{bag.name}: {text}' for text in (*repair.said('the stamp of the velocity'), *_not_later(kept))),
+        *texts,
+    )
     log = RecordedLog(bag.name, signals, _sliding(Sliding(), options), temperature, position)
     places = position if holds_load else None
     return Source(
@@ -330,6 +336,12 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
         load_position=places,
         remarks=texts,
     )
+
+
+def _not_later(kept: BoolArray) -> list[str]:
+    """Samples that are left out, since they are stamped no later than one before."""
+    count = int((~kept).sum())
+    return [f'{count} of {len(kept)} samples left out: stamped no later than one before'] if count else []
 
 
 def _bridged(name: str, signals: Signals) -> tuple[Signals, tuple[str, ...]]:
