@@ -8,6 +8,7 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
@@ -92,15 +93,45 @@ def read_table(log: Path, columns: Sequence[tuple[str, int, str]], rig: Expected
     Raises:
         ValueError: The log cannot be read or lacks a column; one line that names file and field or line.
     """
+    with _opened(log) as lines:
+        return _read(log, lines, columns, rig)
+
+
+@contextmanager
+def _opened(log: Path) -> Iterator[Lines]:
+    """Lines of a log.
+
+    Raises:
+        ValueError: It cannot be read as text; names it.
+    """
     if log.exists() and not (log.is_file() or log.is_dir()):  # a pipe or a device never ends
         raise ValueError(f'{log}: not a file')
     try:
         with log.open(encoding='utf-8-sig') as file:
-            return _read(log, _lines(file, log), columns, rig)
+            yield _lines(file, log)
     except OSError as error:
         raise ValueError(f'{log}: {error.strerror}') from None
     except UnicodeDecodeError:
         raise ValueError(f'{log}: not a text file') from None
+
+
+def head_of(log: Path) -> list[tuple[int, str]]:
+    """Number and text of the first lines of a log, without empty ones.
+
+    Raises:
+        ValueError: It cannot be read as text; names it.
+    """
+    with _opened(log) as lines:
+        return list(islice(lines, _HEAD))
+
+
+def numbers_in(head: Sequence[tuple[int, str]], layout: Layout, header: str) -> FloatArray:
+    """Numbers of the rows in the first lines of a log, shape (n, columns); NaN for what is no number."""
+    rows = [split(text, layout.separator) for _, text in _rows(head[layout.before :], layout, Expected(header))]
+    width = len(layout.header) or len(rows[0])
+    cells = [[cell.replace(',', '.') if layout.has_decimal_comma else cell for cell in row[:width]] for row in rows]
+    whole = [[float(cell) if is_number(cell) else np.nan for cell in row] for row in cells if len(row) == width]
+    return np.array(whole, dtype=np.float64).reshape(-1, width)
 
 
 def _read(log: Path, lines: Lines, columns: Sequence[tuple[str, int, str]], rig: Expected) -> Table:
