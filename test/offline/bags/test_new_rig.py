@@ -25,9 +25,8 @@ def log_of(head, separator, *columns, comma=False, end=''):
 FORMS = {
     'names with units': log_of('time (s),P_a (bar),P_b (bar),F (kN),x (mm)\n', ',', TIME, PRESSURE / 1e5, OTHER / 1e5,
                                FORCE / 1e3, POSITION * 1e3),
-    'a line of units': log_of('Drive 7\nStarted;12\n\nTime;Pressure A;Pressure B;Force;Position\ns;psi;psi;lbf;in\n', ';',
-                              TIME,
-                              PRESSURE / 6894.757293168, OTHER / 6894.757293168, FORCE / 4.4482216152605,
+    'a line of units': log_of('Drive 7\nBegin;12\n\nTime;Pressure A;Pressure B;Force;Position\ns;psi;psi;lbf;in\n', ';',
+                              TIME, PRESSURE / 6894.757293168, OTHER / 6894.757293168, FORCE / 4.4482216152605,
                               POSITION / 0.0254, comma=True),
     'no units, trailing comma': log_of('t,p_1,p_2,f,x,\n', ',', TIME, PRESSURE / 1e5, OTHER / 1e5, FORCE,
                                        POSITION * 1e3, end=','),
