@@ -6,7 +6,6 @@ the direction, the offset does not: half the difference of the directions is the
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -221,16 +220,23 @@ def breakaways(signals: Signals, sliding: Sliding) -> list[SignalReading]:
     """The breakaway peak of each start from a rest of at least `SHORTEST_REST`.
 
     The peak is the largest force sum in the direction of the motion, from the preceding rest to the first even sample,
-    because the velocity filter of a log delays the visible start. A reversal without a rest has no breakaway.
+    because the velocity filter of a log delays the visible start. A reversal without a rest has no breakaway. Noise
+    that looks like motion for less than `SHORTEST_REST` does not end a rest.
     """
     even = even_sliding(signals, sliding)
     found = []
-    for (direction_before, rest), (direction, run) in pairwise(motions(signals, sliding)):
-        rested = signals.time[rest[-1]] - signals.time[rest[0]]
-        starts = signals.time[run[0]] - signals.time[rest[-1]] <= LONGEST_GAP
-        if direction_before != 0 or direction == 0 or not starts or rested < SHORTEST_REST or not even[run].any():
+    rest = np.empty(0, dtype=np.int64)
+    for direction, run in motions(signals, sliding):
+        is_noise = direction != 0 and len(rest) > 0 and signals.time[run[-1]] - signals.time[run[0]] < SHORTEST_REST
+        rested = signals.time[rest[-1]] - signals.time[rest[0]] if len(rest) else 0.0
+        follows = len(rest) > 0 and signals.time[run[0]] - signals.time[rest[-1]] <= LONGEST_GAP
+        if direction == 0 or is_noise:
+            rest = np.concatenate((rest, run)) if follows else run
             continue
-        candidates = np.concatenate((rest, run[: int(np.argmax(even[run]))]))
+        before, rest = rest, np.empty(0, dtype=np.int64)
+        if not follows or rested < SHORTEST_REST or not even[run].any():
+            continue
+        candidates = np.concatenate((before, run[: int(np.argmax(even[run]))]))
         candidates = candidates[np.isfinite(signals.force_sum[candidates])]
         if len(candidates):
             peak = candidates[[np.argmax(direction * signals.force_sum[candidates])]]

@@ -246,6 +246,17 @@ def test_reversals_without_rest_part_the_motion():
     assert [direction for direction, _ in motions(signals, SLIDING) if direction] == [1, -1] * 4
 
 
+def test_noise_at_rest_that_looks_like_motion_does_not_end_the_rest():
+    signals = trapezoid([0.02, -0.02], peak=5.0)
+    noisy = signals.velocity.copy()
+    noisy[10:50:8] = [0.004, -0.004, 0.005, -0.005, 0.004]
+    noisy[290:330:7] = 0.004
+    found = breakaways(signals._replace(velocity=noisy), SLIDING)
+    whole = breakaways(signals, SLIDING)
+    assert [start.dwell for start in found] == pytest.approx([start.dwell for start in whole], abs=0.05)
+    assert [start.force_sum for start in found] == [start.force_sum for start in whole]
+
+
 def test_breakaway_is_the_peak_before_the_rod_slides():
     found = breakaways(trapezoid([0.02, -0.02], peak=5.0), SLIDING)
     assert [start.direction for start in found] == [1, -1]
