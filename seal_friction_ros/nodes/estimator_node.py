@@ -122,6 +122,7 @@ class EstimatorNode(ManagedNode):
         self._sent: list[tuple[str, Output, bytes]] = []  # name of the actuator, answer, its bytes or frame name
         self._together = b''
         self._newest: dict[str, bytes] = {}
+        self._complete: set[str] = set()  # topics that had all numbers of all actuators in a message
         self._logged_errors: dict[str, str] = {}
         self._inputs: dict[str, Any] = {}
         self._recorded_only: list[Any] = []  # subscriptions to topics of the mapping file that no input uses
@@ -672,7 +673,7 @@ class EstimatorNode(ManagedNode):
         """Say what the node waits for, which input has stopped, and which is back."""
         if not self.active:
             return
-        for remark in self._input_watch.look(self._received(), time.monotonic()):
+        for remark in self._input_watch.look(self._arrived(), time.monotonic()):
             if remark.is_warning:
                 self.get_logger().warning(remark.text)
             else:  # a line of its own: rclpy allows one severity a line
@@ -781,6 +782,18 @@ class EstimatorNode(ManagedNode):
     def _received(self) -> Mapping[str, int]:
         """Messages of each input since activation."""
         return {topic: count for one in self._statistics.values() for topic, count in one.received.items()}
+
+    def _arrived(self) -> Mapping[str, int]:
+        """Messages of each input; none of one whose messages never had the numbers that an actuator wants."""
+        numbers = range(len(self._machine.actuators))
+        lacking = {
+            topic
+            for topic, data in self._newest.items()
+            if any(missing(self._machine, number, topic, data) for number in numbers)
+        }
+        self._complete |= self._newest.keys() - lacking
+        never = lacking - self._complete
+        return {topic: 0 if topic in never else count for topic, count in self._received().items()}
 
     def end_interval(self) -> None:
         """Start a new interval of rates and latencies."""

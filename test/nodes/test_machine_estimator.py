@@ -164,6 +164,23 @@ def test_a_joint_that_no_message_holds_is_named_and_the_others_go_on(tmp_path):
         assert 'buckett' not in drivers.status('arm').message
 
 
+def test_an_input_whose_messages_are_empty_has_not_arrived(tmp_path, capfd):
+    with machine(tmp_path) as (nodes, node, drivers):
+        heard(nodes, node, drivers)
+        remarks = ''
+
+        def said(words: str) -> bool:
+            nonlocal remarks
+            drivers.send(())
+            remarks += ''.join(capfd.readouterr())
+            return words in remarks
+
+        assert nodes.spin_until(lambda: said('waiting for /joint_states'))
+        assert 'has arrived' not in remarks
+        move(nodes, drivers, 3)
+        assert nodes.spin_until(lambda: 'every input that is needed has arrived' in ''.join(capfd.readouterr()))
+
+
 def test_a_joint_that_is_named_twice_is_ambiguous_in_the_diagnostics_and_the_others_go_on(tmp_path):
     with machine(tmp_path) as (nodes, node, drivers):
         heard(nodes, node, drivers)
