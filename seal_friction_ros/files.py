@@ -28,7 +28,7 @@ from seal_friction_ros.core.foundation.documents import DEEPEST
 from seal_friction_ros.core.foundation.parameters import ParameterGroup, from_mapping, meant, printable, similar_names
 from seal_friction_ros.core.friction.actuator import MountedSeal
 from seal_friction_ros.core.friction.seal_file import mounting_of
-from seal_friction_ros.core.machine.machine_file import MachineFile, parse_machine
+from seal_friction_ros.core.machine.machine_file import Actuator, MachineFile, parse_machine
 from seal_friction_ros.core.machine.outputs import check_outputs
 
 _CONSTRUCTOR_ERRORS = (ValueError, TypeError, LookupError, AttributeError)  # PyYAML raises these for '!!int foo'
@@ -242,7 +242,7 @@ def read_parameters(path: Path, node: str, groups: Iterable[ParameterGroup]) -> 
 
 
 def read_machine(name: str) -> MachineFile:
-    """Mapping file of a machine: a path, or the name of one in ``config/machines``.
+    """Mapping file of a machine: a path, or the name of one in ``config/machines``; its seal files are relative to it.
 
     Raises:
         ValueError: It cannot be read or is invalid; one line that names file, actuator and key.
@@ -253,7 +253,16 @@ def read_machine(name: str) -> MachineFile:
         check_outputs(file)
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
-    return file
+    return file._replace(actuators=tuple(_with_paths(one, path.parent) for one in file.actuators))
+
+
+def _with_paths(actuator: Actuator, folder: Path) -> Actuator:
+    """Actuator whose seal files that are named by a relative path are in ``folder``."""
+    seals = [
+        str(folder / name) if ('/' in name or name.endswith('.yaml')) and name[0] not in '~/' else name
+        for name in actuator.selection.seals
+    ]
+    return replace(actuator, selection=replace(actuator.selection, seals=tuple(seals)))
 
 
 def machine_configurations(file: MachineFile, where: str) -> dict[str, Configuration]:

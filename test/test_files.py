@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from harness.machines import BENCH, parsed
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
@@ -20,6 +21,8 @@ from seal_friction_ros.files import (
     load_configuration,
     load_parameter_file,
     load_seals,
+    machine_configurations,
+    read_machine,
     read_yaml,
     share_directory,
 )
@@ -412,3 +415,15 @@ def test_a_path_of_an_unknown_user_is_rejected_with_its_name(name):
 def test_parameters_that_are_not_a_mapping_or_too_large_are_rejected_with_the_file(written, parameters):
     refusal = complaint(load_parameter_file, written(f'/**: {{ros__parameters: {parameters}}}'))
     assert 'ros__parameters' in refusal or 'stick_velocity' in refusal
+
+
+def test_the_seal_files_of_a_machine_are_relative_to_its_mapping_file(tmp_path, monkeypatch):
+    (tmp_path / 'seals').mkdir()
+    text = config_path('seals', 'ms28775_114').read_text()
+    (tmp_path / 'seals' / 'rod.yaml').write_text(text.replace('name: ', 'name: my_', 1))
+    (tmp_path / 'robot.yaml').write_text(BENCH.replace('ms28775_114@a', 'seals/rod.yaml@a', 1))
+    monkeypatch.chdir('/')
+    file = read_machine(str(tmp_path / 'robot.yaml'))
+    (configuration,) = machine_configurations(file, 'robot.yaml').values()
+    assert configuration.seal_documents[0]['name'].startswith('my_')
+    assert file.actuators[0].selection.seals[1:] == parsed(BENCH).actuators[0].selection.seals[1:]

@@ -266,10 +266,12 @@ class EstimatorDiagnostics:
             said = findings(parameters, self._health, status)
         said += self._late()
         if status:
-            return DiagnosticStatus.WARN, '; '.join([str(Status(status).name), *said])
+            bits = {bit: _share(estimates, bit) for bit in Status if status & bit}
+            texts = [f'{bit.name}' if share > 0.995 else f'{bit.name} {share:.0%}' for bit, share in bits.items()]
+            said.insert(0, ', '.join(texts))
         if self._malformed != self._malformed_before:
             names = ', '.join(sorted((self._malformed - self._malformed_before).keys()))
-            return DiagnosticStatus.WARN, f'malformed messages on {names}'
+            said.append(f'malformed messages on {names}')
         said += self._feedforward_findings(seconds)
         said += [
             f'{_share(estimates, bit):.0%} {message}'

@@ -122,8 +122,10 @@ class EstimatorNode(ManagedNode):
         self._sent: list[tuple[str, Output, bytes]] = []  # name of the actuator, answer, its bytes or frame name
         self._together = b''
         self._newest: dict[str, bytes] = {}
+        self._complete: set[str] = set()  # topics that had all numbers of all actuators in a message
         self._logged_errors: dict[str, str] = {}
         self._inputs: dict[str, Any] = {}
+        self._recorded_only: list[Any] = []  # subscriptions to topics of the mapping file that no input uses
         self._outputs: dict[Any, Any] = {}
         self._publish: dict[Any, Callable[[bytes], None]] = {}
         self._topics: dict[Any, str] = {}
@@ -173,6 +175,9 @@ class EstimatorNode(ManagedNode):
         self._ticks = [record_plan(topic, TICK_TYPE, (number,)) for number, topic in enumerate(ticks)]
         for topic in self._types:
             self.subscribe(topic, qos.STREAM)
+        for topic, kind in self._file.topics.items() if self._mapping else ():
+            if topic not in self._types and topic not in self._topics.values():
+                self._record_only(topic, full_name(kind))
         self._create_timers()
 
     def _create_outputs(self) -> None:
@@ -249,13 +254,14 @@ class EstimatorNode(ManagedNode):
 
     def release(self) -> None:
         """Destroy publishers, subscriptions and timers."""
-        for subscription in self._inputs.values():
+        for subscription in (*self._inputs.values(), *self._recorded_only):
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
         for timer in self._timers:
             self.destroy_timer(timer)
         self._inputs.clear()
+        self._recorded_only.clear()
         self._outputs.clear()
         self._publish.clear()
         self._timers.clear()
@@ -445,6 +451,22 @@ class EstimatorNode(ManagedNode):
         )
         # A bag has the names of a mapping file, and the resolved ones of the built-in mapping.
         self._topics[name] = name if name.startswith('/') else self._inputs[name].topic_name
+
+    def _record_only(self, topic: str, type_name: str) -> None:
+        """Subscribe to a topic that no input uses, for the bag: `tune` takes the command of a controller from it."""
+
+        def record(data: bytes, source: int, _: int) -> None:
+            """Record one message."""
+            if self.active:
+                received = self._now()
+                sent = max(received - _lateness(source), 0)
+                self._recording.record(topic, type_name, received, data, sent)
+
+        self._recorded_only.append(
+            self.create_subscription(
+                message_class(type_name), topic, with_source_time(record), qos.best_effort(qos.STREAM), raw=True
+            )
+        )
 
     def _on_message(self, name: str, data: bytes, source: int, received: int) -> None:
         """Take a message that was sent at ``source`` [ns, system clock], and those that wait behind a late one.
@@ -651,7 +673,7 @@ class EstimatorNode(ManagedNode):
         """Say what the node waits for, which input has stopped, and which is back."""
         if not self.active:
             return
-        for remark in self._input_watch.look(self._received(), time.monotonic()):
+        for remark in self._input_watch.look(self._arrived(), time.monotonic()):
             if remark.is_warning:
                 self.get_logger().warning(remark.text)
             else:  # a line of its own: rclpy allows one severity a line
@@ -760,6 +782,18 @@ class EstimatorNode(ManagedNode):
     def _received(self) -> Mapping[str, int]:
         """Messages of each input since activation."""
         return {topic: count for one in self._statistics.values() for topic, count in one.received.items()}
+
+    def _arrived(self) -> Mapping[str, int]:
+        """Messages of each input; none of one whose messages never had the numbers that an actuator wants."""
+        numbers = range(len(self._machine.actuators))
+        lacking = {
+            topic
+            for topic, data in self._newest.items()
+            if any(missing(self._machine, number, topic, data) for number in numbers)
+        }
+        self._complete |= self._newest.keys() - lacking
+        never = lacking - self._complete
+        return {topic: 0 if topic in never else count for topic, count in self._received().items()}
 
     def end_interval(self) -> None:
         """Start a new interval of rates and latencies."""

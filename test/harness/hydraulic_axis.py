@@ -89,11 +89,8 @@ def write_machine(folder: Path) -> Path:
     """Write mapping and seal files of the axis; the path of the mapping file."""
     for seal in (ROD_SEAL, PISTON_SEAL):
         (folder / f'{seal["name"]}.yaml').write_text(json.dumps(seal))
-    machine = json.loads(json.dumps(MACHINE))
-    boom = machine['actuators']['boom']
-    boom['seals'] = [str(folder / seal) for seal in boom['seals']]
     path = folder / 'axis.yaml'
-    path.write_text(json.dumps(machine))
+    path.write_text(json.dumps(MACHINE))
     return path
 
 

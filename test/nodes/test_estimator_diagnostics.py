@@ -61,7 +61,26 @@ def test_a_velocity_that_hums_is_named():
 
 @pytest.mark.parametrize('bit', [Status.FASTER_THAN_IDENTIFIED, Status.DIRECTION_NOT_IDENTIFIED])
 def test_one_estimate_beyond_the_identified_motion_is_a_warning(bit):
-    assert level_of(bit, 0.01) == (DiagnosticStatus.WARN, bit.name)
+    assert level_of(bit, 0.01) == (DiagnosticStatus.WARN, f'{bit.name} 1%')
+
+
+def test_each_bit_has_its_share_and_none_hides_what_limits_the_force():
+    diagnostics = EstimatorDiagnostics()
+    for number in range(100):
+        status = Status.FORCE_STALE * (number < 3) | Status.PRESSURE_OUT_OF_RANGE
+        diagnostics.on_estimate(NO_ESTIMATE._replace(status=int(status)), 1000)
+        limited = Limited.CLAMP * (number < 98) | Limited.FADE * (number < 76)
+        diagnostics.on_feedforward(FeedForward(number, 1.0, 0.9, int(limited)))
+    diagnostics.on_malformed('force_sum')
+    message = diagnostics.report(True, False, GOOD).message
+    for words in (
+        'FORCE_STALE 3%',
+        'PRESSURE_OUT_OF_RANGE;',
+        'malformed messages on force_sum',
+        '98% cut',
+        '76% faded',
+    ):
+        assert words in message, message
 
 
 def test_who_looks_on_gets_the_newest_answers_with_the_bits_of_all_since_the_last_look():

@@ -24,7 +24,7 @@ from std_msgs.msg import Float64MultiArray
 from seal_friction_ros.core.estimation.configuration import PLACEHOLDER_WARNING
 from seal_friction_ros.core.estimation.records import Status
 from seal_friction_ros.nodes.machine_estimator import MachineEstimator
-from seal_friction_ros.offline.bags.bag import read_messages
+from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
 from seal_friction_ros.offline.replay.replay import replay
 
 NAMES = ('boom', 'arm', 'bucket')
@@ -136,6 +136,21 @@ def test_three_actuators_from_one_joint_state_give_estimates_and_one_command_and
     assert replay(tmp_path / 'again').identical
 
 
+def test_a_topic_that_no_input_uses_is_recorded_and_the_bag_replays_to_the_byte(tmp_path):
+    recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
+    text = EXCAVATOR.replace('topics: {', 'topics: {/valve: std_msgs/msg/Float64MultiArray, ', 1)
+    with machine(tmp_path, text, **recording) as (nodes, node, drivers):
+        valve = drivers.create_publisher(Float64MultiArray, '/valve', 10)
+        heard(nodes, node, drivers)
+        for number in range(5):
+            valve.publish(Float64MultiArray(data=[float(number)]))
+            move(nodes, drivers, 1)
+        node.finish()
+    assert bag_topics(tmp_path / 'bag')['/valve'].message_count == 5
+    result = replay(tmp_path / 'bag')
+    assert result.identical, result.first_difference
+
+
 def test_a_joint_that_no_message_holds_is_named_and_the_others_go_on(tmp_path):
     with machine(tmp_path, EXCAVATOR.replace('velocity[bucket]', 'velocity[buckett]')) as (nodes, node, drivers):
         heard(nodes, node, drivers)
@@ -147,6 +162,23 @@ def test_a_joint_that_no_message_holds_is_named_and_the_others_go_on(tmp_path):
         assert nodes.spin_until(lambda: drivers.diagnostics and 'buckett' in drivers.status('bucket').message)
         assert 'did you mean bucket' in drivers.status('bucket').message
         assert 'buckett' not in drivers.status('arm').message
+
+
+def test_an_input_whose_messages_are_empty_has_not_arrived(tmp_path, capfd):
+    with machine(tmp_path) as (nodes, node, drivers):
+        heard(nodes, node, drivers)
+        remarks = ''
+
+        def said(words: str) -> bool:
+            nonlocal remarks
+            drivers.send(())
+            remarks += ''.join(capfd.readouterr())
+            return words in remarks
+
+        assert nodes.spin_until(lambda: said('waiting for /joint_states'))
+        assert 'has arrived' not in remarks
+        move(nodes, drivers, 3)
+        assert nodes.spin_until(lambda: 'every input that is needed has arrived' in ''.join(capfd.readouterr()))
 
 
 def test_a_joint_that_is_named_twice_is_ambiguous_in_the_diagnostics_and_the_others_go_on(tmp_path):

@@ -34,7 +34,8 @@ from seal_friction_ros.core.estimation.seal_health import SealHealth, findings, 
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
 from seal_friction_ros.core.friction.seal_file import mount_seals, mounting_of, parse_seal
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
+from seal_friction_ros.offline.bags.import_log import read_samples
+from seal_friction_ros.offline.bags.rig_file import read_rig
 from seal_friction_ros.offline.commands.main import main as seal_friction
 
 SEAL = parse_seal(read_yaml(ROOT / 'config' / 'seals' / 'ms28775_114.yaml'))

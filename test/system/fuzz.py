@@ -36,8 +36,9 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import load_parameter_file, read_yaml
 from seal_friction_ros.offline.bags import mcap_reader
 from seal_friction_ros.offline.bags.bag import bag_topics, read_messages
-from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
+from seal_friction_ros.offline.bags.import_log import read_samples
 from seal_friction_ros.offline.bags.recover import recover
+from seal_friction_ros.offline.bags.rig_file import read_rig
 
 CORPUS = Path(__file__).parents[1] / 'corpus'
 SLOWEST = 1.0  # [s]

@@ -23,9 +23,10 @@ from seal_friction_ros.core.estimation.configuration import parse_snapshot
 from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.files import load_parameter_file, read_yaml
 from seal_friction_ros.offline.bags.bag import BagWriter, bag_topics, read_messages
-from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
+from seal_friction_ros.offline.bags.import_log import read_samples
 from seal_friction_ros.offline.bags.mcap_reader import MAGIC
 from seal_friction_ros.offline.bags.recover import recover
+from seal_friction_ros.offline.bags.rig_file import read_rig
 
 CORPUS = ROOT / 'test' / 'corpus'
 

@@ -7,9 +7,10 @@ tables in the docs follow from these fields.
 import dataclasses
 import difflib
 import math
-import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar, cast
+
+from seal_friction_ros.core.foundation.units import in_si, unit_meant
 
 Record = TypeVar('Record')
 
@@ -96,13 +97,15 @@ def _check_number(where: str, value: Any, meaning: Meaning) -> None:
     if meaning.lower is not None and value < meaning.lower:
         raise ValueError(f'{what} is below its lower bound {meaning.lower} {meaning.unit}')
     if meaning.upper is not None and value > meaning.upper:
-        raise ValueError(f'{what} is above its upper bound {meaning.upper} {meaning.unit}')
+        hint = unit_meant(value, meaning.unit, meaning.upper)
+        raise ValueError(f'{what} is above its upper bound {meaning.upper} {meaning.unit}{hint}')
 
 
 def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any) -> Record:
     """Make a dataclass from untrusted input.
 
-    Integers convert to floats and lists to tuples. No other type is converted.
+    Integers convert to floats, lists to tuples, and where a number is declared, texts with a unit to SI. No other type
+    is converted.
 
     Args:
         record_type: Dataclass whose fields are bool, int, float, str or tuples of str or float.
@@ -120,7 +123,11 @@ def from_mapping(record_type: type[Record], values: Any, where: str, **made: Any
     missing = [n for n, f in fields.items() if n not in values and f.default is dataclasses.MISSING]
     if missing:
         raise ValueError(f'{where} lacks {", ".join(missing)}')
-    converted = {name: _as_declared(value, fields[name].type, f'{where}.{name}') for name, value in values.items()}
+    units = {name: meaning.unit for name, meaning in meanings(record_type).items()}
+    converted = {
+        name: _as_declared(value, fields[name].type, f'{where}.{name}', units.get(name, ''))
+        for name, value in values.items()
+    }
     try:
         return record_type(**made, **converted)
     except ValueError as error:
@@ -190,27 +197,17 @@ def printable(name: Any) -> str:
     return text if text.isprintable() else repr(text)
 
 
-_TYPE_NAMES = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text'}
+_TYPE_NAMES = {int: 'a whole number', bool: 'true or false', str: 'a text'}
 
 
-def _hint(value: Any, declared: Any) -> str:
-    """Hint for a number that YAML 1.1 reads as text: an exponent without point or sign, such as 15e-3 or 1.0e5."""
-    if declared is float and isinstance(value, str) and re.fullmatch(r'[-+]?[\d.]+[eE][-+]?\d+', value):
-        return ': write it with a point and a signed exponent, as in 1.0e+5'
-    return ''
-
-
-def _as_declared(value: Any, declared: Any, where: str) -> Any:
-    if declared in (float, int, bool, str):
-        if declared is float and type(value) is int:
-            try:
-                return float(value)
-            except OverflowError:
-                raise ValueError(f'{where} is too large for a floating-point number') from None
+def _as_declared(value: Any, declared: Any, where: str, unit: str) -> Any:
+    if declared is float:
+        return in_si(value, unit, where)
+    if declared in (int, bool, str):
         if type(value) is not declared:
-            raise ValueError(f'{where} = {value!r} is not {_TYPE_NAMES[declared]}{_hint(value, declared)}')
+            raise ValueError(f'{where} = {value!r} is not {_TYPE_NAMES[declared]}')
         return value
     if not isinstance(value, list | tuple):
         raise ValueError(f'{where} = {value!r} is not a list')
     item = declared.__args__[0]
-    return tuple(_as_declared(v, item, f'{where}[{i}]') for i, v in enumerate(value))
+    return tuple(_as_declared(v, item, f'{where}[{i}]', unit) for i, v in enumerate(value))

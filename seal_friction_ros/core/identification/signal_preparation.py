@@ -6,7 +6,6 @@ the direction, the offset does not: half the difference of the directions is the
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +25,8 @@ LEVEL_GAP_MIN = 1e4  # [Pa] smallest such step: near zero a regulator differs be
 SAME_LEVEL = 0.2  # of the pressure: two directions of one log that differ less are one level (our choice)
 AMBIENT = 1.0e5  # [Pa] of the air, absolute
 AMBIENT_WIDTH = 1.2e4  # [Pa] from it, by weather, altitude and sensor (our choice)
+HELD_COUNTS = 5.0  # steps of the sensor: a signal that ranges no further is held, by whatever dithers (our choice)
+LONGEST_BRIDGE = 2  # samples in a row without a value that are interpolated (our choice)
 LEVEL_WIDTH = 0.1  # of the highest pressure: a wider level is a ramp and is divided into equal parts
 
 
@@ -91,6 +92,28 @@ class OffsetLine(NamedTuple):
     constant: float  # [N] of the load cell
     area_error: float  # [m^2] error of the area in the pressure force
     rms: float  # [N] of the residuals
+
+
+def bridged(signals: Signals) -> tuple[Signals, dict[str, int]]:
+    """Signals with short holes filled in, straight between their neighbours, and the number of values by signal.
+
+    A hole is up to `LONGEST_BRIDGE` values that are not finite, between two that are and not further apart than
+    `LONGEST_GAP`.
+    """
+    filled, counts = signals, {}
+    for name, column in zip(signals._fields[1:], signals[1:], strict=True):
+        known = np.flatnonzero(np.isfinite(column))
+        lacking = np.setdiff1d(np.arange(len(column)), known)
+        after = np.searchsorted(known, lacking)
+        inside = lacking[(after > 0) & (after < len(known))]
+        left, right = (known[np.searchsorted(known, inside) + side] for side in (-1, 0))
+        is_short = (right - left <= LONGEST_BRIDGE + 1) & (signals.time[right] - signals.time[left] <= LONGEST_GAP)
+        holes = inside[is_short]
+        if len(holes):
+            whole = column.copy()
+            whole[holes] = np.interp(signals.time[holes], signals.time[known], column[known])
+            filled, counts[name] = filled._replace(**{name: whole}), len(holes)
+    return filled, counts
 
 
 def slope(time: FloatArray, values: FloatArray, law: SavitzkyGolay) -> FloatArray:
@@ -197,16 +220,23 @@ def breakaways(signals: Signals, sliding: Sliding) -> list[SignalReading]:
     """The breakaway peak of each start from a rest of at least `SHORTEST_REST`.
 
     The peak is the largest force sum in the direction of the motion, from the preceding rest to the first even sample,
-    because the velocity filter of a log delays the visible start. A reversal without a rest has no breakaway.
+    because the velocity filter of a log delays the visible start. A reversal without a rest has no breakaway. Noise
+    that looks like motion for less than `SHORTEST_REST` does not end a rest.
     """
     even = even_sliding(signals, sliding)
     found = []
-    for (direction_before, rest), (direction, run) in pairwise(motions(signals, sliding)):
-        rested = signals.time[rest[-1]] - signals.time[rest[0]]
-        starts = signals.time[run[0]] - signals.time[rest[-1]] <= LONGEST_GAP
-        if direction_before != 0 or direction == 0 or not starts or rested < SHORTEST_REST or not even[run].any():
+    rest = np.empty(0, dtype=np.int64)
+    for direction, run in motions(signals, sliding):
+        is_noise = direction != 0 and len(rest) > 0 and signals.time[run[-1]] - signals.time[run[0]] < SHORTEST_REST
+        rested = signals.time[rest[-1]] - signals.time[rest[0]] if len(rest) else 0.0
+        follows = len(rest) > 0 and signals.time[run[0]] - signals.time[rest[-1]] <= LONGEST_GAP
+        if direction == 0 or is_noise:
+            rest = np.concatenate((rest, run)) if follows else run
             continue
-        candidates = np.concatenate((rest, run[: int(np.argmax(even[run]))]))
+        before, rest = rest, np.empty(0, dtype=np.int64)
+        if not follows or rested < SHORTEST_REST or not even[run].any():
+            continue
+        candidates = np.concatenate((before, run[: int(np.argmax(even[run]))]))
         candidates = candidates[np.isfinite(signals.force_sum[candidates])]
         if len(candidates):
             peak = candidates[[np.argmax(direction * signals.force_sum[candidates])]]
@@ -307,11 +337,12 @@ def clipped_share(values: FloatArray, *, low_is_real: bool = False) -> float:
     """Share of the samples at which the sensor is saturated (clipped); 0.0 if it is not.
 
     A sensor is saturated if its signal changes with nearly every sample but stays for five or more samples at its
-    highest or lowest value. Signals that also stay constant elsewhere (coarse or held signals) are not assessed, and
-    less than 1 % of the samples is ignored (our choice). With ``low_is_real`` only the highest value is looked at.
+    highest or lowest value. Signals that also stay constant elsewhere (coarse or held signals) are not assessed, nor
+    are signals within `HELD_COUNTS` of their smallest step, which are held or vented, and less than 1 % of the samples
+    is ignored (our choice). With ``low_is_real`` only the highest value is looked at.
     """
     finite = values[np.isfinite(values)]
-    if len(finite) < 100 or np.ptp(finite) == 0.0:
+    if len(finite) < 100 or np.ptp(finite) <= HELD_COUNTS * np.diff(np.unique(finite)).min(initial=np.inf):
         return 0.0
     still = np.diff(finite, prepend=np.nan) == 0.0
     share = 0.0

@@ -7,9 +7,16 @@ import math
 from typing import NamedTuple
 
 from seal_friction_ros.core.estimation.records import NEVER, Pressure
-from seal_friction_ros.core.machine.machine_file import FLUID_PRESSURE, Actuator, MachineFile, Signal
+from seal_friction_ros.core.machine.machine_file import (
+    FLUID_PRESSURE,
+    STANDARD_ATMOSPHERE,
+    Actuator,
+    MachineFile,
+    Signal,
+)
 
 LOWEST_GAUGE = -5e4  # [Pa] only a chamber that cavitates is nearer to vacuum
+LOWEST_IN_KPA = 80.0  # in a message: an absolute pressure in kPa is not below it
 LOWEST_ABSOLUTE = 9e4  # [Pa] a pressure that never falls below it may be absolute ...
 HIGHEST_AMBIENT = 1.15e5  # [Pa] ... and is likely to be, if it falls to this
 
@@ -51,8 +58,11 @@ def pressure_remarks(file: MachineFile, actuator: Actuator, lowest: Lowest) -> l
             continue
         highest = math.inf if file.topics[signal.topic] == FLUID_PRESSURE else HIGHEST_AMBIENT
         if signal.absolute and low < LOWEST_GAUGE:
+            raw = low + STANDARD_ATMOSPHERE
+            kpa = f'; if it is in kPa, write unit: kPa ({raw:.4g} in the message)' if raw > LOWEST_IN_KPA else ''
             remarks.append(
-                f'{name} falls to {low:.3g} Pa with ambient pressure taken off: if it is gauge, write absolute: false'
+                f'{name} falls to {low:.3g} Pa with ambient pressure taken off: if it is gauge, write absolute: '
+                f'false{kpa}'
             )
         elif not signal.absolute and not is_ever_unloaded and LOWEST_ABSOLUTE < low <= highest:
             remarks.append(f'{name} is never below {low:.3g} Pa: if it is absolute, write absolute: true')

@@ -49,7 +49,7 @@ from seal_friction_ros.core.estimation.feedforward import FeedForwardSettings
 from seal_friction_ros.core.estimation.messages import INPUTS as OWN_TOPICS
 from seal_friction_ros.core.estimation.node_options import ADAPTATION_PREFIX, FEEDFORWARD_PREFIX
 from seal_friction_ros.core.foundation.parameters import ParameterGroup, check_names, from_mapping, printable
-from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, unit_size
+from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, in_si, unit_meant
 from seal_friction_ros.core.machine.differentiator import Differentiator, chosen_differentiator
 from seal_friction_ros.core.machine.message_fields import short_name
 
@@ -58,6 +58,7 @@ TEMPERATURE = 'sensor_msgs/Temperature'  # in degC by its definition
 STANDARD_ATMOSPHERE = 101_325.0  # [Pa] ISO 2533, at sea level
 VELOCITY_NOISE = 5e-4  # [m/s] of a velocity from position: half of stick_velocity; our choice
 MOST_ACTUATORS = 64
+LARGEST_BORE = 3.0  # [m] no cylinder is as wide; our choice
 
 INPUTS = {
     'velocity': 'velocity',
@@ -204,7 +205,6 @@ class MachineFile(NamedTuple):
 _TOPIC = re.compile(r'/[A-Za-z_]\w*(/[A-Za-z_]\w*)*')
 _TYPE = re.compile(r'[a-z]\w*(/msg)?/[A-Z]\w*')
 _NAME = re.compile(r'[a-z]\w*', re.IGNORECASE)
-_WITH_UNIT = re.compile(r'([-+]?[\d.]+(?:[eE][-+]?\d+)?) *([A-Za-z][\w/]*)')
 ANSWERS = ('each', 'together')
 _OUTPUT_TYPES = ('std_msgs/Float64MultiArray', 'sensor_msgs/JointState', 'std_msgs/Float64')
 _GROUPS = (
@@ -295,17 +295,9 @@ def _text(document: Mapping[Any, Any], key: str, where: str) -> str:
     return value
 
 
-def _number(value: Any, quantity: str, where: str) -> float:
-    """Number in SI, or with a unit of its quantity."""
-    if isinstance(value, str) and (matched := _WITH_UNIT.fullmatch(value)):
-        try:
-            return _finite(float(matched[1]) * _unit(matched[2], quantity, where), where)
-        except ValueError as error:
-            raise ValueError(str(error) if where in str(error) else f'{where} = {printable(value)!r}') from None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        units = QUANTITIES[quantity]
-        raise ValueError(f'{where} = {printable(value)!r} is not a number [{units[0]}] or text such as 1.0 {units[-1]}')
-    return _finite(value, where)
+def _number(value: Any, quantity: str, where: str, *, is_difference: bool = False) -> float:
+    """Finite number in SI, or with a unit of its quantity."""
+    return _finite(in_si(value, QUANTITIES[quantity][0], where, is_difference=is_difference), where)
 
 
 def _finite(value: float, where: str) -> float:
@@ -319,14 +311,6 @@ def _positive(value: Any, quantity: str, where: str) -> float:
     if number <= 0.0:
         raise ValueError(f'{where} = {value!r} is not above 0')
     return number
-
-
-def _unit(name: Any, quantity: str, where: str) -> float:
-    if name not in QUANTITIES[quantity]:
-        raise ValueError(
-            f'{where}: unit {printable(name)!r} is none of a {quantity}: {", ".join(QUANTITIES[quantity])}'
-        )
-    return unit_size(name)
 
 
 def _source(value: Any, quantity: str, topics: Mapping[str, str], where: str) -> Source:
@@ -346,14 +330,14 @@ def _source(value: Any, quantity: str, topics: Mapping[str, str], where: str) ->
     if not isinstance(field, str):
         raise ValueError(f'{where}: name the field of {kind}, as {topic} FIELD')
     unit: Any = value.get('unit', 'degC' if kind == TEMPERATURE else QUANTITIES[quantity][0])
-    size = _unit(unit, quantity, where)
+    size = in_si(f'1 {unit}', QUANTITIES[quantity][0], where, is_difference=True)
     gain = _number(value.get('gain', 1.0), 'number', f'{where}.gain')
     if gain == 0.0:
         raise ValueError(f'{where}.gain = 0: a constant is written as a number')
     absolute = value.get('absolute', kind == FLUID_PRESSURE and quantity == 'pressure')
     if not isinstance(absolute, bool) or (absolute and quantity != 'pressure'):
         raise ValueError(f'{where}.absolute = {absolute!r}: true or false, for a pressure')
-    offset = _number(value.get('offset', 0.0), quantity, f'{where}.offset') + ZEROS.get(unit, 0.0)
+    offset = _number(value.get('offset', 0.0), quantity, f'{where}.offset', is_difference=True) + ZEROS.get(unit, 0.0)
     return Signal(topic, field, gain * size, offset, absolute)
 
 
@@ -399,6 +383,9 @@ def _areas(document: Mapping[str, Any], where: str) -> tuple[float, float]:
         if missing:
             raise ValueError(f'{where} lacks {missing[0]}')
         bore, rod = (_positive(document[key], 'length', f'{where}: {key}') for key in ('bore', 'rod'))
+        if bore > LARGEST_BORE:
+            hint = unit_meant(bore, 'm', LARGEST_BORE)
+            raise ValueError(f'{where}: bore = {bore:g} m is above {LARGEST_BORE:g} m{hint}')
         if rod >= bore:
             raise ValueError(f'{where}: rod = {rod:g} m is not below bore = {bore:g} m')
         return circle(bore), circle(bore) - circle(rod)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from xml.sax.saxutils import escape
 
 from seal_friction_ros.core.estimation.messages import OUTPUTS
-from seal_friction_ros.core.machine.machine_file import MachineFile, Signal
+from seal_friction_ros.core.machine.machine_file import MachineFile
 
 _CLOCK = '/clock'  # where use_sim_time is set
 _OWN_TOPICS = (
@@ -30,13 +30,10 @@ def security_policy(file: MachineFile, made_by: str) -> str:
     Returns:
         The policy as XML, for a node without a namespace.
     """
-    signals = [signal for actuator in file.actuators for signal in actuator.signals().values()]
-    if isinstance(file.ambient_pressure, Signal):
-        signals.append(file.ambient_pressure)
     answers = ['~/friction'] if file.together else [f'{a.name}/{topic}' for a in file.actuators for topic in OUTPUTS]
     commands = dict.fromkeys(actuator.output.topic for actuator in file.actuators if actuator.output)
     parts = [
-        *_allowed('topic', 'subscribe', [*dict.fromkeys(signal.topic for signal in signals), _CLOCK]),
+        *_allowed('topic', 'subscribe', [*(topic for topic in file.topics if topic not in commands), _CLOCK]),
         *_allowed('topic', 'publish', [*answers, *commands, *_OWN_TOPICS]),
         *_allowed('service', 'reply', [f'~/{name}' for name in _SERVICES]),
     ]

@@ -189,7 +189,11 @@ class Translation:
         plan, received = self._plans[message.topic], message.log_time
         if not plan.taken:
             return
-        reading = plan.read(message.data)
+        try:
+            reading = plan.read(message.data)
+        except ValueError as error:  # as the node: it counts the message as malformed and goes on
+            missing[f'{message.topic}: {error}'] += 1
+            return
         missing.update(f'{message.topic}: {text}' for text in reading.missing)
         for number, taken in plan.taken:
             actuator, known = self._actuators[number], self._states[number]

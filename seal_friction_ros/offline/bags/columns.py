@@ -215,6 +215,7 @@ class VelocityRows(NamedTuple):
     """n velocity samples in the order of the bag."""
 
     stamps: IntArray  # [ns] shape (n,)
+    received: IntArray  # [ns] log times, shape (n,)
     columns: FloatArray
     """shape (7, n), in the units of the messages: velocity, both pressures, force sum, position, temperature and its
     variance; NaN before the first message"""
@@ -241,7 +242,7 @@ class _VelocityCollector:
 
     def __init__(self) -> None:
         self._held = Held(INPUTS)
-        self._stamps = array('q')
+        self._stamps, self._received = array('q'), array('q')
         self._columns = growing(sum(INPUTS.values()))
         self._configuration: Configuration | None = None
 
@@ -251,12 +252,14 @@ class _VelocityCollector:
             self._configuration = parse_snapshot(text).configuration
         found = {name: block.of(name) for name in INPUTS}
         self._stamps.frombytes(found['velocity'].stamps.tobytes())
+        self._received.frombytes(block.messages.received[found['velocity'].places].astype(np.int64).tobytes())
         extend(self._columns, self._held.at(found['velocity'].places, found))
 
     def rows(self) -> VelocityRows:
         """All rows."""
         columns = np.array([np.frombuffer(column) for column in self._columns])
-        return VelocityRows(np.frombuffer(self._stamps, np.int64), columns, self._configuration)
+        stamps, received = (np.frombuffer(times, np.int64) for times in (self._stamps, self._received))
+        return VelocityRows(stamps, received, columns, self._configuration)
 
 
 def growing(count: int) -> list['array[float]']:

@@ -26,6 +26,7 @@ from seal_friction_ros.core.estimation.messages import (
     type_of,
 )
 from seal_friction_ros.core.estimation.records import Position, Pressure, ServoReference
+from seal_friction_ros.core.foundation.stamps import StampRepair
 from seal_friction_ros.core.machine.gauge_or_absolute import Lowest, pressure_remarks
 from seal_friction_ros.core.machine.machine import Machine, MachineActuator, MachineState
 from seal_friction_ros.offline.bags.actuator_bag import (
@@ -161,6 +162,7 @@ def _write(
     awaited = [_awaited(one, present) for one in machine.actuators]
     counts: list[Counter[str]] = [Counter() for _ in machine.actuators]
     missing: Counter[str] = Counter()
+    repairs: dict[tuple[int, str], StampRepair] = {}
     translation = Translation(machine, state)
     with progress(f'import {bag.name}', sum(info.message_count for info in topics.values())) as advance:
         for message in _messages_of(machine, bag, also, advance):
@@ -174,6 +176,8 @@ def _write(
             with named(bag, message):
                 for number, record, frame_id in translation.records(message._replace(publish_time=None), missing):
                     kind = type_of(record)
+                    stamp = repairs.setdefault((number, kind), StampRepair()).next(record.stamp, message.log_time)
+                    record = record._replace(stamp=stamp)  # noqa: PLW2901  the repaired one in its place
                     awaited[number].discard(kind)
                     if kind == VELOCITY_TYPE and awaited[number]:
                         continue
@@ -182,7 +186,12 @@ def _write(
                     tracks[number].take(record)
                     if isinstance(record, Pressure):
                         lowest[number] = lowest[number].after(record)
-    return counts, lacking(missing), lowest, tracks
+    said = [
+        text
+        for (number, kind), one in repairs.items()
+        for text in one.said(f'{machine.actuators[number].name}: the stamp of {_TOPICS[kind].lstrip("/")}')
+    ]
+    return counts, [*lacking(missing), *said], lowest, tracks
 
 
 def _awaited(actuator: MachineActuator, present: Collection[str]) -> set[str]:

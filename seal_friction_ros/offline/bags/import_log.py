@@ -1,36 +1,13 @@
 """Import of a measured log: log and rig file -> bag with the pressure, force sum and rod velocity of each row.
 
-The rig file describes the columns of the log, their units, signs and areas. The files in ``config/rigs`` are examples::
-
-    name: my_rig
-    source: origin of the log, and reason for the signs
-    frame_id: rod               # frame of the messages
-    header: comment             # none; row: the first line; comment: the last '#' line before the first row
-    skip_rows: 15               # rows ignored at the beginning
-    start: 1.0                  # [s] added to the time of each row
-    time: {column: 0, unit: ms} # columns are numbered from 0 ...
-    chamber_a: {terms: [{column_name: P(psig), unit: psi}]} # ... or named as in the header
-    chamber_b: {constant: 0.0}  # [Pa]
-    force_sum:                  # sum of gain * column, plus a constant [N]
-      terms: [{column: 6, unit: N}, {column: 5, unit: bar, gain: -518.7, gain_unit: mm2}]
-    velocity:
-      terms: [{column: 4, unit: mm, gain: -1.0}]
-      savitzky_golay: {window: 0.2, order: 2, largest_gap: 0.05} # absent: the terms are a velocity
-    sliding: {slowest: 3.0e-3, largest_acceleration: 0.05} # for identification; absent: these values
-    position: {terms: [{column: 4, unit: mm, gain: -1.0}]} # absent: that of the velocity, if it is made from position
-    temperature: {column: 7, unit: degC} # of the seals; K or degC; absent: not known
-    load: position              # for identification; the force sum holds a load that follows position; absent: auto
-    reference_position: {terms: [{column: 7, unit: mm}]} # for tune; absent: the bag has no reference
-    reference_velocity: {terms: [{column: 8, unit: mm/s}]} # absent: the slope of the position
-    reference_acceleration: {terms: [{column: 9, unit: m/s2}]} # absent: 0
+`rig_file` describes the columns, `log_table` reads the text.
 """
 
-from array import array
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain, repeat
+from itertools import repeat
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,10 +23,9 @@ from seal_friction_ros.core.estimation.messages import (
 )
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Temperature, Velocity
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.foundation.parameters import CheckedParameters, from_mapping, parameter
-from seal_friction_ros.core.foundation.units import QUANTITIES, ZEROS, unit_size
-from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding, slope
-from seal_friction_ros.files import read_yaml
+from seal_friction_ros.core.foundation.units import ZEROS, unit_size
+from seal_friction_ros.core.identification.signal_preparation import slope
+from seal_friction_ros.core.machine.gauge_or_absolute import HIGHEST_AMBIENT, LOWEST_ABSOLUTE
 from seal_friction_ros.offline.bags.bag import (
     FORCE_TOPIC,
     POSITION_TOPIC,
@@ -59,143 +35,13 @@ from seal_friction_ros.offline.bags.bag import (
     VELOCITY_TOPIC,
     BagWriter,
 )
+from seal_friction_ros.offline.bags.log_table import Dropped, Expected, read_table
+from seal_friction_ros.offline.bags.rig_file import PARTS, REFERENCES, Combination, Rig, Term, read_rig
 from seal_friction_ros.offline.work.progress import progress
 
 _LAST_STAMP = (1 << 31) * 1_000_000_000  # [ns] first one beyond the int32 seconds of a ROS stamp
-_LONGEST_LINE = 1 << 18  # characters
 _BLOCK = 10_000  # rows that are numbers of Python at a time
-_SHOWN = 40  # characters of an invalid cell in an error message
-_PARTS = ('time', 'chamber_a', 'chamber_b', 'force_sum', 'velocity')
-_REFERENCES = {
-    'reference_position': 'length',
-    'reference_velocity': 'velocity',
-    'reference_acceleration': 'acceleration',
-}
-"""Optional columns of the wanted motion -> their quantity."""
-_LOADS = ('auto', 'none', 'position')
-_HEADERS = ('none', 'row', 'comment')
-_QUANTITY_OF = {unit: quantity for quantity, units in QUANTITIES.items() for unit in units}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Term(CheckedParameters):
-    """One column of the log with its unit, times a gain with a unit (for example an area, or a sensor scale).
-
-    Raises:
-        ValueError: The column is named twice or not at all, or there is no such unit.
-    """
-
-    column: int = parameter(-1, unit='', lower=-1, upper=9999, description='Number of the column, counted from 0.')
-    column_name: str = parameter('', unit='', description='Name of the column in the header, instead of its number.')
-    unit: str = parameter(unit='', description='Unit of the column.')
-    gain: float = parameter(1.0, unit='', description='Factor; -1 inverts the sign.')
-    gain_unit: str = parameter('1', unit='', description='Unit of the gain.')
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if (self.column < 0) == (not self.column_name):
-            raise ValueError(
-                f'Term.column = {self.column}, Term.column_name = {self.column_name!r}: '
-                'give one of them, the number (0 or more) or the name'
-            )
-        for name in ('unit', 'gain_unit'):
-            if getattr(self, name) not in _QUANTITY_OF:
-                raise ValueError(f'Term.{name} = {getattr(self, name)!r} is not one of {", ".join(_QUANTITY_OF)}')
-
-    @property
-    def size(self) -> float:
-        """SI value of a 1 in the column."""
-        return self.gain * unit_size(self.gain_unit) * unit_size(self.unit)
-
-    def is_a(self, quantity: str) -> bool:
-        """Whether column times gain is a ``quantity`` (a key of the table of quantities above)."""
-        factors = {_QUANTITY_OF[self.unit], _QUANTITY_OF[self.gain_unit]}
-        return factors == {quantity, 'number'} or (quantity == 'force' and factors == {'pressure', 'area'})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Combination(CheckedParameters):
-    """Linear combination of columns: constant + sum of gain times column, in SI.
-
-    Raises:
-        ValueError: The constant is not finite.
-    """
-
-    terms: tuple[Term, ...] = ()
-    constant: float = parameter(0.0, unit='SI', description='Constant part.')
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rig(CheckedParameters):
-    """Format of the logs of one rig.
-
-    Raises:
-        ValueError: A value is out of bounds, or the unit of a column does not fit its quantity.
-    """
-
-    name: str
-    source: str = ''
-    frame_id: str = 'rod'
-    header: str = 'none'
-    skip_rows: int = parameter(0, unit='rows', lower=0, upper=10**9, description='Rows ignored at the beginning.')
-    start: float = parameter(0.0, unit='s', lower=0.0, upper=2.0e9, description='Added to the time of each row.')
-    time: Term
-    chamber_a: Combination
-    chamber_b: Combination
-    force_sum: Combination
-    velocity: Combination
-    savitzky_golay: SavitzkyGolay | None
-    sliding: Sliding
-    position: Combination | None = None
-    temperature: Term | None = None
-    load: str = 'auto'
-    reference_position: Combination | None = None
-    reference_velocity: Combination | None = None
-    reference_acceleration: Combination | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.header not in _HEADERS:
-            raise ValueError(f'Rig.header = {self.header!r} is not one of {", ".join(_HEADERS)}')
-        if not self.frame_id.isprintable() or len(self.frame_id) > 255:
-            raise ValueError(f'Rig.frame_id = {self.frame_id[:_SHOWN]!r} is not up to 255 printable characters')
-        wanted = {'time': 'time', 'chamber_a': 'pressure', 'chamber_b': 'pressure', 'force_sum': 'force'}
-        if self.load not in _LOADS:
-            raise ValueError(f'Rig.load = {self.load!r} is not one of {", ".join(_LOADS)}')
-        if self.load == 'position' and self.position is None and self.savitzky_golay is None:
-            raise ValueError('Rig.load = position but the rig file has no position: add the column of the position')
-        wanted['velocity'] = 'velocity' if self.savitzky_golay is None else 'length'
-        wanted |= {'position': 'length', 'temperature': 'temperature'} | _REFERENCES
-        given = [name for name in _REFERENCES if getattr(self, name) is not None]
-        if given and self.reference_position is None and self.reference_velocity is None:
-            raise ValueError(f'Rig.{given[0]} without reference_position or reference_velocity')
-        for where, term in self.terms():
-            quantity = wanted[where.split('.')[0]]
-            if not term.is_a(quantity):
-                raise ValueError(
-                    f'{where}.unit = {term.unit!r} with gain_unit = {term.gain_unit!r} is not a {quantity}: '
-                    f'use one of {", ".join(QUANTITIES[quantity])}'
-                )
-            if self.header == 'none' and term.column_name:
-                raise ValueError(f'{where}.column_name = {term.column_name!r} but header = none: the log has no names')
-
-    def terms(self) -> Iterator[tuple[str, Term]]:
-        """Every term with its place in the rig file."""
-        yield 'time', self.time
-        for part in _PARTS[1:]:
-            for number, term in enumerate(getattr(self, part).terms):
-                yield f'{part}.terms[{number}]', term
-        if self.temperature is not None:
-            yield 'temperature', self.temperature
-        for part in ('position', *_REFERENCES):
-            combination = getattr(self, part)
-            for number, term in enumerate(() if combination is None else combination.terms):
-                yield f'{part}.terms[{number}]', term
-
-    @property
-    def known_position(self) -> Combination | None:
-        """Position of the rod: that of the rig file, or the one that the velocity is made from; None without either."""
-        return self.velocity if self.position is None and self.savitzky_golay is not None else self.position
+_WARNED = 0.01  # of the rows: more that are left out or not finite are warned of; our choice
 
 
 class ImportSummary(NamedTuple):
@@ -205,6 +51,8 @@ class ImportSummary(NamedTuple):
     not_finite: int  # rows with a NaN or infinite pressure, force sum or velocity; the estimator flags them
     first_stamp: int  # [ns]
     last_stamp: int  # [ns]
+    dropped: Mapping[str, int] = {}  # reason -> rows of the log that are not in the bag
+    remarks: tuple[str, ...] = ()  # what looks wrong
 
 
 class Samples(NamedTuple):
@@ -252,7 +100,9 @@ def convert_log(log: Path, out: Path, rig: Rig) -> ImportSummary:
         BagError: ``out`` exists already or cannot be made.
     """
     read = read_samples(log, rig)
-    return write_samples(out, read.samples, rig.frame_id, read.track)
+    summary = write_samples(out, read.samples, rig.frame_id, read.track)
+    empty = _share_text('have a value that is empty or not finite', summary.not_finite, summary.rows)
+    return summary._replace(dropped=dict(read.dropped), remarks=(*read.remarks, *empty))
 
 
 class ReadLog(NamedTuple):
@@ -263,6 +113,8 @@ class ReadLog(NamedTuple):
     position: FloatArray | None = None  # [m] shape (n,); None if the rig file has none
     temperature: FloatArray | None = None  # [K] likewise
     track: Track = NO_TRACK  # what the bag gets
+    dropped: Mapping[str, int] = {}  # reason -> rows that are left out
+    remarks: tuple[str, ...] = ()  # what looks wrong
 
 
 def read_samples(log: Path, rig: Rig) -> ReadLog:
@@ -274,24 +126,48 @@ def read_samples(log: Path, rig: Rig) -> ReadLog:
     cells = _read_cells(log, rig)
     position = rig.known_position
     with np.errstate(invalid='ignore', over='ignore'):
-        places = None if position is None else _combined(position, cells.columns, len(cells.line_numbers))
+        places = None if position is None else _combined(position, cells, rig)
         term = rig.temperature
         warm = None if term is None else ZEROS[term.unit] + term.size * cells.columns[term]
     samples = _samples(log, rig, cells)
     track = Track(None if rig.position is None else places, _reference(rig, cells, samples), warm)
-    return ReadLog(samples, cells.columns, places, warm, track)
+    count = cells.dropped.counts.total()
+    lost = [f'{text}: {cells.dropped.first}' for text in _share_text('left out', count, count + len(cells.stamps))]
+    remarks = (*lost, *_pressure_remarks(rig, samples))
+    return ReadLog(samples, cells.columns, places, warm, track, cells.dropped.counts, remarks)
+
+
+def _share_text(what: str, count: int, rows: int) -> list[str]:
+    """Warning of a share of the rows, if it is worth one."""
+    return [f'{count} of {rows} rows ({count / rows:.1%}) {what}'] if count > _WARNED * rows else []
+
+
+def _pressure_remarks(rig: Rig, samples: Samples) -> Iterator[str]:
+    """Chambers whose pressure is taken for gauge but likely absolute, by the name of its column or by its values."""
+    lows = {name: np.nanmin(getattr(samples, name), initial=np.inf) for name in ('chamber_a', 'chamber_b')}
+    is_vented = any(low <= LOWEST_ABSOLUTE for name, low in lows.items() if getattr(rig, name).terms)
+    for name, low in lows.items():
+        terms = getattr(rig, name).terms
+        named = [
+            term.column_name
+            for term in terms
+            if term.column_name.rstrip(')] ').lower().endswith(('abs', 'psia', 'bara'))
+        ]
+        if any(term.absolute for term in terms) or not terms:
+            continue
+        if named or (not is_vented and low <= HIGHEST_AMBIENT):
+            why = f'its column is called {named[0]}' if named else f'it is never below {low:.3g} Pa'
+            yield f'{name} is taken as gauge, but {why}: if it is absolute, write absolute: true in the rig file'
 
 
 def _reference(rig: Rig, cells: '_Cells', samples: Samples) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Wanted position, velocity and acceleration; without a column of the velocity, the slope of the position."""
     count = len(samples.stamp)
-    parts = [getattr(rig, name) for name in _REFERENCES]
+    parts = [getattr(rig, name) for name in REFERENCES]
     if not any(parts):
         return None
     with np.errstate(invalid='ignore', over='ignore'):
-        position, velocity, acceleration = (
-            None if part is None else _combined(part, cells.columns, count) for part in parts
-        )
+        position, velocity, acceleration = (None if part is None else _combined(part, cells, rig) for part in parts)
         if position is None:
             position = np.full(count, np.nan)
         if velocity is None:
@@ -300,152 +176,28 @@ def _reference(rig: Rig, cells: '_Cells', samples: Samples) -> tuple[FloatArray,
     return position, velocity, np.zeros(count) if acceleration is None else acceleration
 
 
-def read_rig(path: Path) -> Rig:
-    """Rig from its file.
-
-    Raises:
-        ValueError: The file cannot be read, or a value in it is invalid; names file, field, value and bound.
-    """
-    document = read_yaml(path)
-    if not isinstance(document, Mapping):
-        raise ValueError(f'{path}: a rig file is a mapping of names to values, not {type(document).__name__}')
-    missing = [part for part in _PARTS if part not in document]
-    if missing:
-        raise ValueError(f'{path}: rig file lacks {", ".join(missing)}')
-    velocity, filter_values = _taken_out(document['velocity'], 'savitzky_golay')
-    parts: dict[str, Any] = {part: _combination(document[part], f'{path}: {part}') for part in _PARTS[1:-1]}
-    parts['velocity'] = _combination(velocity, f'{path}: velocity')
-    if 'temperature' in document:
-        parts['temperature'] = from_mapping(Term, document['temperature'], f'{path}: temperature')
-    optional = [part for part in ('position', *_REFERENCES) if part in document]
-    parts |= {part: _combination(document[part], f'{path}: {part}') for part in optional}
-    return from_mapping(
-        Rig,
-        {key: value for key, value in document.items() if key not in (*_PARTS, 'sliding', 'temperature', *optional)},
-        str(path),
-        time=from_mapping(Term, document['time'], f'{path}: time'),
-        savitzky_golay=None
-        if filter_values is None
-        else from_mapping(SavitzkyGolay, filter_values, f'{path}: velocity.savitzky_golay'),
-        sliding=from_mapping(Sliding, document.get('sliding', {}), f'{path}: sliding'),
-        **parts,
-    )
-
-
-def _taken_out(values: Any, key: str) -> tuple[Any, Any]:
-    """A mapping without ``key``, and the value there; anything else unchanged, for `from_mapping` to refuse."""
-    if not isinstance(values, Mapping):
-        return values, None
-    return {k: v for k, v in values.items() if k != key}, values.get(key)
-
-
-def _combination(document: Any, where: str) -> Combination:
-    values, terms = _taken_out(document, 'terms')
-    if terms is not None and not isinstance(terms, list):
-        raise ValueError(f'{where}.terms = {terms!r} is not a list')
-    if isinstance(values, Mapping) and not terms and 'constant' not in values:
-        raise ValueError(f'{where} has neither terms nor a constant')
-    made = tuple(from_mapping(Term, term, f'{where}.terms[{i}]') for i, term in enumerate(terms or ()))
-    return from_mapping(Combination, values, where, terms=made)
-
-
 class _Cells(NamedTuple):
-    """Columns of a log that the rig file names."""
+    """Columns of a log that the rig file names, n rows."""
 
-    line_numbers: Sequence[int]
+    stamps: NDArray[np.int64]  # [ns]
     columns: dict[Term, FloatArray]
+    dropped: Dropped
 
 
 def _read_cells(log: Path, rig: Rig) -> _Cells:
-    if log.exists() and not (log.is_file() or log.is_dir()):  # a pipe or a device never ends
-        raise ValueError(f'{log}: not a file')
-    terms = list(dict(rig.terms()).values())
-    line_numbers, numbers = array('q'), array('d')
-    try:
-        with log.open(encoding='utf-8-sig') as file:
-            header, lines = _parted(enumerate(_lines(file, log), start=1), rig.header)
-            width = len(header)
-            positions: list[int] = []
-            for count, (number, cells) in enumerate(lines):
-                width = width or len(cells)
-                if not positions:
-                    positions = [_position(term, where, header, width, log) for where, term in rig.terms()]
-                if count >= rig.skip_rows:
-                    numbers.extend(_numbers(cells, positions, width, f'{log}: line {number}'))
-                    line_numbers.append(number)
-    except OSError as error:
-        raise ValueError(f'{log}: {error.strerror}') from None
-    except UnicodeDecodeError:
-        raise ValueError(f'{log}: not a text file') from None
-    if not line_numbers:
-        raise ValueError(f'{log}: no row of numbers in it after the {rig.skip_rows} rows that the rig file skips')
-    columns = np.frombuffer(numbers, dtype=np.float64).reshape(len(line_numbers), len(terms)).T
-    return _Cells(line_numbers, dict(zip(terms, columns, strict=True)))
-
-
-def _lines(file: TextIO, log: Path) -> Iterator[str]:
-    while line := file.readline(_LONGEST_LINE):
-        if len(line) == _LONGEST_LINE:
-            raise ValueError(f'{log}: not a log: a line of more than {_LONGEST_LINE} characters')
-        yield line
-
-
-def _parted(
-    numbered_lines: Iterator[tuple[int, str]], header_kind: str
-) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
-    """Names in the header (empty without header), and the rows after it: line number and cells."""
-    header: list[str] = []
-    lines = ((number, text) for number, line in numbered_lines if (text := line.strip()))
-    rows = ((number, _split(text)) for number, text in lines if not text.startswith('#'))
-    for number, text in lines:
-        if not text.startswith('#'):
-            return (_split(text), rows) if header_kind == 'row' else (header, chain([(number, _split(text))], rows))
-        if header_kind == 'comment':
-            header = _split(text.lstrip('#'))
-    return header, rows
-
-
-def _split(text: str) -> list[str]:
-    """Cells of a line, separated by commas, else by semicolons, else by white space; without quotes."""
-    separator = next((mark for mark in ',;' if mark in text), None)
-    return [cell.strip().strip('"\'') for cell in text.split(separator)]
-
-
-def _position(term: Term, where: str, header: list[str], width: int, log: Path) -> int:
-    """Number of the column of a term.
-
-    Raises:
-        ValueError: There is no such column, or several.
-    """
-    if not term.column_name:
-        if term.column >= width:
-            raise ValueError(f'{log}: rig file names {where}.column = {term.column}, but the log has 0 to {width - 1}')
-        return term.column
-    found = [i for i, name in enumerate(header) if name == term.column_name]
-    if len(found) != 1:
-        raise ValueError(
-            f'{log}: rig file names {where}.column_name = {term.column_name!r}, '
-            f'found {len(found)} times in the header: {", ".join(header)[:1000]}'
-        )
-    return found[0]
-
-
-def _numbers(cells: list[str], positions: list[int], width: int, where: str) -> list[float]:
-    if len(cells) != width:
-        raise ValueError(f'{where}: {len(cells)} columns instead of {width}')
-    numbers = []
-    for position in positions:
-        try:
-            numbers.append(float(cells[position]))
-        except ValueError:
-            raise ValueError(f'{where}: column {position} is {cells[position][:_SHOWN]!r}, not a number') from None
-    return numbers
+    terms = dict(rig.terms())
+    wanted = [(where, term.column, term.column_name) for where, term in terms.items()]
+    expected = Expected(rig.header, rig.separator, rig.decimal, rig.skip_rows)
+    table = read_table(log, wanted, expected)
+    columns = dict(zip(terms.values(), table.columns, strict=True))
+    stamps, kept = _stamps(log, rig, table.line_numbers, columns, table.dropped)
+    return _Cells(stamps[kept], {term: column[kept] for term, column in columns.items()}, table.dropped)
 
 
 def _samples(log: Path, rig: Rig, cells: _Cells) -> Samples:
-    stamps = _stamps(log, rig, cells)
+    stamps = cells.stamps
     with np.errstate(invalid='ignore', over='ignore'):  # NaN and infinite cells stay
-        signals = {part: _combined(getattr(rig, part), cells.columns, len(stamps)) for part in _PARTS[1:]}
+        signals = {part: _combined(getattr(rig, part), cells, rig) for part in PARTS[1:]}
     if rig.savitzky_golay is not None:
         seconds = (stamps - stamps[0]) * 1e-9
         try:
@@ -455,33 +207,66 @@ def _samples(log: Path, rig: Rig, cells: _Cells) -> Samples:
     return Samples(stamps, signals['chamber_a'], signals['chamber_b'], signals['force_sum'], signals['velocity'])
 
 
-def _combined(combination: Combination, columns: Mapping[Term, FloatArray], rows: int) -> FloatArray:
-    total = np.full(rows, combination.constant)
+def _combined(combination: Combination, cells: _Cells, rig: Rig) -> FloatArray:
+    total = np.full(len(cells.stamps), combination.constant)
     for term in combination.terms:
-        total += term.size * columns[term]
+        total += term.size * cells.columns[term]
+        if term.absolute:
+            total -= term.gain * unit_size(term.gain_unit) * rig.ambient_pressure
     return total
 
 
-def _stamps(log: Path, rig: Rig, cells: _Cells) -> NDArray[np.int64]:
-    """Stamps [ns]: start + time column.
+def _stamps(
+    log: Path, rig: Rig, line_numbers: Sequence[int], columns: Mapping[Term, FloatArray], dropped: Dropped
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Stamps [ns], start + time column, and the rows to keep: the most whose stamps increase.
 
     Raises:
-        ValueError: A time is not finite, outside the range of a stamp, or not after the previous one.
+        ValueError: More rows than `LARGEST_DROPPED` have a time that is not finite, outside the range of a stamp, or
+            not after the others.
     """
+    rows = len(line_numbers)
+    if rig.time is None:
+        return np.rint((rig.start + np.arange(rows) / rig.rate) * 1e9).astype(np.int64), np.arange(rows)
     with np.errstate(invalid='ignore', over='ignore'):
-        nanoseconds = np.rint((rig.start + rig.time.size * cells.columns[rig.time]) * 1e9)
-    for number, value in zip(cells.line_numbers, nanoseconds, strict=True):
-        if not 0.0 <= value < _LAST_STAMP:
-            raise ValueError(f'{log}: line {number}: a stamp of {value * 1e-9:.9g} s is not between 0 s and 2^31 s')
-    stamps: NDArray[np.int64] = nanoseconds.astype(np.int64)
-    backwards = np.flatnonzero(np.diff(stamps) <= 0)
+        nanoseconds = np.rint((rig.start + rig.time.size * columns[rig.time]) * 1e9)
+        is_stamp = (nanoseconds >= 0.0) & (nanoseconds < _LAST_STAMP)
+    for row in np.flatnonzero(~is_stamp)[:1]:
+        text = f'a stamp of {nanoseconds[row] * 1e-9:.9g} s is not between 0 s and 2^31 s'
+        dropped.add('no valid time', f'{log}: line {line_numbers[row]}: {text}', int((~is_stamp).sum()))
+    stamps: NDArray[np.int64] = np.where(is_stamp, nanoseconds, 0.0).astype(np.int64)
+    dated = np.flatnonzero(is_stamp)
+    backwards = np.flatnonzero(np.diff(stamps[dated]) <= 0)
+    kept = dated[longest_increasing(stamps[dated])] if len(backwards) else dated
     if len(backwards):
-        row = int(backwards[0]) + 1
-        raise ValueError(
-            f'{log}: line {cells.line_numbers[row]}: time {stamps[row] * 1e-9:.9g} s is not after '
-            f'{stamps[row - 1] * 1e-9:.9g} s in the previous row'
-        )
-    return stamps
+        before, row = dated[backwards[0]], dated[backwards[0] + 1]
+        text = f'time {stamps[row] * 1e-9:.9g} s is not after {stamps[before] * 1e-9:.9g} s in the previous row'
+        dropped.add('time does not increase', f'{log}: line {line_numbers[row]}: {text}', len(dated) - len(kept))
+    dropped.check(rows + dropped.counts.total() - (rows - len(kept)))
+    return stamps, kept
+
+
+def longest_increasing(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Indices of a longest strictly increasing subsequence, shape (k,): a single stamp far ahead is left out alone.
+
+    Source: patience sorting, as in Fredman, Discrete Mathematics 11 (1975) 29.
+    """
+    tails: list[int] = []  # smallest last value of a subsequence of each length
+    places: list[int] = []  # its index
+    before = np.full(len(values), -1, dtype=np.int64)
+    for place, value in enumerate(values.tolist()):
+        length = bisect_right(tails, value - 1)
+        before[place] = places[length - 1] if length else -1
+        if length < len(tails):
+            tails[length], places[length] = value, place
+        else:
+            tails.append(value)
+            places.append(place)
+    chosen = np.empty(len(places), dtype=np.int64)
+    place = places[-1] if places else -1
+    for number in range(len(places) - 1, -1, -1):
+        chosen[number], place = place, int(before[place])
+    return chosen
 
 
 def write_samples(out: Path, samples: Samples, frame_id: str, track: Track = NO_TRACK) -> ImportSummary:

@@ -1,16 +1,20 @@
 """Contents of a bag: topics, counts, rates, friction states, status bits, seals."""
 
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, ESTIMATE_TYPE, decode, decode_text
 from seal_friction_ros.core.estimation.records import FrictionEstimate, Status
+from seal_friction_ros.core.foundation.stamps import StampRepair
 from seal_friction_ros.core.friction.states import FrictionState
 from seal_friction_ros.core.machine.answers_together import MACHINE_TYPE, decode_together
 from seal_friction_ros.core.machine.machine_snapshot import parse_machine_text
+from seal_friction_ros.core.machine.message_fields import Reader, short_name
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, machine_messages, named
 from seal_friction_ros.offline.bags.bag import BagError, BagMessage, bag_topics
+from seal_friction_ros.offline.bags.definitions import read_definitions
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,7 @@ class BagInfo:
     topics: dict[str, dict[str, float | str]]  # topic -> type, count and rate [Hz]
     states: dict[str, int]  # estimates in each friction state
     status: dict[str, int]  # estimates with each status bit set; ``all good``: those without any
+    stamps: dict[str, dict[str, int]]  # topic -> jumps of its stamps, stamps after a jump, messages not of its type
     seals: list[str]  # each seal with its chamber, from the newest configuration in the bag
 
     def summary(self) -> str:
@@ -34,6 +39,10 @@ class BagInfo:
         texts = {'seals': self.seals} | {
             title: [f'{name} {count}' for name, count in of_kind.items()] for title, of_kind in counts.items()
         }
+        lines += [
+            f'  {topic}: {", ".join(f"{count} {what}" for what, count in found.items() if count)}'
+            for topic, found in self.stamps.items()
+        ]
         return '\n'.join([*lines, *(f'  {title}: {", ".join(values)}' for title, values in texts.items() if values)])
 
 
@@ -53,9 +62,11 @@ def bag_info(bag: Path, mapping: MappingFile | None = None) -> BagInfo:
     states: Counter[str] = Counter()
     status: Counter[str] = Counter()
     seals: list[str] = []
+    stamps = _Stamps(bag)
     count = 0
     for message in machine_messages(bag, mapping):
         count += message.topic in known
+        stamps.add(message)
         times = [times[0] if times else message.log_time, message.log_time]
         with named(bag, message):
             for estimate in _estimates(message):
@@ -74,7 +85,51 @@ def bag_info(bag: Path, mapping: MappingFile | None = None) -> BagInfo:
         }
         for topic, info in sorted(known.items())
     }
-    return BagInfo(str(bag), times[0], duration, count, topics, dict(states), dict(status), seals)
+    return BagInfo(str(bag), times[0], duration, count, topics, dict(states), dict(status), stamps.found(), seals)
+
+
+class _Stamps:
+    """Stamps that jump, and messages that are not of their type, by topic.
+
+    Args:
+        bag: The bag, which has the definitions of its types.
+    """
+
+    def __init__(self, bag: Path) -> None:
+        self._bag = bag
+        self._readers: dict[str, Reader | None] = {}
+        self._repairs: dict[str, StampRepair] = {}
+        self._malformed: Counter[str] = Counter()
+
+    def add(self, message: BagMessage) -> None:
+        """Take one message."""
+        topic, kind = message.topic, short_name(message.type_name)
+        if topic not in self._readers:
+            self._readers[topic], self._repairs[topic] = None, StampRepair()
+            with suppress(ValueError):  # of a type without a definition
+                self._readers[topic] = Reader(read_definitions(self._bag, [kind])[kind], kind, [])
+        reader = self._readers[topic]
+        if reader is None:
+            return
+        try:
+            stamp = reader.read(message.data).stamp
+        except ValueError:
+            self._malformed[topic] += 1
+        else:
+            if stamp is not None:
+                self._repairs[topic].next(stamp, message.log_time)
+
+    def found(self) -> dict[str, dict[str, int]]:
+        """What was found, of the topics with something."""
+        return {
+            topic: {
+                'jumps of the stamp': repair.jumps,
+                'stamps off by a jump': repair.repaired,
+                'messages not of their type': self._malformed[topic],
+            }
+            for topic, repair in sorted(self._repairs.items())
+            if repair.jumps or self._malformed[topic]
+        }
 
 
 def _estimates(message: BagMessage) -> list[FrictionEstimate]:

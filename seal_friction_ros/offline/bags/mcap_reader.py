@@ -263,8 +263,15 @@ Locate = Callable[[bytes, Block, Names], Integers]
 """`located`, or the same compiled."""
 
 
-def located(data: bytes, block: Block, names: Names) -> Integers:
+def located(data: bytes, block: Block, names: Names, on_wrong_time: Callable[[int], None] | None = None) -> Integers:
     """Rows of `Located` of the messages of a block. The channels described in it become known to ``names``.
+
+    Args:
+        data: Of the block.
+        block: Where it is, and between which log times.
+        names: The channels.
+        on_wrong_time: Called with each log time outside the block or beyond `LAST_TIME`, whose message is left out;
+            None: it is an error.
 
     Raises:
         ValueError: A record is invalid (or another error in `ERRORS`).
@@ -279,9 +286,13 @@ def located(data: bytes, block: Block, names: Names) -> Integers:
         if opcode == Opcode.MESSAGE:
             _, _, channel, _, time, sent = _MESSAGE.unpack_from(data, offset)
             begin = offset + MESSAGE_HEAD
-            if begin > end or channel not in names.channels or not first <= time <= last:
+            is_in_time = first <= time <= last
+            if begin > end or channel not in names.channels or not (is_in_time or on_wrong_time):
                 raise ValueError(f'a message of {length} bytes on channel {channel} at {time} ns is invalid')
-            found.extend((channel, begin, end - begin, time, sent))
+            if is_in_time:
+                found.extend((channel, begin, end - begin, time, sent))
+            elif on_wrong_time:
+                on_wrong_time(time)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             names.learn(BytesIO(data[offset:end]), end - offset)
         offset = end
@@ -293,7 +304,7 @@ OnFault = Callable[[Block, str], None]
 
 
 def messages(
-    file: BinaryIO, layout: Layout, on_fault: OnFault | None = None
+    file: BinaryIO, layout: Layout, on_fault: OnFault | None = None, locate: Locate = located
 ) -> Iterator[tuple[Channel, int, int, bytes]]:
     """Channel, log time [ns], publish time [ns] and bytes of each message, in the order of `in_order`.
 
@@ -301,12 +312,13 @@ def messages(
         file: The file.
         layout: From `scan`.
         on_fault: If None, an unreadable block is an error.
+        locate: As of `in_order`.
 
     Raises:
         ValueError: A block cannot be read, or too many overlap in time.
     """
     names = Names(layout.channels)
-    for data, rows in in_order(file, layout.blocks, names, on_fault=on_fault):
+    for data, rows in in_order(file, layout.blocks, names, locate, on_fault=on_fault):
         for channel, offset, size, time, sent in rows.view(np.uint64).T.tolist():
             yield names.channels[channel], time, sent, data[offset : offset + size]
 

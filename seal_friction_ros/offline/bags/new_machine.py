@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from seal_friction_ros.core.machine.gauge_or_absolute import LOWEST_ABSOLUTE
-from seal_friction_ros.core.machine.machine_file import FLUID_PRESSURE
+from seal_friction_ros.core.machine.machine_file import FLUID_PRESSURE, ONLY_FIELDS
 from seal_friction_ros.core.machine.message_fields import (
     Definition,
     Reader,
@@ -28,6 +28,7 @@ from seal_friction_ros.offline.bags.definitions import read_definitions
 from seal_friction_ros.offline.work.targets import mark
 
 MOST_MESSAGES = 5000  # of a topic that are looked at
+MOST_CANDIDATES = 40  # numbers that are listed
 JOINT_STATE, WRENCH = 'sensor_msgs/JointState', 'geometry_msgs/WrenchStamped'
 ARRAY, NUMBER = 'std_msgs/Float64MultiArray', 'std_msgs/Float64'
 KNOWN = (JOINT_STATE, FLUID_PRESSURE, WRENCH, ARRAY, NUMBER)
@@ -76,7 +77,8 @@ def new_machine(bag: Path) -> str:
     Raises:
         BagError: The bag cannot be read, or holds no joint and no pressure.
     """
-    found = _look(bag)
+    everything = _look(bag)
+    found = {topic: one for topic, one in everything.items() if one.kind in KNOWN}
     joints = {topic: one for topic, one in found.items() if one.kind == JOINT_STATE and one.names}
     measured = {t: one for t, one in joints.items() if not _REFERENCE.search(t)} or joints
     if not measured:
@@ -101,7 +103,25 @@ def new_machine(bag: Path) -> str:
         lines.append(f'  # left out, since they never move in the bag: {", ".join(still)}')
     for number, (name, topic) in enumerate(actuators.items()):
         lines += _actuator(name, number, list(actuators), topic, found)
-    return '\n'.join(lines) + '\n'
+    return '\n'.join([*lines, *_candidates(everything, lines[lines.index('actuators:') :])]) + '\n'
+
+
+def _candidates(found: dict[str, _Topic], lines: list[str]) -> list[str]:
+    """Numbers that no input uses, as comments, if something is missing: topic, element, range."""
+    if not any('missing' in line for line in lines):
+        return []
+
+    def is_used(topic: str, path: str) -> bool:
+        of_topic = [line for line in lines if re.search(rf'{re.escape(topic)}(?![\w/])', line)]
+        return any(path in line or found[topic].kind in ONLY_FIELDS for line in of_topic)
+
+    rows = [
+        f'#   {topic} {path}: {one.low[path]:.4g} to {one.high[path]:.4g}, {one.kind.replace("/", "/msg/")}'
+        for topic, one in sorted(found.items())
+        for path in one.low
+        if not is_used(topic, path) and (one.low[path] or one.high[path])
+    ]
+    return ['# candidates, as TOPIC FIELD; their types go to topics:', *rows[:MOST_CANDIDATES]]
 
 
 @contextmanager
@@ -128,11 +148,16 @@ def recorded_topics(seconds: float, wait: float) -> Iterator[Path]:
 
 
 def _look(bag: Path) -> dict[str, _Topic]:
-    """Topics of known types and the values in them."""
+    """Topics whose types are known or defined in the bag, and the values in them."""
     kinds = {topic: short_name(info.type_name) for topic, info in bag_topics(bag).items() if info.message_count}
-    kinds = {topic: kind for topic, kind in kinds.items() if kind in KNOWN}
-    definitions = read_definitions(bag, kinds.values())
-    found = {topic: _Topic(kind) for topic, kind in kinds.items()}
+    definitions: dict[str, Definition] = {}
+    for kind in dict.fromkeys(kinds.values()):
+        try:
+            definitions |= read_definitions(bag, [kind])
+        except BagError:  # of another type without a definition nothing can be told
+            if kind in KNOWN:
+                raise
+    found = {topic: _Topic(kind) for topic, kind in kinds.items() if kind in definitions}
     readers: dict[str, Reader] = {}
     paths: dict[str, list[str]] = {}
     for message in read_messages(bag):
@@ -144,7 +169,11 @@ def _look(bag: Path) -> dict[str, _Topic]:
             paths[message.topic] = _paths(definitions[one.kind], one)
             readers[message.topic] = Reader(definitions[one.kind], one.kind, paths[message.topic])
         one.count, one.last = one.count + 1, message.log_time
-        for path, value in zip(paths[message.topic], readers[message.topic].read(message.data).numbers, strict=True):
+        try:
+            numbers = readers[message.topic].read(message.data).numbers
+        except ValueError:  # one short message is no reason to see nothing
+            continue
+        for path, value in zip(paths[message.topic], numbers, strict=True):
             if value is not None:
                 one.take(path, value)
     return {topic: one for topic, one in found.items() if one.count}

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from seal_friction_ros.files import parse_yaml
@@ -12,7 +13,7 @@ from seal_friction_ros.offline.bags.bag import BagError, BagWriter
 from seal_friction_ros.offline.bags.mcap_reader import Block, Channel
 from seal_friction_ros.offline.bags.mcap_writer import Description
 
-_CHUNKS_NAMED = 20
+_MOST_NAMED = 20  # faults of a kind
 _QOS, _HASH = 'offered_qos_profiles', 'topic_type_hash'
 
 
@@ -27,8 +28,14 @@ class Recovery:
     first_ns: int = -1  # log time of the first message [ns]
     last_ns: int = -1  # log time of the last message [ns]
     lost_bytes: int = 0  # at the ends of files, after the last complete record
+    lost_messages: int = 0  # whole messages whose log time is none
     lost_chunks: int = 0  # complete chunks with invalid contents
     damage: list[str] = field(default_factory=list)  # one line for each fault; empty for a finished and undamaged bag
+
+    def say(self, number: int, text: str) -> None:
+        """Name the fault of a kind with this number, of the first ones."""
+        if number <= _MOST_NAMED:
+            self.damage.append(text)
 
     def summary(self) -> str:
         """The same for a person."""
@@ -37,6 +44,7 @@ class Recovery:
         if not self.damage:
             return f'{saved}; the bag is not damaged'
         lost = f'lost: {self.lost_bytes} bytes at the ends of files, {self.lost_chunks} chunks'
+        lost += f', {self.lost_messages} messages without a valid log time' if self.lost_messages else ''
         return '\n'.join([f'{saved}; {lost}, and messages that the recorder had not written', *self.damage])
 
 
@@ -87,16 +95,20 @@ def _copy(path: Path, writer: BagWriter, found: Recovery) -> None:
 
     def on_fault(block: Block, reason: str) -> None:
         found.lost_chunks += 1
-        if found.lost_chunks <= _CHUNKS_NAMED:
-            found.damage.append(f'{path.name}: chunk at byte {block.offset}: {reason}')
+        found.say(found.lost_chunks, f'{path.name}: chunk at byte {block.offset}: {reason}')
 
+    def on_wrong_time(time: int) -> None:
+        found.lost_messages += 1
+        found.say(found.lost_messages, f'{path.name}: a message with a log time of {time} ns, which is none')
+
+    locate = partial(mcap_reader.located, on_wrong_time=on_wrong_time)
     try:
         with path.open('rb') as file:
             layout = mcap_reader.scan(file)
             if layout.damage:
                 found.lost_bytes += path.stat().st_size - layout.sound_size
                 found.damage.append(f'{path.name}: {layout.damage}')
-            for channel, log_time, publish_time, data in mcap_reader.messages(file, layout, on_fault):
+            for channel, log_time, publish_time, data in mcap_reader.messages(file, layout, on_fault, locate):
                 topic, encoding, description = channel
                 if encoding != 'cdr':
                     raise BagError(f'{path}: {topic} is encoded as {encoding[:40]!r}, not as CDR')

@@ -1,6 +1,7 @@
 """``seal_friction health``: how the seals are doing, over bags in order of time."""
 
 import argparse
+import math
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
@@ -48,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         lines.append(
             f'{day["bag"]}: no reversal to learn from'
             if not day['reversals']
-            else f'{day["bag"]}: scale {day["scale"]:.3f} +- {day["scale_std"]:.3f}, offset {day["offset"]:.4g} N, '
+            else f'{day["bag"]}: scale {day["scale"]:.3f} +- {day["scale_std"]:.3f}, {_offset_text(day["offset"])}, '
             f'{day["reversals"]} reversals'
         )
         lines += [f'  alarm: {alarm}' for alarm in day['alarms']]
@@ -58,3 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     code = cli.UNUSABLE if errors else cli.SUCCESS
     return cli.print_result(arguments, {**summary.numbers, 'errors': errors}, '\n'.join(lines), code, errors)
+
+
+def _offset_text(offset: float) -> str:
+    """Offset of the force sum [N]; without a force sum there is none."""
+    return f'offset {offset:.4g} N' if math.isfinite(offset) else 'offset not told'

@@ -53,7 +53,8 @@ def add_parser(commands: Any) -> None:
 def run_log(arguments: argparse.Namespace) -> int:
     """Import a log, or several in parallel."""
     from seal_friction_ros.files import config_path
-    from seal_friction_ros.offline.bags.import_log import convert_log, read_rig
+    from seal_friction_ros.offline.bags.import_log import convert_log
+    from seal_friction_ros.offline.bags.rig_file import read_rig
 
     rig = read_rig(config_path('rigs', arguments.rig))
     return _run(arguments, arguments.logs, partial(convert_log, rig=rig), _of_log, [rig])
@@ -71,7 +72,8 @@ def run_bag(arguments: argparse.Namespace) -> int:
 
 def _of_log(summary: 'ImportSummary', _: Path) -> tuple[dict[str, Any], str]:
     """Numbers and text for an imported log."""
-    return summary._asdict(), f'{summary.rows} rows'
+    dropped = [f'{count} rows left out: {reason}' for reason, count in summary.dropped.items()]
+    return summary._asdict(), '\n  '.join([f'{summary.rows} rows', *dropped, *summary.remarks])
 
 
 def _of_bag(found: 'dict[str, ActuatorImport]', out: Path) -> tuple[dict[str, Any], str]:

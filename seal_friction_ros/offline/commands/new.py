@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from seal_friction_ros.offline.commands import command_line as cli
-from seal_friction_ros.offline.work.targets import MAPPING_FILE, POLICY
+from seal_friction_ros.offline.work.targets import MAPPING_FILE, POLICY, RIG_FILE
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    description = 'write a first mapping file for a machine, or its security policy'
+    description = 'write a first mapping file for a machine, a rig file for a log, or a security policy'
     kinds = cli.add_group(commands, 'new', 'KIND', description, 'new robot --from-topics --out robot.yaml')
     robot = cli.add_command(
         kinds, 'robot', run_robot, 'write a mapping file with what a bag or the topics show, and what is missing',
@@ -35,6 +35,12 @@ def add_parser(commands: Any) -> None:
         help='with --from-topics: wait for the first message, 15 s unless given',
     )
     cli.add_target(robot, '--out', MAPPING_FILE, required=True, metavar='FILE.yaml', help='mapping file to write')
+    rig = cli.add_command(
+        kinds, 'rig', run_rig, 'write a rig file with what the head of a log shows, and what is missing',
+        'new rig ram.csv --out my_rig.yaml',
+    )  # fmt: skip
+    rig.add_argument('log', type=Path, metavar='LOG', help='log file, CSV or white space')
+    cli.add_target(rig, '--out', RIG_FILE, required=True, metavar='FILE.yaml', help='rig file to write')
     help_text = 'write the SROS2 policy of machine_estimator for a machine'
     policy = cli.add_command(
         kinds, 'policy', run_policy, help_text, 'new policy config/machines/excavator.yaml --out policy.xml'
@@ -55,10 +61,24 @@ def run_robot(arguments: argparse.Namespace) -> int:
         with recorded_topics(arguments.from_topics, arguments.wait) as bag:
             text = new_machine(bag)
     write_whole(arguments.out, text.encode())
+    return _say_open(arguments, text, {'actuators': _actuators(arguments.out, read_machine)})
+
+
+def run_rig(arguments: argparse.Namespace) -> int:
+    """Write a rig file from the head of a log."""
+    from seal_friction_ros.offline.bags.new_rig import new_rig
+    from seal_friction_ros.offline.work.atomic_file import write_whole
+
+    text = new_rig(arguments.log)
+    write_whole(arguments.out, text.encode())
+    return _say_open(arguments, text, {})
+
+
+def _say_open(arguments: argparse.Namespace, text: str, numbers: dict[str, Any]) -> int:
+    """Say which points of a new file are open."""
     open_points = [line.strip() for line in text.splitlines()[2:] if 'missing' in line or 'guess' in line]
-    numbers = {'file': arguments.out, 'open': open_points, 'actuators': _actuators(arguments.out, read_machine)}
     summary = '\n'.join([f'{len(open_points)} points are open:', *open_points])
-    return cli.print_result(arguments, numbers, summary)
+    return cli.print_result(arguments, {'file': arguments.out, 'open': open_points, **numbers}, summary)
 
 
 def run_policy(arguments: argparse.Namespace) -> int:

@@ -21,6 +21,7 @@ from seal_friction_ros.core.identification.readings import FrictionReadings, Pre
 from seal_friction_ros.core.identification.run_in import Drift, SettledLaw
 from seal_friction_ros.core.identification.runs import BetweenRuns
 from seal_friction_ros.core.identification.selection import ChosenAnew, LawScore, is_beaten
+from seal_friction_ros.core.identification.signal_preparation import LEVEL_GAP, LEVEL_GAP_MIN
 from seal_friction_ros.core.identification.temperature import TemperatureFit
 from seal_friction_ros.core.identification.validation import CrossValidation, PredictionUncertainty
 from seal_friction_ros.offline.identification.load_numbers import load_numbers
@@ -203,7 +204,8 @@ def seal_document(
 def _identified_pressure(data: IdentificationData) -> list[float]:
     """Lowest and highest pressure [Pa] at which the law holds: of the longer run of levels on one side of an outlier.
 
-    Of two equally long runs the lower one counts (our choice).
+    Of two equally long runs the lower one counts (our choice). One held pressure is a range, too, as wide as
+    pressures that count as one level.
     """
     everything, used = data.prepared.readings, data.used.at.pressure
     if data.outlier is not None:
@@ -212,7 +214,10 @@ def _identified_pressure(data: IdentificationData) -> list[float]:
             for side in (everything.level < data.outlier.level, everything.level > data.outlier.level)
         )
         used = (above if len(above.levels) > len(below.levels) else below).at.pressure
-    return [float(used.min()), float(used.max())]
+    low, high = float(used.min()), float(used.max())
+    if high - low <= (step := max(LEVEL_GAP * high, LEVEL_GAP_MIN)):  # one level
+        return [max(low - step / 2.0, 0.0), high + step / 2.0]
+    return [low, high]
 
 
 def _what_the_force_sum_lacks(data: IdentificationData, fit: fitting.LawFit) -> ForceSumCorrection | None:

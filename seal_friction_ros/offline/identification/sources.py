@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
+from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray, IntArray
+from seal_friction_ros.core.foundation.stamps import repaired_stamps
 from seal_friction_ros.core.foundation.units import UNITS, ZEROS
 from seal_friction_ros.core.identification.force_correction import ForceCorrection
 from seal_friction_ros.core.identification.load_over_position import (
@@ -25,11 +26,12 @@ from seal_friction_ros.core.identification.load_over_position import (
 )
 from seal_friction_ros.core.identification.prepare_readings import prepare_logs, prepare_manual_readings
 from seal_friction_ros.core.identification.readings import ManualReadings, PreparedReadings, RecordedLog, check_clipping
-from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding
+from seal_friction_ros.core.identification.signal_preparation import Signals, Sliding, bridged
 from seal_friction_ros.files import config_path, share_directory
 from seal_friction_ros.offline.bags.actuator_bag import MappingFile, open_actuator
 from seal_friction_ros.offline.bags.columns import read_velocity_rows
-from seal_friction_ros.offline.bags.import_log import Rig, read_rig, read_samples
+from seal_friction_ros.offline.bags.import_log import read_samples
+from seal_friction_ros.offline.bags.rig_file import Rig, read_rig
 from seal_friction_ros.offline.identification.data_sheet import TITLE, parse_number, read_data_sheet, read_text
 from seal_friction_ros.offline.identification.load_numbers import load_text
 from seal_friction_ros.offline.work.executor import Workers, run_all
@@ -252,7 +254,10 @@ def _read_log(path: Path, options: SourceOptions) -> Source:
             check_clipping(path.name, where, column[moving] * UNITS[term.unit], is_pressure=is_pressure)
     seconds = (samples.stamp - samples.stamp[0]) * 1e-9
     signals = Signals(seconds, samples.velocity, samples.chamber_a, samples.chamber_b, samples.force_sum)
+    signals, texts = _bridged(path.name, signals)
+    remarks = (*remarks, *texts)
     recorded = RecordedLog(path.name, signals, sliding, log.temperature, log.position)
+    remarks = (*remarks, *(f'{path.name}: {text}' for text in log.remarks))
     source = Source(_data_file(path), None, recorded, pressure_area=_pressure_area(rig), remarks=remarks)
     if log.position is None or rig.load == 'none':
         return source
@@ -303,7 +308,8 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     missing = [name for name in ('pressure', 'force') if not getattr(topics, name)]
     if missing:
         raise ValueError(f'{path}: no {" and no ".join(missing)} messages: they are needed to identify friction')
-    stamp, columns, configuration = read_velocity_rows(bag)
+    stamp, received, columns, configuration = read_velocity_rows(bag)
+    stamp, repair = repaired_stamps(stamp, received)
     chambers, document, holds_load, has_placeholder = None, None, False, False
     if configuration is not None:
         holds_load = configuration.parameters().estimator.force_sum_correction.contains_load
@@ -314,11 +320,37 @@ def _read_bag(path: Path, options: SourceOptions) -> Source:
     signals = Signals((stamp - stamp[:1].sum()) * 1e-9, *columns[:4]).taken(kept)
     temperature = _from_the_first(columns[5] + ZEROS['degC'])[kept] if topics.temperature else None
     position = columns[4][kept] if topics.position else None
+    signals, texts = _bridged(bag.name, signals)
+    texts = (
+        *(f'{bag.name}: {text}' for text in (*repair.said('the stamp of the velocity'), *_not_later(kept))),
+        *texts,
+    )
     log = RecordedLog(bag.name, signals, _sliding(Sliding(), options), temperature, position)
     places = position if holds_load else None
     return Source(
-        _data_file(path), chambers, log, seal_document=document, has_placeholder=has_placeholder, load_position=places
+        _data_file(path),
+        chambers,
+        log,
+        seal_document=document,
+        has_placeholder=has_placeholder,
+        load_position=places,
+        remarks=texts,
     )
+
+
+def _not_later(kept: BoolArray) -> list[str]:
+    """Samples that are left out, since they are stamped no later than one before."""
+    count = int((~kept).sum())
+    return [f'{count} of {len(kept)} samples left out: stamped no later than one before'] if count else []
+
+
+def _bridged(name: str, signals: Signals) -> tuple[Signals, tuple[str, ...]]:
+    """Signals without single missing values, and what was filled in."""
+    filled, counts = bridged(signals)
+    said = ', '.join(f'{count} of {what.replace("_", " ")}' for what, count in counts.items())
+    return filled, (
+        f'{name}: of {len(signals.time)} samples single missing values interpolated: {said}',
+    ) if said else ()
 
 
 def _from_the_first(temperature: FloatArray) -> FloatArray:

@@ -55,7 +55,7 @@ def warnings_of(
     yield from _scatter_texts(selection, quality, levels)
     if quality.breakaway is not None and quality.breakaway.dwell is not None:
         yield _dwell_text(quality.breakaway)
-    if quality.breakaway is None:
+    if quality.breakaway is None and not readings.are_samples:
         yield 'no stroke starts from rest, so breakaway is not identified: let the rod rest 30 s before some strokes'
 
 

@@ -27,6 +27,7 @@ class Kind(NamedTuple):
 PAGE = Kind('a page', ('.html', '.htm'), has_page=True)
 SEAL_FILE = Kind('a seal file', ('.yaml', '.yml'))
 MAPPING_FILE = Kind('a mapping file', ('.yaml', '.yml'))
+RIG_FILE = Kind('a rig file', ('.yaml', '.yml'))
 POLICY = Kind('a security policy', ('.xml',))
 PARAMETER_FILE = Kind('a parameter file, with a page beside it,', ('.yaml', '.yml'), has_page=True)
 DATA_SHEET = Kind('a data sheet, with a page beside it,', ('.csv',), has_page=True, has_mark=False)

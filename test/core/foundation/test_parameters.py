@@ -210,18 +210,26 @@ def test_a_name_is_one_line_in_a_message():
     assert (printable('bore'), printable(5), printable('a\nb')) == ('bore', '5', r"'a\nb'")
 
 
-@pytest.mark.parametrize('text', ['15e-3', '1.0e5', '-1E+5', '+.5e3'])
-def test_a_number_that_yaml_reads_as_text_is_told_how_to_write_it(text):
-    with pytest.raises(ValueError, match=r'is not a number: write it with a point and a signed exponent'):
-        make(stiffness=text)
+@pytest.mark.parametrize(('text', 'newtons'), [('15e2', 1.5e3), ('1.0e5', 1e5), ('2 N/mm', 2e3), ('3.5kN/m', 3.5e3)])
+def test_a_number_may_be_a_text_with_a_unit_or_one_that_yaml_reads_as_text(text, newtons):
+    assert make(stiffness=text).stiffness == pytest.approx(newtons)
+    assert make(lengths=['2.5 mm', 1, '20e-3']).lengths == pytest.approx((2.5e-3, 1.0, 0.02))
     with pytest.raises(ValueError, match=r'is not a whole number$'):
         make(coils=text)
 
 
-@pytest.mark.parametrize('text', ['10', '1e', 'e5', '1e5 N', ''])
-def test_another_text_gets_no_such_hint(text):
-    with pytest.raises(ValueError, match=r'is not a number$'):
+@pytest.mark.parametrize('text', ['10', 'e5', '', 'N/m', '1,5 N/m', '1.2.3 N/m'])
+def test_another_text_is_no_number(text):
+    with pytest.raises(ValueError, match=r'is not a number \[N/m\] or text such as 1\.0 kN/m$'):
         make(stiffness=text)
+
+
+def test_a_unit_of_another_quantity_is_refused_and_a_length_that_fits_in_millimetres_gets_a_hint():
+    with pytest.raises(ValueError, match=r"^spring\.stiffness: unit 'N' is none of a stiffness: N/m, N/mm, kN/m$"):
+        make(stiffness='1e5 N')
+    geometry = {'section_diameter': 2.6e-3, 'ring_inner_diameter': 0.06, 'rod_diameter': 0.06}
+    with pytest.raises(ValueError, match=r'gland_diameter = 63\.0 m is above .* 10\.0 m; if it is in mm, write 63 mm$'):
+        from_mapping(SealGeometry, {**geometry, 'gland_diameter': 63}, 'seal')
 
 
 def test_an_integer_that_no_float_holds_is_refused_as_one():

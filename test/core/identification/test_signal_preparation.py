@@ -11,6 +11,7 @@ from seal_friction_ros.core.identification.signal_preparation import (
     Signals,
     Sliding,
     breakaways,
+    bridged,
     clipped_share,
     even_sliding,
     half_range,
@@ -245,6 +246,17 @@ def test_reversals_without_rest_part_the_motion():
     assert [direction for direction, _ in motions(signals, SLIDING) if direction] == [1, -1] * 4
 
 
+def test_noise_at_rest_that_looks_like_motion_does_not_end_the_rest():
+    signals = trapezoid([0.02, -0.02], peak=5.0)
+    noisy = signals.velocity.copy()
+    noisy[10:50:8] = [0.004, -0.004, 0.005, -0.005, 0.004]
+    noisy[290:330:7] = 0.004
+    found = breakaways(signals._replace(velocity=noisy), SLIDING)
+    whole = breakaways(signals, SLIDING)
+    assert [start.dwell for start in found] == pytest.approx([start.dwell for start in whole], abs=0.05)
+    assert [start.force_sum for start in found] == [start.force_sum for start in whole]
+
+
 def test_breakaway_is_the_peak_before_the_rod_slides():
     found = breakaways(trapezoid([0.02, -0.02], peak=5.0), SLIDING)
     assert [start.direction for start in found] == [1, -1]
@@ -434,3 +446,26 @@ def test_a_setting_is_taken_at_its_bounds_and_refused_beyond_them(law, name, low
 
 def test_a_rod_rests_up_to_3_mm_a_second_and_slides_evenly_below_0_05_m_a_second_squared():
     assert (SLIDING.slowest, SLIDING.largest_acceleration) == (3e-3, 0.05)
+
+
+@pytest.mark.parametrize('counts', [(14.4, 14.5), (60.0, 60.1, 60.2)])
+def test_a_held_pressure_that_dithers_between_counts_is_not_clipped(counts):
+    dither = np.random.default_rng(1).choice(counts, 5000)
+    dither[1000:1100] = max(counts)
+    assert clipped_share(dither) == 0.0
+    assert clipped_share(np.concatenate((dither, np.linspace(20.0, 60.0, 5000)))) > 0.0
+
+
+def test_single_missing_values_are_bridged_and_counted_and_longer_holes_stay():
+    signals = trapezoid([0.02, -0.02])
+    force, velocity = signals.force_sum.copy(), signals.velocity.copy()
+    force[[50, 90, 91]] = np.nan
+    force[200:203] = np.nan
+    force[0] = np.inf
+    velocity[120] = np.nan
+    filled, counts = bridged(signals._replace(force_sum=force, velocity=velocity))
+    assert counts == {'velocity': 1, 'force_sum': 3}
+    assert np.flatnonzero(~np.isfinite(filled.force_sum)).tolist() == [0, 200, 201, 202]
+    assert filled.force_sum[90] == pytest.approx(signals.force_sum[90])
+    assert filled.velocity[120] == pytest.approx(signals.velocity[120])
+    assert bridged(signals) == (signals, {})

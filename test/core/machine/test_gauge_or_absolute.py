@@ -48,6 +48,12 @@ def test_gauge_pressures_with_ambient_pressure_taken_off_are_named():
     assert not remarks([(LOADED, 0.0), (0.0, LOADED)], True)
 
 
+def test_an_absolute_pressure_in_kpa_that_is_taken_for_pascal_gets_a_hint():
+    (line, _) = remarks([(601.0 - 101_325.0, 2100.0 - 101_325.0)], True)
+    assert 'if it is in kPa, write unit: kPa (601 in the message)' in line
+    assert 'kPa' not in remarks([(LOADED, -101_325.0)], True)[0]
+
+
 def test_without_a_pressure_and_with_nan_nothing_is_said():
     assert not remarks([], False)
     assert not remarks([(math.nan, math.nan)], False)

@@ -183,7 +183,15 @@ def bore_of(value) -> float:
 
 @pytest.mark.parametrize(
     ('value', 'metres'),
-    [(0.04, 0.04), (1, 1.0), ('40 mm', 0.04), ('1.5e1mm', 0.015), ('+2 in', 0.0508), ('4.0E-2 m', 0.04)],
+    [
+        (0.04, 0.04),
+        (1, 1.0),
+        ('40 mm', 0.04),
+        ('1.5e1mm', 0.015),
+        ('+2 in', 0.0508),
+        ('4.0E-2 m', 0.04),
+        ('20e-3', 0.02),
+    ],
 )
 def test_a_length_is_in_metres_or_has_its_unit(value, metres):
     assert bore_of(value) == pytest.approx(metres)
@@ -195,14 +203,15 @@ def test_a_length_is_in_metres_or_has_its_unit(value, metres):
         (0.0, 'is not above 0'),
         ('-40 mm', 'is not above 0'),
         (True, 'is not a number [m] or text such as 1.0 in'),
+        (63, 'bore = 63 m is above 3 m; if it is in mm, write 63 mm'),
         ('40', "'40' is not a number [m]"),
-        ('40mm wide', 'is not a number [m]'),
+        ('40mm wide', "unit 'mm wide' is none of a length"),
         ([1.0], 'is not a number [m]'),
         (math.inf, 'is not a finite number below 1e15'),
         (1e15, 'is not a finite number below 1e15'),
         ('1e18 mm', 'is not a finite number below 1e15'),
         ('1.2.3 mm', "bore = '1.2.3 mm'"),
-        ('40 kg', "unit 'kg' is none of a length: m, mm, um, in"),
+        ('40 kg', "unit 'kg' is none of a length: m, mm, cm, um, in"),
     ],
 )
 def test_what_is_no_length_is_refused(value, complaint):
@@ -313,7 +322,7 @@ def test_a_velocity_from_position_has_half_a_millimetre_per_second_of_noise():
         ({'step': 0.0, 'rate': 1.1e5}, 'not within 1 to 1e5'),
         ({'step': 0.0, 'rate': 0.0}, 'rate = 0.0 is not above 0'),
         ({'step': 0.0, 'rate': 500.0, 'noise': 0.0}, 'noise = 0.0 is not above 0'),
-        ({'rate': 500.0}, "step = 'None' is not a number [m]"),
+        ({'rate': 500.0}, 'step = None is not a number [m]'),
         ({'step': 1e-3, 'rate': 100.0}, 'axis: velocity_from_position: steps of 0.001 m at 100 Hz'),
         ({'step': 0.0, 'rate': 500.0, 'delay': 1.0}, 'velocity_from_position has no delay'),
     ],

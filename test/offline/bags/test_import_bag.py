@@ -2,6 +2,8 @@
 
 import json
 import math
+import struct
+from itertools import pairwise
 from statistics import fmean
 
 import pytest
@@ -111,6 +113,51 @@ def test_gauge_taken_for_absolute_and_the_reverse_are_said(tmp_path, source):
     gauge = mapping_file(tmp_path, ('pressure_a: /p_a\n', 'pressure_a: {topic: /p_a, offset: -200 bar}\n'))
     (remark,) = import_bag(foreign, gauge, tmp_path / 'below')['axis'].remarks
     assert 'write absolute: false' in remark
+
+
+def damaged(bag, out, damage):
+    """The bag with the bytes of each message as ``damage(number, message)`` gives them."""
+    with BagWriter(out) as writer:
+        for number, message in enumerate(read_messages(bag)):
+            writer.write(*message._replace(data=damage(number, message)))
+    return out
+
+
+def stamped_ahead(message, seconds):
+    stamp, nanoseconds = struct.unpack_from('<iI', message.data, 4)
+    return message.data[:4] + struct.pack('<iI', stamp + seconds, nanoseconds) + message.data[12:]
+
+
+def test_stamps_that_jump_are_repaired_and_said_by_import_info_and_identify(tmp_path, source, capsys):
+    foreign, count = write_standard(source, tmp_path / 'foreign'), 0
+    count = len(list(read_messages(foreign)))
+    late = damaged(foreign, tmp_path / 'jump', lambda i, m: stamped_ahead(m, 3600 if i < count // 2 else 0))
+    mapping = mapping_file(tmp_path)
+    import_bag(foreign, mapping, tmp_path / 'as_it_was')
+    found = import_bag(late, mapping, tmp_path / 'imported')['axis']
+    assert sum('jumps 1 times' in remark for remark in found.remarks) >= 3
+    for kind, records in signals(tmp_path / 'imported').items():
+        stamps = [record.stamp for record in records]
+        whole = [record.stamp for record in signals(tmp_path / 'as_it_was')[kind]]
+        assert [b - a for a, b in pairwise(stamps)] == pytest.approx([b - a for a, b in pairwise(whole)], abs=2e6)
+    assert main(['info', str(late), '--json']) == 0
+    told = json.loads(capsys.readouterr().out)['stamps']
+    assert {found['jumps of the stamp'] for found in told.values()} == {1}
+    assert main(['info', str(foreign), '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['stamps'] == {}
+
+
+def test_a_short_message_is_left_out_and_counted(tmp_path, source, capsys):
+    foreign = write_standard(source, tmp_path / 'foreign')
+    place = [number for number, message in enumerate(read_messages(foreign)) if message.topic == '/p_a'][100]
+    short = damaged(foreign, tmp_path / 'short', lambda number, m: m.data[:7] if number == place else m.data)
+    found = import_bag(short, mapping_file(tmp_path), tmp_path / 'imported')['axis']
+    (remark,) = found.remarks
+    assert remark.startswith('/p_a: ')
+    assert remark.endswith('(1 messages)')
+    assert found.messages['/rod_velocity'] == 1000
+    assert main(['info', str(short), '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['stamps']['/p_a']['messages not of their type'] == 1
 
 
 def test_the_tracking_error_is_that_of_positions_and_references_of_the_same_time(tmp_path, source):

@@ -15,8 +15,9 @@ from offline.bags.test_import_log import RIG, ROWS
 from seal_friction_ros.offline.bags import import_log
 from seal_friction_ros.offline.bags import import_many as import_many_module
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
-from seal_friction_ros.offline.bags.import_log import convert_log, read_rig
+from seal_friction_ros.offline.bags.import_log import convert_log
 from seal_friction_ros.offline.bags.import_many import import_many
+from seal_friction_ros.offline.bags.rig_file import read_rig
 from seal_friction_ros.offline.commands.main import main
 
 

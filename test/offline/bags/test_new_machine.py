@@ -1,5 +1,7 @@
 """A first mapping file from a bag: it loads, and finds the signals that are there."""
 
+import re
+
 import pytest
 import yaml
 from harness.closed_loop_bags import write_closed_loop
@@ -9,10 +11,12 @@ from harness.standard_bags import write_standard
 from paths import ROOT
 from rosbags.rosbag2 import StoragePlugin
 
+from seal_friction_ros.core.estimation.messages import encode
+from seal_friction_ros.core.estimation.records import Position
 from seal_friction_ros.core.machine.machine import make_machine
 from seal_friction_ros.core.machine.message_fields import parse_definition
 from seal_friction_ros.files import config_path, machine_configurations, read_machine
-from seal_friction_ros.offline.bags.bag import BagError
+from seal_friction_ros.offline.bags.bag import BagError, BagWriter, read_messages
 from seal_friction_ros.offline.bags.import_bag import import_bag
 from seal_friction_ros.offline.bags.new_machine import new_machine
 from seal_friction_ros.offline.commands.main import main
@@ -42,6 +46,26 @@ def test_the_mapping_that_is_written_imports_the_bag(tmp_path, source, storage):
     assert 'bore: 40 mm  # missing' in text
     assert text.count('Pa: absolute') == 2
     assert import_bag(foreign, str(out), tmp_path / 'imported')['axis'].messages['/rod_velocity'] == 300
+
+
+def test_candidates_for_what_is_missing_are_listed_with_topic_element_and_range(tmp_path, source):
+    foreign = write_standard(source, tmp_path / 'foreign')
+    kinds = {'/p_a': 'seal_friction_msgs/msg/RodPosition', '/p_b': 'seal_friction_msgs/msg/RodPosition'}
+    with BagWriter(tmp_path / 'odd') as writer:  # pressures in a message of a type that is not looked for
+        for number, message in enumerate(read_messages(foreign)):
+            if message.topic in kinds:
+                data = encode(Position(message.log_time, 1e5 + number % 3), b'')
+                message = message._replace(type_name=kinds[message.topic], data=data)  # noqa: PLW2901
+            writer.write(*message)
+    text = new_machine(tmp_path / 'odd')
+    (tmp_path / 'robot.yaml').write_text(text)
+    assert text.count('missing: no topic found') == 2
+    listed = [line for line in text.splitlines() if line.startswith('#   ')]
+    assert any(
+        re.match(r'#   /p_a position: 1e\+05 to 1e\+05, seal_friction_msgs/msg/RodPosition', line) for line in listed
+    )
+    assert not any('velocity[axis]' in line for line in listed)
+    assert new_machine(foreign).count('candidates') == 1  # bore and rod are missing
 
 
 def test_the_commands_of_the_docs_run(tmp_path, source, monkeypatch):

@@ -141,6 +141,24 @@ def test_a_bag_of_strangers_keeps_types_and_definitions_that_are_not_installed(t
     assert decoded == list(range(100))
 
 
+def test_a_message_with_an_impossible_log_time_is_left_out_and_counted(tmp_path: Path):
+    with (tmp_path / 'odd.mcap').open('wb') as file:
+        writer = Writer(file, compression=CompressionType.NONE)
+        writer.start(profile='ros2')
+        schema = writer.register_schema(NUMBER, 'ros2msg', b'int64 data')
+        channel = writer.register_channel('/n', 'cdr', schema, {'offered_qos_profiles': '[]'})
+        for i in range(100):
+            time = (1 << 63) + 5 if i == 50 else 1000 + i
+            writer.add_message(channel, time, b'\x00\x01\x00\x00' + i.to_bytes(8, 'little'), 0)
+        writer.finish()
+    with pytest.raises(BagError):
+        messages(tmp_path / 'odd.mcap')
+    found = recover(tmp_path / 'odd.mcap')
+    assert (found.messages, found.lost_messages, found.lost_chunks) == (99, 1, 0)
+    assert f'a log time of {(1 << 63) + 5} ns' in found.damage[0]
+    assert [int.from_bytes(m.data[4:], 'little') for m in messages(Path(found.out))] == [*range(50), *range(51, 100)]
+
+
 def test_what_was_killed_before_its_first_chunk_holds_nothing_and_that_is_said(tmp_path: Path):
     BagWriter(tmp_path / 'bag')._output.close()
     with pytest.raises(BagError, match='nothing to recover'):

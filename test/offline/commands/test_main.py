@@ -142,7 +142,7 @@ def test_a_yaml_file_as_deep_as_one_likes_is_exit_code_2_and_one_line(name: str,
         ('gland_diameter: 20.8534e-3', 'gland_diameter: 0.015', ['gland_diameter', '0.015', 'rod_diameter']),
         ('law: power_law', 'law: magic', ['friction_coefficient', 'magic', 'power_law']),
         ('stiction: 2.47685', 'stiction: lots', ['stiction', 'lots']),
-        ('stiction: 2.47685', 'stiction: 2e-1', ['stiction', '2e-1', 'signed exponent']),
+        ('stiction: 2.47685', 'stiction: 2 mm', ['stiction', 'mm', 'none of a']),
     ],
 )
 def test_a_seal_that_makes_no_sense_is_exit_code_2_with_field_value_and_bound(

@@ -20,6 +20,7 @@ COMMANDS = {
     ('import', 'bag'): [PULL_TEST, '--mapping', 'test_bench'],
     ('import', 'thesis'): [],
     ('new', 'robot'): ['--from-bag', PULL_TEST],
+    ('new', 'rig'): [LOG],
     ('identify',): [PULL_TEST],
     ('sheet',): ['rod_seal'],
     ('spool',): ['ten_cycles.csv'],

@@ -13,8 +13,9 @@ from seal_friction_ros.core.friction.seal_file import parse_seal
 from seal_friction_ros.core.identification.fitting import offsets_of, root_mean_square
 from seal_friction_ros.core.identification.selection import NEAR
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.bags.import_log import read_rig, read_samples
+from seal_friction_ros.offline.bags.import_log import read_samples
 from seal_friction_ros.offline.bags.import_thesis import import_thesis
+from seal_friction_ros.offline.bags.rig_file import read_rig
 from seal_friction_ros.offline.identification.pipeline import IdentifyOptions, fitted_readings, gather, select_law
 from seal_friction_ros.offline.identification.sources import SourceOptions, read_sources
 

@@ -233,3 +233,24 @@ def test_sources_are_read_by_workers_as_by_one_and_the_first_error_counts(tmp_pa
     for workers in (1, 3):
         with pytest.raises(ValueError, match='1x'):
             read_sources(paths, SourceOptions(), workers)
+
+
+@pytest.mark.parametrize('column', ['chamber_a', 'force_sum', 'velocity'])
+def test_two_percent_of_single_missing_values_are_bridged_and_said(tmp_path, column):
+    lost = getattr(GOOD, column).copy()
+    lost[7::50] = np.nan
+    write_samples(tmp_path / 'bag', GOOD._replace(**{column: lost}), 'rod')
+    sources = read_sources([tmp_path / 'bag'], SourceOptions())
+    what = {'chamber_a': 'pressure a', 'force_sum': 'force sum', 'velocity': 'velocity'}[column]
+    count = int(np.isnan(lost).sum())
+    assert f'bag: of {len(lost)} samples single missing values interpolated: {count} of {what}' in sources.remarks
+    assert sources.prepare().readings.two_sided
+
+
+def test_one_held_pressure_holds_over_the_noise_of_its_own_log(tmp_path):
+    part = wave((60e5,))
+    write_samples(tmp_path / 'bag', part, 'rod')
+    run = Run(tmp_path, str(tmp_path / 'bag'))
+    assert run.code == 0, run.errors
+    low, high = run.document['identified_pressure']
+    assert low <= 60e5 * 0.991 < 60e5 * 1.009 <= high  # three times 0.3 %
