@@ -460,7 +460,8 @@ def disagrees(
         return not settings.scale_min * moment.law <= moment.found <= settings.scale_max * moment.law
     if is_at_rest and abs(offset_here(state)) > 0.5 * (friction.coulomb_friction + friction.stiction):
         return True
-    return abs(moment.found - moment.law) > 2.0 * math.hypot(friction.coulomb_friction_std, known.friction_std)
+    missed, by_file, known_to = moment.found - moment.law, friction.coulomb_friction_std, known.friction_std
+    return missed * missed > 4.0 * (by_file * by_file + known_to * known_to)
 
 
 @compilable

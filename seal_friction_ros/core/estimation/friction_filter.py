@@ -209,7 +209,8 @@ def _less(row: Terms, share: float, by: Terms) -> Terms:
 def begun(reading: Reading) -> FrictionFilter:
     """Filter with its prior, at the first reading."""
     force = reading.friction
-    scale = math.hypot(SCALE_PRIOR, reading.friction_std / force)
+    by_file = reading.friction_std / force
+    scale = math.sqrt(SCALE_PRIOR * SCALE_PRIOR + by_file * by_file)  # hypot differs by a bit in compiled code
     std = Terms(
         scale,
         COULOMB_PRIOR * force,

@@ -803,7 +803,7 @@ def test_before_anything_is_learnt_the_deviation_of_the_scale_is_that_of_the_sea
 def test_a_sample_is_learnt_from_every_16_ms_and_no_more_often():
     before = slid()
     for milliseconds, learns in ((1, False), (15, False), (16, True)):
-        after, _ = adapted_step(sample(before.stamp + milliseconds * MS), before=before)
+        after, _ = adapted_step(sample(before.adaptation.stamp + milliseconds * MS), before=before)
         assert (after.adaptation != before.adaptation) is learns
 
 
@@ -819,7 +819,7 @@ def test_a_law_that_disagrees_is_learnt_from_on():
 
 
 def test_outside_the_identified_range_strokes_are_followed_and_with_a_bad_input_nothing_is_learnt():
-    outside = slid(pressure=8e6).adaptation
+    outside = slid(count=40, pressure=8e6).adaptation
     assert outside.strokes.present.samples > 10
     assert outside.filter == NOT_BEGUN
     before = slid()
