@@ -32,8 +32,12 @@ FEWEST_FRAMES = 18.0  # [1/s] of 20
 def soak(minutes: float, look_every: float, folder: Path) -> dict[str, Any]:
     """Run, and look at the monitor every ``look_every`` [s]."""
     domain, looks = free_domain(), list[Look]()
-    with machine(folder, domain), monitor(domain) as (pid, url), Progress(console=Console(stderr=True)) as progress:
-        reader = Reader(url)
+    with (
+        machine(folder, domain),
+        monitor(domain) as watching,
+        Progress(console=Console(stderr=True)) as progress,
+    ):
+        reader = Reader(watching.url)
         end = time.monotonic() + 60.0
         while not reader.rows:
             if time.monotonic() > end:
@@ -43,7 +47,7 @@ def soak(minutes: float, look_every: float, folder: Path) -> dict[str, Any]:
         frames, rows = reader.frames, reader.rows
         while time.monotonic() < start + 60.0 * minutes:
             time.sleep(look_every)
-            looks.append(look(pid, start))
+            looks.append(look(watching.process.pid, start))
             progress.update(task, completed=time.monotonic() - start)
         seconds = time.monotonic() - start
         found = {
