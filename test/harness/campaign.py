@@ -30,7 +30,9 @@ def tell(found: Rows, *, as_json: bool, title: str = '') -> None:
         return
     rows = found if not isinstance(found, Mapping) else [{'': name, **_row(row)} for name, row in found.items()]
     headings = dict.fromkeys(heading for row in rows for heading in row)
-    table = Table(*map(Text, headings), title=title)
+    table = Table(title=title)
+    for heading in headings:
+        table.add_column(Text(heading))
     for row in rows:
         table.add_row(*(Text(_text(row.get(heading, ''))) for heading in headings))
     Console(width=160).print(table)
