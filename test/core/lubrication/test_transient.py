@@ -177,18 +177,6 @@ def test_starved_seal_goes_to_the_left_as_it_goes_to_the_right():
     assert there.sum() == pytest.approx(mirrored.sum(), rel=1e-6)
 
 
-@pytest.mark.parametrize('direction', [1.0, -1.0])
-def test_velocity_at_the_end_of_a_step_is_that_of_an_even_acceleration(direction):
-    """0.4 m/s^2: 4 mm/s on average over 20 ms, then 11 mm/s over 15 ms and 14 mm/s at their end."""
-    start = initial_state(lubrication_model(INNER), 0.0)
-    after = start._replace(before=StepBefore(start.state.gap, start.creep, 20e-3, direction * 4e-3))
-    assert transient._velocity_at_end(after, direction * 11e-3, 15e-3) == pytest.approx(direction * 14e-3)
-    assert transient._velocity_at_end(after, -direction * 11e-3, 15e-3) == -direction * 11e-3  # turned round
-    fast = start._replace(before=StepBefore(start.state.gap, start.creep, 20e-3, direction * 0.4))
-    assert transient._velocity_at_end(fast, direction * 1e-3, 15e-3) == direction * 1e-3  # would turn round
-    assert transient._velocity_at_end(start, direction * 11e-3, 15e-3) == direction * 11e-3  # the first step
-
-
 def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge():
     """Two roundings of 20 um before the chamfer from 0.3 to 0.4667 mm, and two after it."""
     model = lubrication_model(EDGE)
