@@ -22,7 +22,7 @@ from seal_friction_ros.core.identification.selection import LawScore, score_laws
 from seal_friction_ros.core.identification.validation import cross_validate, jackknife_errors
 
 BASE = next(law for law in candidate_laws(Variation()) if law.name == 'pressure_power_law_2_3')
-VISCOUS = with_velocity_terms(BASE, Variation())[0]
+VISCOUS, *_, ASYMMETRIC = with_velocity_terms(BASE, Variation())
 TRUE = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 1.0, 'pressure_exponent': 2.0 / 3.0,
         'viscous_friction': 120.0}  # fmt: skip
 SCATTER = 0.03
@@ -249,9 +249,8 @@ def two_logs() -> FrictionReadings:
 class Criterion:
     """Standard error of a law over its range, by dense matrices with the offsets as parameters."""
 
-    def __init__(self, readings: FrictionReadings, design) -> None:
-        self.law, self.readings, self.design = design.law, readings, design
-        score = score_laws([VISCOUS], readings)[0]
+    def __init__(self, readings: FrictionReadings, score: LawScore, design) -> None:
+        self.law, self.readings = design.law, readings
         self.fit = score.fit
         self.scatter = self._scatter()
         offsets = np.column_stack([readings.at.direction * (readings.source == n) for n in self._with_offset()])
@@ -284,15 +283,18 @@ class Criterion:
         values = self.fit.values
         base = self.law.friction(at, values)
         names = [parameter.name for parameter in self.law.parameters]
-        return np.column_stack([self.law.friction(at, values | {n: values[n] + 1.0}) - base for n in names])
+        return np.column_stack([2.0 * (self.law.friction(at, values | {n: values[n] + 0.5}) - base) for n in names])
 
     def information(self, points=()) -> np.ndarray:
         """With proposed readings, which are one log with an offset."""
         if not points:
             return self.known
         at = self.conditions(points)
-        weight = self.law.friction(at, self.fit.values) if not self.readings.are_samples else self.readings.scale[0]
-        weight = np.broadcast_to(weight, len(at.direction))[:, None] * self.scatter
+        friction = self.law.friction(at, self.fit.values).reshape(-1, 2).mean(axis=1)  # of both directions
+        weight = np.repeat(friction, 2)
+        if self.readings.are_samples:
+            weight = np.full(len(weight), self.readings.scale[0])
+        weight = weight[:, None] * self.scatter
         return self.known + without(self.slopes(at) / weight, at.direction[:, None] / weight)
 
     def error(self, points=()) -> float:
@@ -319,14 +321,20 @@ def condition(information) -> float:
 
 
 @pytest.mark.parametrize(
-    'readings',
-    [collinear(np.random.default_rng(0)), two_logs(), one_way(two_logs()), replace(two_logs(), are_samples=True)],
-    ids=['one log', 'two logs', 'one of them one way', 'samples'],
+    ('readings', 'law'),
+    [
+        (collinear(np.random.default_rng(0)), VISCOUS),
+        (two_logs(), VISCOUS),
+        (two_logs(), ASYMMETRIC),  # only there the offset goes together with a parameter
+        (one_way(two_logs()), VISCOUS),
+        (replace(two_logs(), are_samples=True), VISCOUS),
+    ],
+    ids=['one log', 'two logs', 'asymmetric', 'one of them one way', 'samples'],
 )
-def test_each_proposed_reading_is_that_which_reduces_the_error_most(readings):
-    scores = score_laws([VISCOUS], readings)
+def test_each_proposed_reading_is_that_which_reduces_the_error_most(readings, law):
+    scores = score_laws([law], readings)
     design = design_experiment(scores, readings, NO_RUNS, 0.0, 3)
-    expected = Criterion(readings, design)
+    expected = Criterion(readings, scores[0], design)
     grid = [(r.pressure, r.speed) for r in design_experiment(scores, readings, NO_RUNS, 0.0, 99).readings]
     chosen = [(r.pressure, r.speed) for r in design.readings]
     assert design.error_before == pytest.approx(expected.error(), rel=1e-4)
