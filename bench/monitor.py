@@ -161,12 +161,12 @@ def run(case: str, times: Times, rounds: int, *, with_browser: bool) -> Rounds:
             found.alone.append(measure(pid, times, spun, listener, 0))
             with computing():
                 found.neighbour.append(measure(pid, times, spun, listener, 0))
-            with ExitStack() as page, monitor(domain) as (watching, url):
+            with ExitStack() as page, monitor(domain) as watching:
                 if with_browser:
-                    page.enter_context(browser(folder)).open(url)
+                    page.enter_context(browser(folder)).open(watching.url)
                 else:
-                    Reader(url)
-                found.monitor.append(measure(pid, times, spun, listener, watching))
+                    Reader(watching.url)
+                found.monitor.append(measure(pid, times, spun, listener, watching.process.pid))
     return found
 
 

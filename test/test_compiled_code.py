@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from paths import ROOT
@@ -39,10 +40,27 @@ def result(process: subprocess.Popen[str]) -> list[float]:
     return json.loads(out)
 
 
-def test_the_second_process_compiles_nothing(tmp_path):
-    value, hits = result(started(tmp_path))
+class Filled(NamedTuple):
+    """A folder that a process has compiled into, and the value of the function."""
+
+    folder: Path
+    value: float
+
+    def copied(self, folder: Path) -> Path:
+        return shutil.copytree(self.folder, folder, dirs_exist_ok=True)
+
+
+@pytest.fixture(scope='module')
+def filled(tmp_path_factory) -> Filled:
+    """Filled with a umask that closes nothing."""
+    folder = tmp_path_factory.mktemp('filled')
+    value, hits = result(started(folder, PROGRAM.replace('import json, sys', 'import json, os, sys; os.umask(0)')))
     assert hits == 0
-    assert result(started(tmp_path)) == [value, 1]
+    return Filled(folder, value)
+
+
+def test_the_second_process_compiles_nothing(filled):
+    assert result(started(filled.folder)) == [filled.value, 1]
 
 
 @pytest.mark.parametrize('variable', ['XDG_CACHE_HOME', compiled_code.VARIABLE])
@@ -60,11 +78,11 @@ def test_without_a_folder_it_works_as_well(tmp_path):
     assert hits == 0
 
 
-def test_damaged_files_are_as_good_as_none(tmp_path):
-    value, _ = result(started(tmp_path))
+def test_damaged_files_are_as_good_as_none(filled, tmp_path):
+    filled.copied(tmp_path)
     for path in (*tmp_path.rglob('*.nbi'), *tmp_path.rglob('*.nbc')):
         path.write_bytes(path.read_bytes()[:40])
-    assert result(started(tmp_path)) == [value, 0]
+    assert result(started(tmp_path)) == [filled.value, 0]
 
 
 def open_to_all(folder: Path) -> None:
@@ -85,23 +103,22 @@ def of_another_user(folder: Path) -> None:
 
 @pytest.mark.parametrize('make', [open_to_all, open_to_the_group, of_another_user])
 @pytest.mark.parametrize('variable', ['XDG_CACHE_HOME', compiled_code.VARIABLE])
-def test_a_folder_that_another_user_could_write_to_is_refused_with_one_line(tmp_path, make, variable):
+def test_a_folder_that_another_user_could_write_to_is_refused_with_one_line(filled, tmp_path, make, variable):
     """Whoever may write there could let this process run anything."""
     folder = tmp_path / 'seal_friction_ros'
     named = {variable: str(folder)} if variable == compiled_code.VARIABLE else {}
-    value, _ = result(started(tmp_path, **named))
+    filled.copied(tmp_path)
     make(folder)
     before = sorted(tmp_path.rglob('*'))
     out, errors = started(tmp_path, errors=subprocess.PIPE, **named).communicate(timeout=100.0)
-    assert json.loads(out) == [value, 0]
+    assert json.loads(out) == [filled.value, 0]
     assert errors.startswith(f'compiled code is not kept in {folder}: ')
     assert errors.count('\n') == 1
     assert sorted(tmp_path.rglob('*')) == before
 
 
-def test_the_folder_is_for_its_user_alone_whatever_the_umask(tmp_path):
-    result(started(tmp_path, PROGRAM.replace('import json, sys', 'import json, os, sys; os.umask(0)')))
-    made = [tmp_path / 'seal_friction_ros', *(tmp_path / 'seal_friction_ros').iterdir()]
+def test_the_folder_is_for_its_user_alone_whatever_the_umask(filled):
+    made = [filled.folder / 'seal_friction_ros', *(filled.folder / 'seal_friction_ros').iterdir()]
     assert len(made) == 2
     assert all(folder.stat().st_mode & 0o777 == 0o700 for folder in made)
 

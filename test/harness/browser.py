@@ -50,6 +50,10 @@ class Page:
         """Another tab of the same browser."""
         return Page(self._send, self._receive, self._read)
 
+    def close(self) -> None:
+        """Close the tab."""
+        self.call('Page.close')
+
     def call(self, method: str, **parameters: Any) -> Any:
         """Call a method of the protocol; its result.
 
@@ -79,7 +83,8 @@ class Page:
         text, _, rest = self._read.partition(b'\0')
         self._read[:] = rest
         message: dict[str, Any] = json.loads(text)
-        self._note(message.get('method', ''), message.get('params', {}))
+        if message.get('sessionId') == self._session:  # else it is of another tab
+            self._note(message.get('method', ''), message.get('params', {}))
         return message
 
     def _note(self, method: str, given: dict[str, Any]) -> None:

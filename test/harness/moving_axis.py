@@ -1,14 +1,18 @@
 """One actuator that follows a sine, as its drivers publish it; a test stops single drivers, or all of them."""
 
 import math
+import subprocess
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
-from harness.processes import graph_environment
+from harness.processes import graph_environment, node_process
 from seal_friction_ros.core.estimation.messages import INPUTS, encode
 from seal_friction_ros.core.estimation.records import Force, Position, Pressure, ServoReference, Velocity
 from seal_friction_ros.nodes import qos
@@ -32,9 +36,10 @@ class MovingAxis:
     Args:
         domain: ROS domain.
         begin_stopped: Whether nothing is published at first.
+        frame: Name of the frame in every message.
     """
 
-    def __init__(self, domain: int, *, begin_stopped: bool = False) -> None:
+    def __init__(self, domain: int, *, begin_stopped: bool = False, frame: bytes = b'rod') -> None:
         graph_environment(domain)
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
@@ -45,7 +50,7 @@ class MovingAxis:
         }
         self.stopped: set[type] = set(TOPICS) if begin_stopped else set()
         """inputs that are not published"""
-        self._ended = threading.Event()
+        self._frame, self._ended = frame, threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def __enter__(self) -> 'MovingAxis':
@@ -82,7 +87,15 @@ class MovingAxis:
             Force(stamp, math.copysign(FRICTION, velocity)),
             ServoReference(stamp, position + 1e-4, velocity, acceleration),
             Position(stamp, position),
-            Velocity(stamp, velocity, b'rod'),
+            Velocity(stamp, velocity, self._frame),
         ):
             if type(record) not in self.stopped:
-                self._publishers[type(record)].publish(encode(record, b'rod'))
+                self._publishers[type(record)].publish(encode(record, self._frame))
+
+
+@contextmanager
+def compensated(domain: int, log: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """The estimator of a `MovingAxis`, with a feed-forward, in a process of its own."""
+    parameters = {'feedforward.scale': 0.9, 'seals': ['ms28775_114@a', 'ms28775_114@b']}
+    with node_process('friction_estimator', domain, parameters, log) as process:
+        yield process

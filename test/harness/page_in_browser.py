@@ -1,7 +1,8 @@
 """A report page in a headless browser, at the width of a desk and of a phone."""
 
 import atexit
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -47,6 +48,19 @@ def shared_page() -> Page | None:
     page = stack.enter_context(browser(Path(folder)))
     atexit.register(stack.close)
     return page
+
+
+@contextmanager
+def tab(width: int) -> Iterator[Page]:
+    """An empty tab of a width [px]; there is a browser."""
+    first = shared_page()
+    assert first is not None
+    page = first.another()
+    page.size(width, 900)
+    try:
+        yield page
+    finally:
+        page.close()
 
 
 def opened(path: Path, width: int) -> Page:

@@ -19,7 +19,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from paths import ROOT
 from rcl_interfaces.msg import Parameter, ParameterValue
-from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import DescribeParameters, ListParameters, SetParameters, SetParametersAtomically
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter as RclpyParameter
 from seal_friction_msgs.msg import FrictionEstimate
@@ -385,22 +385,15 @@ def test_a_recording_holds_states_between_which_it_verifies_by_itself(tmp_path: 
     with graph(recording) as g:
         g.connect()
         bag, number = tmp_path / 'bag', 0
-        recorded = g.estimator._recording.record
-        states = []
-
-        def record(topic: str, *rest) -> None:
-            states.extend([topic] * topic.endswith('/state'))
-            recorded(topic, *rest)
-
-        g.estimator._recording.record = record
-        while len(states) < 3:
+        end = time.monotonic() + 1.6  # [s]
+        while time.monotonic() < end:
             g.estimate(SECOND + number * 10**6, 0.003 * (1 if number // 50 % 2 else -1), force=3.0)
             number += 1
         g.estimate(SECOND + number * 10**6, 0.003)
         g.estimator.finish()
-    assert states == ['/friction_estimator/state'] * 3
-    assert bag_topics(bag)['/friction_estimator/state'].message_count == 3
-    assert len(stretches_of(bag, find_topics(bag), 8)) == 4
+    states = bag_topics(bag)['/friction_estimator/state'].message_count
+    assert states >= 3
+    assert len(stretches_of(bag, find_topics(bag), states + 5)) == states + 1
     assert verify_stretches(bag, find_topics(bag), 2) == replay(bag)
     assert replay(bag).identical
 
@@ -457,7 +450,8 @@ def test_placeholder_seals_make_no_force_and_a_scale_is_rejected_with_the_reason
 
 def test_the_node_declares_the_parameters_of_its_table_and_no_other():
     with graph() as g:
-        declared = {name for name in g.estimator._parameters if name.split('.')[0] not in ROS_PARAMETERS}
+        answer = g.call(ListParameters, 'friction_estimator/list_parameters', ListParameters.Request())
+        declared = {name for name in answer.result.names if name.split('.')[0] not in ROS_PARAMETERS}
         assert declared == {name for group in FRICTION_ESTIMATOR_PARAMETERS for name in group.names()}
         assert isinstance(g.estimator, FrictionEstimator)
 

@@ -16,7 +16,7 @@ from harness.machines import BENCH, EXCAVATOR
 from harness.spin_nodes import SpunNodes, ros_context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import ReliabilityPolicy, qos_profile_sensor_data
 from seal_friction_msgs.msg import FrictionEstimate, FrictionFeedForward, MachineFriction
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
@@ -91,11 +91,13 @@ def machine(tmp_path: Path, text: str = EXCAVATOR, **parameters: Any) -> Iterato
             drivers.destroy_node()
 
 
-def heard(nodes: SpunNodes, node: Any, drivers: Drivers) -> None:
+def heard(nodes: SpunNodes, drivers: Drivers) -> None:
     """Spin until the best-effort driver is heard."""
-    profile = node._inputs
-    reliable = profile['/joint_states'].qos_profile.reliability
-    assert nodes.spin_until(lambda: profile['/joint_states'].qos_profile.reliability != reliable)
+
+    def offers() -> list[ReliabilityPolicy]:
+        return [end.qos_profile.reliability for end in drivers.get_subscriptions_info_by_topic('/joint_states')]
+
+    assert nodes.spin_until(lambda: ReliabilityPolicy.BEST_EFFORT in offers())
     nodes.connect()
 
 
@@ -121,7 +123,7 @@ def move_until(nodes: SpunNodes, drivers: Drivers, condition: Callable[[list[flo
 def test_three_actuators_from_one_joint_state_give_estimates_and_one_command_and_replay_to_the_byte(tmp_path, answers):
     recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     with machine(tmp_path, f'answers: {answers}\n{EXCAVATOR}', **recording) as (nodes, node, drivers):
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         move_until(nodes, drivers, lambda force: force[0] > 0.0 > force[1] and force[2] > 0.0)
         newest = {name: found[-1] for name, found in drivers.estimates.items()}
         assert [newest[name].direction for name in NAMES] == [1, -1, 1]
@@ -153,7 +155,7 @@ def test_a_topic_that_no_input_uses_is_recorded_and_the_bag_replays_to_the_byte(
 
 def test_a_joint_that_no_message_holds_is_named_and_the_others_go_on(tmp_path):
     with machine(tmp_path, EXCAVATOR.replace('velocity[bucket]', 'velocity[buckett]')) as (nodes, node, drivers):
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         for number in range(3):
             drivers.send((0.05, -0.03, 0.02))
             assert nodes.spin_until(lambda n=number: len(drivers.estimates['arm']) > n)
@@ -183,7 +185,7 @@ def test_an_input_whose_messages_are_empty_has_not_arrived(tmp_path, capfd):
 
 def test_a_joint_that_is_named_twice_is_ambiguous_in_the_diagnostics_and_the_others_go_on(tmp_path):
     with machine(tmp_path) as (nodes, node, drivers):
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         for number in range(3):
             drivers.send((0.05, -0.03, 0.02, 0.04), (*NAMES, 'bucket'))
             assert nodes.spin_until(lambda n=number: len(drivers.estimates['arm']) > n)
@@ -196,7 +198,7 @@ def test_a_joint_that_is_named_twice_is_ambiguous_in_the_diagnostics_and_the_oth
 
 def test_malformed_bytes_are_counted_and_the_estimate_goes_on(tmp_path):
     with machine(tmp_path) as (nodes, node, drivers):
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         move(nodes, drivers, 2)
         node.on_input('/joint_states', b'\x00\x01\x00\x00garbage', 0)
         move(nodes, drivers, 2)
@@ -206,7 +208,7 @@ def test_malformed_bytes_are_counted_and_the_estimate_goes_on(tmp_path):
 
 def test_the_forces_fall_to_0_when_the_node_stops(tmp_path):
     with machine(tmp_path) as (nodes, node, drivers):
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         move_until(nodes, drivers, lambda force: force[0] > 1.0)
         node.finish()
         assert nodes.spin_until(lambda: drivers.commands[-1] == [0.0, 0.0, 0.0])
@@ -216,7 +218,7 @@ def test_the_forces_fall_to_0_when_the_node_stops(tmp_path):
 def test_what_waited_while_the_node_was_held_up_makes_no_force_and_replays_to_the_byte(tmp_path):
     recording = {'record': True, 'record_directory': str(tmp_path), 'record_name': 'bag'}
     with machine(tmp_path, **recording) as (nodes, node, drivers):
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         move_until(nodes, drivers, lambda force: force[0] > 10.0)
         drivers.commands.clear()
         for _ in range(50):
@@ -244,7 +246,7 @@ def test_a_mistyped_off_switch_ends_the_start(tmp_path, name):
 def test_placeholder_seals_make_no_force_and_a_scale_is_rejected_with_the_reason(tmp_path):
     text = EXCAVATOR.replace('seals: [ms28775_114@a, ms28775_114@b]', 'seals: [placeholder@a, placeholder@b]', 1)
     with machine(tmp_path, text) as (nodes, node, drivers):
-        heard(nodes, node, drivers)
+        heard(nodes, drivers)
         move_until(nodes, drivers, lambda force: force[1] < -5.0)  # the others have their seals
         assert {force[0] for force in drivers.commands} == {0.0}
         (result,) = node.set_parameters([Parameter('boom.feedforward.scale', value=0.5)])

@@ -125,10 +125,10 @@ def test_call_finds_the_type_of_a_service_and_a_refusal_is_exit_code_1(tool):
     assert 'has no field data' in said
 
 
-def test_every_command_of_the_docs_runs(domain):
+def test_every_command_of_the_docs_runs(tool):
     (block,) = (b for b in blocks_of(ROOT / 'docs' / 'interfaces.md') if b.kind == 'topics')
     for line in block.text.splitlines():
-        code, said = run(domain, *line.removeprefix('seal_friction topics ').split())
+        code, said = tool(*line.removeprefix('seal_friction topics ').split())
         assert code == 0, f'{line}: {said}'
     assert 'success: true' in said
 

@@ -7,8 +7,6 @@
 - undisturbed: fewer than one change is found in the hours given.
 """
 
-import argparse
-import json
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -19,6 +17,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from harness.simulated_day import Day, samples
 from paths import ROOT
 
@@ -117,18 +116,10 @@ def campaign(seeds: int, hours: float, workers: int) -> dict[str, Any]:
 
 def main() -> int:
     """Run and judge."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--seeds', type=int, default=20)
-    parser.add_argument('--hours', type=float, default=1.0)
-    parser.add_argument('--workers', type=int, default=2)
-    parser.add_argument('--json', action='store_true')
+    parser = parser_of(__doc__, seeds=(20, 'days of each kind'), hours=(1.0, 'of a day'), workers=(2, 'processes'))
     arguments = parser.parse_args()
     result = campaign(arguments.seeds, arguments.hours, arguments.workers)
-    if arguments.json:
-        print(json.dumps(result))
-    else:
-        for kind, numbers in result.items():
-            print(f'{kind:<14}', *(f'{name} {value:.4g}' for name, value in numbers.items()), sep='  ')
+    tell(result, as_json=arguments.json)
     held = all(numbers.get('within_5_percent', 1.0) == 1.0 for numbers in result.values())
     held = held and result['drift']['found_within_50'] == 1.0 and result['undisturbed']['changes_found'] == 0
     return 0 if held else 1

@@ -5,8 +5,6 @@ first 2 s do not count. Exit code 1 if more than 0.5 % of the samples with statu
 than 80 % of the samples of a clean machine have status 0.
 """
 
-import argparse
-import json
 import sys
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -16,10 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
@@ -199,21 +196,13 @@ def attacked(name: str, mode: str, seconds: float) -> Found:
 
 def main() -> int:
     """Run all; print the table, or JSON."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--seconds', type=float, default=40.0)
-    parser.add_argument('--workers', type=int, default=2)
-    parser.add_argument('--json', action='store_true')
+    parser = parser_of(__doc__, seconds=(40.0, 'of an attack [s]'), workers=(2, 'processes'))
     arguments = parser.parse_args()
     cases = [(name, mode) for name in CLEAN | ATTACKS for mode in ('observe', 'on')]
     with ProcessPoolExecutor(arguments.workers) as pool:
         found = dict(zip(cases, pool.map(partial(_attacked, arguments.seconds), cases), strict=True))
-    if arguments.json:
-        print(json.dumps([{'case': name, 'mode': mode, **one._asdict()} for (name, mode), one in found.items()]))
-    else:
-        table = Table('attack', 'mode', 'status 0', 'of these wrong')
-        for (name, mode), one in found.items():
-            table.add_row(name, mode, f'{one.good:.1%}', f'{one.wrong:.2%}')
-        Console().print(table)
+    rows = [{'case': name, 'mode': mode, **one._asdict()} for (name, mode), one in found.items()]
+    tell(rows, as_json=arguments.json, title='shares of samples')
     wrong = any(one.wrong > 0.005 for one in found.values())
     return int(wrong or any(one.good < 0.8 for (name, _), one in found.items() if name in CLEAN))
 

@@ -8,9 +8,7 @@ one log shows (seal file, least squares) and runs over another, causal. Where |v
 - ``friction``: RMS of the force sum less the friction known one sample before, and less one offset for the whole log.
 """
 
-import argparse
 import itertools
-import json
 import sys
 import tempfile
 from dataclasses import replace
@@ -18,6 +16,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell_tables
 
 from seal_friction_ros.core.estimation.adaptation import AdaptationSettings
 from seal_friction_ros.core.estimation.estimator import init, step
@@ -214,19 +215,12 @@ def _run(*arguments: object) -> None:
 
 def main() -> int:
     """Run and print; exit code 1 if recursive least squares is better anywhere."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument('folder', type=Path)
-    parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as work:
         table = compared(arguments.folder, Path(work))
-    if arguments.json:
-        print(json.dumps(table))
-    for pair, rows in table.items():
-        if not arguments.json:
-            print(pair)
-            for name, row in rows.items():
-                print(f'  {name:32}', *(f'{column} {value:7.3g}' for column, value in row.items()))
+    tell_tables(table, as_json=arguments.json)
     return int(any(r['this package'][c] > r['recursive least squares'][c] for r in table.values() for c in COLUMNS))
 
 

@@ -7,8 +7,6 @@ Prints a table: how many are named, and the longest motion [s] until then. Exit 
 is said to have a wrong input.
 """
 
-import argparse
-import json
 import math
 import sys
 import tempfile
@@ -23,6 +21,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from harness.simulated_day import Day, samples
 from paths import ROOT
 
@@ -162,18 +161,11 @@ def campaign(seeds: int, logs: Path | None, workers: int) -> list[dict[str, Any]
 
 def main() -> int:
     """Run and judge."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--seeds', type=int, default=5)
+    parser = parser_of(__doc__, seeds=(5, 'machines of each fault'), workers=(2, 'processes'))
     parser.add_argument('--logs', type=Path, help='folder with the logs, in a folder for each rig')
-    parser.add_argument('--workers', type=int, default=2)
-    parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
     rows = campaign(arguments.seeds, arguments.logs, arguments.workers)
-    if arguments.json:
-        print(json.dumps(rows))
-    else:
-        for row in rows:
-            print(*(f'{name} {value}' for name, value in row.items()), sep='  ')
+    tell(rows, as_json=arguments.json)
     missed = [row for row in rows if row['fault'] != 'clean' and row['named'] < row['runs']]
     wrong = [row for row in rows if row['fault'] == 'clean' and row['something_else_named']]
     return 1 if missed or wrong else 0

@@ -4,8 +4,6 @@ Every case goes through the pipeline of the node, compiled, with the same bytes.
 it is held, or moves as a given function of time, and friction opposes the motion. Exit code 1 if a claim fails.
 """
 
-import argparse
-import json
 import math
 import sys
 from collections.abc import Callable, Iterator
@@ -14,11 +12,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness import compiled_code  # noqa: F401  before anything is compiled
+from harness.campaign import parser_of, tell
 from harness.compensation import compensating
 
 from seal_friction_ros.core.estimation.compiled_pipeline import receive_all
@@ -239,21 +236,9 @@ def all_cases(seconds: float) -> Iterator[Callable[[], Found]]:
 
 def main() -> int:
     """Run all cases; print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--seconds', type=float, default=60.0, help='length of each case, default 60')
-    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
-    arguments = parser.parse_args()
-    table = Table('case', 'reversals', 'allowed', 'wrong with status 0', 'status 0', 'largest step [N]', 'holds')
+    arguments = parser_of(__doc__, seconds=(60.0, 'length of each case [s]')).parse_args()
     results = [case() for case in all_cases(arguments.seconds)]
-    for found in results:
-        shares = ['' if share is None else f'{100.0 * share:.3f} %' for share in (found.wrong, found.good)]
-        step = '' if found.largest_step is None else f'{found.largest_step:.2f}'
-        verdict = 'yes' if found.holds else 'NO'
-        table.add_row(found.case, str(found.reversals), str(found.allowed_reversals), *shares, step, verdict)
-    if arguments.json:
-        print(json.dumps([{**found._asdict(), 'holds': found.holds} for found in results]))
-    else:
-        Console(width=140).print(table)
+    tell([{**found._asdict(), 'holds': found.holds} for found in results], as_json=arguments.json)
     return 0 if all(found.holds for found in results) else 1
 
 

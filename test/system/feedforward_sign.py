@@ -6,7 +6,6 @@ limit and fade are out of the way, since they alone may delay a reversal; the le
 acts against the reference, or is not exactly 0 N with ``scale`` 0.
 """
 
-import argparse
 import math
 import sys
 from concurrent.futures import ProcessPoolExecutor
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from paths import ROOT
 
 from seal_friction_ros.core.estimation.estimator import EstimatorParameters, EstimatorSettings
@@ -131,14 +131,11 @@ def violations(seed: int) -> list[str]:
 
 def main() -> int:
     """Run the cases; print what goes wrong."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--cases', type=int, default=100_000)
-    parser.add_argument('--workers', type=int, default=2)
-    arguments = parser.parse_args()
+    arguments = parser_of(__doc__, cases=(100_000, 'random cases'), workers=(2, 'processes')).parse_args()
     with ProcessPoolExecutor(arguments.workers) as executor:
         found = [line for lines in executor.map(violations, range(arguments.cases), chunksize=500) for line in lines]
-    print('\n'.join(found[:20]))
-    print(f'{arguments.cases} cases, {len(found)} violations')
+    figures = {'cases': arguments.cases, 'violations': len(found), 'first': found[:20]}
+    tell(figures, as_json=arguments.json)
     return 1 if found else 0
 
 

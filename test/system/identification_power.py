@@ -5,7 +5,6 @@ pressure, or of a whole pressure, as if it was held on another day. Exit code 1 
 rise exceeds four standard errors.
 """
 
-import argparse
 import itertools
 import sys
 from collections import Counter
@@ -14,10 +13,9 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification import diagnostics
@@ -103,17 +101,12 @@ def campaign(draws: int, workers: int) -> list[tuple[list[str], int]]:
 
 def main() -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--draws', type=int, default=200)
-    heads = ('noise of each', 'friction [N]', 'pressures', 'noise [%]', 'right kind [%]', 'outlier [%]', 'flat', 'laws')
-    table, wrong = Table(*heads), 0
-    parser.add_argument('--workers', type=int, default=available_cores(), help='cases at a time')
+    parser = parser_of(__doc__, draws=(200, 'of each case'), workers=(available_cores(), 'cases at a time'))
     options = parser.parse_args()
-    for texts, bad in campaign(options.draws, options.workers):
-        table.add_row(*texts)
-        wrong += bad
-    Console(width=150).print(table)
-    return 1 if wrong else 0
+    heads = ('noise of each', 'friction [N]', 'pressures', 'noise [%]', 'right kind [%]', 'outlier [%]', 'flat', 'laws')
+    found = list(campaign(options.draws, options.workers))
+    tell([dict(zip(heads, texts, strict=True)) for texts, _ in found], as_json=options.json)
+    return 1 if any(bad for _, bad in found) else 0
 
 
 if __name__ == '__main__':

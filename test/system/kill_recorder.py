@@ -5,7 +5,6 @@ message in shared memory before it passes it to the recorder, so the messages lo
 """
 
 import argparse
-import json
 import mmap
 import random
 import signal
@@ -21,9 +20,8 @@ from itertools import count
 from math import sin
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 
 from seal_friction_ros.core.estimation.configuration import first_snapshot, snapshot_text
 from seal_friction_ros.core.estimation.messages import CONFIGURATION_TYPE, INPUTS, Input, encode, encode_text
@@ -160,13 +158,14 @@ def campaign(times: int, longest: float, parallel: int, split_size: int, seed: i
 
 def main() -> int:
     """Kill, recover, verify; print a table, or JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--times', type=int, default=20)
-    parser.add_argument('--longest', type=float, default=3.0, help='longest recording [s]')
-    parser.add_argument('--parallel', type=int, default=1)
-    parser.add_argument('--split-size', type=int, default=500_000, help='of the files of the bag [bytes]')
-    parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--json', action='store_true')
+    parser = parser_of(
+        __doc__,
+        times=(20, 'recordings'),
+        longest=(3.0, 'longest recording [s]'),
+        parallel=(1, 'recordings at a time'),
+        split_size=(500_000, 'of the files of the bag [bytes]'),
+        seed=(1, 'of the moments'),
+    )
     parser.add_argument('--record', nargs=3, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.record:
@@ -185,18 +184,8 @@ def main() -> int:
         'most files of a bag': max(outcome.files for outcome in outcomes),
     }
     good = all(outcome.good for outcome in outcomes)
-    if arguments.json:
-        print(json.dumps({**figures, 'good': good, 'bad': [asdict(o) for o in outcomes if not o.good]}))
-        return 0 if good else 1
-    table = Table(title=f'{len(outcomes)} recordings at 1 kHz, killed')
-    table.add_column('')
-    table.add_column('', justify='right')
-    for name, figure in figures.items():
-        table.add_row(Text(name), f'{figure:.3f}' if isinstance(figure, float) else str(figure))
-    Console().print(table)
-    for outcome in outcomes:
-        if not outcome.good:
-            print(outcome)
+    bad = [asdict(outcome) for outcome in outcomes if not outcome.good]
+    tell({**figures, 'good': good, 'bad': bad}, as_json=arguments.json)
     return 0 if good else 1
 
 

@@ -4,18 +4,14 @@ Plays each bag into a live estimator, both in processes of their own, and compar
 offline replay of the bag byte for byte. Exit code 1 if any differ or if the recording does not verify.
 """
 
-import argparse
-import json
 import shutil
 import sys
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from rich.console import Console
-from rich.table import Table
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from harness.processes import free_domain, play_live
 
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE
@@ -59,26 +55,22 @@ def estimates(bag: Path) -> list[bytes]:
 
 def main() -> int:
     """Play the bags; print a table, or JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser = parser_of(__doc__, times=(1, 'runs of each bag at each rate'))
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG')
     parser.add_argument('--rate', type=float, action='append', help='times the pace of the bag; 0: as fast as answered')
-    parser.add_argument('--times', type=int, default=1, help='runs of each bag at each rate')
-    parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
-    table, rows = Table('bag', 'rate', 'live', 'offline', 'result', title='Estimates live and offline'), []
+    rows = []
     for bag in arguments.bags:
         for rate in (arguments.rate or [1.0, 0.0]) * arguments.times:
             folder = Path(tempfile.mkdtemp())
             run = play(bag, rate, folder)
             counts = len(run.live), len(run.offline)
-            table.add_row(str(bag), f'{rate:g}', *map(str, counts), 'identical' if run.identical else f'see {folder}')
             rows.append({'bag': str(bag), 'rate': rate, 'estimates': counts, 'identical': run.identical})
             if run.identical:
                 shutil.rmtree(folder)
-    if arguments.json:
-        print(json.dumps(rows))
-    else:
-        Console().print(table)
+            else:
+                rows[-1]['kept'] = str(folder)
+    tell(rows, as_json=arguments.json, title='estimates live and offline')
     return int(not all(row['identical'] for row in rows))
 
 

@@ -4,10 +4,13 @@ The findings of the paper with their errors of time step and grid; with ``--infl
 each parameter that the paper does not give, 20 % down and up.
 """
 
-import argparse
 import dataclasses
-import json
+import sys
 from collections.abc import Sequence
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 
 from seal_friction_ros.core.lubrication.findings import Findings, error_of_levels, findings
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
@@ -127,35 +130,14 @@ def _changes(base: Findings, other: Findings) -> dict[str, float]:
 
 def main() -> None:
     """Compute; print the table, or JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--json', action='store_true', help='print JSON')
+    parser = parser_of(__doc__)
     parser.add_argument('--influence', action='store_true', help='influence of our own choices instead of the findings')
     parser.add_argument('--cases', nargs='+', default=SINGLE, help='names or paths of the case files')
     arguments = parser.parse_args()
     if arguments.influence:
-        _print_influence(influence(arguments.cases), as_json=arguments.json)
+        tell(influence(arguments.cases), as_json=arguments.json, title='relative changes for -20 %, +20 % of')
     else:
-        _print_findings(all_findings(arguments.cases), as_json=arguments.json)
-
-
-def _print_findings(found: list[Row], *, as_json: bool) -> None:
-    if as_json:
-        print(json.dumps([dataclasses.asdict(row) for row in found]))
-        return
-    print(f'{"case":26}{"finding":22}{"value":>12}{"step":>12}{"grid":>12}')
-    for row in found:
-        errors = ''.join(f'{"" if e is None else f"{e:.2g}":>12}' for e in (row.by_step, row.by_grid))
-        print(f'{row.case:26}{row.name:22}{row.value:12.4g}{errors}')
-
-
-def _print_influence(rows: dict[str, dict[str, list[float]]], *, as_json: bool) -> None:
-    if as_json:
-        print(json.dumps(rows))
-        return
-    print(f'{"changes in % for -20 %, +20 % of":34}' + ''.join(f'{name:>22}' for name in COMPARED))
-    for name, found in rows.items():
-        cells = (', '.join(f'{100.0 * c:+.2f}' for c in found.get(finding, ())) for finding in COMPARED)
-        print(f'{name:34}' + ''.join(f'{cell:>22}' for cell in cells))
+        tell([dataclasses.asdict(row) for row in all_findings(arguments.cases)], as_json=arguments.json)
 
 
 if __name__ == '__main__':

@@ -6,8 +6,6 @@ than 5 MB after the first minute (or the first third of a shorter run), if a han
 page gets fewer than 18 frames a second or no new rows.
 """
 
-import argparse
-import json
 import sys
 import tempfile
 import time
@@ -16,11 +14,10 @@ from typing import Any
 
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
-from rich.text import Text
 from soak import SETTLED, Look, look
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from harness.monitor_process import Reader, monitor
 from harness.moving_machine import machine
 from harness.processes import free_domain
@@ -32,8 +29,12 @@ FEWEST_FRAMES = 18.0  # [1/s] of 20
 def soak(minutes: float, look_every: float, folder: Path) -> dict[str, Any]:
     """Run, and look at the monitor every ``look_every`` [s]."""
     domain, looks = free_domain(), list[Look]()
-    with machine(folder, domain), monitor(domain) as (pid, url), Progress(console=Console(stderr=True)) as progress:
-        reader = Reader(url)
+    with (
+        machine(folder, domain),
+        monitor(domain) as watching,
+        Progress(console=Console(stderr=True)) as progress,
+    ):
+        reader = Reader(watching.url)
         end = time.monotonic() + 60.0
         while not reader.rows:
             if time.monotonic() > end:
@@ -43,7 +44,7 @@ def soak(minutes: float, look_every: float, folder: Path) -> dict[str, Any]:
         frames, rows = reader.frames, reader.rows
         while time.monotonic() < start + 60.0 * minutes:
             time.sleep(look_every)
-            looks.append(look(pid, start))
+            looks.append(look(watching.process.pid, start))
             progress.update(task, completed=time.monotonic() - start)
         seconds = time.monotonic() - start
         found = {
@@ -74,23 +75,16 @@ def violations(found: dict[str, Any]) -> list[str]:
 
 def main() -> int:
     """Run; print the figures and the limits exceeded."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--minutes', type=float, default=10.0)
-    parser.add_argument('--look', type=float, default=2.0, help='time between two looks at the process [s]')
-    parser.add_argument('--json', action='store_true')
+    parser = parser_of(__doc__, minutes=(10.0, 'of the run'), look=(2.0, 'time between two looks [s]'))
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = soak(arguments.minutes, arguments.look, Path(folder))
     wrong = violations(found)
-    if arguments.json:
-        print(json.dumps({**found, 'violations': wrong}))
-    else:
-        table = Table('figure', 'value', title=f'{arguments.minutes:g} minutes, three actuators at 1 kHz')
-        for key, value in found.items():
-            table.add_row(Text(key), str(value))
-        console = Console()
-        console.print(table)
-        console.print('\n'.join(wrong) or 'no leak')
+    tell(
+        {**found, 'violations': wrong},
+        as_json=arguments.json,
+        title=f'{arguments.minutes:g} minutes, three actuators at 1 kHz',
+    )
     return int(bool(wrong))
 
 

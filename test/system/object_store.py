@@ -8,7 +8,6 @@ store was asked for is counted in its log. Before that: ``pip install s3fs 'moto
 Exit code 1 if a claim does not hold.
 """
 
-import argparse
 import re
 import shutil
 import socket
@@ -21,10 +20,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from rich.console import Console
-from rich.table import Table
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from harness.compensation import compensating
 from harness.dask_cluster import ENVIRONMENT, dask_cluster, wait_for
 from harness.example_bags import write_recorded
@@ -199,15 +196,10 @@ def measured_claims(folder: Path, bags: int) -> list[Claim]:
 
 def main() -> int:
     """Try every claim; print a table."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--bags', type=int, default=4, help='number of recordings')
-    arguments = parser.parse_args()
+    arguments = parser_of(__doc__, bags=(4, 'number of recordings')).parse_args()
     with tempfile.TemporaryDirectory() as name:
         claims = measured_claims(Path(name), arguments.bags)
-    table = Table('claim', 'measured', 'holds')
-    for claim in claims:
-        table.add_row(claim.text, claim.measured, 'yes' if claim.holds else 'NO')
-    Console(width=140).print(table)
+    tell([claim._asdict() for claim in claims], as_json=arguments.json)
     return 0 if all(claim.holds for claim in claims) else 1
 
 

@@ -13,20 +13,16 @@ Tables, all of them by default:
 - ``friction``: friction of one seal from geometry alone against the measured one, thesis's seals and Delft O-ring.
 """
 
-import argparse
 import dataclasses
-import json
 import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell_tables
 from harness.hertz import cylinder_between_plates
 from harness.squeezed_cylinder import force_per_length
 
@@ -253,37 +249,15 @@ TABLES: dict[str, Callable[[Sequence[int]], Rows]] = {
 
 def main() -> int:
     """Compute the requested tables; print each, or all of them as one JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser = parser_of(__doc__)
     parser.add_argument('tables', nargs='*', metavar='TABLE', help=', '.join(TABLES))
-    parser.add_argument('--json', action='store_true')
     parser.add_argument('--lines', type=int, nargs='+', default=LINES, help='meshes of the table ``lines``')
     arguments = parser.parse_args()
     unknown = [name for name in arguments.tables if name not in TABLES]
     if unknown:
         parser.error(f'there is no table {unknown[0]}: there are {", ".join(TABLES)}')
-    computed = {}
-    for name in arguments.tables or TABLES:
-        computed[name] = TABLES[name](arguments.lines)
-        if not arguments.json:
-            _print(name, computed[name])
-    if arguments.json:
-        print(json.dumps(computed))
+    tell_tables({name: TABLES[name](arguments.lines) for name in arguments.tables or TABLES}, as_json=arguments.json)
     return 0
-
-
-def _print(name: str, rows: Rows) -> None:
-    table = Table(title=name)
-    for heading in rows[0]:
-        table.add_column(Text(heading), justify='right')
-    for row in rows:
-        table.add_row(*(_text(value) for value in row.values()))
-    Console(width=180).print(table)
-
-
-def _text(value: float | str) -> str:
-    if isinstance(value, str):
-        return value
-    return f'{value:.6g}' if value >= 1e3 else f'{value:.4g}'
 
 
 if __name__ == '__main__':

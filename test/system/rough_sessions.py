@@ -6,8 +6,6 @@ and activation. One actuator and three, answers each and together. Required: the
 writes no traceback, every force it sends is finite, and every bag replays to the byte.
 """
 
-import argparse
-import json
 import math
 import random
 import sys
@@ -22,14 +20,13 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
-from rich.console import Console
-from rich.table import Table
 from seal_friction_msgs.msg import FrictionFeedForward
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from harness.compensation import LIVE
 from harness.machines import EXCAVATOR
 from harness.processes import free_domain, node_process
@@ -209,23 +206,14 @@ def session(case: Case, seed: int, moments: int, folder: Path) -> Outcome:
 
 def main() -> int:
     """Run the sessions; print a table, or JSON; 1 if a requirement does not hold."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--seeds', type=int, default=4, help='sessions of each case')
-    parser.add_argument('--moments', type=int, default=6000, help='of a session')
-    parser.add_argument('--json', action='store_true')
+    parser = parser_of(__doc__, seeds=(4, 'sessions of each case'), moments=(6000, 'of a session'))
     arguments = parser.parse_args()
     found: dict[str, Outcome] = {}
     for number, case in enumerate(CASES * arguments.seeds):
         with tempfile.TemporaryDirectory() as folder:
             name = f'{case.answers}, seed {number}'
             found[name] = session(case, number, arguments.moments, Path(folder))
-    if arguments.json:
-        print(json.dumps({name: outcome._asdict() for name, outcome in found.items()}))
-    else:
-        table = Table('session', *Outcome._fields)
-        for name, outcome in found.items():
-            table.add_row(name, *map(str, outcome))
-        Console(width=140).print(table)
+    tell({name: outcome._asdict() for name, outcome in found.items()}, as_json=arguments.json)
     return int(not all(outcome.is_good for outcome in found.values()))
 
 

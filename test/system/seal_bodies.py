@@ -11,21 +11,18 @@ Tables, all of them by default:
 - ``air``: air under 6 bar through the gap that opens at the edge of ``inner_seal_control_edge``.
 """
 
-import argparse
 import dataclasses
-import json
 import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.optimize import nnls
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness.blow_by import blow_by
+from harness.campaign import parser_of, tell_tables
 
 from seal_friction_ros.core.lubrication.contact import dry_contact
 from seal_friction_ros.core.lubrication.findings import findings
@@ -250,27 +247,14 @@ TABLES: dict[str, Callable[[LubricationNumerics], Rows]] = {
 
 def main() -> int:
     """Compute the requested tables; print each, or all of them as one JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser = parser_of(__doc__, cells=(226, 'of the film'), time_step=(5e-4, 'of the runs [s]'))
     parser.add_argument('tables', nargs='*', metavar='TABLE', help=', '.join(TABLES))
-    parser.add_argument('--json', action='store_true')
-    parser.add_argument('--cells', type=int, default=226, help='cells of the film')
-    parser.add_argument('--time-step', type=float, default=5e-4, metavar='S', help='of the runs')
     arguments = parser.parse_args()
     unknown = [name for name in arguments.tables if name not in TABLES]
     if unknown:
         parser.error(f'there is no table {unknown[0]}: there are {", ".join(TABLES)}')
     numerics = LubricationNumerics(cells=arguments.cells, time_step=arguments.time_step)
-    computed = {name: TABLES[name](numerics) for name in arguments.tables or TABLES}
-    if arguments.json:
-        print(json.dumps(computed))
-        return 0
-    for name, rows in computed.items():
-        table = Table(title=name)
-        for heading in rows[0]:
-            table.add_column(heading, justify='right')
-        for row in rows:
-            table.add_row(*(value if isinstance(value, str) else f'{value:.4g}' for value in row.values()))
-        Console(width=160).print(table)
+    tell_tables({name: TABLES[name](numerics) for name in arguments.tables or TABLES}, as_json=arguments.json)
     return 0
 
 

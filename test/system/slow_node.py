@@ -5,7 +5,6 @@ feed-forward while SIGSTOP and SIGCONT leave it a share of a processor, then all
 feed-forward is at most `WORST` times that without, at any share, and good again within `RECOVERY` after the load.
 """
 
-import argparse
 import json
 import signal
 import subprocess
@@ -18,11 +17,9 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from rich.console import Console
-from rich.table import Table
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness import hydraulic_axis
+from harness.campaign import parser_of, tell
 from harness.processes import free_domain, graph_environment, node_process
 
 SHARES = (1.0, 0.5, 0.33, 0.2, 0.1)
@@ -108,28 +105,21 @@ def run(share: float, scale: float) -> Found:
 
 def main() -> int:
     """Run all shares; print the table, or JSON; 1 if a requirement does not hold."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
+    parser = parser_of(__doc__)
     parser.add_argument('--shares', type=float, nargs='+', default=SHARES)
-    parser.add_argument('--json', action='store_true')
     arguments = parser.parse_args()
     without = run(1.0, 0.0).slow
     found = {share: run(share, 0.9) for share in arguments.shares}
     rows = {
-        share: {
+        f'{share:g}': {
             'with feed-forward [mm]': one.slow * 1e3,
-            'over that without [-]': one.slow / without,
+            'without [mm]': without * 1e3,
             'before [mm]': one.before * 1e3,
             'good again after [s]': one.recovery,
         }
         for share, one in found.items()
     }
-    if arguments.json:
-        print(json.dumps({'without [mm]': without * 1e3, 'shares': rows}))
-    else:
-        table = Table('share of a processor', *rows[arguments.shares[0]], title=f'without: {without * 1e3:.2f} mm')
-        for share, row in rows.items():
-            table.add_row(f'{share:g}', *(f'{value:.2f}' for value in row.values()))
-        Console().print(table)
+    tell(rows, as_json=arguments.json, title='shares of a processor')
     return int(any(one.slow > WORST * without or one.recovery > RECOVERY for one in found.values()))
 
 

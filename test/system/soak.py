@@ -6,8 +6,6 @@ grows by more than 1 MB after the first minute (or the first third of a shorter 
 left over, or if the number of lost samples is not the reported one.
 """
 
-import argparse
-import json
 import sys
 import tempfile
 import time
@@ -22,10 +20,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
-from rich.text import Text
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.campaign import parser_of, tell
 from harness.compensation import LIVE
 from harness.processes import free_domain, node_process
 from harness.spin_nodes import SpunNodes, ros_context
@@ -166,23 +163,16 @@ def violations(found: dict[str, Any]) -> list[str]:
 
 def main() -> int:
     """Run; print the figures and the limits exceeded."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
-    parser.add_argument('--minutes', type=float, default=30.0)
-    parser.add_argument('--look', type=float, default=2.0, help='time between two looks at the processes [s]')
-    parser.add_argument('--json', action='store_true')
+    parser = parser_of(__doc__, minutes=(30.0, 'of the run'), look=(2.0, 'time between two looks [s]'))
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = soak(arguments.minutes, arguments.look, Path(folder))
     wrong = violations(found)
-    if arguments.json:
-        print(json.dumps({**found, 'violations': wrong}))
-    else:
-        table = Table('figure', 'value', title=f'{arguments.minutes:g} minutes at 1 kHz with recording')
-        for key, value in found.items():
-            table.add_row(Text(key), str(value))
-        console = Console()
-        console.print(table)
-        console.print('\n'.join(wrong) or 'no leak; lost samples are those reported')
+    tell(
+        {**found, 'violations': wrong},
+        as_json=arguments.json,
+        title=f'{arguments.minutes:g} minutes, at 1 kHz with recording',
+    )
     return int(bool(wrong))
 
 

@@ -436,11 +436,11 @@ def switch_off(url: str) -> None:
 def bombed(place: Axis) -> TimeToZero:
     """OFF in the live view after a configuration that is made to break parsers."""
     publisher = place.listener.create_publisher(message_class(CONFIGURATION_TYPE), '/x/configuration', qos.LATCHED)
-    with monitor(place.domain) as (_, url):
+    with monitor(place.domain, '--allow-changes') as watching:
         publisher.publish(encode_text(BOMB))
         place.spin(1.0)
         start = time.monotonic_ns()
-        thread = threading.Thread(target=switch_off, args=(url,))
+        thread = threading.Thread(target=switch_off, args=(watching.url,))
         thread.start()
         found = place.time_to_zero(lambda: start)
         thread.join()

@@ -83,13 +83,13 @@ SEALS |= {
     'power': dataclasses.replace(
         ONE,
         coulomb_law=PressurePowerLaw(3.0, 0.4, 2.0 / 3.0),
+        velocity_terms=VelocityTerms(120.0, asymmetry=-0.2),
         stiction_ratio=0.3,
         force_sum_correction=ForceSumCorrection(3e-6, -2e-5, 4.0, contains_load=True),
         identified_motion=IdentifiedMotion(0.01, 0.03, (1,)),
     ),
     'constant': dataclasses.replace(ONE, coulomb_law=ConstantCoulomb(7.0)),
     'from_elsewhere': dataclasses.replace(ONE, coulomb_law=FromElsewhere(1.0)),
-    'viscous': dataclasses.replace(ONE, velocity_terms=VelocityTerms(120.0, asymmetry=-0.2)),
     'mapped': dataclasses.replace(
         ONE,
         coulomb_law=FrictionMap(
@@ -103,7 +103,7 @@ SEALS |= {
 }
 
 
-OTHERS = ('power', 'viscous', 'from_elsewhere', 'constant', 'mapped', 'stribeck', 'ms28775_114_prior_art')
+OTHERS = ('power', 'from_elsewhere', 'constant', 'mapped', 'stribeck', 'ms28775_114_prior_art')
 WARM = TemperatureScale(reference=310.0, coefficient=0.013, coefficient_std=0.001, lowest=290.0, highest=340.0)
 ELASTIC = Presliding(stiffness=2e5, yield_exponent=1.5)
 SEALS |= {name: dataclasses.replace(SEALS[name], temperature=WARM, presliding=ELASTIC) for name in OTHERS}

@@ -1,6 +1,7 @@
 """The next readings: what they break, how much they help, and that a simulation of them agrees."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -10,23 +11,6 @@ from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions, Variation, candidate_laws
 from seal_friction_ros.core.identification.experiment_design import (
     RUN_TO_RUN,
-    _broken_pair,
-    _condition,
-    _correlated_pair,
-    _correlation,
-    _disagreements,
-    _error,
-    _greedy,
-    _Information,
-    _Model,
-    _model,
-    _prior,
-    _range_points,
-    _readings_worth_one,
-    _relative_slopes,
-    _richest,
-    _scatter,
-    _without_offsets,
     design_experiment,
     laws_not_beaten,
     repeated_run,
@@ -35,10 +19,10 @@ from seal_friction_ros.core.identification.fitting import LawFit, fit
 from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.runs import BetweenRuns, between_runs
 from seal_friction_ros.core.identification.selection import LawScore, score_laws, with_velocity_terms
-from seal_friction_ros.core.identification.validation import CrossValidation, cross_validate, jackknife_errors
+from seal_friction_ros.core.identification.validation import cross_validate, jackknife_errors
 
 BASE = next(law for law in candidate_laws(Variation()) if law.name == 'pressure_power_law_2_3')
-VISCOUS = with_velocity_terms(BASE, Variation())[0]
+VISCOUS, *_, ASYMMETRIC = with_velocity_terms(BASE, Variation())
 TRUE = {'friction_at_no_pressure': 5.0, 'friction_at_one_bar': 1.0, 'pressure_exponent': 2.0 / 3.0,
         'viscous_friction': 120.0}  # fmt: skip
 SCATTER = 0.03
@@ -249,111 +233,131 @@ def test_a_repeated_run_takes_ten_of_the_pressures_each_at_its_middle_speed():
     assert {reading.speed for reading in repeated} == {0.02}
 
 
-# --- information ---
+# --- the criterion, as the documentation of `design_experiment` states it ---
 
 
-def test_information_with_an_unknown_offset_is_the_inverse_of_the_covariance_of_the_parameters():
+def one_way(readings: FrictionReadings) -> FrictionReadings:
+    """The second log in one direction only: it has no offset."""
+    return readings.taken((readings.source == 0) | (readings.at.direction > 0.0))
+
+
+def two_logs() -> FrictionReadings:
     rng = np.random.default_rng(3)
-    rows, offsets = rng.normal(size=(9, 2)), rng.normal(size=9)
-    found = _Information(np.zeros((2, 2)), np.zeros(2), 0.0)
-    assert found.matrix.tolist() == np.zeros((2, 2)).tolist()
-    found = found.plus(rows[:4], offsets[:4]).plus(rows[4:], offsets[4:])
-    everything = np.column_stack((rows, offsets))
-    covariance = np.linalg.inv(everything.T @ everything)[:2, :2]
-    assert np.linalg.inv(found.matrix) == pytest.approx(covariance)
-    without = _Information(np.zeros((2, 2)), np.zeros(2), 0.0).plus(rows, np.zeros(9))
-    assert without.matrix == pytest.approx(rows.T @ rows)
+    return joined(collinear(rng), measured(np.linspace(5.0, 60.0, 10) * BAR, np.full(10, 0.02), rng, 1, -0.7))
 
 
-def test_the_error_is_the_root_mean_square_of_the_standard_errors():
-    slopes = np.array([[1.0, 0.0], [0.0, 3.0]])
-    assert _error(slopes, np.diag([4.0, 16.0])) == pytest.approx(np.sqrt((1.0 / 4.0 + 9.0 / 16.0) / 2.0))
-    information = np.array([[4.0, 1.0], [1.0, 9.0]])
-    expected = [g @ np.linalg.inv(information) @ g for g in slopes]
-    assert _error(slopes, information) == pytest.approx(np.sqrt(np.mean(expected)))
+class Criterion:
+    """Standard error of a law over its range, by dense matrices with the offsets as parameters."""
+
+    def __init__(self, readings: FrictionReadings, score: LawScore, design) -> None:
+        self.law, self.readings = design.law, readings
+        self.fit = score.fit
+        self.scatter = self._scatter()
+        offsets = np.column_stack([readings.at.direction * (readings.source == n) for n in self._with_offset()])
+        self.had = without(self.slopes(readings.at) / readings.scale[:, None], offsets / readings.scale[:, None])
+        estimates = [self.law.friction(readings.at, self.law.named(v)) for v in score.validation.parameters]
+        jackknife = jackknife_errors(np.array(estimates) / readings.scale)
+        leverage = np.sum(np.linalg.qr(self.fit.jacobian)[0] ** 2, axis=1)
+        self.worth = max(float(np.mean(jackknife**2) / np.mean(self.scatter**2 * leverage)), 1.0)
+        self.range = self.conditions([(p, v) for p in np.linspace(*design.pressures, 5)
+                                      for v in np.linspace(*design.speeds, 5)])  # fmt: skip
+        strongest = np.abs(self.slopes(self.range)).max(axis=0) / self.fit.friction(readings.at).mean()
+        self.known = self.had / (self.worth * self.scatter**2) + np.diag(strongest**2)
+
+    def _with_offset(self) -> list[int]:
+        readings = self.readings
+        return [n for n in np.unique(readings.source) if len(set(readings.at.direction[readings.source == n])) == 2]
+
+    def _scatter(self) -> float:
+        r = self.readings
+        deviation = (r.magnitudes(self.fit.offsets) - self.fit.friction(r.at)) / r.scale
+        return float(np.sqrt(np.sum(deviation**2) / (r.count - len(self.law.parameters) - len(self._with_offset()))))
+
+    def conditions(self, points) -> OperatingConditions:
+        pressure, speed = np.repeat(np.array(points), 2, axis=0).T
+        direction = np.tile([-1.0, 1.0], len(points))
+        return OperatingConditions(np.repeat(pressure[:, None], 2, axis=1), None, direction * speed, direction)
+
+    def slopes(self, at) -> np.ndarray:
+        """The law is linear in its parameters."""
+        values = self.fit.values
+        base = self.law.friction(at, values)
+        names = [parameter.name for parameter in self.law.parameters]
+        return np.column_stack([2.0 * (self.law.friction(at, values | {n: values[n] + 0.5}) - base) for n in names])
+
+    def information(self, points=()) -> np.ndarray:
+        """With proposed readings, which are one log with an offset."""
+        if not points:
+            return self.known
+        at = self.conditions(points)
+        friction = self.law.friction(at, self.fit.values).reshape(-1, 2).mean(axis=1)  # of both directions
+        weight = np.repeat(friction, 2)
+        if self.readings.are_samples:
+            weight = np.full(len(weight), self.readings.scale[0])
+        weight = weight[:, None] * self.scatter
+        return self.known + without(self.slopes(at) / weight, at.direction[:, None] / weight)
+
+    def error(self, points=()) -> float:
+        slopes = self.slopes(self.range) / self.law.friction(self.range, self.fit.values)[:, None]
+        return float(np.sqrt(np.mean(np.sum(slopes @ np.linalg.inv(self.information(points)) * slopes, axis=1))))
+
+    def correlation(self, one: str, other: str, points=()) -> float:
+        names = [parameter.name for parameter in self.law.parameters]
+        covariance = np.linalg.inv(self.information(points))
+        i, j = names.index(one), names.index(other)
+        return float(covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j]))
 
 
-def tied(r, other=0.0):
-    """Information on three parameters of unlike size; the correlation of the first two is -r, of the last two 0."""
-    size = np.diag([1.0, 10.0, 0.1])
-    return size @ np.array([[1.0, r, 0.0], [r, 1.0, other], [0.0, other, 1.0]]) @ size
+def without(rows, offsets) -> np.ndarray:
+    """Information on the parameters where the offsets are unknown: that of the residuals of a regression on them."""
+    left = rows - offsets @ np.linalg.lstsq(offsets, rows, rcond=None)[0]
+    return left.T @ left
 
 
-def test_the_pair_is_that_whose_correlation_falls_most():
-    assert _correlation(tied(0.9))[0, 1] == pytest.approx(-0.9)
-    assert np.diag(_correlation(tied(0.9, 0.1))) == pytest.approx(np.ones(3))
-    assert _broken_pair(tied(0.9), tied(0.1)) == (0, 1)
-    assert _broken_pair(tied(0.1, 0.9), tied(0.3, 0.1)) == (1, 2)
-    assert _broken_pair(tied(0.5, 0.8), tied(0.0, 0.75)) == (0, 1)
-    assert _broken_pair(np.eye(1), np.eye(1)) is None
-    before, after = _correlated_pair(('a', 'b', 'c'), tied(0.9), tied(0.1))
-    assert (before, after) == (('a', 'b', pytest.approx(-0.9)), ('a', 'b', pytest.approx(-0.1)))
-    assert _correlated_pair(('a',), np.eye(1), np.eye(1)) == [None, None]
+def condition(information) -> float:
+    """Condition number of the columns with unit length."""
+    size = np.sqrt(np.diag(information))
+    return float(np.sqrt(np.linalg.cond(information / np.outer(size, size))))
 
 
-def test_the_condition_number_is_that_of_columns_of_unit_length():
-    rng = np.random.default_rng(5)
-    jacobian = rng.normal(size=(9, 3)) * [1.0, 1e3, 1e-3]
-    unit = jacobian / np.linalg.norm(jacobian, axis=0)
-    assert _condition(jacobian.T @ jacobian) == pytest.approx(np.linalg.cond(unit))
-    assert _condition(np.diag([1.0, 0.0])) == np.inf
-    assert _condition(np.ones((2, 2))) == np.inf
-    near = 1.0 - 1e-13
-    assert _condition(np.array([[1.0, near], [near, 1.0]])) == pytest.approx(np.sqrt(2e13), rel=0.01)
-    nearer = 1.0 - 3e-15
-    assert _condition(np.array([[1.0, nearer], [nearer, 1.0]])) == np.inf
-
-
-# --- the law linearised ---
-
-KNOWN = TRUE | {'pressure_exponent': 2.0 / 3.0}
-
-
-def linearised(values=KNOWN, held_scale=float('nan'), mean=100.0, law=VISCOUS):
-    return _Model(law, values, np.full(len(law.parameters), 1e-4), 2, mean, held_scale)
-
-
-def test_slopes_of_the_friction_are_those_of_its_formula():
-    """Two seals: 2 f_0 + 2 F_1 (P / 1 bar)^(2/3) + 2 sigma v."""
-    at = linearised().conditions([(8.0 * BAR, 0.03), (27.0 * BAR, 0.05)])
-    assert at.pressure.tolist() == [[8.0 * BAR] * 2] * 2 + [[27.0 * BAR] * 2] * 2
-    assert at.direction.tolist() == [-1.0, 1.0] * 2
-    assert at.velocity.tolist() == [-0.03, 0.03, -0.05, 0.05]
-    names = [parameter.name for parameter in VISCOUS.parameters]
-    expected = {
-        'friction_at_no_pressure': [2.0] * 4, 'friction_at_one_bar': [8.0, 8.0, 18.0, 18.0],
-        'viscous_friction': [0.06, 0.06, 0.1, 0.1],
-    }  # fmt: skip
-    assert linearised().slopes(at) == pytest.approx(np.column_stack([expected[name] for name in names]), rel=1e-6)
-    at_bound = KNOWN | {p.name: p.upper for p in VISCOUS.parameters if p.name == 'friction_at_one_bar'}
-    assert linearised(at_bound).slopes(at)[:, names.index('friction_at_one_bar')] == pytest.approx(
-        [8.0, 8.0, 18.0, 18.0], rel=1e-3
-    )  # from inside
-    friction = np.array([10.0 + 8.0 + 7.2] * 2 + [10.0 + 18.0 + 12.0] * 2)
-    assert linearised().friction(at) == pytest.approx(friction)
-    assert linearised(mean=600.0).friction(at) == pytest.approx([30.0, 30.0, 40.0, 40.0])  # 5 % of the mean at least
-    assert linearised().scale(at) == pytest.approx(friction)
-    assert linearised(held_scale=70.0).scale(at).tolist() == [70.0] * 4
-    uneven = linearised(KNOWN | {'asymmetry': 0.25}, law=ASYMMETRIC)
-    out, back = uneven.friction(at)[:2][::-1]
-    assert out != pytest.approx(back, rel=0.1)
-    assert uneven.scale(at)[:2] == pytest.approx([(out + back) / 2.0] * 2)  # both directions have one divisor
-    grid = linearised().conditions(_range_points((8.0 * BAR, 27.0 * BAR), (0.03, 0.05)))
-    relative = linearised().slopes(grid) / linearised().friction(grid)[:, np.newaxis]
-    assert _relative_slopes(linearised(), (8.0 * BAR, 27.0 * BAR), (0.03, 0.05)) == pytest.approx(relative)
-
-
-def test_before_any_reading_each_parameter_changes_the_friction_by_all_of_it():
-    """Mean friction 100 N; the rise with 27 bar changes it by at most 18 N each unit."""
-    names = [parameter.name for parameter in VISCOUS.parameters]
-    found = _prior(linearised(), 0.0, 27.0 * BAR, (0.01, 0.05))
-    assert found == pytest.approx(np.diag(np.diag(found)))
-    strongest = {'friction_at_no_pressure': 2.0, 'friction_at_one_bar': 18.0, 'viscous_friction': 0.1}
-    assert np.diag(found) == pytest.approx([(strongest[name] / 100.0) ** 2 for name in names], rel=1e-5)
+@pytest.mark.parametrize(
+    ('readings', 'law'),
+    [
+        (collinear(np.random.default_rng(0)), VISCOUS),
+        (two_logs(), VISCOUS),
+        (two_logs(), ASYMMETRIC),  # only there the offset goes together with a parameter
+        (one_way(two_logs()), VISCOUS),
+        (replace(two_logs(), are_samples=True), VISCOUS),
+    ],
+    ids=['one log', 'two logs', 'asymmetric', 'one of them one way', 'samples'],
+)
+def test_each_proposed_reading_is_that_which_reduces_the_error_most(readings, law):
+    scores = score_laws([law], readings)
+    design = design_experiment(scores, readings, NO_RUNS, 0.0, 3)
+    expected = Criterion(readings, scores[0], design)
+    grid = [(r.pressure, r.speed) for r in design_experiment(scores, readings, NO_RUNS, 0.0, 99).readings]
+    chosen = [(r.pressure, r.speed) for r in design.readings]
+    assert design.error_before == pytest.approx(expected.error(), rel=1e-4)
+    assert design.parts['scatter'] == pytest.approx(expected.scatter)
+    for count, reading in enumerate(design.readings):
+        errors = {point: expected.error([*chosen[:count], point]) for point in grid if point not in chosen[:count]}
+        assert errors[chosen[count]] == pytest.approx(min(errors.values()), rel=1e-5)
+        assert reading.shrink == pytest.approx(errors[chosen[count]] / expected.error(), rel=1e-4)
+    before, after = design.correlation_before, design.correlation_after
+    assert before.correlation == pytest.approx(expected.correlation(before.one, before.other), rel=1e-3)
+    assert after.correlation == pytest.approx(expected.correlation(before.one, before.other, chosen), rel=1e-3)
+    falls = {  # of the variance inflation 1 / (1 - r^2)
+        pair: (1.0 - expected.correlation(*pair, chosen) ** 2) / (1.0 - expected.correlation(*pair) ** 2)
+        for pair in combinations([parameter.name for parameter in design.law.parameters], 2)
+    }
+    assert max(falls, key=falls.get) == (before.one, before.other)
+    had = expected.had / (expected.worth * expected.scatter**2)
+    new = expected.information(chosen) - expected.known
+    assert design.condition_before == pytest.approx(condition(had), rel=1e-3)
+    assert design.condition_after == pytest.approx(condition(had + new), rel=1e-3)
 
 
 CONSTANT = next(law for law in candidate_laws(Variation()) if law.name == 'constant_coulomb')
-ASYMMETRIC = with_velocity_terms(BASE, Variation())[-1]
 LEVEL = 'coulomb_friction_at_any_pressure'
 
 
@@ -369,74 +373,31 @@ def constant(off, n=8):
 
 
 def test_scatter_is_the_standard_deviation_about_the_law_less_what_is_fitted_and_a_hundredth_at_least():
-    readings, score = constant(0.06)
-    assert _scatter(score, readings) == pytest.approx(0.06 * np.sqrt(8.0 / 6.0))  # one parameter and one offset
-    readings, score = constant(0.001)
-    assert _scatter(score, readings) == 0.01
-
-
-def test_readings_are_worth_as_many_independent_ones_as_the_jackknife_says():
-    readings, score = constant(0.06)
-    assert _readings_worth_one(score, readings, 0.06) == 1.0  # there is no jackknife
-    estimates = np.array([[9.0], [10.0], [11.0], [10.0]])
-    validation = CrossValidation(np.zeros(8), np.zeros(8), np.ones(4), estimates)
-    # Of two seals 2 N out of 20 N: jackknife variance 3/4 * 2 * 0.1^2; of 8 independent readings 0.06^2 / 8 each.
-    expected = 0.75 * 2.0 * 0.1**2 / (0.06**2 / 8.0)
-    assert _readings_worth_one(replace(score, validation=validation), readings, 0.06) == pytest.approx(expected)
-    same = replace(validation, parameters=np.full((4, 1), 10.0))
-    assert _readings_worth_one(replace(score, validation=same), readings, 0.06) == 1.0
-
-
-def test_without_offsets_the_derivatives_are_those_of_a_fit_with_an_offset():
-    rng = np.random.default_rng(2)
-    readings = measured(np.linspace(5.0, 60.0, 6) * BAR, np.full(6, 0.02), rng)
-    slopes = rng.normal(size=(12, 2))
-    rows, column = slopes / readings.scale[:, np.newaxis], readings.at.direction / readings.scale
-    expected = rows - np.outer(column, column @ rows) / (column @ column)
-    assert _without_offsets(slopes, readings) == pytest.approx(expected)
-    one_way = readings.taken(readings.at.direction > 0.0)
-    part = slopes[readings.at.direction > 0.0]
-    assert _without_offsets(part, one_way) == pytest.approx(part / one_way.scale[:, np.newaxis])
+    for off, expected in ((0.06, 0.06 * np.sqrt(8.0 / 6.0)), (0.001, 0.01)):  # one parameter and one offset
+        readings, score = constant(off)
+        found = design_experiment([score], readings, NO_RUNS, 0.0, 0)
+        assert found.parts['scatter'] == pytest.approx(expected)
 
 
 def test_a_law_gets_the_viscous_friction_and_the_friction_at_no_pressure_that_were_not_told():
     readings = measured(np.array([30.0, 30.0]) * BAR, np.full(2, 0.02), np.random.default_rng(0), scatter=0.0)
     (prior,) = candidate_laws(Variation(pressures=1))
     values = {'friction_at_one_bar': 1.5, 'pressure_exponent': 2.0 / 3.0, 'friction_at_no_pressure': 0.0}
-    score = LawScore(prior, LawFit(prior, values, np.zeros(1), np.ones((4, 1))))
-    found = _model(score, readings, readings.at)
-    names = [p.name for p in found.law.parameters]
-    assert names == ['friction_at_no_pressure', 'friction_at_one_bar', 'viscous_friction']
-    assert [found.values[name] for name in names] == [0.0, 1.5, 0.0]
-    friction = 2.0 * 1.5 * 30.0 ** (2.0 / 3.0)
-    assert (found.mean, found.seals) == (pytest.approx(friction), 2)
-    typical = readings.at.typical(friction / 2.0)
-    starts = [p.start(typical) for p in found.law.parameters]
-    assert found.steps == pytest.approx([1e-7 * abs(starts[0]), 1.5e-4, 1e-7 * abs(starts[2])])
-    assert np.isnan(found.held_scale)
-    swept = replace(readings, are_samples=True)
-    assert _model(score, swept, swept.at).held_scale == pytest.approx(np.abs(readings.force).mean())
-    full = LawScore(VISCOUS, LawFit(VISCOUS, KNOWN, np.zeros(1), np.ones((4, 3))))
-    same = _model(full, readings, readings.at)
-    assert same.law is VISCOUS
-    assert same.values == KNOWN
+    score = LawScore(prior, LawFit(prior, values, np.zeros(1), np.ones((4, 1))), losses=np.ones(4))
+    found = design_experiment([score], readings, NO_RUNS, 0.0, 1).law
+    assert [p.name for p in found.parameters] == ['friction_at_no_pressure', 'friction_at_one_bar', 'viscous_friction']
 
 
 def test_laws_disagree_by_their_largest_difference_over_their_mean():
-    def of(level):
-        return LawScore(CONSTANT, LawFit(CONSTANT, {LEVEL: level}, np.zeros(1), np.ones((4, 1))))
-
-    points = [(1e6, 0.02), (2e6, 0.02)]
-    assert _disagreements([of(10.0), of(11.0), of(15.0)], linearised(), points) == pytest.approx([5.0 / 12.0] * 2)
-    assert _disagreements([of(10.0), of(15.0)], linearised(mean=1000.0), points) == pytest.approx([10.0 / 50.0] * 2)
-    uneven = LawScore(ASYMMETRIC, LawFit(ASYMMETRIC, KNOWN | {'asymmetry': 0.25, 'viscous_friction': 0.0},
-                                         np.zeros(1), np.ones((4, 1))))  # fmt: skip
-    same = LawScore(BASE, LawFit(BASE, KNOWN, np.zeros(1), np.ones((4, 1))))
-    (one,) = _disagreements([uneven, same], linearised(), points[:1])
-    at = linearised().conditions(points[:1])
-    both = np.array([uneven.fit.friction(at), same.fit.friction(at)])
-    assert one == pytest.approx((np.ptp(both, axis=0) / both.mean(axis=0)).max())
-    assert _disagreements([of(10.0)], linearised(), []) == []
+    readings, _ = constant(0.06)
+    scores = [
+        LawScore(CONSTANT, LawFit(CONSTANT, {LEVEL: level}, np.zeros(1), np.ones((8, 1))), losses=np.ones(4))
+        for level in (10.0, 11.0, 15.0)
+    ]
+    found = design_experiment(scores, readings, NO_RUNS, 0.0, 2)
+    assert [reading.disagreement for reading in found.readings] == pytest.approx([5.0 / 12.0] * 2)
+    alone = design_experiment(scores[:1], readings, NO_RUNS, 0.0, 2)
+    assert [reading.disagreement for reading in alone.readings] == [0.0, 0.0]
 
 
 def scored(law, losses, condition=1.0, **values):
@@ -445,17 +406,20 @@ def scored(law, losses, condition=1.0, **values):
     return LawScore(law, LawFit(law, inside, np.zeros(1), jacobian), losses=np.asarray(losses, float))
 
 
+def designed_for(scores):
+    return design_experiment(scores, held(), NO_RUNS, 0.0, 1).law
+
+
 def test_the_richest_law_that_is_not_beaten_and_not_at_its_bound_is_designed_for():
     even = np.ones(4)
     scores = [scored(CONSTANT, 1.3 * even), scored(BASE, 1.05 * even), scored(VISCOUS, even)]
     near = laws_not_beaten([LawScore(CONSTANT, why_not='too few'), *scores])
     assert near == scores[1:]
-    assert _richest(near) is scores[2]
+    assert designed_for(near) is VISCOUS
     at_bound = scored(VISCOUS, even, friction_at_one_bar=VISCOUS.parameters[1].upper)
-    assert _richest([scores[1], at_bound]) is scores[1]
-    assert _richest([at_bound]) is at_bound
-    other = scored(VISCOUS, 0.9 * even)
-    assert _richest([scores[2], other]) is other
+    constant_law = scored(CONSTANT, 1.05 * even)
+    assert designed_for([constant_law, at_bound]).name == 'coulomb_viscous'
+    assert designed_for([at_bound]) is VISCOUS
     without_effect = scored(VISCOUS, even, condition=0.0)
     assert laws_not_beaten([scores[1], without_effect]) == [scores[1]]
     assert laws_not_beaten([without_effect]) == [without_effect]
@@ -463,38 +427,6 @@ def test_the_richest_law_that_is_not_beaten_and_not_at_its_bound_is_designed_for
     assert laws_not_beaten([wild, scores[2]]) == [scores[2]]
     with pytest.raises(ValueError, match='no law was fitted'):
         laws_not_beaten([LawScore(CONSTANT, why_not='too few')])
-
-
-# --- the design ---
-
-
-def test_the_points_that_come_first_are_taken_in_turn_and_then_the_best_of_the_grid():
-    model = linearised()
-    slopes = _relative_slopes(model, (0.0, 27.0 * BAR), (0.01, 0.05))
-    prior = _prior(model, 0.0, 27.0 * BAR, (0.01, 0.05))
-    first, grid = [(8.0 * BAR, 0.02)], [(0.0, 0.01), (27.0 * BAR, 0.05), (27.0 * BAR, 0.01)]
-    points, errors, information = _greedy(model, slopes, prior, 0.05, first, grid, 2)
-    assert points[0] == first[0]
-    assert len(points) == 3
-    assert len(set(points)) == 3
-
-    def error(chosen):
-        at = model.conditions(chosen)
-        weight = 0.05 * model.friction(at)
-        rows = np.column_stack((model.slopes(at), at.direction)) / weight[:, np.newaxis]
-        full = rows.T @ rows
-        matrix = full[:3, :3] - np.outer(full[:3, 3], full[3, :3]) / full[3, 3]
-        return _error(slopes, prior + matrix), matrix
-
-    for count in (1, 2, 3):
-        assert errors[count - 1] == pytest.approx(error(points[:count])[0])
-    second = min(grid, key=lambda point: error([*first, point])[0])
-    assert points[1] == second
-    third = min((point for point in grid if point != second), key=lambda point: error([*first, second, point])[0])
-    assert points[2] == third
-    assert information == pytest.approx(error(points)[1])
-    assert len(_greedy(model, slopes, prior, 0.05, first, grid, 9)[0]) == 4
-    assert _greedy(model, slopes, prior, 0.05, [], [], 9)[:2] == ([], [])
 
 
 def test_a_design_says_what_it_is_for(designed):

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from seal_friction_ros.core.identification.prepare_readings import (
-    _swept,
-    _travel,
     prepare_logs,
     prepare_manual_readings,
 )
@@ -156,8 +154,16 @@ def test_a_swept_log_gives_samples_in_ten_blocks_and_too_few_are_refused():
 
 
 def test_the_way_of_the_rod_counts_no_pause_and_no_missing_velocity():
-    signals = Signals(np.array([0.0, 1.0, 1.25, 1.5, 4.0]), np.array([9.0, 1.0, -2.0, np.nan, 3.0]), *np.zeros((3, 5)))
-    assert _travel(signals).tolist() == [0.0, 0.5, 1.0, 1.0, 2.5]  # after a pause half a second
+    made = log((5, 15, 30))
+
+    def way(**changes):
+        return prepare_logs([made._replace(signals=made.signals._replace(**changes))], ('a',)).readings.travel[-1]
+
+    time, velocity = made.signals.time.copy(), made.signals.velocity.copy()
+    time[120:] += 10.0  # in the first stroke; after a pause half a second counts
+    velocity[120] = np.nan
+    assert way(time=time) - way() == pytest.approx(0.03 * (0.5 - 0.01))
+    assert way(velocity=velocity) - way() == pytest.approx(-0.03 * 0.01)
 
 
 def test_strokes_of_one_log_at_one_pressure_have_four_parts():
@@ -197,9 +203,9 @@ def test_samples_are_counted_once_by_the_first_reason():
 
 
 def even_log(name, count, bar=20.0, warm=True):
-    """Even sliding throughout, half of it each way, at pressures that rise."""
-    k = np.arange(count)
-    velocity = np.where(k < count // 2, 0.03, -0.03)
+    """Even sliding of ``count`` samples, half of them each way with two at the turn, at pressures that rise."""
+    k = np.arange(count + 2)
+    velocity = np.where(k < count // 2 + 1, 0.03, -0.03)
     pressure = (1.0 + bar * k / count) * BAR
     force = np.sign(velocity) * (FRICTION + pressure / BAR) + OFFSET
     signals = Signals(k / RATE, velocity, pressure, pressure, force)
@@ -207,23 +213,22 @@ def even_log(name, count, bar=20.0, warm=True):
 
 
 def test_of_long_sweeps_every_nth_sample_is_taken_but_200_of_each():
-    logs = [even_log('long', 9000), even_log('short', 300)]
-    even = [np.ones(9000, bool), np.ones(300, bool)]
-    readings, chambers = _swept(logs, even, ('a',))
+    def readings_of(**counts):
+        return prepare_logs([even_log(name, count) for name, count in counts.items()], ('a',)).readings
+
+    readings = readings_of(long=9000, short=300)
     assert np.bincount(readings.source).tolist() == [3000, 300]  # of 9300 every third, so that it is 4000 at most
-    assert readings.force[:2].tolist() == logs[0].signals.force_sum[[0, 3]].tolist()
-    assert chambers.shape == (3300, 2)
+    assert readings.force[:2].tolist() == even_log('long', 9000).signals.force_sum[[0, 3]].tolist()
     assert readings.temperature.tolist() == [300.0] * 3300
     assert readings.at.direction.tolist() == np.sign(readings.at.velocity).tolist()
-    longer = _swept([even_log('long', 9000), even_log('short', 599)], [even[0], np.ones(599, bool)], ('a',))[0]
-    assert np.bincount(longer.source).tolist() == [3000, 300]  # every second: of 599 every third are 200 at least
-    assert len(_swept([even_log('cold', 4000, warm=False)], [np.ones(4000, bool)], ('a',))[0].temperature) == 0
-    assert _swept([even_log('all', 4000)], [np.ones(4000, bool)], ('a',))[0].count == 4000
-    enough = _swept([even_log('few', 200)], [np.ones(200, bool)], ('a',))[0]
+    assert np.bincount(readings_of(long=9000, short=599).source).tolist() == [3000, 300]  # every second: 200 at least
+    assert len(prepare_logs([even_log('cold', 4000, warm=False)], ('a',)).readings.temperature) == 0
+    assert readings_of(all=4000).count == 4000
+    enough = readings_of(few=200)
     assert [np.count_nonzero(group) for group in enough.groups] == [20] * 10
     assert [np.count_nonzero(level) for level in enough.levels.values()] == [20] * 10
     with pytest.raises(ValueError, match='few: 199 samples of even sliding, 200 are needed'):
-        _swept([even_log('all', 400), even_log('few', 199)], [np.ones(400, bool), np.ones(199, bool)], ('a',))
+        readings_of(all=400, few=199)
 
 
 @pytest.mark.parametrize(('longer', 'held'), [(1.4, True), (1.6, False)])

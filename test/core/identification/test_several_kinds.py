@@ -11,12 +11,8 @@ from seal_friction_ros.core.identification.readings import FrictionReadings
 from seal_friction_ros.core.identification.several_kinds import (
     KindsRung,
     SealKind,
-    _fit,
-    _left_out,
-    _multiple_correlation,
     _rivals,
     _rows,
-    _rungs,
     advice,
     fit_kinds,
     kinds_readings,
@@ -245,16 +241,15 @@ def test_where_the_laws_disagree_is_proposed_with_the_largest_disagreement_first
 
 
 def test_what_is_tried_follows_what_was_varied():
-    def kinds_of(**changes):
-        rungs = _rungs(cylinder(**changes))
-        return {(rung.viscous, rung.areas) for rung in rungs}, len(rungs)
+    """81 pairs of exponents, without and with areas, and viscous friction where the speed varied."""
 
-    everything = {(viscous, areas) for viscous in (False, True) for areas in (False, True)}
-    assert kinds_of() == (everything, 4 * 9**2)
-    assert kinds_of(speeds=(0.02, 0.029))[0] == {(False, False), (False, True)}
-    assert kinds_of(speeds=(0.02, 0.031))[0] == everything
-    assert kinds_of(pairs=[(30.0, 30.0), (30.4, 30.4)])[0] == {(False, False), (True, False)}
-    assert kinds_of(kinds=(ROD, PISTON, SealKind('other rod seal', ('b',))))[1] == 4 * 4**3
+    def tried(**changes):
+        return fit_kinds(cylinder(**changes), 1e9).tried
+
+    assert tried() == 4 * 9**2
+    assert tried(speeds=(0.02, 0.029)) == 2 * 9**2
+    assert tried(speeds=(0.02, 0.031)) == 4 * 9**2
+    assert tried(kinds=(ROD, PISTON, SealKind('other rod seal', ('b',)))) == 4 * 4**3
 
 
 # --- parts of the fit ---
@@ -276,26 +271,20 @@ RUNG = KindsRung((0.85, 1.0), viscous=True, areas=True)
 
 def test_each_log_has_its_own_offset_also_if_it_was_left_out():
     data = other_source(cylinder(), -30.0)
-    rows = _rows(data)
-    gram = rows.matrix.T @ rows.matrix
-    found = _fit(data, rows, gram, RUNG)
+    result = fit_kinds(data)
+    found = result.fit
+    assert found.rung == RUNG
     assert found.offsets == pytest.approx([OFFSET, -30.0])
     assert found.rises == pytest.approx([0.5, 1.5])
     assert found.areas == pytest.approx(AREAS)
-    predicted, deviation, parameters = _left_out(rows, data.readings, RUNG, gram)
-    assert deviation == pytest.approx(np.zeros(72), abs=1e-5)
-    assert predicted == pytest.approx(found.frictions(data.readings.at).sum(axis=1))
-    scaled = parameters / rows.scale[rows.chosen(RUNG)[0]]
-    assert scaled == pytest.approx(np.tile([0.5, 1.5, CONSTANT, VISCOUS], (2, 1)))
+    assert result.deviation == pytest.approx(np.zeros(72), abs=1e-5)
+    assert result.predicted == pytest.approx(found.frictions(data.readings.at).sum(axis=1))
     # A log in one direction has none: its offset of -30 N is friction of it.
     forward = (data.readings.source == 0) | (data.readings.at.direction > 0.0)
     one_way = replace(data, readings=data.readings.taken(forward), chamber_pressures=data.chamber_pressures[forward])
-    rows = _rows(one_way)
-    assert (rows.sources, rows.kinds) == (1, 2)
-    gram = rows.matrix.T @ rows.matrix
-    assert _fit(one_way, rows, gram, RUNG).offsets[1] == 0.0
-    deviation = _left_out(rows, one_way.readings, RUNG, gram)[1]
-    assert deviation[one_way.readings.source == 1] == pytest.approx(np.full(18, -30.0), rel=1e-4)
+    result = fit_kinds(one_way, 1e9)
+    assert result.fit.offsets[1] == 0.0
+    assert result.deviation[one_way.readings.source == 1].mean() == pytest.approx(-30.0, rel=0.15)
 
 
 def test_held_pressures_of_both_directions_of_a_log_are_one_condition():
@@ -351,11 +340,16 @@ def test_a_kind_is_poorly_told_apart_beyond_a_tenth_of_it_and_a_twentieth_of_all
 def test_a_pressure_is_held_if_it_changes_by_less_than_a_fiftieth_of_the_highest():
     x, z = np.array([-1.0, -1.0, 1.0, 1.0]), np.array([-1.0, 1.0, -1.0, 1.0])
     for std, held in ((0.0199, True), (0.0206, False)):  # of the highest, which is 1 + std
-        pressures = np.column_stack((1.0 + std * x, 1.0 + 0.5 * z))
-        assert (_multiple_correlation(pressures) == 1.0).all() == held
-    skew = np.column_stack((10.0 + x, 10.0 + 0.6 * x + 0.8 * z))
-    assert _multiple_correlation(skew) == pytest.approx([0.6, 0.6])
-    assert _multiple_correlation(np.column_stack((10.0 + x, 10.0 + z))) == pytest.approx([0.0, 0.0], abs=1e-6)
+        assert (moved_together(at_pressures(1.0 + std * x, 1.0 + 0.5 * z)) == 1.0).all() == held
+    assert moved_together(at_pressures(10.0 + x, 10.0 + 0.6 * x + 0.8 * z)) == pytest.approx([0.6, 0.6])
+    assert moved_together(at_pressures(10.0 + x, 10.0 + z)) == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def at_pressures(a, b):
+    """Four strokes with these pressures [bar] at one seal in each chamber."""
+    data = cylinder([(1, 1)], speeds=(0.02, 0.06), kinds=(SealKind('one', ('a',)), SealKind('other', ('b',))))
+    at = data.readings.at._replace(pressure=np.column_stack((a, b)) * BAR)
+    return replace(data, readings=replace(data.readings, at=at))
 
 
 def test_the_first_condition_is_that_which_parts_the_kinds_most():

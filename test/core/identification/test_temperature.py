@@ -11,17 +11,7 @@ from seal_friction_ros.core.foundation.normal_distribution import BAND_95
 from seal_friction_ros.core.friction.temperature import scale_at
 from seal_friction_ros.core.identification.candidate_laws import OperatingConditions
 from seal_friction_ros.core.identification.readings import FrictionReadings
-from seal_friction_ros.core.identification.temperature import (
-    _centred,
-    _left,
-    _line,
-    _means,
-    _numbered,
-    _others,
-    _runs,
-    at_reference,
-    fit_temperature,
-)
+from seal_friction_ros.core.identification.temperature import at_reference, fit_temperature
 
 BAR = 1e5
 
@@ -171,63 +161,73 @@ def test_readings_without_temperature_have_no_fit():
     assert fit_temperature(plain.taken(np.arange(0))) is None
 
 
-# --- parts of it ---
+# --- what the temperature is told from ---
 
 
-def test_from_four_runs_on_cells_reach_across_them_and_else_a_run_has_eight_parts():
-    four, three = readings((290.0, 300.0, 310.0, 320.0), strokes=2), readings((290.0, 300.0, 310.0), strokes=8)
-    run, part, across = _runs(four)
-    assert across
-    assert run.tolist() == part.tolist() == four.source.tolist()
-    run, part, across = _runs(three)
-    assert not across
-    assert run.tolist() == three.source.tolist()
-    assert part.tolist() == [i // 3 for i in range(72)]  # 24 strokes in eight parts, of three runs
-    by_test = replace(three, group=np.arange(72) // 18, left_out_by='test')
-    assert _runs(by_test)[2]
-    assert _runs(by_test)[0].tolist() == by_test.group.tolist()
-
-
-def test_what_else_varied_counts_from_2_percent_on_and_the_way_of_the_rod_within_a_run():
-    made = readings((290.0, 300.0), strokes=8)
-    cells = _numbered(made.level, made.at.direction.astype(int), made.source)
-    assert len(np.unique(cells)) == 12
-    alternating = np.where(np.arange(48) // 2 % 2 == 0, 1.0, -1.0)  # within each cell
-    for off, counts in ((0.019, 0), (0.021, 1)):
-        speed = 0.02 * (1.0 + off * alternating)
-        varied = replace(made, at=made.at._replace(velocity=made.at.direction * speed))
-        assert len(_others(varied, cells, across=True)) == counts
-        pressure = made.at.pressure.mean() * (1.0 + off * alternating)[:, np.newaxis] + 0.0 * made.at.pressure
-        pressed = replace(made, at=made.at._replace(pressure=pressure))
-        assert len(_others(pressed, cells, across=True)) == counts
-    unknown = replace(made, at=made.at._replace(velocity=np.full(48, np.nan)))
-    assert _others(unknown, cells, across=True) == []
-    columns = _others(made, cells, across=False)
-    assert len(columns) == 4
-    for source in (0, 1):
-        here = made.source == source
-        way, square = columns[2 * source : 2 * source + 2]
-        share = made.travel[here] / np.ptp(made.travel[here])
-        assert way[here] == pytest.approx(share)
-        assert square[here] == pytest.approx(share**2)
-        assert (way[~here] == 0.0).all()
-    assert _others(replace(made, travel=np.empty(0)), cells, across=False) == []
-
-
-def test_cells_and_other_columns_are_taken_off_as_by_a_regression_on_them():
+def drawn(sources: int) -> FrictionReadings:
+    """Readings at random temperatures, off the law by 2 %: alike out and back, so that the offset is 5 N."""
+    made = readings([300.0] * sources, noise=0.0)
     rng = np.random.default_rng(1)
-    cells, column, other = np.repeat([0, 1, 2], 5), rng.normal(size=15), rng.normal(size=15)
-    dummies = (cells[:, np.newaxis] == np.arange(3)).astype(float)
-    assert _centred(column, cells) == pytest.approx(column - dummies @ [column[cells == c].mean() for c in range(3)])
-    design = np.column_stack((dummies, other))
-    left = column - design @ np.linalg.lstsq(design, column, rcond=None)[0]
-    assert _left(column, cells, [other]) == pytest.approx(left)
-    assert _left(column, cells, [other, np.ones(15), 1e6 * other]) == pytest.approx(left)  # nothing new
-    assert _left(column, cells, []) == pytest.approx(_centred(column, cells))
-    assert _means(column, cells) == pytest.approx([column[cells == c].mean() for c in range(3)])
-    x, y = rng.normal(size=9), rng.normal(size=9)
-    line = stats.linregress(x, y)
-    assert _line(x, y) == pytest.approx((line.slope, line.stderr * stats.t.ppf(0.975, 7) / BAND_95))
+    warmth, off = (np.repeat(rng.normal(size=made.count // 2), 2) for _ in range(2))
+    kelvin = 300.0 + 10.0 * (warmth + rng.normal(size=sources)[made.source])
+    return replace(
+        made, temperature=kelvin, force=5.0 + np.exp(-0.012 * (kelvin - 300.0) + 0.02 * off) * (made.force - 5.0)
+    )
+
+
+def regressed(made, cells, part, others=()):
+    """Coefficient and its error by a line through the means of parts, less a regression on cells and other columns."""
+    design = np.column_stack((cells[:, np.newaxis] == np.unique(cells), *others))
+    columns = made.temperature, np.log(made.magnitudes(np.full(len(made.names), 5.0)))
+    left = [column - design @ np.linalg.lstsq(design, column, rcond=None)[0] for column in columns]
+    line = stats.linregress(*([column[part == one].mean() for one in np.unique(part)] for column in left))
+    error = line.stderr * stats.t.ppf(0.975, len(np.unique(part)) - 2) / BAND_95
+    return pytest.approx((-line.slope, error), rel=1e-6)
+
+
+def fitted(made):
+    found = fit_temperature(made)
+    return found.coefficient, found.error
+
+
+def cells_of(made):
+    return 2 * made.level + (made.at.direction > 0.0)
+
+
+def test_from_four_runs_on_pressures_are_compared_across_them():
+    made = drawn(4)
+    assert fitted(made) == regressed(made, cells_of(made), made.source)
+    tests = replace(drawn(3), group=np.arange(72) // 18, left_out_by='test')  # a file may hold several runs
+    assert fitted(tests) == regressed(tests, cells_of(tests), tests.group)
+
+
+def test_three_runs_are_told_by_eight_parts_of_each_without_the_way_of_the_rod():
+    made = drawn(3)
+    cells, part = cells_of(made) + 6 * made.source, np.arange(72) // 3
+    way = made.travel / np.ptp(made.travel)
+    ways = [np.where(made.source == run, way**power, 0.0) for run in range(3) for power in (1, 2)]
+    assert fitted(made) == regressed(made, cells, part, ways)
+    unknown = replace(made, travel=np.empty(0))
+    assert fitted(unknown) == regressed(made, cells, part)
+    assert fitted(made) != fitted(unknown)
+
+
+@pytest.mark.parametrize(('off', 'counts'), [(0.019, False), (0.021, True)])
+def test_pressure_and_speed_count_if_they_vary_by_2_percent_within_a_level(off, counts):
+    made = drawn(4)
+    cells = cells_of(made)
+    varying = np.repeat(np.random.default_rng(2).normal(size=made.count // 2), 2)
+    varying -= np.array([varying[cells == cell].mean() for cell in cells])
+    varying = 1.0 + off * varying / varying.std()
+    varied = made.at._replace(velocity=made.at.velocity * varying)
+    pressed = made.at._replace(pressure=made.at.pressure.mean() * varying[:, np.newaxis])
+    both = pressed._replace(velocity=varied.velocity)  # one column more says nothing new
+    expected = regressed(made, cells, made.source, [varying] if counts else [])
+    assert (fitted(made) == expected) is not counts
+    for at in (varied, pressed, both):
+        assert fitted(replace(made, at=at)) == expected
+    unknown = made.at._replace(velocity=np.full(made.count, np.nan))
+    assert fitted(replace(made, at=unknown)) == fitted(made)
 
 
 def test_the_samples_behind_the_readings_and_their_offset_go_to_the_reference_with_them():

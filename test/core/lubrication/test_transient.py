@@ -25,6 +25,7 @@ from seal_friction_ros.core.lubrication.lubrication_case import (
 from seal_friction_ros.core.lubrication.spool import SpoolSealMotion, superposed
 from seal_friction_ros.core.lubrication.study import study_table
 from seal_friction_ros.core.lubrication.transient import (
+    SealForces,
     StepBefore,
     TransientResult,
     initial_state,
@@ -177,19 +178,7 @@ def test_starved_seal_goes_to_the_left_as_it_goes_to_the_right():
     assert there.sum() == pytest.approx(mirrored.sum(), rel=1e-6)
 
 
-@pytest.mark.parametrize('direction', [1.0, -1.0])
-def test_velocity_at_the_end_of_a_step_is_that_of_an_even_acceleration(direction):
-    """0.4 m/s^2: 4 mm/s on average over 20 ms, then 11 mm/s over 15 ms and 14 mm/s at their end."""
-    start = initial_state(lubrication_model(INNER), 0.0)
-    after = start._replace(before=StepBefore(start.state.gap, start.creep, 20e-3, direction * 4e-3))
-    assert transient._velocity_at_end(after, direction * 11e-3, 15e-3) == pytest.approx(direction * 14e-3)
-    assert transient._velocity_at_end(after, -direction * 11e-3, 15e-3) == -direction * 11e-3  # turned round
-    fast = start._replace(before=StepBefore(start.state.gap, start.creep, 20e-3, direction * 0.4))
-    assert transient._velocity_at_end(fast, direction * 1e-3, 15e-3) == direction * 1e-3  # would turn round
-    assert transient._velocity_at_end(start, direction * 11e-3, 15e-3) == direction * 11e-3  # the first step
-
-
-def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge():
+def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge(monkeypatch):
     """Two roundings of 20 um before the chamfer from 0.3 to 0.4667 mm, and two after it."""
     model = lubrication_model(EDGE)
     loads = initial_state(model, -1e-3)
@@ -197,9 +186,19 @@ def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge()
     loaded = model.place[solid > 0.01 * solid.max()]
     before, after = 0.26e-3 - loaded[-1], 0.3e-3 + 60e-6 / 0.36 + 40e-6 - loaded[0]
 
-    def may(position, *positions, lag=0.0):
-        at = loads._replace(position=position, lag=lag)
-        return transient._may_be_one_step(model, at, list(positions))
+    def may(position, *positions, lag=0.0, case=EDGE):
+        """Whether a run takes two steps at once, from a position on that its first step reaches."""
+
+        def reached(_model, _moment, time, position):
+            return loads._replace(time=time, position=position, lag=lag), SealForces(0.0, 0.0, 0.0, 0.0, 0.0), 1, 0.0
+
+        monkeypatch.setattr(transient, 'transient_step', reached)
+        middle, end = positions if len(positions) == 2 else (0.5 * (position + positions[0]), positions[0])
+        motion = MeasuredMotion([0.0, 1e-3, 2e-3, 3e-3], [-1e-3, position, middle, end])
+        taken: list[int] = []
+        numerics = dataclasses.replace(case.numerics, steps_at_once=2)
+        run_transient(dataclasses.replace(case, numerics=numerics), motion, taken.append)
+        return taken == [1, 2]
 
     near, far = 1e-7, 1e-4
     assert may(before - far, before - 0.5 * far, before - near)
@@ -212,7 +211,7 @@ def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge()
     assert may(before + 0.5 * far, before + far - near, lag=far)  # the contact counts, not the spool
     assert not may(before - 2.0 * far, before - far, before - 1.5 * far)  # to and fro
     assert not may(before - far, before - far)
-    assert transient._may_be_one_step(lubrication_model(INNER), loads, [0.0, 1.0])
+    assert may(before - far, after + far, case=INNER)  # without an edge
 
 
 def test_run_of_more_numbers_than_fit_is_refused():

@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -17,7 +19,9 @@ from seal_friction_ros.core.lubrication.lubrication_case import (
     LubricationNumerics,
     Viscoelasticity,
 )
+from seal_friction_ros.core.lubrication.reynolds import FilmEnds
 from seal_friction_ros.core.lubrication.transient import (
+    SealForces,
     StepBefore,
     TransientState,
     fluid_force,
@@ -46,6 +50,36 @@ def at_rest(case: LubricationCase, position: float = 0.0) -> TransientState:
     return initial_state(lubrication_model(case), position)
 
 
+NO_FLOW = np.zeros(33)
+INSTANT = 1e-12  # [s] in which nothing slides
+
+
+class Step(NamedTuple):
+    """A step whose film is the one that it began with."""
+
+    after: TransientState
+    forces: SealForces
+    ends: FilmEnds
+
+
+@pytest.fixture
+def stepped(monkeypatch):
+    """Function that takes a step of a case in which the film stays as it is, while ``flow`` [m^2/s] goes through it."""
+
+    def take(case, moment, step, position, flow=NO_FLOW) -> Step:
+        asked = []
+
+        def contact(_contact, state, _rigid, _velocity, ends, *_):
+            asked.append(ends)
+            return SimpleNamespace(state=state, flow=flow, iterations=1)
+
+        monkeypatch.setattr(transient, 'contact_step', contact)
+        after, forces, *_ = transient_step(lubrication_model(case), moment, moment.time + step, position)
+        return Step(after, forces, *asked)
+
+    return take
+
+
 # -- forces
 
 
@@ -65,7 +99,7 @@ def test_solid_friction_is_tau_c_on_all_the_surface_where_all_of_it_touches():
 
 
 @pytest.mark.parametrize('gap', [1e-3, 2e-6])
-def test_chamfer_pushes_by_the_pressure_on_what_the_wall_falls_below_the_seal(gap):
+def test_chamfer_pushes_by_the_pressure_on_what_the_wall_falls_below_the_seal(stepped, gap):
     """Pressure of film and asperities times the height of the step, towards the open side."""
     model = lubrication_model(EDGE)
     moment = at_rest(EDGE)._replace(position=0.25e-3, lag=-0.05e-3, state=plates(gap, 3e5))
@@ -73,30 +107,34 @@ def test_chamfer_pushes_by_the_pressure_on_what_the_wall_falls_below_the_seal(ga
     fall, _ = EDGE.control_edge.fall(0.3e-3 + np.array([-0.3e-3, 0.3e-3]))
     assert (solid > 1e4) == (gap < 1e-5)
     exact = -(3e5 + solid) * (fall[1] - fall[0]) * CIRCUMFERENCE
-    assert transient._edge_force(model, moment) == pytest.approx(exact, rel=2e-3)
-    assert transient._edge_force(lubrication_model(CASE), moment) == 0.0
+    assert stepped(EDGE, moment, INSTANT, moment.position).forces.edge == pytest.approx(exact, rel=2e-3)
+    assert stepped(CASE, moment, INSTANT, moment.position).forces.edge == 0.0
 
 
-def test_bottom_of_the_groove_bears_what_film_and_asperities_push_unless_it_has_no_friction():
+def test_bottom_of_the_groove_bears_what_film_and_asperities_push_unless_it_has_no_friction(stepped):
+    """The seat follows the lag but for the friction of that force."""
     state = plates(2e-6, 3e5)
     rubbing = dataclasses.replace(CASE, groove=GrooveSpring(friction_coefficient=0.15))
     model = lubrication_model(rubbing)
     solid = asperity_pressure(state.gap[:1], model.contact.asperities)[0][0]
-    assert transient._bottom_force(model, state) == pytest.approx((3e5 + solid) * CIRCUMFERENCE * FILM)
-    assert transient._bottom_force(lubrication_model(CASE), state) == 0.0
+    for case, force in ((rubbing, (3e5 + solid) * CIRCUMFERENCE * FILM), (CASE, 0.0)):
+        moment = at_rest(case)._replace(state=state, lag=0.1e-3, position=0.1e-3)
+        after = stepped(case, moment, INSTANT, moment.position).after
+        assert after.seat == pytest.approx(case.seated_groove.seat(moment.seat, after.lag, force), rel=1e-9)
 
 
 @pytest.mark.parametrize('way', [0.3e-3, -0.3e-3])
-def test_seal_slides_as_fast_as_groove_and_wall_balance(way):
+def test_seal_slides_as_fast_as_groove_and_wall_balance(stepped, way):
     """Spring less chamfer and film is the solid friction; the film is driven by an uneven pressure, too."""
     case = dataclasses.replace(EDGE, grease=OIL)
     model = lubrication_model(case)
     moment = at_rest(case, 0.25e-3)
     uneven = moment.state._replace(pressure=np.linspace(0.0, 1e6, 32))
     moment = moment._replace(state=uneven, lag=0.01e-3)
-    velocity, lag = transient._slide(model, moment, 0.01, 0.25e-3 + way)
+    step = stepped(case, moment, 0.01, 0.25e-3 + way)
+    velocity, lag = step.forces.sliding_velocity, step.after.lag
     assert lag == pytest.approx(0.01e-3 + way - velocity * 0.01, rel=1e-12)
-    edge, fluid = transient._edge_force(model, moment), fluid_force(model, moment.state, velocity)
+    edge, fluid = stepped(case, moment, INSTANT, 0.25e-3).forces.edge, fluid_force(model, moment.state, velocity)
     assert abs(edge) > 0.1
     assert abs(fluid_force(model, moment.state, 0.0)) > 1e-3
     solid = math.copysign(solid_limit(model, moment.state), way)
@@ -105,29 +143,32 @@ def test_seal_slides_as_fast_as_groove_and_wall_balance(way):
 
 
 @pytest.mark.parametrize('share', [0.99, -0.99, 1.01, -1.01])
-def test_seal_sticks_until_the_spring_pulls_as_strongly_as_the_asperities_hold(share):
+def test_seal_sticks_until_the_spring_pulls_as_strongly_as_the_asperities_hold(stepped, share):
     model = lubrication_model(CASE)
     moment = at_rest(CASE)
     position = share * solid_limit(model, moment.state) / CASE.groove.stiffness
-    velocity, lag = transient._slide(model, moment, 1e-3, position)
-    assert (velocity == 0.0) == (abs(share) < 1.0)
-    assert velocity * share >= 0.0
-    assert abs(lag) <= abs(position)
+    step = stepped(CASE, moment, 1e-3, position)
+    assert (step.forces.sliding_velocity == 0.0) == (abs(share) < 1.0)
+    assert step.forces.sliding_velocity * share >= 0.0
+    assert abs(step.after.lag) <= abs(position)
 
 
 @pytest.mark.parametrize('share', [-0.5, 0.5, 2.0, -2.0])
-def test_asperities_of_a_seal_that_sticks_balance_the_spring_up_to_their_limit(share):
+def test_asperities_of_a_seal_that_sticks_balance_the_spring_up_to_their_limit(stepped, share):
     model = lubrication_model(EDGE)
     moment = at_rest(EDGE, 0.25e-3)
     moment = moment._replace(state=moment.state._replace(pressure=np.linspace(0.0, 1e6, 32)))
-    limit, edge = solid_limit(model, moment.state), transient._edge_force(model, moment)
+    limit, edge = solid_limit(model, moment.state), stepped(EDGE, moment, INSTANT, 0.25e-3).forces.edge
     fluid = fluid_force(model, moment.state, 0.0)
     lag = (share * limit + edge + fluid) / EDGE.groove.stiffness
     moment = moment._replace(lag=lag, position=moment.position + lag, seat=lag)
-    forces = transient._forces(model, moment, 0.0)
+    forces = stepped(EDGE, moment, INSTANT, moment.position).forces
     assert forces.solid == pytest.approx(limit * min(max(share, -1.0), 1.0))
-    assert (forces.edge, forces.fluid, forces.sliding_velocity) == pytest.approx((edge, fluid, 0.0))
-    assert forces.friction == pytest.approx(forces.solid + fluid + edge)
+    assert forces.edge == pytest.approx(edge)
+    assert (forces.sliding_velocity == 0.0) == (abs(share) < 1.0)
+    assert forces.fluid == pytest.approx(fluid_force(model, moment.state, forces.sliding_velocity))
+    assert forces.friction == pytest.approx(forces.solid + forces.fluid + forces.edge)
+    assert forces.fluid == pytest.approx(fluid) or abs(share) > 1.0
 
 
 # -- what a step carries over
@@ -193,11 +234,27 @@ def test_film_that_would_begin_below_nothing_begins_anew():
     assert thinner.step == pytest.approx(2e-3 / 3.0)
 
 
-def test_seal_that_stuck_or_would_stop_keeps_the_mean_velocity_of_its_step():
-    start, speed = at_rest(CASE), 2.0**-8
-    for before in (0.0, 3.0 * speed):  # the other half of this step would end at 1.5 and at 0 times the speed
-        moment = start._replace(before=StepBefore(start.state.gap, start.creep, 1e-3, before))
-        assert transient._velocity_at_end(moment, speed, 1e-3) == speed
+@pytest.mark.parametrize('way', [1e-3, -1e-3])
+@pytest.mark.parametrize(
+    ('before', 'at_end'),
+    [
+        (None, 1.0),  # the first step
+        (4.0 / 11.0, 14.0 / 11.0),  # of an even acceleration: 4 mm/s over 20 ms, then 11 mm/s over 15 ms, 14 at the end
+        (0.0, 1.0),  # it stuck
+        (-1.0, 1.0),  # it turned round
+        (3.3, 1.0 / 70.0),  # it nearly stops
+        (3.4, 1.0),  # it would turn round
+    ],
+)
+def test_velocity_at_the_end_of_a_step_is_that_of_an_even_acceleration(stepped, way, before, at_end):
+    """Shares of the mean velocity of the step."""
+    start = at_rest(CASE)
+    after = stepped(CASE, start, 15e-3, way).after
+    mean = after.contact_place / 15e-3
+    assert mean * way > 0.0
+    if before is not None:
+        start = start._replace(before=StepBefore(start.state.gap, start.creep, 20e-3, before * mean))
+    assert stepped(CASE, start, 15e-3, way).forces.sliding_velocity == pytest.approx(at_end * mean)
 
 
 @pytest.mark.parametrize('lost', [1e-9, -1e-9])
@@ -228,48 +285,59 @@ def starved(place: float) -> TransientState:
     return at_rest(STARVED)._replace(position=place, lag=0.0, wall_film=film)
 
 
+HELD = dataclasses.replace(STARVED, groove=dataclasses.replace(STARVED.groove, stiffness=1e9))  # moves with the spool
+
+
 @pytest.mark.parametrize('way', [30e-6, -30e-6])
-def test_seal_takes_the_film_ahead_of_it_and_is_fed_by_half_of_its_speed(way):
+def test_seal_takes_the_film_ahead_of_it_and_is_fed_by_half_of_its_speed(stepped, way):
     """0.1 um on the wall is 0.2 um under a seal, over the height that shear carries at its end."""
-    model = lubrication_model(STARVED)
-    moment = initial_state(model, 0.0)
+    moment = at_rest(HELD)
     wedge = np.linspace(4e-6, 8e-6, 32)  # [m] which shear carries, as the roughness of wall and seal cancel
-    ends, taken = transient._supply(model, moment._replace(state=moment.state._replace(gap=wedge)), way, 1e-3)
-    assert taken.sum() == pytest.approx(0.1e-6 * 30e-6)
+    step = stepped(HELD, moment._replace(state=moment.state._replace(gap=wedge)), 1e-3, way)
+    ahead = moment.wall_film.ahead(*((0.3e-3, 0.3e-3 + way) if way > 0.0 else (way - 0.3e-3, -0.3e-3)), -0.3e-3, 0.3e-3)
+    assert ahead.sum() == pytest.approx(0.1e-6 * 30e-6)
     filled = (1.0, 0.2e-6 / 8e-6) if way > 0.0 else (0.2e-6 / 4e-6, 1.0)
-    assert (ends.saturation_left, ends.saturation_right) == pytest.approx(filled)
-    rich = dataclasses.replace(STARVED, film_supply=FilmSupply(1e-3))
-    ends, _ = transient._supply(lubrication_model(rich), at_rest(rich), way, 1e-3)
+    assert (step.ends.saturation_left, step.ends.saturation_right) == pytest.approx(filled, rel=1e-3)
+    rich = dataclasses.replace(HELD, film_supply=FilmSupply(1e-3))
+    ends = stepped(rich, at_rest(rich), 1e-3, way).ends
     assert (ends.saturation_left, ends.saturation_right) == (1.0, 1.0)
 
 
-def test_flooded_seal_and_one_at_rest_take_nothing():
+def test_flooded_seal_and_one_at_rest_take_nothing(stepped):
     for case, way in ((CASE, 30e-6), (STARVED, 0.0)):
-        ends, taken = transient._supply(lubrication_model(case), at_rest(case), way, 1e-3)
-        assert (ends, taken.sum()) == (lubrication_model(case).ends(), 0.0)
+        step = stepped(case, at_rest(case), 1e-3, way)
+        assert step.ends == lubrication_model(case).ends()
+        if step.after.wall_film is not None:
+            assert step.after.wall_film.volume.tolist() == at_rest(case).wall_film.volume.tolist()
 
 
-def wall_after(moment: TransientState, place: float, taken: np.ndarray) -> np.ndarray:
-    """Change of the film on the wall as 3e-14 m^2 flow in at the left of the seal and 7e-14 m^2 out at the right."""
-    through = np.array([3e-14, 0.0, 7e-14])
-    after = transient._wall_film_after(lubrication_model(STARVED), moment, moment.wall_film, taken, through, place)
-    return (after.volume - WALL) * 1e14
+@pytest.fixture
+def wall_change(stepped):
+    """Change of the film on the wall [1e-14 m^2] as 3 flow in at the left of the seal and 7 out at the right."""
+
+    def change(place: float, to: float) -> np.ndarray:
+        through = np.zeros(33)
+        through[[0, -1]] = 3e-14, 7e-14
+        after = stepped(HELD, starved(place), 1e-3, to, through / 1e-3).after
+        return (after.wall_film.volume - WALL) * 1e14
+
+    return change
 
 
-def test_seal_at_rest_drinks_at_one_end_and_spills_at_the_other():
+def test_seal_at_rest_drinks_at_one_end_and_spills_at_the_other(wall_change):
     """Its ends stand in cells 32 and 64 of the wall, 0.6 mm apart."""
-    change = wall_after(starved(0.009e-3), 0.009e-3, np.zeros(100))
+    change = wall_change(0.009e-3, 0.009e-3)
     assert change == pytest.approx(-3.0 * np.eye(100)[32] + 7.0 * np.eye(100)[64], abs=1e-9)
 
 
-def test_seal_on_its_way_pushes_what_it_did_not_take_in_and_leaves_what_flows_out_behind():
-    """One cell of the wall to the right, or to the left, from ends at 32 and 64 whole cells."""
-    width, taken = FILM / 32, 2e-14 * np.eye(100)[50]
-    change = wall_after(starved(0.0), width, taken)  # pushed: 2 + 7; left behind: -3
-    assert change == pytest.approx(-2.0 * np.eye(100)[50] + 9.0 * np.eye(100)[65] - 3.0 * np.eye(100)[32], abs=1e-9)
-    change = wall_after(starved(0.0), -1.5 * width, taken)  # pushed: 2 - 3; left behind: 7, over a cell and a half
-    behind = 7.0 / 1.5 * np.eye(100)[63] + 3.5 / 1.5 * np.eye(100)[62]
-    assert change == pytest.approx(-2.0 * np.eye(100)[50] - np.eye(100)[30] + behind, abs=1e-9)
+def test_seal_on_its_way_pushes_what_it_did_not_take_in_and_leaves_what_flows_out_behind(wall_change):
+    """One cell of the wall to the right, or one and a half to the left, from ends at 32 and 64 whole cells."""
+    width, cell = FILM / 32, np.eye(100)
+    change = wall_change(0.0, 1.001 * width)  # taken: all 65 of a cell; pushed: 65 + 7; left behind: -3
+    assert change == pytest.approx(-65.0 * cell[64] + 72.0 * cell[65] - 3.0 * cell[32], abs=0.1)
+    change = wall_change(0.0, -1.5 * width)  # taken: 32 and half of 31; pushed: 47.5 - 3; behind: 7 over 1.5 cells
+    taken = 32.0 * cell[31] + 15.5 * cell[30]
+    assert change == pytest.approx(44.5 * cell[30] - taken + 7.0 / 1.5 * cell[63] + 3.5 / 1.5 * cell[62], abs=0.1)
 
 
 # -- a run

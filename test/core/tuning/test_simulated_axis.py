@@ -233,14 +233,43 @@ def test_a_search_in_which_every_point_is_rejected_ends(monkeypatch):
     assert result.candidates == 2
 
 
-def test_the_search_starts_from_none_and_from_a_third_to_more_than_all_of_the_friction_up_to_twice_the_delay_ahead():
-    points = simulated_axis._grid(DEFAULT)
-    settings = [DEFAULT.feedforward(point) for point in points]
+OUTCOME = Performance(1.0, 1.0, 1.0, 0.0, 0, 0.0, 0.0)
+
+
+def friction_of(*forces):
+    """Runs with these frictions [N]."""
+    return tuple(AxisRun(*(np.array(values),) * 6) for values in forces)
+
+
+def searched(monkeypatch, value):
+    """Result of a search whose J is ``value`` of the settings, and the settings that were tried, in order."""
+    tried = []
+
+    def case(_, feedforward, friction_error, delay_error, __):
+        tried.append(feedforward)
+        return RobustnessCase(friction_error, delay_error, None)
+
+    monkeypatch.setattr(TuningProblem, 'case', case)
+    monkeypatch.setattr(TuningProblem, 'without', lambda _: OUTCOME)
+    monkeypatch.setattr(TuningProblem, 'runs', lambda *_: friction_of([100.0]))  # a limit of 150 N, as it was
+    monkeypatch.setattr(simulated_axis, 'merit', lambda *_: value(tried[-1], tried[0]))
+    return tune(DEFAULT).feedforward, list(dict.fromkeys(tried))
+
+
+def widths(settings):
+    """Smoothing and slew limit as numbers of steps."""
+    return nearest_preferred(settings.smoothing_velocity), nearest_preferred(settings.slew_limit)
+
+
+def test_the_search_starts_from_none_and_from_a_third_to_more_than_all_of_the_friction_up_to_twice_the_delay_ahead(
+    monkeypatch,
+):
+    _, tried = searched(monkeypatch, lambda *_: 1.0)
+    settings = tried[:13]
     assert [s.lead_time for s in settings if s.scale == 0.0] == [0.0]
     for scale in (0.3, 0.6, 0.9, 1.2):
         leads = [s.lead_time for s in settings if s.scale == scale]
         assert leads == pytest.approx([0.0, DEFAULT.whole_delay, 2.0 * DEFAULT.whole_delay], abs=DEFAULT.lead_step)
-    assert len(points) == 13
     assert abs(math.log10(20.0 * DEFAULT.lead_step / DEFAULT.whole_delay)) <= 0.05  # twenty steps to the delay
     change = (10.0 * math.pi) ** 2 * 1e-3 * PERIOD  # of the speed of the sine in one sample
     assert {abs(math.log10(s.smoothing_velocity / (0.5 * change))) <= 0.05 for s in settings} == {True}
@@ -256,30 +285,35 @@ def test_a_point_of_the_search_counts_hundredths_of_the_scale_steps_of_lead_and_
     assert settings.force_limit == PIPELINE.feedforward.force_limit
 
 
-@pytest.mark.parametrize('start', [SearchPoint(0, 0, 3, 4), SearchPoint(120, 40, 3, 4), SearchPoint(37, 12, 3, 4)])
-@pytest.mark.parametrize('best', [(93, 27), (1, 2), (-7, 31)])
-def test_the_compass_ends_at_the_best_scale_and_lead_that_are_not_negative(start, best):
-    asked = []
+@pytest.mark.parametrize('best', [(93, 27), (1, 2), (-7, 31), (47, -3)])
+def test_the_search_ends_at_the_best_scale_and_lead_that_are_not_negative(monkeypatch, best):
+    def value(s, first):
+        scale, lead = 100.0 * s.scale, s.lead_time / DEFAULT.lead_step
+        return 1.0 + (scale - best[0]) ** 2 + 2.0 * (lead - best[1]) ** 2 + 1e6 * (widths(s) != widths(first))
 
-    def merit_at(point):
-        asked.append(point)
-        return (point.scale - best[0]) ** 2 + 2.0 * (point.lead - best[1]) ** 2
-
-    found = simulated_axis._compass(start, merit_at, simulated_axis.STRIDES)
-    assert found == (max(best[0], 0), max(best[1], 0), 3, 4)
-    assert min(point.scale for point in asked) >= 0
-    assert min(point.lead for point in asked) >= 0
+    found, tried = searched(monkeypatch, value)
+    assert found.scale == pytest.approx(max(best[0], 0) / 100.0)
+    assert found.lead_time == pytest.approx(max(best[1], 0) * DEFAULT.lead_step)
+    assert widths(found) == widths(tried[0])
+    assert min(s.scale for s in tried) >= 0.0
+    assert min(s.lead_time for s in tried) >= 0.0
 
 
-def test_the_gentlest_settings_are_the_widest_and_slowest_that_lose_a_twentieth():
-    def merit_at(point):
-        return 2.0 * (1.0 + 0.0098 * max(point.smoothing - 10, 0) + 0.02 * max(30 - point.slew, 0))
+@pytest.mark.parametrize(('of_width', 'wider', 'slower'), [(0.0, 5, 0), (9.0, 0, 2)])
+def test_the_gentlest_settings_are_the_widest_and_slowest_that_lose_a_twentieth(monkeypatch, of_width, wider, slower):
+    """A step of smoothing costs 0.98 %: five are 4.9 %, and one of the slew limit costs more than is left."""
+    lead = round(DEFAULT.whole_delay / DEFAULT.lead_step) * DEFAULT.lead_step
 
-    wide = simulated_axis._gentlest(SearchPoint(90, 20, 10, 30), merit_at)
-    assert wide == (90, 20, 15, 30)  # 4.9 %; the slew limit would cost more than is left
-    slow = simulated_axis._gentlest(SearchPoint(90, 20, 10, 30), lambda p: merit_at(p) + 9.0 * (p.smoothing != 10))
-    assert slow == (90, 20, 10, 28)
-    assert simulated_axis._gentlest(SearchPoint(1, 2, 3, 4), lambda _: math.inf) == (1, 2, 3, 4)
+    def value(s, first):
+        (smoothing, slew), (sharpest, fastest) = widths(s), widths(first)
+        losses = 0.0098 * max(smoothing - sharpest, 0) + 0.02 * max(fastest - slew, 0)
+        elsewhere = abs(s.scale - 0.9) + 1e3 * abs(s.lead_time - lead)
+        return 2.0 * (1.0 + losses) + of_width * (smoothing != sharpest) + 100.0 * elsewhere
+
+    found, tried = searched(monkeypatch, value)
+    assert (found.scale, found.lead_time) == pytest.approx((0.9, lead))
+    smoothing, slew = widths(tried[0])
+    assert widths(found) == (smoothing + wider, slew - slower)
 
 
 @pytest.mark.parametrize('error', [0.2, -0.1, -1.0])
@@ -409,20 +443,6 @@ def test_the_compass_halves_its_stride_down_to_one_step():
     assert strides[-1] == 1
 
 
-def test_the_largest_friction_is_found_without_and_with_all_of_the_friction_compensated(monkeypatch):
-    """Largest friction of six motions, whatever its direction; no limit hides it from the force."""
-    asked = []
-
-    def runs(_, settings):
-        asked.append(settings)
-        forces = ([3.0, -50.0], [20.0, 5.0], [1.0]) if settings.scale == 0.0 else ([-7.0], [40.0, 2.0], [0.0])
-        return tuple(AxisRun(*(np.array(values),) * 6) for values in forces)
-
-    monkeypatch.setattr(TuningProblem, 'runs', runs)
-    assert simulated_axis._largest_friction(DEFAULT) == 50.0
-    assert [(settings.scale, settings.force_limit) for settings in asked] == [(0.0, 150.0), (1.0, 1e6)]
-
-
 def test_a_candidate_that_cannot_be_the_best_is_not_tried_in_every_case(monkeypatch):
     """More cases cannot lower J: a point is known to be worse from the first one that is 5 % above the best so far."""
     cases = []
@@ -435,17 +455,24 @@ def test_a_candidate_that_cannot_be_the_best_is_not_tried_in_every_case(monkeypa
         scale = cases[-1][0]
         return abs(scale - 0.6) + 0.5 + (0.02 if len(outcomes) > 1 else 0.0)
 
-    outcome = Performance(1.0, 1.0, 1.0, 0.0, 0, 0.0, 0.0)
+    asked = []
+
+    def runs(_, settings):
+        """Largest friction of six motions, whatever its direction; no limit hides it from the force."""
+        asked.append((settings.scale, settings.force_limit))
+        return friction_of(*([[3.0, -50.0], [20.0], [1.0]] if settings.scale == 0.0 else [[-7.0], [40.0, 2.0], [0.0]]))
+
     monkeypatch.setattr(TuningProblem, 'case', case)
-    monkeypatch.setattr(TuningProblem, 'without', lambda _: outcome)
+    monkeypatch.setattr(TuningProblem, 'runs', runs)
+    monkeypatch.setattr(TuningProblem, 'without', lambda _: OUTCOME)
     monkeypatch.setattr(simulated_axis, 'merit', merit)
-    monkeypatch.setattr(simulated_axis, '_largest_friction', lambda _: 50.0)
     counted = []
     result = tune(DEFAULT, counted.append)
     assert result.feedforward.scale == 0.6
     assert result.merit == pytest.approx(0.52)
     assert result.candidates == sum(counted) == len(counted)
     assert result.largest_friction == 50.0
+    assert asked == [(0.0, 150.0), (1.0, 1e6)]
     assert {c[4] for c in cases} == {75.0}  # half as large again
     last = cases[-9:]
     assert [c[1:3] for c in last] == list(itertools.product((-0.3, 0.0, 0.3), (-0.2, 0.0, 0.2)))

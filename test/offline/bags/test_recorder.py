@@ -381,7 +381,7 @@ def test_the_disk_is_asked_by_bytes_written_and_by_time(tmp_path: Path, monkeypa
     recorder = Recorder(tmp_path / 'bag', free_space=1)
     for number in range(20):
         recorder.record('/t', CONFIGURATION_TYPE, number, encode_text(str(number)) + bytes(size))
-        recorder._wake()
+        recorder.flush_if_idle()
         wait_until(lambda: not recorder.waiting)
         time.sleep(0.003)
     recorder.close()

@@ -32,11 +32,12 @@ def recorded(tmp_path: Path) -> Path:
 
 def unfinished(bag: Path) -> Path:
     """A recording whose process was killed: no close, no index."""
-    writer = BagWriter(bag)
-    for message in read_messages(bag.parent / 'replayed'):
-        writer.write(*message)
-    writer._output.close()
-    return bag
+    written = bag.parent / 'open' / bag.name
+    written.parent.mkdir()
+    with BagWriter(written) as writer:
+        for message in read_messages(bag.parent / 'replayed'):
+            writer.write(*message)
+        return shutil.copytree(written, bag)
 
 
 def messages(bag: Path) -> list[BagMessage]:
@@ -160,7 +161,8 @@ def test_a_message_with_an_impossible_log_time_is_left_out_and_counted(tmp_path:
 
 
 def test_what_was_killed_before_its_first_chunk_holds_nothing_and_that_is_said(tmp_path: Path):
-    BagWriter(tmp_path / 'bag')._output.close()
+    with BagWriter(tmp_path / 'open'):
+        shutil.copytree(tmp_path / 'open', tmp_path / 'bag')
     with pytest.raises(BagError, match='nothing to recover'):
         recover(tmp_path / 'bag')
     assert not (tmp_path / 'bag_recovered').exists()

@@ -12,9 +12,12 @@ from urllib.parse import urlsplit
 
 import pytest
 import yaml
-from harness.three_recordings import NAMES, PRESSURES, SAMPLES, Recordings, friction, record
+from harness.three_recordings import NAMES, PRESSURES, SAMPLES, SEALS, Recordings, friction, record
 
+from seal_friction_ros.core.estimation.configuration import SealSelection
+from seal_friction_ros.core.estimation.estimator import EstimatorSettings
 from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE, VELOCITY_TYPE
+from seal_friction_ros.files import load_configuration
 from seal_friction_ros.offline.bags.actuator_bag import open_actuator
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.monitor.actuator_view import COLUMNS
@@ -27,6 +30,13 @@ mostly_long = pytest.mark.parametrize(
 )
 """For commands of some seconds; those on own bags have quick tests of their own."""
 MEAN = 0.75  # mean pressure at both seals over that of chamber a
+
+
+def true_scale() -> float:
+    """Friction over that of the seal files, mean of the later 15 reversals: 8 at the third pressure."""
+    law = load_configuration(SealSelection(SEALS), EstimatorSettings()).parameters().estimator.seals[0].seal.coulomb_law
+    third, fourth = (friction(p) / (law.bound(p, 0.0) + law.bound(0.5 * p, 0.0)) for p in PRESSURES[2:])
+    return (8 * third + 7 * fourth) / 15
 
 
 @pytest.fixture(scope='module')
@@ -95,7 +105,7 @@ def test_the_estimates_are_those_of_the_own_messages_whatever_recorded_them(reco
 def test_health_follows_the_reversals_of_the_axis(command):
     (found,) = command.numbers('health', command.bag, '--out', command.folder / 'page.html')['bags']
     assert found['reversals'] == 30
-    assert found['scale'] == pytest.approx(1.12, abs=0.02)
+    assert found['scale'] == pytest.approx(true_scale(), rel=0.035)  # it follows each new pressure within strokes
 
 
 @each_kind
@@ -103,7 +113,7 @@ def test_a_fleet_has_a_row_for_each_bag(command, kind):
     (command.folder / 'bags.txt').write_text(command.bag)
     (found,) = command.numbers('fleet', command.folder / 'bags.txt', '--out', command.folder / 'page.html')['bags']
     assert found['replay'] == ('no estimates recorded' if kind == 'foreign' else 'identical')
-    assert found['scale'] == pytest.approx(1.12, abs=0.02)
+    assert found['scale'] == pytest.approx(true_scale(), rel=0.035)  # it follows each new pressure within strokes
 
 
 @mostly_long

@@ -6,10 +6,12 @@ import shutil
 from pathlib import Path
 
 import pytest
+from harness.closed_loop_bags import write_closed_loop
 from harness.compensation import compensating
-from harness.example_bags import write_inputs, write_recorded
+from harness.example_bags import rewrite, write_recorded
 from harness.report_page import checked_page
 
+from seal_friction_ros.core.estimation.messages import ESTIMATE_TYPE, FEEDFORWARD_TYPE
 from seal_friction_ros.offline.commands.main import main
 from seal_friction_ros.offline.replay import bag_summary as module
 
@@ -19,9 +21,10 @@ def fleet(tmp_path_factory) -> Path:
     """A good bag, one without estimates, a garbage file, a cut bag, a folder that says it is a bag."""
     folder = tmp_path_factory.mktemp('fleet') / 'bags'
     (folder / 'rig ä').mkdir(parents=True)
-    recorded = write_recorded(folder.parent, compensating())
+    recorded = write_closed_loop(folder.parent / 'recorded', seconds=1.0)
     shutil.copytree(recorded, folder / 'rig ä' / 'gut')
-    write_inputs(folder / 'inputs', 200)
+    answers = (ESTIMATE_TYPE, FEEDFORWARD_TYPE)
+    rewrite(recorded, folder / 'inputs', lambda _, one: None if one.type_name in answers else one)
     (folder / 'garbage.mcap').write_bytes(os.urandom(5000))
     cut = shutil.copytree(recorded, folder / 'rig ä' / 'cut')
     file = next(cut.glob('*.mcap'))
@@ -46,7 +49,7 @@ def test_every_bag_has_a_row_and_damaged_ones_are_listed_with_their_reason(fleet
     assert {bag['replay'] for bag in found['bags'] if Path(bag['bag']).name == 'gut'} == {'identical'}
     assert all(errors.count(f'seal_friction: {fleet}') == 3 and name in errors for name in damaged)
     page = checked_page(tmp_path / 'fleet.html')
-    assert ' of 5 bags are bad, 3 damaged' in page.texts['p.said'][0]  # the force sums of the others are no friction
+    assert page.texts['p.said'][0].startswith('Bad: 3 of 5 bags are bad, 3 damaged')
 
 
 def test_finished_bags_are_not_computed_again_and_failed_ones_only_when_asked(fleet, tmp_path, capsys, monkeypatch):
@@ -77,8 +80,8 @@ def test_finished_bags_are_not_computed_again_and_failed_ones_only_when_asked(fl
 def test_a_bag_that_ends_its_process_is_listed_and_tried_again(fleet, tmp_path, capsys, monkeypatch):
     summary = module.bag_summary
 
-    def dying(bag, namespace='', override=None):
-        return os._exit(9) if bag.name == 'inputs' else summary(bag, namespace, override)
+    def dying(bag, chosen):
+        return os._exit(9) if bag.name == 'inputs' else summary(bag, chosen)
 
     words = (fleet, '--out', tmp_path / 'fleet.html', '--work', tmp_path / 'work')
     monkeypatch.setattr(module, 'bag_summary', dying)
@@ -88,15 +91,17 @@ def test_a_bag_that_ends_its_process_is_listed_and_tried_again(fleet, tmp_path, 
     ]
     monkeypatch.setattr(module, 'bag_summary', summary)
     _, found, _ = run(capsys, *words)
-    assert not [bag for bag in found['bags'] if bag['bag'].endswith('inputs') and bag['why'].startswith('damaged')]
+    assert [bag['level'] for bag in found['bags'] if bag['bag'].endswith('inputs')] == ['good']
 
 
 def test_the_table_has_a_row_for_each_bag_and_pressure_level(fleet, tmp_path, capsys):
     parquet = pytest.importorskip('pyarrow.parquet')
-    out = tmp_path / 'fleet.parquet'
-    run(capsys, fleet, '--out', tmp_path / 'fleet.html', '--parquet', out)
+    out, listed = tmp_path / 'fleet.parquet', tmp_path / 'bags.txt'
+    recorded = write_recorded(tmp_path, compensating())  # at several pressures
+    listed.write_text(f'{recorded}\n{fleet / "rig ä" / "cut"}\n')
+    run(capsys, listed, '--out', tmp_path / 'fleet.html', '--parquet', out)
     rows = parquet.read_table(out).to_pylist()
-    of_bag = [row for row in rows if row['bag'].endswith('gut')]
+    of_bag = [row for row in rows if row['bag'].endswith('recorded')]
     assert len(of_bag) > 1
     assert len({row['level_pressure'] for row in of_bag}) == len(of_bag)
     assert all(row['level_samples'] >= 1 and row['replay'] == 'identical' for row in of_bag)
@@ -104,7 +109,7 @@ def test_the_table_has_a_row_for_each_bag_and_pressure_level(fleet, tmp_path, ca
     assert damaged['why'].startswith('damaged: ')
     assert damaged['duration'] is None
     assert damaged['level_pressure'] is None
-    assert run(capsys, fleet, '--out', tmp_path / 'fleet.html', '--parquet', out)[0] == 2  # not overwritten
+    assert run(capsys, listed, '--out', tmp_path / 'fleet.html', '--parquet', out)[0] == 2  # not overwritten
     assert out.read_bytes()
 
 

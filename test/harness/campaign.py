@@ -1,0 +1,57 @@
+"""What the campaigns of ``test/system`` share: their arguments, and how they say what they found."""
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+Rows = Sequence[Mapping[str, Any]] | Mapping[str, Any]
+"""Rows, rows by name, or figures by name"""
+
+
+def parser_of(description: str, **numbers: tuple[float, str]) -> argparse.ArgumentParser:
+    """Parser with ``--json`` and an option for each of ``numbers``: its default, whose type it has, and its meaning."""
+    parser = argparse.ArgumentParser(description=description.split('\n', maxsplit=1)[0])
+    for name, (default, meaning) in numbers.items():
+        text = f'{meaning}; default {default:g}'
+        parser.add_argument(f'--{name.replace("_", "-")}', type=type(default), default=default, help=text)
+    parser.add_argument('--json', action='store_true', help='print JSON')
+    return parser
+
+
+def tell(found: Rows, *, as_json: bool, title: str = '') -> None:
+    """Print one table, or JSON."""
+    if as_json:
+        print(json.dumps(found))
+        return
+    rows = found if not isinstance(found, Mapping) else [{'': name, **_row(row)} for name, row in found.items()]
+    headings = dict.fromkeys(heading for row in rows for heading in row)
+    table = Table(title=title)
+    for heading in headings:
+        table.add_column(Text(heading))
+    for row in rows:
+        table.add_row(*(Text(_text(row.get(heading, ''))) for heading in headings))
+    Console(width=160).print(table)
+
+
+def tell_tables(tables: Mapping[str, Rows], *, as_json: bool) -> None:
+    """Print several tables by title, or all of them as one JSON object."""
+    if as_json:
+        print(json.dumps(tables))
+        return
+    for title, rows in tables.items():
+        tell(rows, as_json=False, title=title)
+
+
+def _row(row: Any) -> Mapping[str, Any]:
+    return row if isinstance(row, Mapping) else {'value': row}
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f'{value:.6g}' if abs(value) >= 1e3 else f'{value:.4g}'
+    return '\n'.join(map(_text, value)) if isinstance(value, list | tuple) else str(value)
