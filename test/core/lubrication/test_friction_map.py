@@ -21,23 +21,17 @@ from seal_friction_ros.core.lubrication import friction_map as module
 from seal_friction_ros.core.lubrication.contact import ContactState
 from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_friction
 from seal_friction_ros.core.lubrication.grease import Grease
-from seal_friction_ros.core.lubrication.lubrication_case import (
-    AirPressure,
-    LubricationCase,
-    LubricationNumerics,
-    MapGrid,
-    Viscoelasticity,
-)
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
+from seal_friction_ros.core.lubrication.model import film_at_rest, profile_model, solid_limit
 from seal_friction_ros.core.lubrication.oring_film import oring_film
+from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
-from seal_friction_ros.core.lubrication.transient import initial_state, lubrication_model, solid_limit
-from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 
 CASE = LubricationCase(
     name='inner',
-    numerics=LubricationNumerics(cells=96, time_step=1e-3),
+    numerics=LubricationNumerics(cells=96),
     map=MapGrid(velocity_min=1e-3, velocity_max=0.1, velocities=5, pressure_max=3e5, pressures=2),
 )
 LAW = FrictionMap(
@@ -107,13 +101,8 @@ def test_friction_of_a_ring_from_its_drawing_falls_with_speed_and_rises_with_pre
 def test_solid_friction_of_a_ring_is_at_most_tau_c_on_the_contact(ring_row):
     case, rows = ring_row
     film = oring_film(case, case.oring, 3e5)
-    area = film.model.circumference * film.model.case.numerics.film_width
+    area = film.model.circumference * film.model.film_width
     assert 0.0 < rows[1].solid[0] < case.seal.solid_shear_stress * area
-
-
-def test_a_ring_has_no_run_of_its_own(ring_row):
-    with pytest.raises(ValueError, match='an O-ring has a friction map only: seal_friction ehl map'):
-        lubrication_model(ring_row[0])
 
 
 def test_film_remembers_over_about_the_length_of_the_contact():
@@ -131,8 +120,8 @@ def test_step_of_the_map_that_fails_is_taken_in_halves_and_counted(monkeypatch):
             raise NotConvergedError('told to')
         return really(*arguments)
 
-    model = lubrication_model(CASE)
-    start = initial_state(model, 0.0).state
+    model = profile_model(CASE, 0.0, 0.0)
+    start = film_at_rest(model)
     smoothly, none = module.steady_state(model, start, 0.01)
     monkeypatch.setattr(module, 'contact_step', fails_at_first)
     state, retried = module.steady_state(model, start, 0.01)
@@ -153,8 +142,8 @@ def test_map_gives_up_when_more_than_twenty_steps_have_failed(monkeypatch, failu
             raise NotConvergedError('told to')
         return SimpleNamespace(state=state)
 
-    model = lubrication_model(CASE)
-    start = initial_state(model, 0.0).state
+    model = profile_model(CASE, 0.0, 0.0)
+    start = film_at_rest(model)
     monkeypatch.setattr(module, 'contact_step', fails_often)
     if gives_up:
         with pytest.raises(NotConvergedError, match=r'^told to$'):
@@ -174,8 +163,8 @@ def test_step_to_the_steady_film_that_fails_is_led_by_one_of_250_passages(monkey
             raise NotConvergedError('told to')
         return SimpleNamespace(state=state)
 
-    model = lubrication_model(CASE)
-    start = initial_state(model, 0.0).state
+    model = profile_model(CASE, 0.0, 0.0)
+    start = film_at_rest(model)
     monkeypatch.setattr(module, 'contact_step', fails_at_first)
     _, states, retried = module._slid(model, start, -0.1, [math.inf])
     assert asked == [math.inf, pytest.approx(1.5), math.inf]
@@ -192,7 +181,7 @@ def test_film_is_led_to_the_steady_one_by_steps_each_two_to_five_times_as_long_a
         return start, [start], 0
 
     monkeypatch.setattr(module, '_slid', slid)
-    assert module.steady_state(SimpleNamespace(case=CASE), 1.0, velocity) == (1.0, 0)
+    assert module.steady_state(SimpleNamespace(film_width=0.6e-3), 1.0, velocity) == (1.0, 0)
     growth = np.array(led[1:-1]) / np.array(led[:-2])
     assert growth.min() >= 2.0 - 1e-9
     assert growth.max() <= 5.0 + 1e-9
@@ -230,7 +219,7 @@ def test_map_takes_both_ways_from_rest_speed_after_speed_and_its_mean(monkeypatc
 def test_friction_is_that_of_asperities_and_film_whichever_way(velocity):
     """Oil of 0.5 Pa s in an even gap of 2 um."""
     oil = Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.5)
-    model = lubrication_model(dataclasses.replace(CASE, grease=oil))
+    model = profile_model(dataclasses.replace(CASE, grease=oil), 0.0, 0.0)
     state = ContactState(np.full(96, 2e-6), np.zeros(96), np.ones(96))
     friction, solid = module._friction(model, state, velocity)
     assert solid == solid_limit(model, state)
@@ -250,7 +239,7 @@ def test_memory_of_a_friction_that_falls_exponentially_is_the_length_of_its_expo
         states = (2.0 + (start - 2.0) * np.exp(-np.cumsum(durations) * velocity / 0.1e-3)).tolist()
         return states[-1], states, 100
 
-    rest = SimpleNamespace(case=CASE), 0.0, 7.0
+    rest = SimpleNamespace(film_width=0.6e-3), 0.0, 7.0
     monkeypatch.setattr(module, '_at_rest', lambda _, pressure: rest if pressure == 0.0 else None)
     monkeypatch.setattr(module, 'steady_state', steady)
     monkeypatch.setattr(module, '_slid', slid)
@@ -261,18 +250,11 @@ def test_memory_of_a_friction_that_falls_exponentially_is_the_length_of_its_expo
     assert asked == [(0.0, pytest.approx(6.8e-3)), (5.0, 34e-3)]
 
 
-def test_map_is_of_the_seal_on_a_plain_flooded_wall_with_the_pressure_on_its_left():
-    case = dataclasses.replace(
-        CASE, control_edge=ControlEdge(), film_supply=FilmSupply(), viscoelasticity=Viscoelasticity()
-    )
-    model, start, stiffness = module._at_rest(case, 2e5)
-    plain = model.case
-    assert (plain.control_edge, plain.film_supply, plain.viscoelasticity) == (None, None, None)
-    assert stiffness == case.groove.stiffness
+def test_map_is_of_the_seal_on_a_flooded_wall_with_the_pressure_on_its_left():
+    model, start, stiffness = module._at_rest(CASE, 2e5)
+    assert (model.pressure_left, model.pressure_right) == (2e5, 0.0)
+    assert stiffness == CASE.groove.stiffness
     assert start.saturation.min() == 1.0
-    under_air = dataclasses.replace(CASE, air=AirPressure(pressure_left=1e5, pressure_right=3e5))
-    air = module._at_rest(under_air, 2e5).model.case.air
-    assert (air.pressure_left, air.pressure_right) == (2e5, 0.0)
 
 
 def test_map_that_does_not_converge_is_an_error_that_says_where(monkeypatch):

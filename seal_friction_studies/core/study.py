@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.lubrication.findings import REFERENCE_HALF_WIDTH, findings
-from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
+from seal_friction_studies.core.findings import REFERENCE_HALF_WIDTH, findings
+from seal_friction_studies.core.transient import TransientResult, last_cycle
 
 
 class StudyTable(NamedTuple):

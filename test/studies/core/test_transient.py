@@ -8,39 +8,44 @@ from functools import cache
 
 import numpy as np
 import pytest
+import yaml
+from paths import ROOT
 
 from seal_friction_ros.core.foundation.errors import NotConvergedError
-from seal_friction_ros.core.lubrication import transient
-from seal_friction_ros.core.lubrication.findings import discretisation_errors, error_of_levels, findings
-from seal_friction_ros.core.lubrication.groove import GrooveSpring
-from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration, MeasuredMotion
-from seal_friction_ros.core.lubrication.lubrication_case import (
+from seal_friction_ros.core.lubrication.friction_map import steady_friction
+from seal_friction_ros.core.lubrication.lubrication_case import MapGrid
+from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
+from seal_friction_studies.core import transient
+from seal_friction_studies.core.findings import discretisation_errors, error_of_levels, findings
+from seal_friction_studies.core.groove import GrooveSpring
+from seal_friction_studies.core.kinematics import ConstantAcceleration, MeasuredMotion
+from seal_friction_studies.core.spool import SpoolSealMotion, superposed
+from seal_friction_studies.core.study import study_table
+from seal_friction_studies.core.study_case import (
     AirPressure,
-    LubricationCase,
-    LubricationNumerics,
     SpoolSeal,
+    StudyCase,
+    StudyNumerics,
     Viscoelasticity,
-    parse_lubrication_case,
+    parse_study_case,
 )
-from seal_friction_ros.core.lubrication.spool import SpoolSealMotion, superposed
-from seal_friction_ros.core.lubrication.study import study_table
-from seal_friction_ros.core.lubrication.transient import (
+from seal_friction_studies.core.transient import (
     StepBefore,
     TransientResult,
     initial_state,
-    lubrication_model,
     run_transient,
     start_of_step,
+    transient_model,
     with_solid_shear_stress,
 )
-from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
+from seal_friction_studies.core.wall import ControlEdge, FilmSupply
 
-INNER = LubricationCase(name='inner', numerics=LubricationNumerics(cells=96, time_step=1e-3))
+INNER = StudyCase(name='inner', numerics=StudyNumerics(cells=96, time_step=1e-3))
 EDGE = dataclasses.replace(INNER, motion=ConstantAcceleration(distance=2.7e-3), control_edge=ControlEdge())
 
 
 @cache
-def done(case: LubricationCase) -> TransientResult:
+def done(case: StudyCase) -> TransientResult:
     return run_transient(case)
 
 
@@ -122,7 +127,7 @@ def test_chamfer_gives_back_what_it_took_but_for_what_friction_changes():
         motion=ConstantAcceleration(distance=2.7e-3, speed=5e-3, cycles=1),
         film_supply=FilmSupply(1e-9),
         seal=dataclasses.replace(EDGE.seal, solid_shear_stress=1e3),
-        numerics=LubricationNumerics(cells=96, time_step=2e-3),
+        numerics=StudyNumerics(cells=96, time_step=2e-3),
     )
     result = done(slow)
     way = result.sliding_velocity * np.diff(result.time, prepend=0.0)
@@ -140,7 +145,7 @@ def test_starved_film_removes_the_rise_on_deceleration():
 
 def test_starved_film_is_neither_made_nor_lost():
     starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), motion=ConstantAcceleration(cycles=1))
-    model = transient.lubrication_model(starved)
+    model = transient.transient_model(starved)
     motion = starved.motion
     moment = initial_state(model, motion.position(0.0))
 
@@ -157,8 +162,8 @@ def test_starved_film_is_neither_made_nor_lost():
 
 
 def test_starved_seal_goes_to_the_left_as_it_goes_to_the_right():
-    starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), numerics=LubricationNumerics(cells=64))
-    model = transient.lubrication_model(starved)
+    starved = dataclasses.replace(INNER, film_supply=FilmSupply(0.6e-6), numerics=StudyNumerics(cells=64))
+    model = transient.transient_model(starved)
     ends, forces = [], []
     for direction in (1.0, -1.0):
         moment = initial_state(model, 0.0)
@@ -180,7 +185,7 @@ def test_starved_seal_goes_to_the_left_as_it_goes_to_the_right():
 @pytest.mark.parametrize('direction', [1.0, -1.0])
 def test_velocity_at_the_end_of_a_step_is_that_of_an_even_acceleration(direction):
     """0.4 m/s^2: 4 mm/s on average over 20 ms, then 11 mm/s over 15 ms and 14 mm/s at their end."""
-    start = initial_state(lubrication_model(INNER), 0.0)
+    start = initial_state(transient_model(INNER), 0.0)
     after = start._replace(before=StepBefore(start.state.gap, start.creep, 20e-3, direction * 4e-3))
     assert transient._velocity_at_end(after, direction * 11e-3, 15e-3) == pytest.approx(direction * 14e-3)
     assert transient._velocity_at_end(after, -direction * 11e-3, 15e-3) == -direction * 11e-3  # turned round
@@ -191,7 +196,7 @@ def test_velocity_at_the_end_of_a_step_is_that_of_an_even_acceleration(direction
 
 def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge():
     """Two roundings of 20 um before the chamfer from 0.3 to 0.4667 mm, and two after it."""
-    model = lubrication_model(EDGE)
+    model = transient_model(EDGE)
     loads = initial_state(model, -1e-3)
     solid, _ = transient.asperity_pressure(loads.state.gap, model.contact.asperities)
     loaded = model.place[solid > 0.01 * solid.max()]
@@ -212,11 +217,11 @@ def test_steps_are_taken_at_once_until_a_loaded_part_comes_to_the_rounded_edge()
     assert may(before + 0.5 * far, before + far - near, lag=far)  # the contact counts, not the spool
     assert not may(before - 2.0 * far, before - far, before - 1.5 * far)  # to and fro
     assert not may(before - far, before - far)
-    assert transient._may_be_one_step(lubrication_model(INNER), loads, [0.0, 1.0])
+    assert transient._may_be_one_step(transient_model(INNER), loads, [0.0, 1.0])
 
 
 def test_run_of_more_numbers_than_fit_is_refused():
-    long = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1000), numerics=LubricationNumerics(4000))
+    long = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1000), numerics=StudyNumerics(4000))
     with pytest.raises(ValueError, match=r'case inner: \d+ steps of 4000 cells are too many to keep'):
         run_transient(long)
 
@@ -297,7 +302,7 @@ def test_runs_are_the_same_to_the_bit():
 
 
 def test_the_formula_of_second_order_follows_a_parabola_over_steps_of_any_length():
-    start = initial_state(lubrication_model(INNER), 0.0)
+    start = initial_state(transient_model(INNER), 0.0)
 
     def at(time):
         return np.full(INNER.numerics.cells, 1e-6 + 1e-6 * time**2)
@@ -316,7 +321,7 @@ def test_friction_is_of_nearly_second_order_in_the_time_step():
     one = dataclasses.replace(INNER, motion=ConstantAcceleration(cycles=1))
     friction = []
     for step in (1e-3, 5e-4, 2.5e-4):
-        result = run_transient(dataclasses.replace(one, numerics=LubricationNumerics(cells=96, time_step=step)))
+        result = run_transient(dataclasses.replace(one, numerics=StudyNumerics(cells=96, time_step=step)))
         friction.append(np.interp(np.linspace(0.4, 0.46, 7) * result.time[-1], result.time, result.friction))
     coarse, fine = (np.abs(change).mean() for change in np.diff(friction, axis=0))
     assert coarse > 2.5 * fine
@@ -341,7 +346,7 @@ def test_steps_at_once_away_from_the_edge_leave_the_findings_as_they_are():
 @pytest.mark.long
 def test_the_error_of_the_peak_at_the_control_edge_holds_a_finer_one():
     def with_step(step):
-        return dataclasses.replace(EDGE, numerics=LubricationNumerics(cells=64, time_step=step))
+        return dataclasses.replace(EDGE, numerics=StudyNumerics(cells=64, time_step=step))
 
     case = with_step(1.4e-4)
     found = findings(run_transient(case))
@@ -409,8 +414,8 @@ def test_mirrored_pair_of_seals_makes_a_friction_without_preference():
 
 
 def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
-    case = parse_lubrication_case({'name': 'x', 'groove': {'half_clearance': 1e-4}, 'viscoelasticity': {}})
-    assert isinstance(case, LubricationCase)
+    case = parse_study_case({'name': 'x', 'groove': {'half_clearance': 1e-4}, 'viscoelasticity': {}})
+    assert isinstance(case, StudyCase)
     assert (case.grease.yield_stress, case.motion.speed, case.numerics.cells) == (530.96, 34e-3, 226)
     assert case.seal.modulus == pytest.approx(8.0 * 1.785e6)
     assert case.groove.half_clearance == 1e-4
@@ -443,5 +448,22 @@ def test_case_document_makes_a_case_with_the_defaults_of_the_paper():
 )
 def test_case_without_sense_is_refused_in_one_line(document, words):
     with pytest.raises(ValueError, match=words) as caught:
-        parse_lubrication_case(document)
+        parse_study_case(document)
     assert '\n' not in str(caught.value)
+
+
+def test_map_of_a_case_is_of_its_seal_on_a_plain_flooded_wall_whatever_else_the_case_has():
+    grid = MapGrid(velocities=2, pressures=2)
+    plain = dataclasses.replace(INNER, map=grid)
+    walls = {'control_edge': ControlEdge(), 'film_supply': FilmSupply(), 'viscoelasticity': Viscoelasticity()}
+    with_walls = dataclasses.replace(plain, **walls)
+    under_air = dataclasses.replace(plain, air=AirPressure(pressure_left=1e5, pressure_right=3e5))
+    expected = steady_friction(plain, 2e5).friction
+    assert all((steady_friction(case, 2e5).friction == expected).all() for case in (with_walls, under_air))
+
+
+def test_an_o_ring_has_no_run_of_its_own():
+    text = (ROOT / 'config' / 'oring' / 'ms28775_114_blind.yaml').read_text()
+    case = dataclasses.replace(INNER, oring=parse_oring_case(yaml.safe_load(text)).case)
+    with pytest.raises(ValueError, match='an O-ring has a friction map only: seal_friction ehl map'):
+        transient_model(case)

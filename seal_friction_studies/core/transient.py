@@ -20,18 +20,17 @@ from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
 from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.lubrication.contact import (
     ContactState,
-    LubricatedContact,
     asperity_pressure,
     contact_step,
     dry_contact,
     film_properties,
 )
-from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
+from seal_friction_ros.core.lubrication.model import LubricationModel, fluid_force, profile_model, solid_limit
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
-from seal_friction_ros.core.lubrication.seal_section import seal_body
-from seal_friction_ros.core.lubrication.shear import fluid_shear, sliding_velocity, solid_shear
-from seal_friction_ros.core.lubrication.wall import WallFilm
+from seal_friction_studies.core.balance import sliding_velocity
+from seal_friction_studies.core.kinematics import SpoolMotion
+from seal_friction_studies.core.study_case import StudyCase
+from seal_friction_studies.core.wall import WallFilm
 
 _MOST_HALVINGS = 10
 _LONGEST_WALL = 1_000_000  # cells of its film
@@ -39,47 +38,26 @@ _LARGEST_RECORD = 100_000_000  # numbers along the seal that a run may keep, 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class LubricationModel:
-    """A case with the quantities that are constant over a run; `lubrication_model` makes it."""
+class TransientModel(LubricationModel):
+    """A seal on a wall that may have a control edge; `transient_model` makes it."""
 
-    case: LubricationCase
-    contact: LubricatedContact
-    place: FloatArray  # cells along the seal from its crown [m], shape (n,)
-    ambient: FloatArray  # pressure of what is beside the seal, along it [Pa], shape (n,)
-    profile: FloatArray
-    """gap to a plain wall without film and asperities, less the deflection by what is beside it [m], shape (n,)"""
-    circumference: float  # [m]
+    case: StudyCase
 
     def rigid_gap(self, contact_place: float) -> FloatArray:
         """Gap of the undeformed seal [m] with its crown at ``contact_place`` along the wall [m]."""
         edge = self.case.control_edge
         return self.profile if edge is None else self.profile + edge.fall(contact_place + self.place)[0]
 
-    def ends(self, left: float = 1.0, right: float = 1.0) -> FilmEnds:
-        """Pressure beyond both ends of the film, and saturation of the inflow."""
-        return FilmEnds(self.case.air.pressure_left, self.case.air.pressure_right, left, right)
 
-
-def lubrication_model(case: LubricationCase) -> LubricationModel:
-    """Model of a case of a profile on a half-plane, a layer or a section by finite elements.
-
-    The air acts on the seal from all sides, and rubber transmits its pressure like a fluid: only the pressure above
-    that of the air deflects the seal. The air pressure falls linearly over the middle half of the film (our choice).
+def transient_model(case: StudyCase) -> TransientModel:
+    """Model of a case; as `profile_model`.
 
     Raises:
         ValueError: The grid does not fit the seal, or the seal is an O-ring.
     """
     if case.oring is not None:
         raise ValueError(f'case {case.name}: an O-ring has a friction map only: seal_friction ehl map')
-    numerics = case.numerics
-    width = numerics.film_width / numerics.cells
-    body = seal_body(case.seal, numerics)
-    place: FloatArray = np.asarray((np.arange(numerics.cells) + 0.5) * width - 0.5 * numerics.film_width)
-    passed = np.clip(0.5 + 2.0 * place / numerics.film_width, 0.0, 1.0)
-    ambient = case.air.pressure_left + passed * (case.air.pressure_right - case.air.pressure_left)
-    profile = case.seal.fall(place) - case.interference - body.deflection(ambient)
-    contact = LubricatedContact(body, case.topography, case.grease)
-    return LubricationModel(case, contact, place, ambient, profile, math.pi * case.seal.sealing_diameter)
+    return TransientModel(**vars(profile_model(case, case.air.pressure_left, case.air.pressure_right)))
 
 
 class StepBefore(NamedTuple):
@@ -122,7 +100,7 @@ class SealForces(NamedTuple):
 class TransientResult(NamedTuple):
     """A run; arrays with one entry per step, the first after the first step."""
 
-    case: LubricationCase
+    case: StudyCase
     time: FloatArray  # [s]
     position: FloatArray  # of the spool [m]
     velocity: FloatArray  # of the spool [m/s]
@@ -149,7 +127,7 @@ def last_cycle(result: TransientResult) -> BoolArray:
     return np.asarray(result.time > begin + 1e-12)
 
 
-def initial_state(model: LubricationModel, position: float) -> TransientState:
+def initial_state(model: TransientModel, position: float) -> TransientState:
     """The seal at rest and relaxed on its left seat: dry contact, gap filled by the film on the wall.
 
     Raises:
@@ -183,7 +161,7 @@ def initial_state(model: LubricationModel, position: float) -> TransientState:
 
 
 def transient_step(
-    model: LubricationModel, moment: TransientState, time: float, position: float
+    model: TransientModel, moment: TransientState, time: float, position: float
 ) -> tuple[TransientState, SealForces, int, float]:
     """One step to ``time`` [s], when the spool is at ``position`` [m].
 
@@ -224,7 +202,7 @@ def transient_step(
     return after, _forces(model, after, at_end), done.iterations, defect
 
 
-def _creep(case: LubricationCase) -> tuple[FloatArray, FloatArray]:
+def _creep(case: StudyCase) -> tuple[FloatArray, FloatArray]:
     """Shares of the compliance that creep, and their times [s]; both empty for an elastic seal."""
     parts = case.viscoelasticity.creep if case.viscoelasticity else ()
     shares, times = np.array(parts, dtype=np.float64).reshape(-1, 2).T
@@ -267,7 +245,7 @@ def _velocity_at_end(moment: TransientState, velocity: float, step: float) -> fl
     return at_end if at_end * velocity > 0.0 else velocity
 
 
-def _edge_force(model: LubricationModel, moment: TransientState) -> float:
+def _edge_force(model: TransientModel, moment: TransientState) -> float:
     edge = model.case.control_edge
     if edge is None:
         return 0.0
@@ -277,19 +255,7 @@ def _edge_force(model: LubricationModel, moment: TransientState) -> float:
     return -model.circumference * axial
 
 
-def fluid_force(model: LubricationModel, state: ContactState, velocity: float) -> float:
-    """Fluid friction [N] at a sliding ``velocity`` [m/s]."""
-    numbers, width = model.case.grease.numbers, model.contact.body.cell_width
-    roughness = model.contact.stress_roughness
-    return -model.circumference * float(fluid_shear(*state, -velocity, numbers, width, model.ends(), roughness))
-
-
-def solid_limit(model: LubricationModel, state: ContactState) -> float:
-    """Magnitude of the solid friction [N] of a sliding contact."""
-    return model.circumference * solid_shear(model.contact, state.gap, model.case.seal.solid_shear_stress)
-
-
-def _bottom_force(model: LubricationModel, state: ContactState) -> float:
+def _bottom_force(model: TransientModel, state: ContactState) -> float:
     """Normal force of the seal on the bottom of its groove [N]: that of film and asperities on its face."""
     if model.case.groove.friction_coefficient == 0.0:
         return 0.0
@@ -297,7 +263,7 @@ def _bottom_force(model: LubricationModel, state: ContactState) -> float:
     return model.circumference * model.contact.body.cell_width * float((state.pressure + solid).sum())
 
 
-def _slide(model: LubricationModel, moment: TransientState, step: float, position: float) -> tuple[float, float]:
+def _slide(model: TransientModel, moment: TransientState, step: float, position: float) -> tuple[float, float]:
     """Sliding velocity [m/s] during the step and lag [m] after it."""
     groove = model.case.seated_groove
     stuck_lag = moment.lag + position - moment.position
@@ -322,7 +288,7 @@ def _slide(model: LubricationModel, moment: TransientState, step: float, positio
     return velocity, stuck_lag - velocity * step
 
 
-def _forces(model: LubricationModel, moment: TransientState, velocity: float) -> SealForces:
+def _forces(model: TransientModel, moment: TransientState, velocity: float) -> SealForces:
     fluid = fluid_force(model, moment.state, velocity)
     edge = _edge_force(model, moment)
     limit = solid_limit(model, moment.state)
@@ -334,7 +300,7 @@ def _forces(model: LubricationModel, moment: TransientState, velocity: float) ->
     return SealForces(solid + fluid + edge, solid, fluid, edge, velocity)
 
 
-def _supply(model: LubricationModel, moment: TransientState, way: float, step: float) -> tuple[FilmEnds, FloatArray]:
+def _supply(model: TransientModel, moment: TransientState, way: float, step: float) -> tuple[FilmEnds, FloatArray]:
     """Ends of the film for a step by ``way`` [m], and the lubricant taken from each cell of the wall [m^2]."""
     if moment.wall_film is None or way == 0.0:
         return model.ends(), np.zeros(1)
@@ -348,13 +314,13 @@ def _supply(model: LubricationModel, moment: TransientState, way: float, step: f
     return (model.ends(right=filled) if way > 0.0 else model.ends(left=filled)), taken
 
 
-def _seal_ends(model: LubricationModel, contact_place: float) -> tuple[float, float]:
+def _seal_ends(model: TransientModel, contact_place: float) -> tuple[float, float]:
     half = 0.5 * model.case.numerics.film_width
     return contact_place - half, contact_place + half
 
 
 def _wall_film_after(
-    model: LubricationModel,
+    model: TransientModel,
     moment: TransientState,
     wall_film: WallFilm,
     taken: FloatArray,
@@ -375,7 +341,7 @@ def _wall_film_after(
 
 
 def run_transient(
-    case: LubricationCase, motion: SpoolMotion | None = None, on_step: Callable[[int], None] | None = None
+    case: StudyCase, motion: SpoolMotion | None = None, on_step: Callable[[int], None] | None = None
 ) -> TransientResult:
     """Run a case through its motion, or through another.
 
@@ -392,7 +358,7 @@ def run_transient(
         ValueError: The result would not fit in memory.
     """
     moved = case.motion if motion is None else motion
-    model = lubrication_model(case)
+    model = transient_model(case)
     steps = max(1, math.ceil(moved.duration / case.numerics.time_step - 1e-9))
     if 4 * steps * case.numerics.cells > _LARGEST_RECORD:
         raise ValueError(
@@ -446,7 +412,7 @@ def run_transient(
     )  # fmt: skip
 
 
-def _may_be_one_step(model: LubricationModel, moment: TransientState, positions: list[float]) -> bool:
+def _may_be_one_step(model: TransientModel, moment: TransientState, positions: list[float]) -> bool:
     """Whether the spool may go on to the last of some ``positions`` [m] at once.
 
     It has to go on in one direction, without the loaded part of the seal (beyond 1 % of the highest pressure, our
@@ -467,6 +433,6 @@ def _may_be_one_step(model: LubricationModel, moment: TransientState, positions:
     return bool(high < begin or low > end)
 
 
-def with_solid_shear_stress(case: LubricationCase, solid_shear_stress: float) -> LubricationCase:
+def with_solid_shear_stress(case: StudyCase, solid_shear_stress: float) -> StudyCase:
     """The case with another tau_c [Pa]."""
     return dataclasses.replace(case, seal=dataclasses.replace(case.seal, solid_shear_stress=solid_shear_stress))

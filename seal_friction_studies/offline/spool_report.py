@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from seal_friction_ros.core.foundation.units import MM
-from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation, SpoolFriction, evaluate_cycles
 from seal_friction_ros.offline.identification.sources import column_in_si, table_rows
 from seal_friction_ros.offline.reports import figure_style as style
-from seal_friction_ros.offline.reports import verdicts
 from seal_friction_ros.offline.reports.figure_style import Plot, finished, house_style
 from seal_friction_ros.offline.reports.page import ReportSummary, head_of, write_page
+from seal_friction_studies.core.spool_evaluation import SpoolEvaluation, SpoolFriction, evaluate_cycles
+from seal_friction_studies.offline import verdicts
 
 COLUMN_UNITS = {
     'time': {'s': 's', 'ms': 'ms'},
@@ -68,7 +68,7 @@ def write_spool_report(
         'numbers': numbers,
         'settings': settings,
     }
-    figures = write_page(out, 'spool_evaluation', plots, **shown)
+    figures = write_page(out, Path(__file__).with_name('templates') / 'spool_evaluation', plots, **shown)
     return ReportSummary(out, figures, numbers)
 
 

@@ -8,7 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
+from seal_friction_ros.core.foundation.parameters import parameter
+from seal_friction_ros.core.lubrication.lubrication_case import ReferenceMotion
 
 
 class SpoolMotion(Protocol):
@@ -25,7 +26,7 @@ class SpoolMotion(Protocol):
 
 
 @dataclass(frozen=True)
-class ConstantAcceleration(CheckedParameters):
+class ConstantAcceleration(ReferenceMotion):
     """Reciprocation about ``centre`` without dwell: acceleration, constant speed, deceleration, and return.
 
     Defaults: Table 1 of the spool-valve paper.
@@ -35,7 +36,6 @@ class ConstantAcceleration(CheckedParameters):
     """
 
     distance: float = parameter(1.8e-3, unit='m', lower=1e-6, upper=10.0, description='Way from end to end, s_max.')
-    speed: float = parameter(34e-3, unit='m/s', lower=1e-6, upper=10.0, description='Speed between the ends, v_max.')
     acceleration: float = parameter(
         0.68, unit='m/s2', lower=1e-4, upper=1e5, description='Magnitude at both ends, a_const.'
     )

@@ -6,27 +6,22 @@ import math
 import numpy as np
 import pytest
 
-from seal_friction_ros.core.lubrication.findings import (
-    check_time_step,
-    discretisation_errors,
-    error_of_levels,
-    findings,
-)
-from seal_friction_ros.core.lubrication.groove import GrooveSpring
-from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, LubricationNumerics, SpoolSeal
-from seal_friction_ros.core.lubrication.spool import SpoolSealMotion, stroke_friction, superposed
-from seal_friction_ros.core.lubrication.study import study_table
-from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle, with_solid_shear_stress
-from seal_friction_ros.core.lubrication.wall import ControlEdge
+from seal_friction_studies.core.findings import check_time_step, discretisation_errors, error_of_levels, findings
+from seal_friction_studies.core.groove import GrooveSpring
+from seal_friction_studies.core.kinematics import ConstantAcceleration
+from seal_friction_studies.core.spool import SpoolSealMotion, stroke_friction, superposed
+from seal_friction_studies.core.study import study_table
+from seal_friction_studies.core.study_case import SpoolSeal, StudyCase, StudyNumerics
+from seal_friction_studies.core.transient import TransientResult, last_cycle, with_solid_shear_stress
+from seal_friction_studies.core.wall import ControlEdge
 
 MOTION = ConstantAcceleration(distance=2e-3, speed=20e-3, acceleration=0.4, cycles=2)
 """Speeds up for 50 ms over 0.5 mm; 150 ms from end to end."""
-CASE = LubricationCase(name='made', motion=MOTION, groove=GrooveSpring(stiffness=1e4))
+CASE = StudyCase(name='made', motion=MOTION, groove=GrooveSpring(stiffness=1e4))
 EDGE = dataclasses.replace(CASE, control_edge=ControlEdge(position=0.8e-3))
 
 
-def made(case: LubricationCase = CASE, steps: int = 600, **columns: object) -> TransientResult:
+def made(case: StudyCase = CASE, steps: int = 600, **columns: object) -> TransientResult:
     """A run whose ``columns`` are functions of position and velocity of the spool; friction is their sum by default."""
     time = case.motion.duration * np.arange(1, steps + 1) / steps
     ends = np.array([case.motion.position(t) for t in (0.0, *time)])
@@ -170,7 +165,7 @@ def test_friction_after_the_edge_is_read_a_whole_film_within_the_seat_above_half
     found = findings(made(EDGE, 6000, solid=solid))
     assert found.after_edge == pytest.approx(2.0, rel=0.02)
     assert found.edge_assist == 0.0  # a chamfer that does not push
-    half = dataclasses.replace(EDGE, numerics=LubricationNumerics(film_width=0.3e-3))
+    half = dataclasses.replace(EDGE, numerics=StudyNumerics(film_width=0.3e-3))
     assert findings(made(half, 6000, solid=solid)).after_edge > 2.5
 
 
@@ -307,10 +302,10 @@ def test_number_that_a_level_does_not_have_has_no_error():
     def stuck(place, velocity):
         return np.where(place < 0.0, 0.0, velocity)
 
-    def run(case: LubricationCase) -> TransientResult:
+    def run(case: StudyCase) -> TransientResult:
         return made(case, solid=lobed if case.numerics.time_step < 2e-3 else along(2.0), sliding_velocity=stuck)
 
-    case = dataclasses.replace(BISTABLE, numerics=LubricationNumerics(cells=160, time_step=5e-4))
+    case = dataclasses.replace(BISTABLE, numerics=StudyNumerics(cells=160, time_step=5e-4))
     by_step, by_grid = discretisation_errors(case, findings(run(case)), run)
     assert 'second_lobe' not in by_step
     assert by_grid['second_lobe'] == 0.0
@@ -320,10 +315,10 @@ def test_number_that_a_level_does_not_have_has_no_error():
 def test_time_step_may_pass_the_rounding_of_the_edge_in_four():
     """20 um at 20 mm/s in four steps: 0.25 ms."""
     for step in (2.5e-4, 1e-4):
-        check_time_step(dataclasses.replace(EDGE, numerics=LubricationNumerics(time_step=step)))
+        check_time_step(dataclasses.replace(EDGE, numerics=StudyNumerics(time_step=step)))
     with pytest.raises(ValueError, match=r'case made: numerics.time_step is 0.00026 s, .* at most 0.00025 s'):
-        check_time_step(dataclasses.replace(EDGE, numerics=LubricationNumerics(time_step=2.6e-4)))
-    check_time_step(dataclasses.replace(CASE, numerics=LubricationNumerics(time_step=0.1)))
+        check_time_step(dataclasses.replace(EDGE, numerics=StudyNumerics(time_step=2.6e-4)))
+    check_time_step(dataclasses.replace(CASE, numerics=StudyNumerics(time_step=0.1)))
 
 
 @pytest.mark.parametrize(
@@ -346,12 +341,12 @@ def test_errors_come_from_doubled_steps_and_halved_grids():
     """Friction 2 + 1e3 dt + 2e4 / n^2 N, at 0.5 ms and 120 cells: of first order in dt, of second in 1 / n."""
     runs = []
 
-    def run(case: LubricationCase) -> TransientResult:
+    def run(case: StudyCase) -> TransientResult:
         runs.append((case.numerics.time_step, case.numerics.cells))
         force = 2.0 + 1e3 * case.numerics.time_step + 2e4 / case.numerics.cells**2
         return made(case, solid=along(force))
 
-    case = dataclasses.replace(CASE, numerics=LubricationNumerics(cells=160, time_step=5e-4))
+    case = dataclasses.replace(CASE, numerics=StudyNumerics(cells=160, time_step=5e-4))
     by_step, by_grid = discretisation_errors(case, findings(run(case)), run)
     assert runs[1:] == [(1e-3, 160), (2e-3, 160), (5e-4, 80), (5e-4, 40)]
     assert by_step['friction'] == pytest.approx(0.5, rel=1e-6)
@@ -359,7 +354,7 @@ def test_errors_come_from_doubled_steps_and_halved_grids():
     assert by_step['solid_share'] == 0.0
     assert 'edge_peak' not in by_step
     runs.clear()
-    coarse = dataclasses.replace(CASE, numerics=LubricationNumerics(cells=50))
+    coarse = dataclasses.replace(CASE, numerics=StudyNumerics(cells=50))
     discretisation_errors(coarse, findings(run(coarse)), run)
     assert [cells for _, cells in runs[3:]] == [32, 32]
 

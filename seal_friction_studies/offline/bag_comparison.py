@@ -7,18 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.identification.spool_evaluation import (
+from seal_friction_ros.offline.bags.recorded_run import read_run
+from seal_friction_studies.core.kinematics import MeasuredMotion
+from seal_friction_studies.core.measuring_chain import MeasuringChain, transducer_force
+from seal_friction_studies.core.spool_evaluation import (
     SpoolEvaluation,
     moving_average,
     resonance_frequency,
     without_resonance,
 )
-from seal_friction_ros.core.lubrication.kinematics import MeasuredMotion
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
-from seal_friction_ros.core.lubrication.measuring_chain import MeasuringChain, transducer_force
-from seal_friction_ros.core.lubrication.transient import TransientResult
-from seal_friction_ros.offline.bags.recorded_run import read_run
-from seal_friction_ros.offline.contact.lubrication_runs import run_with_progress
+from seal_friction_studies.core.study_case import StudyCase
+from seal_friction_studies.core.transient import TransientResult
+from seal_friction_studies.offline.study_runs import run_with_progress
 
 _FEWEST_SAMPLES = 10
 
@@ -64,7 +64,7 @@ class Comparison:
 
 
 def compare_with_bag(
-    case: LubricationCase, bag: Path, window: tuple[float, float] | None, evaluation: SpoolEvaluation | None = None
+    case: StudyCase, bag: Path, window: tuple[float, float] | None, evaluation: SpoolEvaluation | None = None
 ) -> Comparison:
     """Run a case through the recorded position of a bag and compare the recorded force with the computed friction.
 
@@ -130,7 +130,7 @@ def _recorded(bag: Path, window: tuple[float, float] | None) -> _Recorded:
     return _Recorded(time - time[0], position[good], recorded.force_sum[good])
 
 
-def _run_through(case: LubricationCase, bag: Path, time: FloatArray, position: FloatArray) -> TransientResult:
+def _run_through(case: StudyCase, bag: Path, time: FloatArray, position: FloatArray) -> TransientResult:
     try:
         motion = MeasuredMotion(time.tolist(), position.tolist())
     except ValueError as error:

@@ -7,8 +7,9 @@ import pytest
 
 from seal_friction_ros.core.friction.presliding import NOT_SHEARED, Slide, presliding_numbers, presliding_of_map, shear
 from seal_friction_ros.core.friction.seal_file import parse_seal
-from seal_friction_ros.core.lubrication.transient import last_cycle, run_transient
-from seal_friction_ros.offline.contact.lubrication_runs import run_map, seal_document, single_case
+from seal_friction_ros.offline.contact.lubrication_runs import run_map, seal_document
+from seal_friction_studies.core.transient import last_cycle, run_transient
+from seal_friction_studies.offline.study_runs import single_case
 
 
 def figure_14(groove_friction):

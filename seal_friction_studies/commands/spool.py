@@ -23,8 +23,8 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Evaluate and write the page."""
-    from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
-    from seal_friction_ros.offline.reports.spool_report import write_spool_report
+    from seal_friction_studies.core.spool_evaluation import SpoolEvaluation
+    from seal_friction_studies.offline.spool_report import write_spool_report
 
     law = SpoolEvaluation(cycles=arguments.cycles, evaluated_cycle=arguments.cycle, moving_average=arguments.average)
     numbers = write_spool_report(arguments.table, arguments.out, law, arguments.reference)

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
-from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
+from seal_friction_studies.core.study_case import StudyCase
+from seal_friction_studies.core.transient import TransientResult, last_cycle
 
 REFERENCE_HALF_WIDTH = 0.5e-3
 """[m] about the middle: range of the mean friction of the paper (chapter 6)"""
@@ -86,7 +86,7 @@ COARSEST = 4.0
 """factor of the longest step, from which errors are estimated"""
 
 
-def check_time_step(case: LubricationCase) -> None:
+def check_time_step(case: StudyCase) -> None:
     """Refuse a step over which the seal passes the rounded control edge on the coarsest level: such levels may agree.
 
     Raises:
@@ -104,7 +104,7 @@ def check_time_step(case: LubricationCase) -> None:
 
 
 def discretisation_errors(
-    case: LubricationCase, fine: Findings, run: Callable[[LubricationCase], TransientResult]
+    case: StudyCase, fine: Findings, run: Callable[[StudyCase], TransientResult]
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Error of each finding by time step and by grid, each from three levels: field -> error.
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seal_friction_ros.core.identification.spool_evaluation import (
+from seal_friction_studies.core.spool_evaluation import (
     SpoolEvaluation,
     cycle_starts,
     evaluate_cycles,

@@ -6,31 +6,25 @@ import math
 import numpy as np
 import pytest
 
-from seal_friction_ros.core.lubrication import transient
 from seal_friction_ros.core.lubrication.contact import ContactState, asperity_pressure
 from seal_friction_ros.core.lubrication.grease import Grease
-from seal_friction_ros.core.lubrication.groove import GrooveSpring
-from seal_friction_ros.core.lubrication.kinematics import MeasuredMotion
-from seal_friction_ros.core.lubrication.lubrication_case import (
-    AirPressure,
-    LubricationCase,
-    LubricationNumerics,
-    Viscoelasticity,
-)
-from seal_friction_ros.core.lubrication.transient import (
+from seal_friction_ros.core.lubrication.model import fluid_force, solid_limit
+from seal_friction_studies.core import transient
+from seal_friction_studies.core.groove import GrooveSpring
+from seal_friction_studies.core.kinematics import MeasuredMotion
+from seal_friction_studies.core.study_case import AirPressure, StudyCase, StudyNumerics, Viscoelasticity
+from seal_friction_studies.core.transient import (
     StepBefore,
     TransientState,
-    fluid_force,
     initial_state,
-    lubrication_model,
     run_transient,
-    solid_limit,
     start_of_step,
+    transient_model,
     transient_step,
 )
-from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply, WallFilm
+from seal_friction_studies.core.wall import ControlEdge, FilmSupply, WallFilm
 
-CASE = LubricationCase(name='small', numerics=LubricationNumerics(cells=32, time_step=1e-3))
+CASE = StudyCase(name='small', numerics=StudyNumerics(cells=32, time_step=1e-3))
 EDGE = dataclasses.replace(CASE, control_edge=ControlEdge())
 OIL = Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.5)
 CREEPING = dataclasses.replace(CASE, viscoelasticity=Viscoelasticity(stiffening=3.0, relaxation_time=0.01, decades=1))
@@ -42,8 +36,8 @@ def plates(gap: float, pressure: float) -> ContactState:
     return ContactState(np.full(32, gap), np.full(32, pressure), np.ones(32))
 
 
-def at_rest(case: LubricationCase, position: float = 0.0) -> TransientState:
-    return initial_state(lubrication_model(case), position)
+def at_rest(case: StudyCase, position: float = 0.0) -> TransientState:
+    return initial_state(transient_model(case), position)
 
 
 # -- forces
@@ -52,45 +46,45 @@ def at_rest(case: LubricationCase, position: float = 0.0) -> TransientState:
 @pytest.mark.parametrize('velocity', [0.03, -0.03])
 def test_film_resists_motion_by_the_shear_of_newton_all_round(velocity):
     """Viscosity 0.5 Pa s, gap 2 um; air of one pressure on both sides."""
-    air = AirPressure(2e5, 2e5)
-    model = lubrication_model(dataclasses.replace(CASE, grease=OIL, air=air))
+    air = AirPressure(pressure_left=2e5, pressure_right=2e5)
+    model = transient_model(dataclasses.replace(CASE, grease=OIL, air=air))
     force = fluid_force(model, plates(2e-6, 2e5), velocity)
     assert force == pytest.approx(0.5 * velocity / 2e-6 * CIRCUMFERENCE * FILM, rel=1e-9)
 
 
 def test_solid_friction_is_tau_c_on_all_the_surface_where_all_of_it_touches():
     case = dataclasses.replace(CASE, topography=dataclasses.replace(CASE.topography, filling=True))
-    assert solid_limit(lubrication_model(case), plates(1e-9, 0.0)) == pytest.approx(1.5e6 * CIRCUMFERENCE * FILM)
-    assert solid_limit(lubrication_model(case), plates(1e-3, 0.0)) == 0.0
+    assert solid_limit(transient_model(case), plates(1e-9, 0.0)) == pytest.approx(1.5e6 * CIRCUMFERENCE * FILM)
+    assert solid_limit(transient_model(case), plates(1e-3, 0.0)) == 0.0
 
 
 @pytest.mark.parametrize('gap', [1e-3, 2e-6])
 def test_chamfer_pushes_by_the_pressure_on_what_the_wall_falls_below_the_seal(gap):
     """Pressure of film and asperities times the height of the step, towards the open side."""
-    model = lubrication_model(EDGE)
+    model = transient_model(EDGE)
     moment = at_rest(EDGE)._replace(position=0.25e-3, lag=-0.05e-3, state=plates(gap, 3e5))
     solid = asperity_pressure(np.array([gap]), model.contact.asperities)[0][0]
     fall, _ = EDGE.control_edge.fall(0.3e-3 + np.array([-0.3e-3, 0.3e-3]))
     assert (solid > 1e4) == (gap < 1e-5)
     exact = -(3e5 + solid) * (fall[1] - fall[0]) * CIRCUMFERENCE
     assert transient._edge_force(model, moment) == pytest.approx(exact, rel=2e-3)
-    assert transient._edge_force(lubrication_model(CASE), moment) == 0.0
+    assert transient._edge_force(transient_model(CASE), moment) == 0.0
 
 
 def test_bottom_of_the_groove_bears_what_film_and_asperities_push_unless_it_has_no_friction():
     state = plates(2e-6, 3e5)
     rubbing = dataclasses.replace(CASE, groove=GrooveSpring(friction_coefficient=0.15))
-    model = lubrication_model(rubbing)
+    model = transient_model(rubbing)
     solid = asperity_pressure(state.gap[:1], model.contact.asperities)[0][0]
     assert transient._bottom_force(model, state) == pytest.approx((3e5 + solid) * CIRCUMFERENCE * FILM)
-    assert transient._bottom_force(lubrication_model(CASE), state) == 0.0
+    assert transient._bottom_force(transient_model(CASE), state) == 0.0
 
 
 @pytest.mark.parametrize('way', [0.3e-3, -0.3e-3])
 def test_seal_slides_as_fast_as_groove_and_wall_balance(way):
     """Spring less chamfer and film is the solid friction; the film is driven by an uneven pressure, too."""
     case = dataclasses.replace(EDGE, grease=OIL)
-    model = lubrication_model(case)
+    model = transient_model(case)
     moment = at_rest(case, 0.25e-3)
     uneven = moment.state._replace(pressure=np.linspace(0.0, 1e6, 32))
     moment = moment._replace(state=uneven, lag=0.01e-3)
@@ -106,7 +100,7 @@ def test_seal_slides_as_fast_as_groove_and_wall_balance(way):
 
 @pytest.mark.parametrize('share', [0.99, -0.99, 1.01, -1.01])
 def test_seal_sticks_until_the_spring_pulls_as_strongly_as_the_asperities_hold(share):
-    model = lubrication_model(CASE)
+    model = transient_model(CASE)
     moment = at_rest(CASE)
     position = share * solid_limit(model, moment.state) / CASE.groove.stiffness
     velocity, lag = transient._slide(model, moment, 1e-3, position)
@@ -117,7 +111,7 @@ def test_seal_sticks_until_the_spring_pulls_as_strongly_as_the_asperities_hold(s
 
 @pytest.mark.parametrize('share', [-0.5, 0.5, 2.0, -2.0])
 def test_asperities_of_a_seal_that_sticks_balance_the_spring_up_to_their_limit(share):
-    model = lubrication_model(EDGE)
+    model = transient_model(EDGE)
     moment = at_rest(EDGE, 0.25e-3)
     moment = moment._replace(state=moment.state._replace(pressure=np.linspace(0.0, 1e6, 32)))
     limit, edge = solid_limit(model, moment.state), transient._edge_force(model, moment)
@@ -135,8 +129,8 @@ def test_asperities_of_a_seal_that_sticks_balance_the_spring_up_to_their_limit(s
 
 def test_seal_at_rest_under_air_touches_as_without_it_and_has_crept_under_all_of_its_load():
     """The air pushes rubber from all sides: h = g + K p_c(h); what creeps answers to film and asperities."""
-    case = dataclasses.replace(CREEPING, air=AirPressure(4e5, 0.0))
-    model = lubrication_model(case)
+    case = dataclasses.replace(CREEPING, air=AirPressure(pressure_left=4e5, pressure_right=0.0))
+    model = transient_model(case)
     start = initial_state(model, 0.0)
     solid, _ = asperity_pressure(start.state.gap, model.contact.asperities)
     rigid = model.place**2 / 2e-3 - 60e-6  # 36 um, and 60 um/MPa of 0.4 MPa
@@ -157,7 +151,7 @@ def test_seal_on_its_left_seat_stands_to_the_right_of_its_spool_at_the_edge():
 
 def test_seal_gives_way_at_once_by_a_quarter_and_creeps_towards_the_rest():
     """Stiffening 3: a quarter at once, 3 / 8 with 10 ms and 3 / 8 with 0.1 s: tau c' = 3 / 8 K p - c."""
-    model = lubrication_model(CREEPING)
+    model = transient_model(CREEPING)
     start = initial_state(model, 0.0)
     after, *_ = transient_step(model, start, 5e-3, 0.2e-3)
     solid, _ = asperity_pressure(after.state.gap, model.contact.asperities)
@@ -209,7 +203,7 @@ def test_defect_of_a_step_is_what_is_lost_over_what_is_there_whichever_way(monke
         done = really(*arguments)
         return done._replace(flow=done.flow + lost * np.eye(33)[32])
 
-    model = lubrication_model(CASE)
+    model = transient_model(CASE)
     monkeypatch.setattr(transient, 'contact_step', leaks)
     after, _, _, defect = transient_step(model, initial_state(model, 0.0), 2e-3, 0.0)
     there = (after.state.gap * after.state.saturation).sum() * FILM / 32
@@ -231,7 +225,7 @@ def starved(place: float) -> TransientState:
 @pytest.mark.parametrize('way', [30e-6, -30e-6])
 def test_seal_takes_the_film_ahead_of_it_and_is_fed_by_half_of_its_speed(way):
     """0.1 um on the wall is 0.2 um under a seal, over the height that shear carries at its end."""
-    model = lubrication_model(STARVED)
+    model = transient_model(STARVED)
     moment = initial_state(model, 0.0)
     wedge = np.linspace(4e-6, 8e-6, 32)  # [m] which shear carries, as the roughness of wall and seal cancel
     ends, taken = transient._supply(model, moment._replace(state=moment.state._replace(gap=wedge)), way, 1e-3)
@@ -239,20 +233,20 @@ def test_seal_takes_the_film_ahead_of_it_and_is_fed_by_half_of_its_speed(way):
     filled = (1.0, 0.2e-6 / 8e-6) if way > 0.0 else (0.2e-6 / 4e-6, 1.0)
     assert (ends.saturation_left, ends.saturation_right) == pytest.approx(filled)
     rich = dataclasses.replace(STARVED, film_supply=FilmSupply(1e-3))
-    ends, _ = transient._supply(lubrication_model(rich), at_rest(rich), way, 1e-3)
+    ends, _ = transient._supply(transient_model(rich), at_rest(rich), way, 1e-3)
     assert (ends.saturation_left, ends.saturation_right) == (1.0, 1.0)
 
 
 def test_flooded_seal_and_one_at_rest_take_nothing():
     for case, way in ((CASE, 30e-6), (STARVED, 0.0)):
-        ends, taken = transient._supply(lubrication_model(case), at_rest(case), way, 1e-3)
-        assert (ends, taken.sum()) == (lubrication_model(case).ends(), 0.0)
+        ends, taken = transient._supply(transient_model(case), at_rest(case), way, 1e-3)
+        assert (ends, taken.sum()) == (transient_model(case).ends(), 0.0)
 
 
 def wall_after(moment: TransientState, place: float, taken: np.ndarray) -> np.ndarray:
     """Change of the film on the wall as 3e-14 m^2 flow in at the left of the seal and 7e-14 m^2 out at the right."""
     through = np.array([3e-14, 0.0, 7e-14])
-    after = transient._wall_film_after(lubrication_model(STARVED), moment, moment.wall_film, taken, through, place)
+    after = transient._wall_film_after(transient_model(STARVED), moment, moment.wall_film, taken, through, place)
     return (after.volume - WALL) * 1e14
 
 

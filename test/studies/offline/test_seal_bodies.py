@@ -1,4 +1,4 @@
-"""The tables of test/system/seal_bodies.py, on coarse grids."""
+"""The tables of test/studies/seal_bodies.py, on coarse grids."""
 
 import dataclasses
 import json

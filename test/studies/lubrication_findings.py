@@ -1,7 +1,7 @@
-"""Findings of the lubricated contact as numbers: ``python test/system/lubrication_findings.py [--influence] [--json]``.
+"""Findings of the paper as numbers: ``python test/studies/lubrication_findings.py [--influence] [--json]``.
 
-The findings of the paper with their errors of time step and grid; with ``--influence`` the change of the findings with
-each parameter that the paper does not give, 20 % down and up.
+With their errors of time step and grid; with ``--influence`` the change of the findings with each parameter that the
+paper does not give, 20 % down and up.
 """
 
 import argparse
@@ -9,10 +9,10 @@ import dataclasses
 import json
 from collections.abc import Sequence
 
-from seal_friction_ros.core.lubrication.findings import Findings, error_of_levels, findings
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
-from seal_friction_ros.core.lubrication.transient import run_transient
-from seal_friction_ros.offline.contact.lubrication_runs import run_case, run_study, single_case
+from seal_friction_studies.core.findings import Findings, error_of_levels, findings
+from seal_friction_studies.core.study_case import StudyCase
+from seal_friction_studies.core.transient import run_transient
+from seal_friction_studies.offline.study_runs import run_case, run_study, single_case
 
 OUR_CHOICES = {  # case: parameters that the paper does not give and that act in this case
     'inner_seal': (
@@ -76,7 +76,7 @@ def all_findings(names: Sequence[str]) -> list[Row]:
     return rows + study_rows(cases[0])
 
 
-def study_rows(case: LubricationCase) -> list[Row]:
+def study_rows(case: StudyCase) -> list[Row]:
     """Deviation of friction over tau_c from its mean, with the errors of step and grid."""
     n = case.numerics
     levels = [n]
@@ -108,7 +108,7 @@ def influence(names: Sequence[str]) -> dict[str, dict[str, list[float]]]:
     return rows
 
 
-def _with(case: LubricationCase, parameter: str, factor: float) -> LubricationCase:
+def _with(case: StudyCase, parameter: str, factor: float) -> StudyCase:
     part, name = parameter.split('.')
     record = getattr(case, part)
     names = [f'{name}_left', f'{name}_right'] if name == 'crown_radius' else [name]

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import BoolArray, FloatArray
-from seal_friction_ros.core.lubrication.kinematics import SpoolMotion
-from seal_friction_ros.core.lubrication.lubrication_case import SpoolSeal
-from seal_friction_ros.core.lubrication.transient import TransientResult, last_cycle
+from seal_friction_studies.core.kinematics import SpoolMotion
+from seal_friction_studies.core.study_case import SpoolSeal
+from seal_friction_studies.core.transient import TransientResult, last_cycle
 
 
 class SpoolSealMotion:

@@ -1,4 +1,4 @@
-"""The body under the film and its groove: ``python test/system/seal_bodies.py [TABLE ...] [--json]``.
+"""The body under the film and its groove: ``python test/studies/seal_bodies.py [TABLE ...] [--json]``.
 
 Tables, all of them by default:
 
@@ -28,24 +28,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from harness.blow_by import blow_by
 
 from seal_friction_ros.core.lubrication.contact import dry_contact
-from seal_friction_ros.core.lubrication.findings import findings
 from seal_friction_ros.core.lubrication.grease import apparent_viscosity
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationNumerics, SealBody, Spool
-from seal_friction_ros.core.lubrication.seal_section import (
-    SealSection,
-    face_compliance,
-    nothing_around,
-    seal_section,
-)
-from seal_friction_ros.core.lubrication.transient import last_cycle, lubrication_model, run_transient
-from seal_friction_ros.core.oring_contact.equilibrium import (
-    make_assembly,
-    outline,
-    solve_equilibrium,
-    unstressed_state,
-)
+from seal_friction_ros.core.lubrication.seal_section import SealSection, face_compliance, nothing_around, seal_section
+from seal_friction_ros.core.oring_contact.equilibrium import make_assembly, outline, solve_equilibrium, unstressed_state
 from seal_friction_ros.core.oring_contact.surroundings import node_areas, surface_pressure
-from seal_friction_ros.offline.contact.lubrication_runs import cases_of_spool, load_case, run_spool, single_case
+from seal_friction_studies.core.findings import findings
+from seal_friction_studies.core.study_case import Spool, StudyNumerics, StudySeal
+from seal_friction_studies.core.transient import last_cycle, run_transient, transient_model
+from seal_friction_studies.offline.study_runs import cases_of_spool, load_case, run_spool, single_case
 
 Rows = list[dict[str, float | str]]
 EDGE_BODIES = ('half_plane', 'finite_elements', 'bonded_layer')
@@ -59,7 +49,7 @@ PRESSURE = 6e5  # [Pa] gauge
 STEP = 4e-6  # [m] of squeeze
 
 
-def bodies(numerics: LubricationNumerics) -> Rows:
+def bodies(numerics: StudyNumerics) -> Rows:
     """Findings of ``inner_seal`` with each body."""
     case = dataclasses.replace(single_case('inner_seal', 'finding'), numerics=numerics)
     elements = {'body': 'finite_elements'}
@@ -93,7 +83,7 @@ def bodies(numerics: LubricationNumerics) -> Rows:
 HELD = ('bottom_and_flanks', 'sliding_bottom')
 
 
-def edge(numerics: LubricationNumerics) -> Rows:
+def edge(numerics: StudyNumerics) -> Rows:
     """Findings of ``inner_seal_control_edge`` with each body."""
     case = single_case('inner_seal_control_edge', 'finding')
     numerics = dataclasses.replace(case.numerics, cells=numerics.cells)
@@ -113,7 +103,7 @@ def edge(numerics: LubricationNumerics) -> Rows:
     return rows
 
 
-def valve(numerics: LubricationNumerics) -> Rows:
+def valve(numerics: StudyNumerics) -> Rows:
     """Peaks of the whole valve over the friction around them, all its seals with each body."""
     spool = load_case('spool')
     assert isinstance(spool, Spool)
@@ -140,9 +130,9 @@ VALVE_NUMBERS = (
 )
 
 
-def strain(_: LubricationNumerics) -> Rows:
+def strain(_: StudyNumerics) -> Rows:
     """Contact force on a smooth wall."""
-    seal = SealBody(body='finite_elements')
+    seal = StudySeal(body='finite_elements')
     rows: Rows = []
     for mesh in (24, 48):
         for squeeze in SQUEEZES:
@@ -159,7 +149,7 @@ def strain(_: LubricationNumerics) -> Rows:
     return rows
 
 
-def groove(numerics: LubricationNumerics) -> Rows:
+def groove(numerics: StudyNumerics) -> Rows:
     """Figure 14 of the paper with friction in the groove."""
     case = dataclasses.replace(single_case('inner_seal_groove', 'finding'), numerics=numerics)
     rows: Rows = []
@@ -183,10 +173,10 @@ def groove(numerics: LubricationNumerics) -> Rows:
     return rows
 
 
-def air(_: LubricationNumerics) -> Rows:
+def air(_: StudyNumerics) -> Rows:
     """The seal at rest and dry on its way out of the seat, without the interference that pressure adds."""
     case = single_case('inner_seal_control_edge', 'finding')
-    model, speed = lubrication_model(case), case.motion.speed
+    model, speed = transient_model(case), case.motion.speed
     rows: Rows = []
     for beyond in BEYOND:
         gap = dry_contact(model.contact, model.rigid_gap(case.control_edge.position + beyond))
@@ -206,20 +196,20 @@ def air(_: LubricationNumerics) -> Rows:
     return rows
 
 
-def contact_forces(seal: SealBody, elements: int, squeeze: float) -> tuple[float, float]:
+def contact_forces(seal: StudySeal, elements: int, squeeze: float) -> tuple[float, float]:
     """Contact force [N] of the section on a smooth wall, by small displacements and by finite strain."""
     section = seal_section(seal, 0.6e-3, elements)
     return _of_small_displacements(seal, section, squeeze), _of_finite_strain(seal, section, squeeze)
 
 
-def _of_small_displacements(seal: SealBody, section: SealSection, squeeze: float) -> float:
+def _of_small_displacements(seal: StudySeal, section: SealSection, squeeze: float) -> float:
     """No gap and no force of a node is negative, and one of them is zero: a least-squares problem of forces >= 0."""
     root = np.linalg.cholesky(face_compliance(section).off_wall)
     gap = seal.fall(section.place) - squeeze
     return float(nnls(root.T, -np.linalg.solve(root, gap))[0].sum())
 
 
-def _of_finite_strain(seal: SealBody, section: SealSection, squeeze: float) -> float:
+def _of_finite_strain(seal: StudySeal, section: SealSection, squeeze: float) -> float:
     """The wall closes in steps and then stiffens; the last two penalties are extrapolated to a rigid wall."""
     model, modulus = section.model, section.model.rubber.elastic_modulus
     assembly, state = make_assembly(model, section.held), unstressed_state(model)
@@ -238,7 +228,7 @@ def _of_finite_strain(seal: SealBody, section: SealSection, squeeze: float) -> f
     return 2.0 * forces[-1] - forces[-2]
 
 
-TABLES: dict[str, Callable[[LubricationNumerics], Rows]] = {
+TABLES: dict[str, Callable[[StudyNumerics], Rows]] = {
     'bodies': bodies,
     'edge': edge,
     'valve': valve,
@@ -259,7 +249,7 @@ def main() -> int:
     unknown = [name for name in arguments.tables if name not in TABLES]
     if unknown:
         parser.error(f'there is no table {unknown[0]}: there are {", ".join(TABLES)}')
-    numerics = LubricationNumerics(cells=arguments.cells, time_step=arguments.time_step)
+    numerics = StudyNumerics(cells=arguments.cells, time_step=arguments.time_step)
     computed = {name: TABLES[name](numerics) for name in arguments.tables or TABLES}
     if arguments.json:
         print(json.dumps(computed))

@@ -2,11 +2,12 @@ r"""Axial force of the groove on the seal: a spring, or two stable positions wit
 
 from dataclasses import dataclass
 
-from seal_friction_ros.core.foundation.parameters import CheckedParameters, parameter
+from seal_friction_ros.core.foundation.parameters import parameter
+from seal_friction_ros.core.lubrication.lubrication_case import SealHold
 
 
 @dataclass(frozen=True)
-class GrooveSpring(CheckedParameters):
+class GrooveSpring(SealHold):
     r"""Force of the spool on the seal over the lag e of the contact behind the spool.
 
     .. math:: F(e) = k (|e| - c)\,\mathrm{sgn}(e)\ (|e| \ge c),\quad F(e) = \tfrac{k}{2} e (e^2 / c^2 - 1)\ (|e| < c)
@@ -28,13 +29,6 @@ class GrooveSpring(CheckedParameters):
     bottom, whose normal force is taken as that of the contact.
     """
 
-    stiffness: float = parameter(
-        2.2e4,
-        unit='N/m',
-        lower=10.0,
-        upper=1e9,
-        description='k, about G A / t: shear modulus, contact area and height of the seal.',
-    )
     half_clearance: float = parameter(
         0.0, unit='m', lower=0.0, upper=1e-2, description='c, half the axial clearance; 0 is a plain spring.'
     )
