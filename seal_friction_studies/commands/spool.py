@@ -1,4 +1,4 @@
-"""``seal_friction spool``: evaluate a reciprocating rig as the spool-valve paper does."""
+"""``seal_friction spool``: evaluate a reciprocating rig after the spool-valve paper."""
 
 import argparse
 from pathlib import Path
@@ -10,7 +10,7 @@ from seal_friction_ros.offline.commands import command_line as cli
 def add_parser(commands: Any) -> None:
     """Add the command."""
     parser = cli.add_command(
-        commands, 'spool', run, 'evaluate a reciprocating rig as the spool-valve paper does',
+        commands, 'spool', run, 'evaluate a reciprocating rig after the spool-valve paper',
         'spool ten_cycles.csv --out outer_ring.html',
     )  # fmt: skip
     parser.add_argument('table', type=Path, help='table with the columns time_s, displacement_mm, force_N')

@@ -1,11 +1,11 @@
-"""Friction of a seal in reciprocating motion on a test rig, evaluated as in the spool-valve paper.
+"""Friction of a seal in reciprocating motion on a test rig, evaluated after the spool-valve paper.
 
-The rig drives ten cycles; the film has settled in the ninth, which is evaluated. A notch filter removes the resonance
-of the measuring chain (force transducer, joints, rod; 157 Hz in the paper), which does not depend on speed. The force
-is normalised by its mean in the middle of the stroke, where the speed is constant.
+The rig drives ten cycles; the ninth is evaluated. The force is averaged over samples and normalised by its mean in the
+middle of the stroke, where the speed is constant. Before that, a notch filter removes the resonance of the measuring
+chain (force transducer, joint, rod; 157 Hz in the paper), which does not depend on speed.
 
-Source: spool-valve paper, chapters 4 (cycles), 6 (resonance, normalisation) and 7.3 (moving average). Automatic
-detection and notch are our choice; the paper does both by eye.
+Source: spool-valve paper, chapters 4 (cycles), 6 (normalisation) and 7.3 (moving average). The paper names the
+resonance (section 6.2) and averages over it: detection and notch are our choice.
 """
 
 from dataclasses import dataclass

@@ -12,7 +12,7 @@ from seal_friction_ros.core.foundation.parameters import CheckedParameters, para
 class ControlEdge(CheckedParameters):
     """Chamfer at the right end of the seat: beyond it the wall falls back and the seal hangs free.
 
-    All values are our choice; the paper says only that the seat is chamfered.
+    All values are our choice: the paper names a control edge and gives no shape of it.
     """
 
     position: float = parameter(

@@ -1,4 +1,4 @@
-"""Report of a measurement of several cycles, evaluated as in the spool-valve paper."""
+"""Report of a measurement of several cycles, evaluated after the spool-valve paper."""
 
 from pathlib import Path
 from typing import Any

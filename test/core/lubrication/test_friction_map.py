@@ -282,13 +282,6 @@ def test_law_stays_within_its_table(pressure, speed):
     assert 1.0 - 1e-12 <= LAW.sliding_friction(pressure, speed) <= 6.0 + 1e-12
 
 
-def test_friction_follows_a_change_of_speed_over_the_memory_length():
-    assert LAW.lagged(3.0, 0.0, 1e-1, 0.0) == 3.0
-    assert LAW.lagged(3.0, 0.0, 1e-1, 1e-3) == pytest.approx(1.0 + 2.0 / math.e)
-    assert LAW.lagged(3.0, 0.0, 1e-1, 1.0) == pytest.approx(1.0)
-    assert dataclasses.replace(LAW, memory_length=0.0).lagged(3.0, 0.0, 1e-1, 0.0) == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize(
     ('change', 'words'),
     [
