@@ -29,6 +29,7 @@ from seal_friction_ros.core.lubrication.model import LubricationModel, fluid_for
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds
 from seal_friction_studies.core.balance import sliding_velocity
 from seal_friction_studies.core.kinematics import SpoolMotion
+from seal_friction_studies.core.krylov import gmres
 from seal_friction_studies.core.study_case import StudyCase
 from seal_friction_studies.core.wall import WallFilm
 
@@ -57,7 +58,8 @@ def transient_model(case: StudyCase) -> TransientModel:
     """
     if case.oring is not None:
         raise ValueError(f'case {case.name}: an O-ring has a friction map only: seal_friction ehl map')
-    return TransientModel(**vars(profile_model(case, case.air.pressure_left, case.air.pressure_right)))
+    model = profile_model(case, case.air.pressure_left, case.air.pressure_right)
+    return TransientModel(**vars(model) | {'contact': dataclasses.replace(model.contact, solve=gmres)})
 
 
 class StepBefore(NamedTuple):

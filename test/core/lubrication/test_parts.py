@@ -1,4 +1,4 @@
-"""Grease, roughness, flow factors, half-plane, groove, wall, motion: each against its own book."""
+"""Grease, roughness, flow factors, half-plane: each against its own book."""
 
 import math
 
@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
-from seal_friction_ros.core.lubrication.contact import film_properties
+from seal_friction_ros.core.lubrication.contact import StalledError, film_properties, scipy_gmres
 from seal_friction_ros.core.lubrication.elasticity import HalfPlane, condensed_body, hat_functions
 from seal_friction_ros.core.lubrication.flow_factors import (
     PEKLENIK_NUMBERS,
@@ -19,10 +19,8 @@ from seal_friction_ros.core.lubrication.flow_factors import (
     shear_stress_factors,
 )
 from seal_friction_ros.core.lubrication.grease import Grease, apparent_viscosity
-from seal_friction_ros.core.lubrication.krylov import StalledError, gmres
 from seal_friction_ros.core.lubrication.topography import Topography, contact_pressure
 from seal_friction_studies.core.bonded_layer import BondedLayer
-from seal_friction_studies.core.groove import GrooveSpring
 
 MODULUS = 14.28e6  # [Pa]
 
@@ -240,20 +238,12 @@ def test_no_pressure_meets_a_stiffer_body_than_the_stiffest_half_plane():
     assert np.linalg.eigvalsh(body.matrix()).min() == pytest.approx(stiffest, rel=1e-6)
 
 
-def test_gmres_solves_and_says_when_it_cannot():
+def test_gmres_of_scipy_solves_and_says_when_it_cannot():
     matrix = np.diag(np.arange(1.0, 21.0)) + np.triu(np.full((20, 20), 0.1), 1)
     right = np.ones(20)
-    assert matrix @ gmres(lambda x: matrix @ x, right, 1e-10, 40) == pytest.approx(right, abs=1e-10)
+    assert matrix @ scipy_gmres(lambda x: matrix @ x, right, 1e-10, 40) == pytest.approx(right, abs=1e-10)
     with pytest.raises(StalledError, match=r'after 3 iterations'):
-        gmres(lambda x: matrix @ x, right, 1e-10, 3)
-
-
-def bottom(groove: GrooveSpring, seats: np.ndarray) -> np.ndarray:
-    """Lag of the bottom of the seal [m]."""
-    return seats - np.array([groove.force(seat) for seat in seats]) / groove.stiffness
-
-
-"""Cells from -2 to 2 um."""
+        scipy_gmres(lambda x: matrix @ x, right, 1e-10, 3)
 
 
 def test_body_prints_as_the_numbers_it_is_made_of():

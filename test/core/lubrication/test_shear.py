@@ -1,4 +1,4 @@
-"""Friction of a given contact: closed forms for its film, its asperities, and the balance with the spring."""
+"""Friction of a given contact: closed forms for its film and its asperities."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Friction of a given contact: closed forms for its film, its asperities, and the balance with the spring."""
+"""Sliding velocity at which the spring of the groove and the friction of the wall balance."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Case of a seal: what follows from its numbers, what it refuses, and what its file may say."""
+"""Case of a study: what follows from its numbers, what it refuses, and what its file may say."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Grease, roughness, flow factors, half-plane, groove, wall, motion: each against its own book."""
+"""Bonded layer, groove, wall, air, motion, measuring chain: each against its own book."""
 
 import dataclasses
 import math

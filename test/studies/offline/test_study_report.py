@@ -1,4 +1,4 @@
-"""Pages of the lubricated contact, from results made up by hand: every template, with names that must be escaped."""
+"""Pages of the studies, from results made up by hand: every template, with names that must be escaped."""
 
 from dataclasses import replace
 

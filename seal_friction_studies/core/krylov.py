@@ -1,13 +1,10 @@
 """GMRES for a linear system whose matrix is known only by its product with a vector.
 
-Own code, because `scipy.sparse.linalg.gmres` (SciPy 1.17) makes a whole run 1.26 to 1.45 times slower. Processor time
-of one cycle of ``inner_seal``, best of six, in two series on a busy machine: 1.8 and 2.1 s with this function, 2.6 and
-2.9 s with SciPy's (226 cells); best of two and of four with 1000 cells: 11.0 and 8.9 s, 13.8 and 12.5 s. The number of
-Newton iterations is the same, and the friction agrees to 6e-16 of its maximum. The matrix is dense, so no sparse direct
-solver applies; assembling it and `scipy.linalg.solve` took 12 s (226 cells).
-
-To repeat: put ``gmres(LinearOperator((n, n), product), right, rtol=0.0, atol=tolerance,
-restart=iterations, maxiter=1)`` in place of `contact.gmres` and run ``python bench/ehl.py --cells 226 1000``.
+Own code for whole motions, whose many small systems `contact.scipy_gmres` solves 1.26 to 1.45 times slower. Processor
+time of one cycle of ``inner_seal``, best of six, in two series on a busy machine: 1.8 and 2.1 s with this function, 2.6
+and 2.9 s with SciPy's (226 cells); best of two and of four with 1000 cells: 11.0 and 8.9 s, 13.8 and 12.5 s. The number
+of Newton iterations is the same, and the friction agrees to 1e-15 of its maximum. The matrix is dense, so no sparse
+direct solver applies; assembling it and `scipy.linalg.solve` took 12 s (226 cells).
 """
 
 import math
@@ -17,10 +14,7 @@ import numpy as np
 from scipy.linalg.lapack import dgels
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-
-
-class StalledError(ArithmeticError):
-    """The residual did not fall below the tolerance."""
+from seal_friction_ros.core.lubrication.contact import StalledError
 
 
 def gmres(
