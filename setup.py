@@ -5,6 +5,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = 'seal_friction_ros'
+STUDIES = 'seal_friction_studies'  # a second package of this distribution; NAME knows it by name only
 
 
 def shared(folder: str, pattern: str) -> tuple[str, list[str]]:
@@ -15,7 +16,7 @@ def shared(folder: str, pattern: str) -> tuple[str, list[str]]:
 setup(
     name=NAME,
     version='0.1.0',
-    packages=find_packages(include=[NAME, NAME + '.*']),
+    packages=find_packages(include=[NAME, NAME + '.*', STUDIES, STUDIES + '.*']),
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
@@ -38,6 +39,8 @@ setup(
         NAME: ['py.typed'],
         f'{NAME}.offline.reports': ['templates/*.html', 'templates/*.js'],
         f'{NAME}.offline.monitor': ['page/*'],
+        STUDIES: ['py.typed'],
+        f'{STUDIES}.offline': ['templates/*.html'],
     },
     python_requires='>=3.11',
     # What no distribution packages; the rest comes by package.xml, or by requirements/run.txt.

@@ -18,22 +18,22 @@ from seal_friction_ros.core.estimation.records import Force, Pressure, RodSample
 from seal_friction_ros.core.friction.actuator import MountedSeal, Seal, Uncertainty
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.friction_map import friction_map, map_pressures, memory_length, steady_friction
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
-from seal_friction_ros.core.lubrication.transient import run_transient
 from seal_friction_ros.files import default_configuration
-from seal_friction_ros.offline.contact.lubrication_runs import single_case
+from seal_friction_studies.core.study_case import StudyCase
+from seal_friction_studies.core.transient import run_transient
+from seal_friction_studies.offline.study_runs import single_case
 
 CELLS = (226, 452, 1000)
 STEPS = (1e-3, 5e-4, 2.5e-4)  # [s]
 CALLS = 5_000  # of a function in one timing
 
 
-def of_grid(case: LubricationCase, cells: int, time_step: float) -> LubricationCase:
+def of_grid(case: StudyCase, cells: int, time_step: float) -> StudyCase:
     """The case with another grid."""
     return dataclasses.replace(case, numerics=dataclasses.replace(case.numerics, cells=cells, time_step=time_step))
 
 
-def one_cycle(case: LubricationCase) -> float:
+def one_cycle(case: StudyCase) -> float:
     """Processor time of one cycle [s]; the better of two."""
     once = dataclasses.replace(case, motion=dataclasses.replace(case.motion, cycles=1))
     times = []
@@ -45,7 +45,7 @@ def one_cycle(case: LubricationCase) -> float:
 
 
 def times(
-    case: LubricationCase, cells: Sequence[int], steps: Sequence[float], calls: int, edge: LubricationCase
+    case: StudyCase, cells: Sequence[int], steps: Sequence[float], calls: int, edge: StudyCase
 ) -> dict[str, float]:
     """All times [s], and the exponents of the time in cells and in steps."""
     one_cycle(of_grid(case, 64, 5e-3))  # compiles

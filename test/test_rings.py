@@ -9,7 +9,7 @@ import sys
 import pytest
 from paths import ROOT
 
-PACKAGE = 'seal_friction_ros'
+PACKAGE, STUDIES = 'seal_friction_ros', 'seal_friction_studies'
 SOURCES = ROOT / PACKAGE
 ROS = {
     'rclpy', 'rcl_interfaces', 'std_msgs', 'std_srvs', 'diagnostic_msgs', 'lifecycle_msgs', 'seal_friction_msgs',
@@ -61,6 +61,13 @@ def imports_of(ring: str) -> list[tuple[str, str]]:
     return [(file.relative_to(SOURCES).as_posix(), name) for file in files for name in imported(file.read_text())]
 
 
+def studied(ring: str) -> list[tuple[str, str]]:
+    """As `imports_of`, of a ring of the studies."""
+    files = sorted((ROOT / STUDIES / ring).rglob('*.py'))
+    assert files
+    return [(f'{STUDIES}/{ring}/{file.name}', name) for file in files for name in imported(file.read_text())]
+
+
 def is_below(name: str, module: str) -> bool:
     return name == module or name.startswith(f'{module}.')
 
@@ -84,6 +91,28 @@ def test_core_stands_on_the_standard_library_and_numerics_alone():
         return top not in sys.stdlib_module_names | THIRD_PARTY_OF_CORE and not is_below(name, f'{PACKAGE}.core')
 
     assert not offenders('core', outside)
+
+
+def test_the_package_does_not_import_the_studies_in_any_ring():
+    """`offline/commands/studies.py` finds their commands by name."""
+    everything = [(file, name) for file in SOURCES.rglob('*.py') for name in imported(file.read_text())]
+    assert not [f'{file} imports {name}' for file, name in everything if is_below(name, STUDIES)]
+
+
+def test_core_of_the_studies_stands_on_both_cores_and_numerics_alone():
+    own = (f'{PACKAGE}.core', f'{STUDIES}.core')
+
+    def outside(name: str) -> bool:
+        known = name.split('.', maxsplit=1)[0] in (sys.stdlib_module_names - NOT_PHYSICS) | THIRD_PARTY_OF_CORE
+        return not known and not any(is_below(name, module) for module in own)
+
+    assert not [f'{file} imports {name}' for file, name in studied('core') if outside(name)]
+
+
+@pytest.mark.parametrize(('ring', 'above'), [('offline', ('commands',)), ('commands', ())])
+def test_the_studies_need_no_ros_and_import_from_their_own_rings_below_only(ring, above):
+    forbidden = [f'{PACKAGE}.nodes', *ROS, *(f'{STUDIES}.{one}' for one in above)]
+    assert not [f'{file} imports {name}' for file, name in studied(ring) if any(is_below(name, m) for m in forbidden)]
 
 
 def test_core_draws_chance_only_from_a_seed_that_was_passed():
@@ -158,7 +187,8 @@ def test_a_circle_of_imports_is_found():
 
 def test_no_modules_import_each_other_in_a_circle():
     """Imports within functions and for types count, too."""
-    files = {'.'.join(file.relative_to(ROOT).with_suffix('').parts): file for file in SOURCES.rglob('*.py')}
+    sources = [*SOURCES.rglob('*.py'), *(ROOT / STUDIES).rglob('*.py')]
+    files = {'.'.join(file.relative_to(ROOT).with_suffix('').parts): file for file in sources}
     files = {name.removesuffix('.__init__'): file for name, file in files.items()}
     modules = {name: {part for full in imported(file.read_text()) for part in (full, full.rpartition('.')[0])}
                for name, file in files.items()}  # fmt: skip

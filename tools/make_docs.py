@@ -22,27 +22,27 @@ from seal_friction_ros.core.friction.laws.velocity_terms import VelocityTerms
 from seal_friction_ros.core.friction.mounting import Mounting
 from seal_friction_ros.core.friction.presliding import Presliding
 from seal_friction_ros.core.identification.signal_preparation import SavitzkyGolay, Sliding
-from seal_friction_ros.core.identification.spool_evaluation import SpoolEvaluation
 from seal_friction_ros.core.lubrication.grease import Grease
-from seal_friction_ros.core.lubrication.groove import GrooveSpring
-from seal_friction_ros.core.lubrication.kinematics import ConstantAcceleration
-from seal_friction_ros.core.lubrication.lubrication_case import (
-    AirPressure,
-    LubricationNumerics,
-    MapGrid,
-    SealBody,
-    ShearStressStudy,
-    SpoolSeal,
-    Viscoelasticity,
-)
+from seal_friction_ros.core.lubrication.lubrication_case import MapGrid
 from seal_friction_ros.core.lubrication.topography import Topography
-from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.machine.machine_file import INPUTS
 from seal_friction_ros.core.oring_contact.material import Rubber
 from seal_friction_ros.core.oring_contact.oring_case import Groove, OringCase, OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction
 from seal_friction_ros.core.servo.simulator_options import SERVO_SIMULATOR_PARAMETERS
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings, TuningSettings
+from seal_friction_studies.core.groove import GrooveSpring
+from seal_friction_studies.core.kinematics import ConstantAcceleration
+from seal_friction_studies.core.spool_evaluation import SpoolEvaluation
+from seal_friction_studies.core.study_case import (
+    AirPressure,
+    ShearStressStudy,
+    SpoolSeal,
+    StudyNumerics,
+    StudySeal,
+    Viscoelasticity,
+)
+from seal_friction_studies.core.wall import ControlEdge, FilmSupply
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test' / 'system'))
 from fault_rows import SIGNAL_ROWS, Row
@@ -73,13 +73,13 @@ RECORDS = (
     OringNumerics,
     OringCase,
     MeasuredFriction,
-    SealBody,
+    StudySeal,
     Topography,
     Grease,
     GrooveSpring,
     AirPressure,
     ConstantAcceleration,
-    LubricationNumerics,
+    StudyNumerics,
     ControlEdge,
     FilmSupply,
     Viscoelasticity,

@@ -19,8 +19,8 @@ if [ "$(cat "$environment/.done" 2>/dev/null)" != "$sum" ]; then
 fi
 # The environment has no rclpy, which makes the messages of some tests.
 if [ $# -eq 0 ]; then
-    set -- test/core test/offline
-    for file in $(grep -lrE --include='test_*.py' '^from (rclpy|harness\.(machines|standard_bags|live_machine))' test/core test/offline); do
+    set -- test/core test/offline test/studies
+    for file in $(grep -lrE --include='test_*.py' '^from (rclpy|harness\.(machines|standard_bags|live_machine))' "$@"); do
         set -- "$@" --ignore "$file"
     done
 fi

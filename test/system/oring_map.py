@@ -24,7 +24,7 @@ from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase,
 from seal_friction_ros.core.oring_contact.oring_case_file import MeasuredFriction, parse_oring_case
 from seal_friction_ros.core.oring_contact.results import oring_results
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.contact.lubrication_runs import single_case
+from seal_friction_ros.offline.contact.lubrication_runs import load_case
 from seal_friction_ros.offline.reports import figure_style as style
 from seal_friction_ros.offline.work.executor import available_cores, run_all
 
@@ -126,7 +126,7 @@ def main() -> None:
     said: dict[str, Any] = {}
     every: dict[str, Beside] = {}
     for name in wanted.cases:
-        case = single_case(name, 'O-ring map')
+        case = load_case(name)
         if wanted.cells:
             case = dataclasses.replace(case, numerics=dataclasses.replace(case.numerics, cells=wanted.cells))
         readings = measured_of(case).pressures

@@ -10,11 +10,11 @@ import pytest
 from oring_map import UNKNOWN, Beside, beside, draw, varied
 
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
-from seal_friction_ros.offline.contact.lubrication_runs import single_case
+from seal_friction_ros.offline.contact.lubrication_runs import load_case
 
 
 def coarse(name: str, cells: int = 64, lines: int = 13):
-    case = single_case(name, 'O-ring map')
+    case = load_case(name)
     return dataclasses.replace(
         case,
         numerics=dataclasses.replace(case.numerics, cells=cells),
@@ -56,7 +56,7 @@ def test_the_picture_shows_what_was_chosen_apart_from_what_was_not(tmp_path):
 
 @pytest.mark.parametrize('label', UNKNOWN)
 def test_each_unknown_can_be_varied_by_itself(label):
-    case = single_case('oring_ms28775_114', 'O-ring map')
+    case = load_case('oring_ms28775_114')
     part, field, factors = UNKNOWN[label]
     for factor in factors:
         was, now = (getattr(getattr(c, part), field) for c in (case, varied(case, part, field, factor)))

@@ -15,9 +15,10 @@ from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase,
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case, varied_ring
 from seal_friction_ros.files import config_path, read_yaml
-from seal_friction_ros.offline.contact.lubrication_runs import compile_for_map, single_case
+from seal_friction_ros.offline.contact.lubrication_runs import compile_for_map
 from seal_friction_ros.offline.contact.sampling import coarse_case, coarse_ring, latin_hypercube, ring_forces
 from seal_friction_ros.offline.work.executor import available_cores, try_all
+from seal_friction_studies.offline.study_runs import single_case
 
 Values = Mapping[str, float]
 

@@ -1,4 +1,4 @@
-"""Geometry of an O-ring in its gland: squeeze, stretch, projected area, contact length."""
+"""Geometry of an O-ring in its gland: squeeze, stretch and their forces, projected area, contact length."""
 
 import math
 from dataclasses import dataclass
@@ -72,3 +72,39 @@ def stretch(seal: SealGeometry) -> float:
     Source: thesis, section 4.1.
     """
     return (seal.rod_diameter - seal.ring_inner_diameter) / seal.ring_inner_diameter
+
+
+def hoop_force(seal: SealGeometry) -> float:
+    """Tension along the stretched ring [N]: T = E eps pi d^2 / 4; 0 for a loose ring.
+
+    Source: thesis, section 4.1.
+    """
+    return seal.elastic_modulus * max(stretch(seal), 0.0) * math.pi * seal.section_diameter**2 / 4.0
+
+
+def stretch_force(seal: SealGeometry) -> float:
+    """Radial force of the stretched ring on its inner wall, all round [N]: 2 pi T, as of a hoop under pressure.
+
+    Source: thesis, section 4.1 and Figure 13. It is part of the normal force on a rod, not on a bore.
+    """
+    return 2.0 * math.pi * hoop_force(seal)
+
+
+def squeeze_force(seal: SealGeometry) -> float:
+    r"""Normal force of the squeezed ring on either wall without pressure, all round [N], by the line contact of Hertz.
+
+    .. math:: F = \frac{\pi}{6}\, s^2\, \pi D d E, \quad 2 C = s^2 \left(\ln\frac{4}{s} - \frac12\right)
+
+    with the squeeze C, the half-width s of the contact over the radius of the section, and the mean diameter D of the
+    gap. Plane strain: a ring between rod and gland cannot grow along its hoop. The limit of small strain: the finite
+    elements give 3 % more at 8 % squeeze, 20 % more at 25 %.
+
+    Source: [Johnson1985]_ equations (4.43) and (5.57), for both contacts.
+    """
+    share = 2.0 * squeeze(seal)
+    half_width = math.sqrt(share)
+    for _ in range(60):  # a contraction: a step leaves less than two thirds of the error
+        half_width = math.sqrt(share / (math.log(4.0 / half_width) - 0.5))
+    mean_diameter = (seal.rod_diameter + seal.gland_diameter) / 2.0
+    line_load = math.pi / 6.0 * half_width**2 * seal.section_diameter * seal.elastic_modulus
+    return math.pi * mean_diameter * line_load

@@ -1,7 +1,6 @@
-"""Transient mixed lubrication of a reciprocating seal, from grease and roughness to a friction map for the node.
+"""Mixed lubrication of a sliding seal, from grease and roughness to a friction map for the node.
 
-Read in this order: `grease`, `topography`, `flow_factors`, `reynolds` (film of a given gap), `elasticity`, `krylov`,
-`contact` (film and seal together, one time step), `shear`, `groove`, `wall`, `kinematics`, `lubrication_case` (all
-parameters), `seal_section` (the body by finite elements), `transient` (a whole motion), `findings`, `study`, `spool`,
-`measuring_chain`, `oring_film` (the seal from finite elements), `friction_map`.
+Read in this order: `grease`, `topography`, `flow_factors`, `reynolds` (film of a given gap), `elasticity`,
+`contact` (film and seal together, one time step), `shear`, `seal_profile` and `seal_section` (a seal that is no
+O-ring), `lubrication_case` (all parameters), `model`, `oring_film` (the seal from finite elements), `friction_map`.
 """

@@ -15,10 +15,12 @@ Scheme and preconditioner are our choice; GMRES: Y. Saad, M. H. Schultz 1986.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.compiled import compiled
@@ -31,7 +33,6 @@ from seal_friction_ros.core.lubrication.flow_factors import (
     shear_stress_coefficients,
 )
 from seal_friction_ros.core.lubrication.grease import Grease, apparent_viscosity
-from seal_friction_ros.core.lubrication.krylov import StalledError, gmres
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds, complementarity, reynolds_rows
 from seal_friction_ros.core.lubrication.topography import Topography, contact_pressure
 
@@ -46,6 +47,29 @@ _COMPLEMENTARITY_TOLERANCE = 1e-13
 _PRESSURE_SCALE = 1e5  # [Pa] p_s of the complementarity
 THINNEST = 1e-9
 """[m] a gap below this flows like this"""
+
+
+Solver = Callable[[Callable[[FloatArray], FloatArray], FloatArray, float, int], FloatArray]
+"""Solves A x = b from the product A x, b, the tolerance of the residual (2-norm) and the most products"""
+
+
+class StalledError(ArithmeticError):
+    """The residual did not fall below the tolerance."""
+
+
+def scipy_gmres(
+    product: Callable[[FloatArray], FloatArray], right: FloatArray, tolerance: float, iterations: int
+) -> FloatArray:
+    """`Solver` of SciPy, without restart.
+
+    Raises:
+        StalledError: The residual is larger after ``iterations``, or not a number.
+    """
+    operator = LinearOperator((len(right), len(right)), product, dtype=np.float64)
+    found, failed = gmres(operator, right, rtol=0.0, atol=tolerance, restart=iterations, maxiter=1)
+    if failed or not np.isfinite(found).all():
+        raise StalledError(f'GMRES: not solved after {iterations} iterations')
+    return np.asarray(found)
 
 
 class ContactState(NamedTuple):
@@ -71,6 +95,7 @@ class LubricatedContact:
     body: ElasticBody
     topography: Topography
     grease: Grease
+    solve: Solver = scipy_gmres
 
     @property
     def rough(self) -> tuple[float, float, tuple[float, ...]]:
@@ -244,7 +269,7 @@ def _newton_change(
         return deflected(by_gap, by_total)
 
     try:
-        y = gmres(product, wanted, tolerance, _GMRES_ITERATIONS)
+        y = contact.solve(product, wanted, tolerance, _GMRES_ITERATIONS)
     except StalledError as error:
         raise NotConvergedError(f'contact step: {error}') from None
     more_gap, more_left, _ = solved(y, none)

@@ -1,4 +1,4 @@
-"""Deflection of the seal surface under pressure: a half-plane, a layer bonded to a rigid base, or finite elements."""
+"""Deflection of the seal surface under pressure: a half-plane, or finite elements."""
 
 import math
 from dataclasses import dataclass, field
@@ -77,12 +77,11 @@ class HalfPlane:
         object.__setattr__(self, 'stiffness_band', _stiffness_band(self.cells, self.cell_width, self.modulus))
 
     def _influence(self) -> FloatArray:
-        """Deflection of a cell by a unit pressure r cells away [m/Pa], shape (cells,)."""
         if self.depth < self.cells * self.cell_width:
             raise ValueError(
                 f'HalfPlane.depth = {self.depth} m is less than the {self.cells * self.cell_width} m of the film'
             )
-        return _influence(np.arange(self.cells), self.cell_width, self.modulus, self.depth)
+        return influence_of_cells(np.arange(self.cells), self.cell_width, self.modulus, self.depth)
 
     def deflection(self, pressure: FloatArray) -> FloatArray:
         """Deflection [m] of each cell under ``pressure`` [Pa], shape (cells,); n log n by fast Fourier transform."""
@@ -92,31 +91,6 @@ class HalfPlane:
     def matrix(self) -> FloatArray:
         """Full influence matrix [m/Pa], shape (cells, cells)."""
         return np.asarray(toeplitz(self.influence))
-
-
-@dataclass(frozen=True, eq=False)
-class BondedLayer(HalfPlane):
-    r"""Influence matrix of an incompressible layer of height ``depth`` h, bonded to a rigid base.
-
-    A pressure of wave number q deflects it by :math:`2 S(q h) / (E^* q)`, in plane strain without friction,
-
-    .. math:: S(y) = \frac{\sinh 2y - 2y}{\cosh 2y + 1 + 2 y^2}
-
-    so the kernel is that of the half-plane of depth h and a smooth part c,
-
-    .. math:: u(x) = \frac{2}{\pi E^*} \int p(s) \left[\ln\frac{h}{|x - s|} + c\Big(\frac{x - s}{h}\Big)\right] ds,\quad
-        c(\xi) = \int_0^\infty \frac{(S(y) - 1) \cos y\xi + e^{-y}}{y}\,dy
-
-    Near the load it is a half-plane of depth :math:`h e^{c(0)}` = 0.377 h. Source: G. Carbone, L. Mangialardi:
-    Analysis of the adhesive contact of confined layers by using a Green's function approach, J. Mech. Phys. Solids 56,
-    2008, pp. 684-706.
-    """
-
-    def _influence(self) -> FloatArray:
-        distance = np.arange(self.cells)
-        smooth = _of_layer(np.asarray(distance * (self.cell_width / self.depth), dtype=np.float64))
-        deep = _influence(distance, self.cell_width, self.modulus, self.depth)
-        return np.asarray(deep + 2.0 * self.cell_width / (math.pi * self.modulus) * smooth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,23 +151,7 @@ def condensed_body(
     return CondensedBody(len(places), width, modulus, (shapes * np.maximum(values, least)) @ shapes.T)
 
 
-_LARGEST_WAVE_NUMBER = 25.0  # [1/h] S is 1 to the last digit beyond
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-
-
-def _of_layer(distance: FloatArray) -> FloatArray:
-    """Smooth part c of the kernel of a bonded layer, at ``distance`` over its height; Gauss's rule by panels."""
-    panels = math.ceil(_LARGEST_WAVE_NUMBER * (1.0 + float(distance[-1])))
-    half = 0.5 * _LARGEST_WAVE_NUMBER / panels
-    y = ((2.0 * np.arange(panels)[:, None] + 1.0 + _NODES) * half).ravel()
-    weights = np.tile(_WEIGHTS * half, panels)
-    decay = np.exp(-2.0 * y)
-    share = (1.0 - decay**2 - 4.0 * y * decay) / (1.0 + decay**2 + 2.0 * decay * (1.0 + 2.0 * y**2))
-    even, odd = (share - 1.0) / y * weights, np.exp(-y) / y * weights
-    return np.array([float((even * np.cos(y * xi) + odd).sum()) for xi in distance])
-
-
-def _influence(distance: FloatArray | IntArray, width: float, modulus: float, depth: float) -> FloatArray:
+def influence_of_cells(distance: FloatArray | IntArray, width: float, modulus: float, depth: float) -> FloatArray:
     """Integral of the kernel over a cell whose centre is ``distance`` cells away [m/Pa]."""
     far, near = (distance + 0.5) * width, (distance - 0.5) * width
     logarithms = far * np.log(far) - near * np.log(np.abs(near))
@@ -204,7 +162,7 @@ def _stiffness_band(cells: int, width: float, modulus: float) -> FloatArray:
     """Inverse of the influence matrix of a long periodic grid, cut to a band; the diagonal keeps the sum of a row."""
     length = 8 * cells
     distance = np.minimum(np.arange(length), length - np.arange(length))
-    spectrum = np.fft.rfft(_influence(distance, width, modulus, length * width)).real
+    spectrum = np.fft.rfft(influence_of_cells(distance, width, modulus, length * width)).real
     spectrum[0] = math.inf
     band = np.fft.irfft(1.0 / spectrum, length)[: _HALF_BAND + 1]
     band[0] = -2.0 * band[1:].sum() + modulus / (cells * width)

@@ -1,6 +1,5 @@
 """The friction map of a case: steady friction over speed and pressure, and its memory length."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,14 +12,14 @@ from seal_friction_ros.core.foundation.errors import NotConvergedError
 from seal_friction_ros.core.friction.laws.friction_map import FrictionMap
 from seal_friction_ros.core.lubrication.contact import ContactState, contact_step
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
-from seal_friction_ros.core.lubrication.oring_film import oring_film
-from seal_friction_ros.core.lubrication.transient import (
+from seal_friction_ros.core.lubrication.model import (
     LubricationModel,
+    film_at_rest,
     fluid_force,
-    initial_state,
-    lubrication_model,
+    profile_model,
     solid_limit,
 )
+from seal_friction_ros.core.lubrication.oring_film import oring_film
 
 _PASSAGES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, math.inf)  # steps to the steady film
 _MOST_RETRIES = 20
@@ -56,12 +55,6 @@ def map_pressures(grid: MapGrid) -> FloatArray:
     return np.linspace(0.0, grid.pressure_max, grid.pressures)
 
 
-def _flooded_elastic_case(case: LubricationCase, pressure: float) -> LubricationCase:
-    """The case on a plain flooded wall, elastic, with ``pressure`` [Pa] on its left."""
-    air = dataclasses.replace(case.air, pressure_left=pressure, pressure_right=0.0)
-    return dataclasses.replace(case, air=air, control_edge=None, film_supply=None, viscoelasticity=None)
-
-
 class _AtRest(NamedTuple):
     model: LubricationModel
     start: ContactState
@@ -72,8 +65,8 @@ def _at_rest(case: LubricationCase, pressure: float) -> _AtRest:
     """The seal of a case at rest on a plain flooded wall, with ``pressure`` [Pa] on its left."""
     if case.oring is not None:
         return _AtRest(*oring_film(case, case.oring, pressure))
-    model = lubrication_model(_flooded_elastic_case(case, pressure))
-    return _AtRest(model, initial_state(model, 0.0).state, case.groove.stiffness)
+    model = profile_model(case, pressure, 0.0)
+    return _AtRest(model, film_at_rest(model), case.groove.stiffness)
 
 
 def _friction(model: LubricationModel, state: ContactState, velocity: float) -> tuple[float, float]:
@@ -108,7 +101,7 @@ def _slid(
                     raise
                 failed = left.pop()
                 if math.isinf(failed):
-                    left += [failed, _LONG_PASSAGES * model.case.numerics.film_width / abs(velocity)]
+                    left += [failed, _LONG_PASSAGES * model.film_width / abs(velocity)]
                 else:
                     left += [0.5 * failed, 0.5 * failed]
                 continue
@@ -124,7 +117,7 @@ def steady_state(model: LubricationModel, start: ContactState, velocity: float) 
     Raises:
         NotConvergedError: More than 20 steps failed.
     """
-    passage = model.case.numerics.film_width / abs(velocity)
+    passage = model.film_width / abs(velocity)
     state, _, retried = _slid(model, start, velocity, [share * passage for share in _PASSAGES])
     return state, retried
 
@@ -165,7 +158,7 @@ def memory_length(case: LubricationCase) -> MemoryLength:
     fast = case.motion.speed
     slow, first = steady_state(model, start, 0.2 * fast)
     steady, second = steady_state(model, slow, fast)
-    step = 4.0 * model.case.numerics.film_width / fast / _MEMORY_STEPS
+    step = 4.0 * model.film_width / fast / _MEMORY_STEPS
     _, states, third = _slid(model, slow, fast, [step] * _MEMORY_STEPS)
     course = np.array([_friction(model, state, fast)[0] for state in (slow, *states)])
     end = _friction(model, steady, fast)[0]

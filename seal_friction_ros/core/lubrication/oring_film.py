@@ -10,7 +10,6 @@ quarter of the contact width beyond both edges of the contact, as far as the ele
 choice).
 """
 
-import dataclasses
 import math
 from typing import NamedTuple
 
@@ -21,7 +20,7 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.lubrication.contact import ContactState, LubricatedContact, dry_contact
 from seal_friction_ros.core.lubrication.elasticity import condensed_body
 from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
-from seal_friction_ros.core.lubrication.transient import LubricationModel
+from seal_friction_ros.core.lubrication.model import LubricationModel
 from seal_friction_ros.core.oring_contact.compliance import sliding_face
 from seal_friction_ros.core.oring_contact.loading import loaded_states, oring_model
 from seal_friction_ros.core.oring_contact.oring_case import OringCase
@@ -63,12 +62,8 @@ def oring_film(case: LubricationCase, oring: OringCase, pressure: float) -> Orin
     dry_pressure: FloatArray = PchipInterpolator(face.place, face.pressure)(place)
     ambient = np.where(np.arange(cells) < int(dry_pressure.argmax()), pressure, 0.0)
     contact = LubricatedContact(body, case.topography, case.grease)
-    fitted = dataclasses.replace(
-        case,
-        numerics=dataclasses.replace(case.numerics, film_width=end - begin),
-        air=dataclasses.replace(case.air, pressure_left=pressure, pressure_right=0.0),
-    )
-    model = LubricationModel(fitted, contact, place, ambient, dry_gap - body.deflection(dry_pressure), circumference)
+    profile = dry_gap - body.deflection(dry_pressure)
+    model = LubricationModel(case, contact, place, ambient, profile, circumference, pressure, 0.0)
     solid = np.maximum(dry_pressure - ambient, _LEAST_PRESSURE * modulus)
     stiffness, length, _ = contact.asperities
     guess = np.maximum(dry_gap, 0.0) + length * np.log1p(stiffness / solid)

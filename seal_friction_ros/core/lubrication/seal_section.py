@@ -1,4 +1,4 @@
-r"""The body under the film: half-plane, bonded layer, or the section of the seal by finite elements.
+r"""The body under the film: half-plane, or the section of the seal by finite elements.
 
 The section of the paper is confidential, so this profile is ours: a crown of two radii, flanks square to the axis and a
 flat bottom in the groove of the spool, about which it is a body of revolution. The elements are those of the O-ring
@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seal_friction_ros.core.foundation.arrays import FloatArray, IntArray
-from seal_friction_ros.core.lubrication.elasticity import BondedLayer, ElasticBody, HalfPlane, condensed_body
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationNumerics, SealBody
+from seal_friction_ros.core.lubrication.elasticity import ElasticBody, HalfPlane, condensed_body
+from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics, SealBody
 from seal_friction_ros.core.oring_contact.compliance import small_displacements
 from seal_friction_ros.core.oring_contact.equilibrium import OringModel, make_model, unstressed_state
 from seal_friction_ros.core.oring_contact.material import Rubber
@@ -96,8 +96,7 @@ def seal_body(seal: SealBody, numerics: LubricationNumerics) -> ElasticBody:
     """
     cells, width = numerics.cells, numerics.film_width / numerics.cells
     if seal.body != 'finite_elements':
-        kernel = HalfPlane if seal.body == 'half_plane' else BondedLayer
-        return kernel(cells, width, seal.modulus, seal.section_height)
+        return HalfPlane(cells, width, seal.modulus, seal.section_height)
     section = seal_section(seal, numerics.film_width, numerics.section_elements)
     places: FloatArray = np.asarray((np.arange(cells) + 0.5) * width - 0.5 * numerics.film_width)
     circumference = math.pi * seal.sealing_diameter

@@ -29,7 +29,10 @@ class WallContact(NamedTuple):
 
     position: FloatArray  # of the nodes in contact [m], increasing, shape (k,)
     stress: FloatArray  # contact stress [Pa], shape (k,)
-    force: float  # contact force, over the full circumference [N]
+    force: float  # contact stress, what the wall bears beyond the share of the fluid, over the circumference [N]
+    wall_force: float
+    """all stress of the wall where it is above the pressure of the fluid, over the circumference: the usual definition,
+    which a sharp transition between fluid and contact gives [N]"""
     peak_stress: float  # [Pa]
     edges: tuple[float, float]  # begin and end of the contact [m]; equal without contact
 
@@ -126,13 +129,14 @@ def _contact(loaded: LoadedRing, position: FloatArray, wall: int) -> WallContact
     along = position[:, 0] if wall == WALL else position[:, 1]
     fluid = np.where(surroundings.wetted, surroundings.pressure, 0.0)
     inside = near & (stresses[:, wall] > fluid)
+    wall_force = float((stresses[:, wall] * areas)[inside].sum())
     order = np.argsort(along[inside], kind='stable')
     if not inside.any():
-        return WallContact(np.zeros(0), np.zeros(0), force, 0.0, (0.0, 0.0))
+        return WallContact(np.zeros(0), np.zeros(0), force, 0.0, 0.0, (0.0, 0.0))
     contact_position, contact_stress = along[inside][order], stress[inside][order]
     above = (stresses[:, wall] - fluid)[inside][order]
     edges = _edge(contact_position, above), _edge(contact_position[::-1], above[::-1])
-    return WallContact(contact_position, contact_stress, force, float(contact_stress.max()), edges)
+    return WallContact(contact_position, contact_stress, force, wall_force, float(contact_stress.max()), edges)
 
 
 def _edge(position: FloatArray, above: FloatArray) -> float:

@@ -31,11 +31,11 @@ from seal_friction_ros.offline.commands import (
     seals,
     servo,
     sheet,
-    spool,
     topics,
     tune,
 )
 from seal_friction_ros.offline.commands import command_line as cli
+from seal_friction_ros.offline.commands.studies import of_studies
 from seal_friction_ros.offline.work.interrupt import take_interrupts
 from seal_friction_ros.offline.work.outcome import THREAD_VARIABLES, error_text
 from seal_friction_ros.offline.work.status import as_typed, show_status
@@ -43,7 +43,7 @@ from seal_friction_ros.packages import as_missing, needed
 
 GROUPS = {
     'replay': (info, replay, compare, recover, report, import_data),
-    'identify': (identify, sheet, spool, seals, charts),
+    'identify': (identify, sheet, *of_studies('commands.spool'), seals, charts),
     'watch': (monitor, topics, health, fleet, adapt),
     'tune': (tune, servo),
     'compute': (oring, ehl),

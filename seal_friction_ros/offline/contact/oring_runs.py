@@ -1,11 +1,13 @@
 """Finite-element O-ring: case file -> numbers and seal file."""
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import linear_regression
 from typing import Any, NamedTuple
 
+from seal_friction_ros.core.friction.geometry import stretch_force
 from seal_friction_ros.core.oring_contact.oring_case import OringCase, check_pressures
 from seal_friction_ros.core.oring_contact.oring_case_file import OringCaseFile, SealFriction, parse_oring_case
 from seal_friction_ros.core.oring_contact.results import OringResult, WallContact, oring_results
@@ -35,6 +37,9 @@ class OringSummary:
     pressure_Pa: tuple[float, ...]
     normal_force_N: tuple[float, ...]
     """integral of the contact stress over the sliding wall"""
+    wall_force_N: tuple[float, ...]
+    """integral of all stress of that wall where it is above the pressure of the fluid"""
+    stretch_force_N: float  # of the ring stretched over its inner wall, by the hoop equation of the thesis
     axial_force_N: tuple[float, ...]
     """axial force of the gland on the ring"""
     peak_contact_stress_Pa: tuple[float, ...]
@@ -97,16 +102,18 @@ def compute_case(
 
 
 def _summary(file: OringCaseFile, results: Sequence[OringResult]) -> OringSummary:
-    contacts = [sliding_contact(file.case, result) for result in results]
+    geometry, contacts = file.case.geometry, [sliding_contact(file.case, result) for result in results]
     normal = tuple(contact.force for contact in contacts)
     axial = tuple(result.axial_force for result in results)
     gain, radial = linear_regression(axial, normal) if len(results) > 1 else (None, None)
     law = file.friction.law if file.friction else None
     return OringSummary(
         case=file.case.name,
-        sliding_wall=file.case.geometry.sliding_wall,
+        sliding_wall=geometry.sliding_wall,
         pressure_Pa=tuple(result.pressure for result in results),
         normal_force_N=normal,
+        wall_force_N=tuple(contact.wall_force for contact in contacts),
+        stretch_force_N=stretch_force(dataclasses.replace(geometry, elastic_modulus=file.case.rubber.elastic_modulus)),
         axial_force_N=axial,
         peak_contact_stress_Pa=tuple(contact.peak_stress for contact in contacts),
         contact_width_m=tuple(contact.width for contact in contacts),

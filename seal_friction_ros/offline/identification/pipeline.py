@@ -17,8 +17,8 @@ from seal_friction_ros.core.foundation.arrays import FloatArray
 from seal_friction_ros.core.foundation.parameters import from_mapping
 from seal_friction_ros.core.foundation.units import BAR
 from seal_friction_ros.core.friction.actuator import MountedSeal, actuator_friction
-from seal_friction_ros.core.friction.geometry import SealGeometry
-from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw, squeeze_force
+from seal_friction_ros.core.friction.geometry import SealGeometry, squeeze_force
+from seal_friction_ros.core.friction.laws.normal_force import NormalForceLaw
 from seal_friction_ros.core.friction.laws.pressure_power_law import PressurePowerLaw
 from seal_friction_ros.core.friction.seal_file import parse_part, parse_seal
 from seal_friction_ros.core.identification import diagnostics, fitting, run_in, runs, validation

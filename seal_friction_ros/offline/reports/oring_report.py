@@ -108,7 +108,7 @@ def _verdict(computed: Computed) -> Verdict:
 def _number_table(computed: Computed) -> Table:
     area = projected_area(computed.file.case.geometry)
     heads = (
-        'pressure [bar]', '[psi]', 'normal force [N]', 'other wall [N]', 'axial force [N]',
+        'pressure [bar]', '[psi]', 'normal force [N]', 'all wall stress [N]', 'other wall [N]', 'axial force [N]',
         'off pressure times area [%]', 'peak contact stress [MPa]', 'contact width [mm]', 'volume lost [%]',
         'Newton steps',
     )  # fmt: skip
@@ -122,6 +122,7 @@ def _number_table(computed: Computed) -> Table:
                 number(result.pressure / BAR),
                 number(result.pressure / PSI, 0),
                 number(contact.force),
+                number(contact.wall_force),
                 number(other.force),
                 number(result.axial_force),
                 number(off, 3, signed=True),

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from seal_friction_ros.core.foundation.normal_distribution import BAND_95
@@ -115,11 +115,19 @@ def environment() -> Environment:
     return made
 
 
-def render_page(template: str, pictures: dict[str, bytes], plots: dict[str, Any], **values: Any) -> str:
+def template_of(template: str | Path) -> Template:
+    """Template: a name in ``templates/``, or a path of another folder, which may extend those; both without suffix."""
+    if isinstance(template, str):
+        return environment().get_template(f'{template}.html')
+    folders = FileSystemLoader([template.parent, TEMPLATES])
+    return environment().overlay(loader=folders).get_template(f'{template.name}.html')
+
+
+def render_page(template: str | Path, pictures: dict[str, bytes], plots: dict[str, Any], **values: Any) -> str:
     """HTML of a page.
 
     Args:
-        template: Name of a file in ``templates/``, without suffix.
+        template: As of `template_of`.
         pictures: Name of a figure -> SVG; a figure that is named in the template but missing here is left out.
         plots: Name of a figure -> its data, see `plot_data`.
         values: What the template shows.
@@ -129,7 +137,7 @@ def render_page(template: str, pictures: dict[str, bytes], plots: dict[str, Any]
     """
     encoded = {name: b64encode(svg).decode() for name, svg in pictures.items()}
     shared = {'script': script('plots'), 'version': package_version(), 'MOST_OPEN': MOST_OPEN}
-    return environment().get_template(f'{template}.html').render(pictures=encoded, plots=plots, **shared, **values)
+    return template_of(template).render(pictures=encoded, plots=plots, **shared, **values)
 
 
 @cache
@@ -139,7 +147,7 @@ def script(name: str) -> Markup:
 
 
 def write_page(
-    out: Path, template: str, plots: Iterable[Plot], *, warnings: Sequence[str] = (), **values: Any
+    out: Path, template: str | Path, plots: Iterable[Plot], *, warnings: Sequence[str] = (), **values: Any
 ) -> tuple[Path, ...]:
     """Write a page, and each figure as PNG and SVG in ``<stem>_figures`` beside it; existing files are replaced.
 

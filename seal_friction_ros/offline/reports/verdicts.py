@@ -21,16 +21,18 @@ WIDE_BAND = 0.15  # [-] standard deviation of a seal file: LOOK above
 NAME_SEALS = 'name the seal files of your machine (parameter seals); seal_friction seals lists those that there are'
 
 
-def _worst(levels: Sequence[str]) -> str:
+def worst(levels: Sequence[str]) -> str:
+    """Worst of some levels; GOOD of none."""
     return max(levels, key=(GOOD, LOOK, BAD).index, default=GOOD)
 
 
-def _between(value: float, good: float, bad: float) -> str:
+def between(value: float, good: float, bad: float) -> str:
     """Level of a number that should be small."""
     return GOOD if value <= good else BAD if value > bad or not math.isfinite(value) else LOOK
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """A share as text."""
     return f'{100.0 * share:.3g} %'
 
 
@@ -51,7 +53,7 @@ def of_bag(numbers: BagNumbers) -> Verdict:
     """Verdict on the estimates of a bag, and on its loop if it has one."""
     share = numbers.in_band / numbers.strokes if numbers.strokes else None
     inside = LOOK if share is None else GOOD if share >= MOST_IN_BAND else BAD if share < FEWEST_IN_BAND else LOOK
-    flags = _between(numbers.flagged, MOST_FLAGGED, FAR_TOO_MANY_FLAGGED)
+    flags = between(numbers.flagged, MOST_FLAGGED, FAR_TOO_MANY_FLAGGED)
     loop = BAD if (numbers.tracking_change or 0.0) > 0.0 else GOOD
     seals = BAD if numbers.has_placeholder else GOOD
     friction = (
@@ -62,10 +64,10 @@ def of_bag(numbers: BagNumbers) -> Verdict:
     parts = [(seals, 'the estimate used the placeholder seal')] if numbers.has_placeholder else []
     parts += [(loop, numbers.tracking)] if numbers.tracking else []
     parts += [(inside, friction)]
-    parts += [(flags, f'{_percent(numbers.flagged)} of the estimates carry a status bit')] if flags != GOOD else []
+    parts += [(flags, f'{percent(numbers.flagged)} of the estimates carry a status bit')] if flags != GOOD else []
     text = '; '.join(part for level in (BAD, LOOK, GOOD) for at, part in parts if at == level)
     return Verdict(
-        _worst([inside, flags, loop, seals]), f'{text[0].upper()}{text[1:]}.', _after_bag(numbers, inside, flags, loop)
+        worst([inside, flags, loop, seals]), f'{text[0].upper()}{text[1:]}.', _after_bag(numbers, inside, flags, loop)
     )
 
 
@@ -101,14 +103,14 @@ class IdentificationNumbers(NamedTuple):
 
 def of_identification(found: IdentificationNumbers) -> Verdict:
     """Verdict on an identified law."""
-    error = _between(found.error, SMALL_ERROR, LARGE_ERROR)
+    error = between(found.error, SMALL_ERROR, LARGE_ERROR)
     band = GOOD if found.coverage >= MOST_IN_BAND else BAD if found.coverage < FEWEST_IN_BAND else LOOK
-    level = _worst(
+    level = worst(
         [error, band, BAD if found.unsound else GOOD, LOOK if found.outlier or found.changed or found.drifted else GOOD]
     )
     text = (
-        f'{found.law}, on readings that the fit did not see: single ones are off by {_percent(found.error)} on '
-        f'average, the mean at a pressure by {_percent(found.worst)} at most; {_percent(found.coverage)} lie in the '
+        f'{found.law}, on readings that the fit did not see: single ones are off by {percent(found.error)} on '
+        f'average, the mean at a pressure by {percent(found.worst)} at most; {percent(found.coverage)} lie in the '
         '95 % band'
     )
     reasons = [f'the parameters are not determined ({found.unsound})'] if found.unsound else []
@@ -130,9 +132,9 @@ def of_kinds(error: float, shares: Sequence[tuple[str, float, float]], files: Se
         files: Their seal files.
     """
     apart = LOOK if max(std for _, _, std in shares) > WIDE_BAND else GOOD
-    level = _worst([_between(error, SMALL_ERROR, LARGE_ERROR), apart])
-    each = ', '.join(f'{name} {_percent(share)} (standard deviation {_percent(std)})' for name, share, std in shares)
-    text = f'Shares of the friction: {each}. Readings that the fit did not see are off by {_percent(error)} on average.'
+    level = worst([between(error, SMALL_ERROR, LARGE_ERROR), apart])
+    each = ', '.join(f'{name} {percent(share)} (standard deviation {percent(std)})' for name, share, std in shares)
+    text = f'Shares of the friction: {each}. Readings that the fit did not see are off by {percent(error)} on average.'
     after = f'use the seal files together: seals: [{", ".join(files)}].'
     if level != GOOD:
         after = f'drive the pressures that are proposed below; until then {after}'
@@ -154,10 +156,10 @@ def of_seal(
     """
     if is_placeholder:
         return Verdict(BAD, 'Placeholder: its numbers are those of another seal.', f'{NAME_SEALS}.')
-    tested = '' if off is None else f', within {_percent(off)} of the mean of the tests'
+    tested = '' if off is None else f', within {percent(off)} of the mean of the tests'
     level = LOOK if std > WIDE_BAND else GOOD
     text = (
-        f'{friction:.3g} N of Coulomb friction at {pressure / BAR:.3g} bar, standard deviation {_percent(std)}{tested}.'
+        f'{friction:.3g} N of Coulomb friction at {pressure / BAR:.3g} bar, standard deviation {percent(std)}{tested}.'
     )
     after = 'the band is wide: fit it to readings of your machine (docs/identification.md).' if level == LOOK else ''
     return Verdict(level, text, after or f'use it: seals: [{name}].')
@@ -245,57 +247,17 @@ def of_oring(
         volume_lost: Largest loss of volume [-].
         friction: Whether the case has a coefficient of friction.
     """
-    level = _worst([_between(balance, 0.02, 0.1), _between(volume_lost, 0.01, 0.03)])
+    level = worst([between(balance, 0.02, 0.1), between(volume_lost, 0.01, 0.03)])
     ends = f'{normal[0]:.3g} N at {pressures[0] / BAR:.3g} bar'
     if len(normal) > 1:
         ends += f' to {normal[-1]:.3g} N at {pressures[-1] / BAR:.3g} bar'
-    text = f'Normal force {ends}; forces balance within {_percent(balance)}, volume within {_percent(volume_lost)}.'
+    text = f'Normal force {ends}; forces balance within {percent(balance)}, volume within {percent(volume_lost)}.'
     if level != GOOD:
         return Verdict(level, text, 'compute with more lines (numerics.lines of the case) and compare.')
     after = (
         'measure a few readings and compare: the modulus decides.'
         if friction
         else 'add a coefficient of friction to the case for friction.'
-    )
-    return Verdict(level, text, after)
-
-
-def of_lubrication(friction: float, solid_share: float, change: float) -> Verdict:
-    """Verdict on a run: friction [N], its solid share [-], its largest relative change with a coarser step or grid."""
-    level = _between(change, SMALL_NUMERICS, LARGE_NUMERICS)
-    text = (
-        f'Friction {friction:.3g} N about the middle of the stroke, {_percent(solid_share)} of it solid; half the '
-        f'cells or twice the step change it by {_percent(change)} at most.'
-    )
-    after = (
-        'compare with a measurement (--bag).'
-        if level == GOOD
-        else 'compute with more cells and a smaller step (numerics of the case).'
-    )
-    return Verdict(level, text, after)
-
-
-def of_comparison_with_bag(measured: float, computed: float, correlation: float) -> Verdict:
-    """Verdict on computed against measured friction, mean magnitudes [N]."""
-    off = abs(computed / measured - 1.0) if measured else math.inf
-    level = _worst([_between(off, SMALL_ERROR, LARGE_ERROR), _between(1.0 - correlation, 0.1, 0.3)])
-    text = (
-        f'Computed {computed:.3g} N, measured {measured:.3g} N: off by {_percent(off)}; correlation {correlation:.2f}.'
-    )
-    after = (
-        'use the map of this case (ehl map).' if level == GOOD else 'check the solid shear stress first (ehl study).'
-    )
-    return Verdict(level, text, after)
-
-
-def of_study(deviation: float) -> Verdict:
-    """Verdict on a study: largest deviation of friction over solid shear stress from its mean [-]."""
-    level = _between(deviation, SMALL_ERROR, LARGE_ERROR)
-    text = f'Friction is proportional to the solid shear stress within {_percent(deviation)}.'
-    after = (
-        'fit the shear stress to one measured force.'
-        if level == GOOD
-        else 'fit the shear stress at the speed that matters.'
     )
     return Verdict(level, text, after)
 
@@ -310,7 +272,7 @@ def of_map(lowest: float, highest: float, relative_std: float | None, seal_file:
         seal_file: Whether a seal file is written.
     """
     spread = (
-        '' if relative_std is None else f', with a relative standard deviation of {_percent(relative_std)} by samples'
+        '' if relative_std is None else f', with a relative standard deviation of {percent(relative_std)} by samples'
     )
     after = (
         'use the seal file; its band is not from measurements.'
@@ -322,32 +284,12 @@ def of_map(lowest: float, highest: float, relative_std: float | None, seal_file:
     )
 
 
-def of_spool(largest: float) -> Verdict:
-    """Verdict on the computed friction of a spool [N]."""
-    return Verdict(
-        LOOK,
-        f'Friction up to {largest:.3g} N in the last cycle; computed, not measured.',
-        'compare with a measured force.',
-    )
-
-
-def of_spool_measurement(reference: float, resonance: float | None) -> Verdict:
-    """Verdict on an evaluated rig: reference force [N], resonance of the measuring chain [Hz] if one was found."""
-    if resonance is None:
-        text = (
-            f'Reference force {reference:.4g} N; no resonance of the measuring chain stands out, so none was removed.'
-        )
-        return Verdict(LOOK, text, 'look for ringing after the reversals.')
-    text = f'Reference force {reference:.4g} N; the resonance of the measuring chain at {resonance:.0f} Hz is removed.'
-    return Verdict(GOOD, text, 'compare it with another ring: --reference.')
-
-
 def of_servo(dwell: float, share: float, with_friction: float, without: float) -> Verdict:
     """Verdict on the simulated servo: rest [s] and share of a period [-] per reversal, tracking errors RMS [m]."""
     if not dwell:
         return Verdict(GOOD, 'The rod reverses without a rest.', 'nothing: friction does not flatten the peaks.')
     text = (
-        f'Friction flattens the peaks: a rest of {1e3 * dwell:.1f} ms at each reversal, {_percent(share)} of a period; '
+        f'Friction flattens the peaks: a rest of {1e3 * dwell:.1f} ms at each reversal, {percent(share)} of a period; '
         f'the tracking error is {length_text(with_friction)} RMS with friction, {length_text(without)} without.'
     )
     level = LOOK if with_friction > without + 0.1 * UM else GOOD

@@ -83,14 +83,6 @@ def test_a_map_of_two_by_two_and_of_nearly_equal_ratios_is_taken():
     assert small.sliding_friction(2.5e6, 1e-2) == pytest.approx(2.5)
 
 
-def test_friction_follows_a_change_of_speed_over_the_memory_length():
-    law, steady = friction_map(memory_length=0.002), 18.0
-    assert law.lagged(30.0, 3e6, 0.01, 0.0) == 30.0
-    assert law.lagged(30.0, 3e6, 0.01, 0.002) == pytest.approx(steady + 12.0 / math.e)
-    assert law.lagged(10.0, 3e6, 0.01, 0.004) == pytest.approx(steady - 8.0 / math.e**2)
-    assert friction_map().lagged(30.0, 3e6, 0.01, 0.0) == steady
-
-
 def test_the_coulomb_friction_of_a_map_is_that_at_its_reference_speed():
     law = friction_map(reference_speed=0.1)
     assert (law.depends_on_speed, law.coulomb_speed, law.coulomb_friction(3e6)) == (True, 0.1, 15.0)

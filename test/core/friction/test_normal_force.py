@@ -4,11 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seal_friction_ros.core.friction.geometry import SealGeometry
 from seal_friction_ros.core.friction.laws.normal_force import (
     AreaDeformationGain,
     NormalForceTable,
-    squeeze_force,
 )
 
 AREA = 1e-4  # [m^2]
@@ -61,12 +59,3 @@ def test_a_table_that_makes_no_sense_is_refused(pressures_, forces, complaint):
 def test_a_seal_that_does_not_press_is_refused():
     with pytest.raises(ValueError, match=r'radial_force = 0.0 N is below its lower bound 1e-06 N'):
         AreaDeformationGain(0.4, 0.0)
-
-
-def test_a_ring_between_two_walls_has_the_force_of_lindley():
-    ring = SealGeometry(
-        section_diameter=2.62e-3, ring_inner_diameter=15.54e-3, rod_diameter=16.0e-3, gland_diameter=20.72e-3
-    )
-    share = 0.26 / 2.62  # the gap is 2.36 mm
-    line_load = 2.62e-3 * 5.5e6 * (1.25 * share**1.5 + 50.0 * share**6)  # [N/m]
-    assert squeeze_force(ring) == pytest.approx(3.14159265 * 18.36e-3 * line_load, rel=1e-6)

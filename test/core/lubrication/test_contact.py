@@ -270,7 +270,7 @@ def test_what_does_not_converge_says_which_part_of_it(monkeypatch):
     state = dry(contact)
     monkeypatch.setattr(contact_module, '_GMRES_TOLERANCE', 1e-12)
     monkeypatch.setattr(contact_module, '_GMRES_ITERATIONS', 1)
-    with pytest.raises(NotConvergedError, match=r'^contact step: GMRES: .* left after 1 iterations$'):
+    with pytest.raises(NotConvergedError, match=r'^contact step: GMRES: not solved after 1 iterations$'):
         contact_step(contact, state, profile(64), -0.02, FilmEnds(), state.gap, 1e-3)
     monkeypatch.setattr(contact_module, '_ITERATIONS', 1)
     with pytest.raises(NotConvergedError, match=r'^dry contact: .* m left after 1 iterations$'):

@@ -21,23 +21,17 @@ from seal_friction_ros.core.lubrication import friction_map as module
 from seal_friction_ros.core.lubrication.contact import ContactState
 from seal_friction_ros.core.lubrication.friction_map import friction_map, memory_length, steady_friction
 from seal_friction_ros.core.lubrication.grease import Grease
-from seal_friction_ros.core.lubrication.lubrication_case import (
-    AirPressure,
-    LubricationCase,
-    LubricationNumerics,
-    MapGrid,
-    Viscoelasticity,
-)
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, MapGrid
+from seal_friction_ros.core.lubrication.model import film_at_rest, profile_model, solid_limit
 from seal_friction_ros.core.lubrication.oring_film import oring_film
+from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
-from seal_friction_ros.core.lubrication.transient import fluid_force, initial_state, lubrication_model, solid_limit
-from seal_friction_ros.core.lubrication.wall import ControlEdge, FilmSupply
 from seal_friction_ros.core.oring_contact.oring_case import OringNumerics
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 
 CASE = LubricationCase(
     name='inner',
-    numerics=LubricationNumerics(cells=96, time_step=1e-3),
+    numerics=LubricationNumerics(cells=96),
     map=MapGrid(velocity_min=1e-3, velocity_max=0.1, velocities=5, pressure_max=3e5, pressures=2),
 )
 LAW = FrictionMap(
@@ -107,13 +101,8 @@ def test_friction_of_a_ring_from_its_drawing_falls_with_speed_and_rises_with_pre
 def test_solid_friction_of_a_ring_is_at_most_tau_c_on_the_contact(ring_row):
     case, rows = ring_row
     film = oring_film(case, case.oring, 3e5)
-    area = film.model.circumference * film.model.case.numerics.film_width
+    area = film.model.circumference * film.model.film_width
     assert 0.0 < rows[1].solid[0] < case.seal.solid_shear_stress * area
-
-
-def test_a_ring_has_no_run_of_its_own(ring_row):
-    with pytest.raises(ValueError, match='an O-ring has a friction map only: seal_friction ehl map'):
-        lubrication_model(ring_row[0])
 
 
 def test_film_remembers_over_about_the_length_of_the_contact():
@@ -131,8 +120,8 @@ def test_step_of_the_map_that_fails_is_taken_in_halves_and_counted(monkeypatch):
             raise NotConvergedError('told to')
         return really(*arguments)
 
-    model = lubrication_model(CASE)
-    start = initial_state(model, 0.0).state
+    model = profile_model(CASE, 0.0, 0.0)
+    start = film_at_rest(model)
     smoothly, none = module.steady_state(model, start, 0.01)
     monkeypatch.setattr(module, 'contact_step', fails_at_first)
     state, retried = module.steady_state(model, start, 0.01)
@@ -143,130 +132,129 @@ def test_step_of_the_map_that_fails_is_taken_in_halves_and_counted(monkeypatch):
     assert state.gap == pytest.approx(smoothly.gap, rel=1e-9)
 
 
-PASSAGE = 0.6e-3  # [m]
-OIL = Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.5)
-
-
-def film(gap: float) -> ContactState:
-    """An even film [m] without pressure."""
-    return ContactState(np.full(96, gap), np.zeros(96), np.ones(96))
-
-
-class Film:
-    """In the place of the steps of a contact: gives ``made(state, velocity, duration)``, unless ``fails`` it does."""
-
-    def __init__(self, monkeypatch, made=lambda state, *_: state, fails=lambda _: False) -> None:
-        self.begun: list[ContactState] = []
-        self.velocities: list[float] = []
-        self.durations: list[float] = []
-        self.failed = 0
-        self._made, self._fails = made, fails
-        monkeypatch.setattr(module, 'contact_step', self._step)
-
-    def _step(self, _contact, state, _profile, velocity, _ends, _old, duration):
-        self.begun.append(state)
-        self.velocities.append(-velocity)
-        self.durations.append(duration)
-        if self._fails(len(self.durations)):
-            self.failed += 1
-            raise NotConvergedError('told to')
-        return SimpleNamespace(state=self._made(state, -velocity, duration))
-
-
-@pytest.fixture(scope='module')
-def at_rest():
-    model = lubrication_model(CASE)
-    return model, initial_state(model, 0.0).state
-
-
 @pytest.mark.parametrize(('failures', 'gives_up'), [(20, False), (21, True)])
-def test_map_gives_up_when_more_than_twenty_steps_have_failed(monkeypatch, at_rest, failures, gives_up):
-    steps = Film(monkeypatch, fails=lambda number: number <= failures)
+def test_map_gives_up_when_more_than_twenty_steps_have_failed(monkeypatch, failures, gives_up):
+    asked = []
+
+    def fails_often(_contact, state, *arguments):
+        asked.append(arguments[4])
+        if len(asked) <= failures:
+            raise NotConvergedError('told to')
+        return SimpleNamespace(state=state)
+
+    model = profile_model(CASE, 0.0, 0.0)
+    start = film_at_rest(model)
+    monkeypatch.setattr(module, 'contact_step', fails_often)
     if gives_up:
         with pytest.raises(NotConvergedError, match=r'^told to$'):
-            module.steady_state(*at_rest, 0.1)
+            module._slid(model, start, 0.1, [1e-3])
     else:
-        assert module.steady_state(*at_rest, 0.1)[1] == 20
-        assert steps.durations[20] == pytest.approx(0.02 * PASSAGE / 0.1 / 2**20)
+        assert module._slid(model, start, 0.1, [1e-3])[2] == 20
+        assert asked[20] == 1e-3 / 2**20
+
+
+def test_step_to_the_steady_film_that_fails_is_led_by_one_of_250_passages(monkeypatch):
+    """0.6 mm at 0.1 m/s: 6 ms a passage."""
+    asked = []
+
+    def fails_at_first(_contact, state, *arguments):
+        asked.append(arguments[4])
+        if len(asked) == 1:
+            raise NotConvergedError('told to')
+        return SimpleNamespace(state=state)
+
+    model = profile_model(CASE, 0.0, 0.0)
+    start = film_at_rest(model)
+    monkeypatch.setattr(module, 'contact_step', fails_at_first)
+    _, states, retried = module._slid(model, start, -0.1, [math.inf])
+    assert asked == [math.inf, pytest.approx(1.5), math.inf]
+    assert (len(states), retried) == (1, 1)
 
 
 @pytest.mark.parametrize('velocity', [0.1, -0.1])
-def test_film_is_led_to_the_steady_one_by_steps_each_two_to_five_times_as_long_as_the_last(
-    monkeypatch, at_rest, velocity
-):
-    """From a fiftieth of a passage on; a step to the steady film that fails is led by one of 250 passages."""
-    steps = Film(monkeypatch, fails=lambda number: number == 11)
-    assert module.steady_state(*at_rest, velocity) == (at_rest[1], 1)
-    growth = np.array(steps.durations[1:10]) / np.array(steps.durations[:9])
+def test_film_is_led_to_the_steady_one_by_steps_each_two_to_five_times_as_long_as_the_last(monkeypatch, velocity):
+    """From a fiftieth of a passage on: 0.6 mm at 0.1 m/s last 6 ms."""
+    led: list[float] = []
+
+    def slid(_model, start, _velocity, durations):
+        led.extend(durations)
+        return start, [start], 0
+
+    monkeypatch.setattr(module, '_slid', slid)
+    assert module.steady_state(SimpleNamespace(film_width=0.6e-3), 1.0, velocity) == (1.0, 0)
+    growth = np.array(led[1:-1]) / np.array(led[:-2])
     assert growth.min() >= 2.0 - 1e-9
     assert growth.max() <= 5.0 + 1e-9
-    passages = np.array(steps.durations) * 0.1 / PASSAGE
-    assert passages[0] == pytest.approx(0.02)
-    assert passages[9:].tolist() == pytest.approx([100.0, math.inf, 250.0, math.inf])
+    assert led[0] == pytest.approx(0.02 * 6e-3)
+    assert led[-2:] == [pytest.approx(100.0 * 6e-3), math.inf]
 
 
 def test_map_takes_both_ways_from_rest_speed_after_speed_and_its_mean(monkeypatch):
-    """The film is 2 um thick the one way and 1 um the other; the third step of each speed fails once."""
-    steps = Film(
-        monkeypatch, lambda _, velocity, __: film(2e-6 if velocity > 0.0 else 1e-6), lambda number: number % 12 == 3
-    )
+    """The film of a speed is the number of speeds before it. 10 N the one way and 14 N towards the pressure."""
+    begun = []
+
+    def steady(_model, state, velocity):
+        begun.append((state, velocity))
+        return state + 1, 2
+
+    def friction(_model, state, velocity):
+        return (10.0 if velocity > 0.0 else 14.0) + state, (4.0 if velocity > 0.0 else 5.0) + state
+
+    rest = SimpleNamespace(case=CASE), 0, 7.0
+    monkeypatch.setattr(module, '_at_rest', lambda case, pressure: rest if (case, pressure) == (CASE, 2e5) else None)
+    monkeypatch.setattr(module, 'steady_state', steady)
+    monkeypatch.setattr(module, '_friction', friction)
     row = steady_friction(CASE, 2e5)
-    model = lubrication_model(dataclasses.replace(CASE, air=AirPressure(pressure_left=2e5)))
+    after = np.arange(1.0, 6.0)
+    assert row.friction == pytest.approx(12.0 + after)
+    assert row.solid == pytest.approx(4.5 + after)
+    assert row.direction_difference == pytest.approx(np.full(5, 4.0))  # the pressure is on the left
+    assert (row.pressure, row.stiffness, row.retried_steps) == (2e5, 7.0, 20)
     speeds = np.geomspace(1e-3, 0.1, 5)
-    solid_out, solid_back = (solid_limit(model, film(gap)) for gap in (2e-6, 1e-6))
-    out = np.array([solid_out + fluid_force(model, film(2e-6), v) for v in speeds])
-    back = np.array([solid_back - fluid_force(model, film(1e-6), -v) for v in speeds])
-    assert row.friction == pytest.approx((out + back) / 2.0)
-    assert row.solid == pytest.approx(np.full(5, (solid_out + solid_back) / 2.0))
-    assert row.direction_difference == pytest.approx(back - out)  # the pressure is on the left
-    assert (row.pressure, row.stiffness, row.retried_steps) == (2e5, CASE.groove.stiffness, steps.failed)
-    assert steps.failed >= 10
-    firsts = [0, *(np.flatnonzero(np.diff(steps.velocities)) + 1)]
-    assert np.array(steps.velocities)[firsts] == pytest.approx([*speeds, *-speeds])
-    rest = initial_state(model, 0.0).state.gap
-    thickness = [steps.begun[number].gap for number in firsts]
-    assert all(np.array_equal(thickness[number], rest) for number in (0, 5))
-    assert [gap[0] for gap in thickness[1:5] + thickness[6:]] == [2e-6] * 4 + [1e-6] * 4
+    assert [state for state, _ in begun] == [0, 1, 2, 3, 4] * 2
+    assert [velocity for _, velocity in begun] == pytest.approx([*speeds, *-speeds])
 
 
-def test_friction_is_that_of_asperities_and_film_whichever_way(monkeypatch):
+@pytest.mark.parametrize('velocity', [0.03, -0.03])
+def test_friction_is_that_of_asperities_and_film_whichever_way(velocity):
     """Oil of 0.5 Pa s in an even gap of 2 um."""
-    Film(monkeypatch, lambda *_: film(2e-6))
-    case = dataclasses.replace(CASE, grease=OIL)
-    row = steady_friction(case, 0.0)
-    speeds = np.geomspace(1e-3, 0.1, 5)
-    assert row.solid == pytest.approx(np.full(5, solid_limit(lubrication_model(case), film(2e-6))))
-    assert row.solid[0] > 0.0
-    assert row.friction - row.solid == pytest.approx(0.5 * speeds / 2e-6 * math.pi * 6e-3 * 0.6e-3)
+    oil = Grease(yield_stress=0.0, consistency_index=0.0, base_viscosity=0.5)
+    model = profile_model(dataclasses.replace(CASE, grease=oil), 0.0, 0.0)
+    state = ContactState(np.full(96, 2e-6), np.zeros(96), np.ones(96))
+    friction, solid = module._friction(model, state, velocity)
+    assert solid == solid_limit(model, state)
+    assert solid > 0.0
+    assert friction - solid == pytest.approx(0.5 * 0.03 / 2e-6 * math.pi * 6e-3 * 0.6e-3)
 
 
 def test_memory_of_a_friction_that_falls_exponentially_is_the_length_of_its_exponential(monkeypatch):
-    """To half over 0.1 mm; from steady sliding at a fifth of 34 mm/s, without pressure. No asperities touch."""
+    """From 5 to 2 N over 0.1 mm; from steady sliding at a fifth of 34 mm/s, without pressure."""
+    asked = []
 
-    def follows(state, velocity, duration):
-        steady = 1e4 if velocity == 34e-3 else 2e4  # [1/m] of the gap
-        return film(1.0 / (steady + (1.0 / state.gap[0] - steady) * math.exp(-duration * abs(velocity) / 0.1e-3)))
+    def steady(_model, state, velocity):
+        asked.append((state, velocity))
+        return (2.0, 10) if velocity == 34e-3 else (5.0, 1)
 
-    steps = Film(monkeypatch, follows, lambda number: number in (3, 20, 60))
-    found = memory_length(dataclasses.replace(CASE, grease=OIL))
+    def slid(_model, start, velocity, durations):
+        states = (2.0 + (start - 2.0) * np.exp(-np.cumsum(durations) * velocity / 0.1e-3)).tolist()
+        return states[-1], states, 100
+
+    rest = SimpleNamespace(film_width=0.6e-3), 0.0, 7.0
+    monkeypatch.setattr(module, '_at_rest', lambda _, pressure: rest if pressure == 0.0 else None)
+    monkeypatch.setattr(module, 'steady_state', steady)
+    monkeypatch.setattr(module, '_slid', slid)
+    monkeypatch.setattr(module, '_friction', lambda _model, state, velocity: (state, velocity))
+    found = memory_length(CASE)
     assert found.length == pytest.approx(0.1e-3, rel=2e-3)
-    assert (found.retried_steps, steps.failed) == (3, 3)
-    assert list(dict.fromkeys(steps.velocities)) == [pytest.approx(6.8e-3), 34e-3]
+    assert found.retried_steps == 111
+    assert asked == [(0.0, pytest.approx(6.8e-3)), (5.0, 34e-3)]
 
 
-@pytest.mark.parametrize(
-    'changed',
-    [
-        {'control_edge': ControlEdge(), 'film_supply': FilmSupply(), 'viscoelasticity': Viscoelasticity()},
-        {'air': AirPressure(pressure_left=1e5, pressure_right=3e5)},
-    ],
-)
-def test_map_is_of_the_seal_on_a_plain_flooded_wall_with_the_pressure_on_its_left(monkeypatch, changed):
-    steps = Film(monkeypatch)
-    rows = [steady_friction(case, 2e5) for case in (CASE, dataclasses.replace(CASE, **changed))]
-    for one, other in zip(*rows, strict=True):
-        assert np.array_equal(one, other)
-    assert steps.begun[0].saturation.min() == 1.0
+def test_map_is_of_the_seal_on_a_flooded_wall_with_the_pressure_on_its_left():
+    model, start, stiffness = module._at_rest(CASE, 2e5)
+    assert (model.pressure_left, model.pressure_right) == (2e5, 0.0)
+    assert stiffness == CASE.groove.stiffness
+    assert start.saturation.min() == 1.0
 
 
 def test_map_that_does_not_converge_is_an_error_that_says_where(monkeypatch):
@@ -292,13 +280,6 @@ def test_law_passes_through_its_table_and_holds_beyond_its_ends():
 @given(st.floats(0.0, 2e5), st.floats(0.0, 1.0))
 def test_law_stays_within_its_table(pressure, speed):
     assert 1.0 - 1e-12 <= LAW.sliding_friction(pressure, speed) <= 6.0 + 1e-12
-
-
-def test_friction_follows_a_change_of_speed_over_the_memory_length():
-    assert LAW.lagged(3.0, 0.0, 1e-1, 0.0) == 3.0
-    assert LAW.lagged(3.0, 0.0, 1e-1, 1e-3) == pytest.approx(1.0 + 2.0 / math.e)
-    assert LAW.lagged(3.0, 0.0, 1e-1, 1.0) == pytest.approx(1.0)
-    assert dataclasses.replace(LAW, memory_length=0.0).lagged(3.0, 0.0, 1e-1, 0.0) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

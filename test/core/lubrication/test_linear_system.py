@@ -5,7 +5,6 @@ import pytest
 
 from seal_friction_ros.core.lubrication import contact as contact_module
 from seal_friction_ros.core.lubrication.elasticity import HalfPlane
-from seal_friction_ros.core.lubrication.krylov import StalledError, gmres
 from seal_friction_ros.core.lubrication.reynolds import FilmEnds, complementarity, reynolds_rows
 
 CELLS = 7
@@ -150,36 +149,6 @@ def test_banded_stiffness_is_nearly_the_inverse_of_the_compliance_and_carries_an
     assert band[1:] == pytest.approx(inverse[1:], rel=0.02)
     assert band[0] == pytest.approx(inverse[0], rel=0.1)
     assert band[0] + 2.0 * band[1:].sum() == pytest.approx(1.4e7 / (64 * 5e-6), rel=1e-12)
-
-
-def test_gmres_needs_as_many_products_as_the_matrix_has_different_eigenvalues():
-    products = []
-
-    def product(x):
-        products.append(x)
-        return np.array([2.0, 2.0, 5.0, 5.0]) * x
-
-    assert gmres(product, np.array([2.0, 4.0, 5.0, 10.0]), 1e-12, 4) == pytest.approx([1.0, 2.0, 1.0, 2.0])
-    assert len(products) == 2
-
-
-def test_gmres_begins_at_zero_and_ends_there_if_that_will_do():
-    def never(_):
-        raise AssertionError
-
-    assert gmres(never, np.array([3e-7, -4e-7]), 5e-7, 5).tolist() == [0.0, 0.0]
-
-
-@pytest.mark.parametrize('factor', [np.nan, np.inf])
-def test_gmres_gives_up_at_once_on_what_is_not_finite(factor):
-    with np.errstate(invalid='ignore'), pytest.raises(StalledError, match='3 of 3 left after 1 iterations'):
-        gmres(lambda x: factor * x, np.array([0.0, 3.0]), 1e-9, 5)
-
-
-@pytest.mark.parametrize(('matrix', 'right'), [([[0, 0], [0, 0]], [0, 3]), ([[0, 1], [0, 0]], [1, 0])])
-def test_gmres_says_so_where_the_matrix_is_singular_and_has_no_solution_in_its_reach(matrix, right):
-    with pytest.raises(StalledError):
-        gmres(lambda x: np.array(matrix, dtype=float) @ x, np.array(right, dtype=float), 1e-9, 5)
 
 
 def test_an_elimination_that_meets_a_pivot_of_zero_has_no_solution_and_does_not_divide_by_it():

@@ -12,8 +12,9 @@ from scipy.integrate import trapezoid
 
 from seal_friction_ros.core.lubrication import oring_film as module
 from seal_friction_ros.core.lubrication.contact import asperity_pressure
-from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase, LubricationNumerics
+from seal_friction_ros.core.lubrication.lubrication_case import LubricationCase
 from seal_friction_ros.core.lubrication.oring_film import OringFilm, oring_film
+from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics
 from seal_friction_ros.core.lubrication.topography import Topography
 from seal_friction_ros.core.oring_contact.compliance import SlidingFace, sliding_face
 from seal_friction_ros.core.oring_contact.loading import loaded_states, oring_model
@@ -61,7 +62,7 @@ def sealed(request) -> Sealed:
 def test_film_reaches_a_quarter_of_the_contact_beyond_both_its_edges(sealed):
     model, (left, right) = sealed.film.model, sealed.dry.edges
     length = 1.5 * (right - left)
-    assert model.case.numerics.film_width == pytest.approx(length)
+    assert model.film_width == pytest.approx(length)
     assert model.contact.body.cell_width == pytest.approx(length / 64)
     assert model.place == pytest.approx(left - (right - left) / 4 + (np.arange(64) + 0.5) * length / 64)
 
@@ -90,7 +91,7 @@ def test_fluid_stands_up_to_the_peak_of_the_contact_and_nothing_beyond_it(sealed
     assert (start.pressure[~under] == 0.0).all()
     assert model.ambient.tolist() == start.pressure.tolist()
     assert start.saturation.tolist() == [1.0] * 64
-    assert (model.case.air.pressure_left, model.case.air.pressure_right) == (PRESSURE, 0.0)
+    assert (model.pressure_left, model.pressure_right) == (PRESSURE, 0.0)
 
 
 def test_ring_at_rest_is_in_balance_with_fluid_and_asperities(sealed):

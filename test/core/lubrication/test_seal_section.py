@@ -7,12 +7,9 @@ import pytest
 from scipy.sparse import coo_array
 from seal_bodies import contact_forces
 
-from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane
-from seal_friction_ros.core.lubrication.lubrication_case import (
-    LubricationNumerics,
-    SealBody,
-    parse_lubrication_case,
-)
+from seal_friction_ros.core.lubrication.elasticity import HalfPlane
+from seal_friction_ros.core.lubrication.lubrication_case import parse_lubrication_case
+from seal_friction_ros.core.lubrication.seal_profile import LubricationNumerics, SealBody
 from seal_friction_ros.core.lubrication.seal_section import (
     SealSection,
     face_compliance,
@@ -21,6 +18,8 @@ from seal_friction_ros.core.lubrication.seal_section import (
     section_rubber,
 )
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, element_forces
+from seal_friction_studies.core.bonded_layer import BondedLayer
+from seal_friction_studies.core.study_case import StudyCase, StudyNumerics, StudySeal
 
 SEAL = SealBody(body='finite_elements')
 FILM = 0.6e-3  # [m]
@@ -107,7 +106,8 @@ def test_rubber_of_the_section_is_as_stiff_in_shear_as_that_of_the_seal(c10, c01
 
 @pytest.mark.parametrize(('body', 'kind'), [('half_plane', HalfPlane), ('bonded_layer', BondedLayer)])
 def test_body_of_a_seal_that_has_no_elements_is_the_known_one_of_its_height(body, kind):
-    found = seal_body(SealBody(body=body, section_height=2e-3), LubricationNumerics(cells=40, film_width=0.4e-3))
+    numerics = StudyNumerics(cells=40, film_width=0.4e-3)
+    found = StudyCase(name='x', seal=StudySeal(body=body, section_height=2e-3), numerics=numerics).elastic_body()
     assert found.matrix() == pytest.approx(kind(40, 1e-5, 8.0 * 1.785e6, 2e-3).matrix())
 
 
@@ -196,7 +196,7 @@ def test_contact_force_of_a_small_squeeze_is_that_of_finite_strain():
 @pytest.mark.parametrize(
     ('seal', 'words'),
     [
-        ({'body': 'foam'}, "body = 'foam' is not one of half_plane, bonded_layer, finite_elements"),
+        ({'body': 'foam'}, "body = 'foam' is not one of half_plane, finite_elements"),
         ({'section_hold': 'glue'}, "section_hold = 'glue' is not one of bottom, bottom_and_flanks, sliding_bottom"),
         ({'body': 'finite_elements', 'section_height': 3e-3}, 'section_height = 0.003 m reaches the axis'),
         ({'body': 'finite_elements', 'section_width': 2.6e-3}, 'section_width = 0.0026 m leaves 0.000155 m'),

@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
 from seal_friction_ros.core.foundation.arrays import FloatArray
-from seal_friction_ros.core.lubrication.elasticity import BondedLayer, HalfPlane, condensed_body
+from seal_friction_ros.core.lubrication.elasticity import HalfPlane, condensed_body
 from seal_friction_ros.core.oring_contact.compliance import SlidingFace, sliding_face
 from seal_friction_ros.core.oring_contact.elements import deformation_gradient, element_forces, make_elements
 from seal_friction_ros.core.oring_contact.loading import loaded_states, oring_model
@@ -21,6 +21,7 @@ from seal_friction_ros.core.oring_contact.oring_case import OringCase, OringNume
 from seal_friction_ros.core.oring_contact.oring_case_file import parse_oring_case
 from seal_friction_ros.core.oring_contact.results import OringResult, evaluate_contact
 from seal_friction_ros.core.oring_contact.surroundings import GLAND, ROD
+from seal_friction_studies.core.bonded_layer import BondedLayer
 
 PRESSURES = (0.0, 3.4e6, 6.9e6)  # [Pa]
 HEIGHT = 1e-3  # [m] of the block

@@ -178,7 +178,7 @@ def test_a_profile_that_is_only_shifted_does_not_deviate():
     place = np.linspace(0.0, 1.8e-3, 37)
     stress = 1e6 * (place / 1.8e-3) * (1.0 - place / 1.8e-3)
     its = ThesisContact(0.0, float(stress.max()), 1.8e-3, place, stress)
-    rod = WallContact(place - 0.7e-3, stress, 0.0, float(stress.max()), (-0.7e-3, 1.1e-3))
+    rod = WallContact(place - 0.7e-3, stress, 0.0, 0.0, float(stress.max()), (-0.7e-3, 1.1e-3))
     assert max(oring_accuracy.profile_deviation(its, rod)) < 0.01
     rms, worst = oring_accuracy.profile_deviation(its, rod._replace(stress=1.1 * stress))
     assert worst == pytest.approx(0.1, abs=0.02)

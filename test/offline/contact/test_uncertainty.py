@@ -13,10 +13,10 @@ from paths import ROOT
 from seal_friction_ros.core.foundation.unknowns import Unknown
 from seal_friction_ros.files import read_yaml
 from seal_friction_ros.offline.commands.main import main
-from seal_friction_ros.offline.contact.lubrication_runs import single_case
 from seal_friction_ros.offline.contact.sampling import coarse_case, latin_hypercube, sampled
 from seal_friction_ros.offline.contact.uncertainty import Uncertainty
 from seal_friction_ros.offline.work.finished_parts import Part, part_key
+from seal_friction_studies.offline.study_runs import single_case
 
 DRY = """name: dry
 numerics: {cells: 32}

@@ -30,7 +30,7 @@ from seal_friction_ros.offline.reports.page import (
 
 EVIL = '<script>alert("1")</script>&\''
 FROM = {'verdict': Verdict(GOOD, 'fine'), 'head': Head('seal_friction report bag'), 'warnings': []}
-PARTS = {'base', 'macros', 'lubrication', 'lubrication_macros', 'uncertainty'}
+PARTS = {'base', 'macros', 'lubrication', 'uncertainty'}
 PAGES = sorted(path.stem for path in TEMPLATES.glob('*.html') if path.stem not in PARTS)
 EVERYTHING = """{% extends 'base.html' %}{% from 'macros.html' import figure, notes, table, tile with context %}
 {% block title %}{{ name }}{% endblock %}{% block body %}{{ tile(name, name) }}{{ notes([name]) }}

@@ -56,7 +56,7 @@ def coefficient_table(table: Bound, normal_force: float, _unused: float) -> floa
 class CoefficientTable(FrictionCoefficientLaw):
     """Coefficient of friction by monotone interpolation over normal force, constant beyond both ends.
 
-    Source: thesis, chapter 7 ("mu defined at multiple F_n values") and Figure 18.
+    Source: thesis, chapter 7 (mu is "Defined at multiple F_n values") and Figure 18.
 
     Raises:
         ValueError: Fewer than two points, forces that do not increase, or a coefficient that is not positive.

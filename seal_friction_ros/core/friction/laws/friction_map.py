@@ -93,10 +93,3 @@ class FrictionMap(FrictionLaw):
     def columns_per_log_speed(self) -> float:
         """Columns of the table per unit of the natural logarithm of the speed."""
         return (len(self.speeds) - 1) / (math.log(self.speeds[-1]) - math.log(self.speeds[0]))
-
-    def lagged(self, friction: float, pressure: float, speed: float, distance: float) -> float:
-        """Friction [N] after sliding ``distance`` [m] at ``speed`` [m/s], from ``friction`` [N] before."""
-        steady = self.sliding_friction(pressure, speed)
-        if self.memory_length == 0.0:
-            return steady
-        return steady + (friction - steady) * math.exp(-distance / self.memory_length)

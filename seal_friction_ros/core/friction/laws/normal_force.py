@@ -1,13 +1,11 @@
 """Pressure -> normal force of one seal on the wall it slides on."""
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
 from seal_friction_ros.core.foundation.compiled import Bound, evaluate
 from seal_friction_ros.core.foundation.monotone_table import MonotoneTable
 from seal_friction_ros.core.foundation.parameters import parameter
-from seal_friction_ros.core.friction.geometry import SealGeometry, squeeze
 from seal_friction_ros.core.friction.laws.law import Law
 
 
@@ -95,18 +93,3 @@ NORMAL_FORCE_LAWS: dict[str, type[NormalForceLaw]] = {
     'monotone_table': NormalForceTable,
 }
 """Name in a seal file -> law."""
-
-
-def squeeze_force(geometry: SealGeometry) -> float:
-    """Normal force of a squeezed ring without pressure, summed over the circumference [N].
-
-    F = pi D d E (1.25 C^1.5 + 50 C^6), with D the mean diameter of the gap and C the squeeze.
-
-    Source: [Lindley1967]_, for a ring between two parallel walls. Against the finite elements of the thesis (18.2 N at
-    7.5 % squeeze) it gives 22 N.
-    """
-    mean_diameter = (geometry.rod_diameter + geometry.gland_diameter) / 2.0
-    share = squeeze(geometry)
-    strain_part = 1.25 * math.pow(share, 1.5) + 50.0 * math.pow(share, 6.0)
-    line_load = geometry.section_diameter * geometry.elastic_modulus * strain_part
-    return math.pi * mean_diameter * line_load

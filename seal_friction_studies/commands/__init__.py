@@ -1,0 +1,1 @@
+"""Commands of the studies; `seal_friction` finds them by name."""

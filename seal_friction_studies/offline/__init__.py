@@ -1,0 +1,1 @@
+"""Runs, comparisons with bags, and pages of the studies."""

@@ -1,0 +1,3 @@
+"""Small cases of the lubricated contact."""
+
+from harness.ehl_cases import ring, small  # noqa: F401
