@@ -16,7 +16,7 @@ from seal_friction_ros.offline.work.targets import PAGE, Kind, checked_targets
 from seal_friction_ros.packages import needed
 
 if TYPE_CHECKING:
-    from seal_friction_ros.offline.bags.actuator_bag import MappingFile
+    from seal_friction_ros.offline.bags.mapped_bag import MappingFile
     from seal_friction_ros.offline.work.executor import Workers
     from seal_friction_ros.offline.work.finished_parts import Kept
     from seal_friction_ros.offline.work.places import Place
@@ -158,7 +158,7 @@ def mapping_of(arguments: argparse.Namespace) -> 'MappingFile | None':
     Raises:
         ValueError: It cannot be read or is invalid.
     """
-    from seal_friction_ros.offline.bags.actuator_bag import read_mapping
+    from seal_friction_ros.offline.bags.mapped_bag import read_mapping
 
     return read_mapping(arguments.mapping) if arguments.mapping else None
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from seal_friction_ros.core.estimation.configuration import Configuration, first_snapshot, snapshot_text
-from seal_friction_ros.offline.bags.actuator_bag import MappingFile
+from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.work.executor import Workers, nothing
 from seal_friction_ros.offline.work.finished_parts import (
     Kept,

@@ -9,8 +9,8 @@ from typing import Any
 
 from seal_friction_ros.core.estimation.configuration import Configuration
 from seal_friction_ros.core.foundation.compiled import has_compiler
+from seal_friction_ros.offline.bags.actuator_bag import Topics, find_topics
 from seal_friction_ros.offline.bags.bag import BagError, bag_topics
-from seal_friction_ros.offline.bags.topics import Topics, find_topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.bag_parts import Chosen, try_bags
 from seal_friction_ros.offline.replay.replay import count_messages, replay

@@ -17,9 +17,9 @@ from seal_friction_ros.core.estimation.configuration import ALGORITHM_VERSION, S
 from seal_friction_ros.core.estimation.message_blocks import Kind, UnsuitedError
 from seal_friction_ros.core.estimation.messages import decode_text
 from seal_friction_ros.files import default_configuration
+from seal_friction_ros.offline.bags.actuator_bag import Topics
 from seal_friction_ros.offline.bags.block_reader import Stretch, read_in_bulk, times_of
 from seal_friction_ros.offline.bags.mcap_reader import ERRORS, LAST_TIME
-from seal_friction_ros.offline.bags.topics import Topics
 from seal_friction_ros.offline.replay.answer_comparison import ReplayResult
 from seal_friction_ros.offline.replay.compiled_replay import Run, compile_now, first_configurations, kinds_of_topics
 from seal_friction_ros.offline.work.cluster import Cluster

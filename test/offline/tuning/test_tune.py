@@ -245,8 +245,8 @@ def test_given_mass_and_delay_are_used(axis: Path, tmp_path: Path, capsys):
 
 def test_recording_has_the_inputs_of_the_pipeline(axis: Path):
     recording, track, configuration = read_recording(open_actuator(axis))
-    assert len(recording.estimates) == len(track.position) == 2000
-    assert recording.motions[50].reference_velocity == Sine().at(0.05).velocity
+    assert len(recording.stamps) == len(track.position) == 2000
+    assert recording.reference_velocity[50] == Sine().at(0.05).velocity
     assert np.isfinite(recording.force_sum).all()
     assert configuration == compensating()
 
