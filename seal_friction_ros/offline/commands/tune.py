@@ -1,4 +1,4 @@
-"""``seal_friction tune``: tune the friction feed-forward."""
+"""``seal_friction tune``: tune the friction feed-forward; ``seal_friction servo``: a simulated servo."""
 
 import argparse
 from pathlib import Path
@@ -11,7 +11,7 @@ from seal_friction_ros.offline.work.targets import PARAMETER_FILE
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command."""
+    """Add the commands."""
     parser = cli.add_command(
         commands, 'tune', run, 'tune the friction feed-forward on a simulated servo or on a recorded axis',
         'tune --out feedforward.yaml',
@@ -33,8 +33,7 @@ def add_parser(commands: Any) -> None:
     help_text = 'parameter file to write; a report goes beside it'
     cli.add_target(parser, '--out', PARAMETER_FILE, required=True, metavar='FILE.yaml', help=help_text)
     cli.add_configuration(parser)
-    cli.add_namespace(recorded)
-    cli.add_mapping(recorded)
+    cli.add_actuator(recorded)
     help_text = 'write the parameters of this actuator of machine_estimator; default: that of the bag, if it has any'
     parser.add_argument('--actuator', default='', metavar='NAME', help=help_text)
     for name, meaning in _settings().items():
@@ -43,6 +42,8 @@ def add_parser(commands: Any) -> None:
         number = int if name == 'seed' else float
         kinds = tuple(kind for kind in (TuningSettings, RecordedAxisSettings) if name in meanings(kind))
         groups[kinds].add_argument(f'--{name.replace("_", "-")}', type=number, metavar='X', help=text)
+    description = 'write a page on a simulated servo with and without friction'
+    cli.add_page(cli.add_command(commands, 'servo', run_servo, description, 'servo --out servo.html', needs=('numba',)))
 
 
 def _settings() -> dict[str, Meaning]:
@@ -108,3 +109,10 @@ def _given(arguments: argparse.Namespace) -> dict[str, Any]:
         name = foreign[0].replace('_', '-')
         raise ValueError(f'--{name} is {"not for" if arguments.bag else "only for"} a --bag')
     return given
+
+
+def run_servo(arguments: argparse.Namespace) -> int:
+    """Simulate and write the page."""
+    from seal_friction_ros.offline.reports.servo_charts import write_servo_charts
+
+    return cli.print_result(arguments, write_servo_charts(arguments.out), '')
