@@ -50,9 +50,6 @@ class BagHealth(NamedTuple):
     learnt: AdaptationState | None = None  # at the end; None if the bag has no estimate, or it was not asked for
 
 
-_NAMES = tuple(name for name in BagHealth._fields if name != 'learnt')
-
-
 def bag_health(
     bag: Path,
     namespace: str = '',
@@ -115,16 +112,14 @@ def health_of_bags(
     Raises:
         ValueError: The work folder or the cluster cannot be used.
     """
-    outcomes = try_bags(
-        'health', bags, _NAMES, _values, Chosen(namespace, mapping, override), workers, kept,
+    return try_bags(
+        'health', bags, BagHealth, _health, Chosen(namespace, mapping, override), workers, kept,
         lambda: compile_now(first_configurations(bags, namespace, override, mapping)),
     )  # fmt: skip
-    return [Outcome(BagHealth(**one.result) if one.result else None, one.error) for one in outcomes]
 
 
-def _values(bag: Path, chosen: Chosen) -> dict[str, Any]:
-    found = bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)._asdict()
-    return {name: found[name] for name in _NAMES}
+def _health(bag: Path, chosen: Chosen) -> BagHealth:
+    return bag_health(bag, chosen.namespace, chosen.override, mapping=chosen.mapping)._replace(learnt=None)
 
 
 class _Strokes:

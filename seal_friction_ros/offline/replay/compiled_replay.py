@@ -55,15 +55,11 @@ def replay_in_bulk(
         advance(messages)
 
     try:
-        return _replay(bag, topics, override, count)
+        run = Run(override or default_configuration(), has_override=override is not None)
+        return run.compared(read_in_bulk(bag, kinds_of_topics(topics)), topics, count)
     except (UnsuitedError, OSError, *ERRORS):
         advance(-done)
         return None
-
-
-def _replay(bag: Path, topics: Topics, override: Configuration | None, advance: Callable[[int], None]) -> ReplayResult:
-    run = Run(override or default_configuration(), has_override=override is not None)
-    return run.compared(read_in_bulk(bag, kinds_of_topics(topics)), topics, advance)
 
 
 class Run:
