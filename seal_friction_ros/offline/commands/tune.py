@@ -53,6 +53,7 @@ def _settings() -> dict[str, Meaning]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Tune on the simulated servo or on a bag."""
+    from seal_friction_ros.offline.bags.actuator_bag import open_actuator
     from seal_friction_ros.offline.replay.replay import chosen_configuration
     from seal_friction_ros.offline.reports.tune_report import write_tuning_page
     from seal_friction_ros.offline.tuning.recorded_command import read_output_gain
@@ -70,10 +71,11 @@ def run(arguments: argparse.Namespace) -> int:
     configuration = chosen_configuration(arguments.params, arguments.seal)
     gain, actuator = None, arguments.actuator
     if arguments.bag:
-        known, one = RecordedAxisSettings(**given), (arguments.namespace, cli.mapping_of(arguments))
+        known = RecordedAxisSettings(**given)
+        axis = open_actuator(arguments.bag, arguments.namespace, cli.mapping_of(arguments))
         if arguments.command_topic:
-            gain = read_output_gain(arguments.bag, arguments.command_topic, known, *one)
-        tuning: Any = tune_bag(arguments.bag, known, configuration, *one)
+            gain = read_output_gain(axis, arguments.command_topic, known)
+        tuning: Any = tune_bag(axis, known, configuration)
         actuator = actuator or tuning.actuator
     else:
         machine = load_machine(arguments.machine) if arguments.machine else DEFAULT_MACHINE
@@ -101,10 +103,8 @@ def _given(arguments: argparse.Namespace) -> dict[str, Any]:
     kind, other = (RecordedAxisSettings, TuningSettings) if arguments.bag else (TuningSettings, RecordedAxisSettings)
     given = {name: value for name in _settings() if (value := getattr(arguments, name)) is not None}
     foreign = [name for name in given if name in meanings(other) and name not in meanings(kind)]
-    foreign += ['machine'] if arguments.machine and arguments.bag else []
-    foreign += ['namespace'] if arguments.namespace and not arguments.bag else []
-    foreign += ['mapping'] if arguments.mapping and not arguments.bag else []
-    foreign += ['command_topic'] if arguments.command_topic and not arguments.bag else []
+    others = ('machine',) if arguments.bag else ('namespace', 'mapping', 'command_topic')
+    foreign += [name for name in others if getattr(arguments, name)]
     if foreign:
         name = foreign[0].replace('_', '-')
         raise ValueError(f'--{name} is {"not for" if arguments.bag else "only for"} a --bag')

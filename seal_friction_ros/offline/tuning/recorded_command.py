@@ -1,14 +1,13 @@
 """Command of a controller in a bag, and the gain from force to command (`core.tuning.output_gain`)."""
 
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
 from seal_friction_ros.core.machine.message_fields import Reader
 from seal_friction_ros.core.tuning.output_gain import CommandRecord, OutputGain, output_gain
 from seal_friction_ros.core.tuning.settings import RecordedAxisSettings
-from seal_friction_ros.offline.bags.actuator_bag import open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError, read_definitions
 from seal_friction_ros.offline.bags.columns import (
     Block,
@@ -20,7 +19,6 @@ from seal_friction_ros.offline.bags.columns import (
     growing,
     wanted_of,
 )
-from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 
 NUMBER, NUMBERS = 'std_msgs/msg/Float64', 'std_msgs/msg/Float64MultiArray'
 _FIELDS = {NUMBER: 'data', NUMBERS: 'data[0]'}
@@ -57,28 +55,20 @@ class _CommandCollector:
         return number
 
 
-def read_output_gain(
-    bag: Path,
-    topic: str,
-    known: RecordedAxisSettings,
-    namespace: str = '',
-    mapping: MappingFile | None = None,
-) -> OutputGain:
+def read_output_gain(source: ActuatorBag, topic: str, known: RecordedAxisSettings) -> OutputGain:
     """Gain from force to the command on a topic.
 
     Args:
-        bag: Command, pressures, velocity and, if measured, position.
+        source: Command, pressures, velocity and, if measured, position.
         topic: Topic of the command, a `std_msgs/Float64` or `Float64MultiArray`.
         known: Areas of both chambers.
-        namespace: As of `open_actuator`.
-        mapping: Likewise.
 
     Raises:
         BagError: The bag lacks something, or cannot tell the gain.
     """
     if not (known.area_a and known.area_b):
         raise BagError(f'{topic}: give --area-a and --area-b [m2]: the gain needs the force of the pressures')
-    source = open_actuator(bag, namespace, mapping)
+    bag = source.path
     kind = source.infos[topic].type_name if topic in source.infos else ''
     if kind not in _FIELDS:
         what = f'is {kind}' if kind else 'is not in it'

@@ -49,10 +49,9 @@ from seal_friction_ros.core.tuning.settings import (
 )
 from seal_friction_ros.core.tuning.simulated_axis import MOST_CANDIDATES, Tuning, TuningProblem, tune
 from seal_friction_ros.files import default_configuration, read_parameters
-from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag, open_actuator
+from seal_friction_ros.offline.bags.actuator_bag import ActuatorBag
 from seal_friction_ros.offline.bags.bag import BagError
 from seal_friction_ros.offline.bags.columns import Block, Numbers, collected
-from seal_friction_ros.offline.bags.mapped_bag import MappingFile
 from seal_friction_ros.offline.bags.recorded_run import RunCollector, wanted_of_run
 from seal_friction_ros.offline.replay.replay import Replay
 from seal_friction_ros.offline.work.atomic_file import write_whole
@@ -290,30 +289,23 @@ def tune_simulator(
 
 
 def tune_bag(
-    bag: Path,
-    known: RecordedAxisSettings,
-    configuration: Configuration | None = None,
-    namespace: str = '',
-    mapping: MappingFile | None = None,
+    actuator: ActuatorBag, known: RecordedAxisSettings, configuration: Configuration | None = None
 ) -> BagTuning:
     """Find the feed-forward that matches the friction in a bag of a real axis.
 
     Args:
-        bag: Pressure, velocity, force sum and reference; the estimates are computed anew.
+        actuator: Pressure, velocity, force sum and reference; the estimates are computed anew.
         known: Known properties of the axis.
         configuration: Seals, estimator and feed-forward instead of those in the bag.
-        namespace: As of `open_actuator`.
-        mapping: Likewise.
 
     Raises:
         BagError: The bag cannot be read, or an input is missing in it.
     """
-    actuator = open_actuator(bag, namespace, mapping)
     recording, track, recorded = read_recording(actuator, configuration)
     try:
         found = tune_recorded_axis(recording, recorded.feedforward, known)
     except ValueError as error:
-        raise BagError(f'{bag}: {error}') from None
+        raise BagError(f'{actuator.path}: {error}') from None
     tuned = tuple(parameter for parameter, is_identified in found.identified.items() if is_identified)
     motion = f'{len(recording.stamps)} samples, {recording.time[-1]:.3f} s'
     name = actuator.name
