@@ -214,16 +214,15 @@ def open_actuator(bag: Path, namespace: str = '', mapping: MappingFile | None = 
         ValueError: The mapping does not fit the bag.
     """
     infos = bag_topics(bag)
-    if mapping is None:
-        snapshot = recorded_machine(bag, infos)
-        if snapshot is not None:
-            return actuator_of(bag, infos, snapshot, namespace)
-    if mapping is None or not is_for(mapping, infos):
-        return ActuatorBag(bag, topics_among(infos, bag, namespace), infos)
-    names = [one.name for one in mapping.file.actuators]
-    mapping = mapping.only(_chosen(bag, names, namespace))
-    machine, _ = machine_in(bag, mapping)
-    return _opened(machine.actuators[0], bag, infos, len(names), mapping)
+    if mapping is not None and is_for(mapping, infos):
+        names = [one.name for one in mapping.file.actuators]
+        mapping = mapping.only(_chosen(bag, names, namespace))
+        machine, _ = machine_in(bag, mapping)
+        return _opened(machine.actuators[0], bag, infos, len(names), mapping)
+    snapshot = recorded_machine(bag, infos) if mapping is None else None
+    if snapshot is not None:
+        return actuator_of(bag, infos, snapshot, namespace)
+    return ActuatorBag(bag, topics_among(infos, bag, namespace), infos)
 
 
 def actuator_of(bag: Path, infos: Mapping[str, TopicInfo], snapshot: MachineSnapshot, namespace: str) -> ActuatorBag:
